@@ -278,6 +278,11 @@ fn records(bytes: &[u8]) -> Vec<(usize, u8)> {
     found
 }
 
+/// Distance of the bytes that are changed: one, but three where no size is asked for (`FLOTOR_TEST_SIZE`).
+fn stride() -> usize {
+    if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size != "quick") { 1 } else { 3 }
+}
+
 /// Reads the file once for every byte of it, that byte turned to something else.
 fn for_every_wrong_byte(
     file: &TestFile,
@@ -289,7 +294,7 @@ fn for_every_wrong_byte(
         handle.seek(SeekFrom::Start(at as u64)).unwrap();
         handle.write_all(&[byte]).unwrap();
     };
-    for (at, &byte) in bytes.iter().enumerate() {
+    for (at, &byte) in bytes.iter().enumerate().step_by(stride()) {
         for wrong in [byte ^ 0xff, byte ^ 0x01] {
             put(at, wrong);
             let (ticks, end) = read(&file.0);
@@ -333,7 +338,7 @@ fn nonsense_without_checksums_never_panics() {
     fs::write(&file.0, &bytes).unwrap();
     let mut refused = 0;
     for_every_wrong_byte(&file, |_, _, end| refused += usize::from(end.is_err()));
-    assert!(refused > 1000, "{refused}");
+    assert!(refused > 1000 / stride(), "{refused}");
 }
 
 #[test]

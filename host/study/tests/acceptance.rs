@@ -145,7 +145,11 @@ fn the_staircase_errs_as_it_is_known_to() {
 /// default population, and some who say "I don't know" less often or never; two tracks make an estimate, as in the experiment.
 #[test]
 fn better_estimators_find_the_threshold() {
-    let runs = if std::env::var("FLOTOR_TEST_SIZE").as_deref() == Ok("full") { 10_000 } else { 150 };
+    let runs = match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
+        Ok("full") => 10_000,
+        Ok("daily") => 150,
+        _ => 60,
+    };
     for (threshold, criterion) in [(0.1114, 1.0), (0.1357, 1.0), (0.142, 0.0), (0.142, 0.25), (0.142, 0.5)] {
         let rows = rows(&observer_of(threshold, criterion), 2, runs, 5);
         let of = |method| *rows.iter().find(|row| row.method == method).unwrap();

@@ -371,7 +371,7 @@ fn a_spring_that_falls_over_gives_way_and_lies_until_it_is_lifted() {
 fn no_lap_through_the_air_generates_energy() {
     let mut sampler = Sampler::new(40);
     let (mut lifted, mut landed) = (0, 0);
-    for lap in 0..of(200, 16) {
+    for lap in 0..of(200, 8) {
         let preset = Preset::ALL[(lap % 4) as usize];
         let spring = preset.spring();
         let free_length_m = spring.geometry().free_length_m;

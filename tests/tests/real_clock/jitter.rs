@@ -1,11 +1,15 @@
 //! `flotor jitter`: servo and bare loop in turns, on the machine's clock.
 
+use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use serde_json::Value;
 
 #[test]
 fn every_period_of_both_loops_is_a_tick_or_missed() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let _turn = crate::alone();
     let scratch = Scratch::default();
     let picture = scratch.path().join("jitter.svg").display().to_string();

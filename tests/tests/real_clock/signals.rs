@@ -64,6 +64,9 @@ fn before_anything_is_energised_the_first_signal_ends_the_process() {
 
 #[test]
 fn after_a_second_signal_nothing_holds_the_process_for_long() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let _turn = crate::among_idle_ones();
     let scratch = Scratch::default();
     let scene = format!(

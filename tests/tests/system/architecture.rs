@@ -5,7 +5,7 @@
 //! must find nothing, and on a made-up offence, which it must find.
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
-use flotor_tests::{files_under, workspace_root};
+use flotor_tests::{TestSize, files_under, workspace_root};
 use proc_macro2::{TokenStream, TokenTree};
 use std::path::Path;
 use std::process;
@@ -264,6 +264,9 @@ fn made_of(name: &str) -> String {
 
 #[test]
 fn plugins_carry_neither_loader_nor_command_line() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let plugins = workspace_members(&metadata()).into_iter();
     for plugin in plugins.filter(|member| matches!(member.role, Role::Plugin | Role::Fixture)) {
         let made_of = made_of(&plugin.name);

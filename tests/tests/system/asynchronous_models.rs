@@ -61,6 +61,9 @@ fn a_field_is_nearer_to_the_membrane_than_a_force_that_is_held() {
 
 #[test]
 fn equal_runs_give_equal_bits_and_a_recording_replays() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let scene = workspace_root().join("host/scenes/membrane-200hz.toml").display().to_string();
     let recording = scratch.path().join("run.mcap").display().to_string();

@@ -11,7 +11,7 @@ use flotor_session::{Observer, RunOptions, Session};
 use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::{holds_ticks, workspace_root};
+use flotor_tests::{TestSize, holds_ticks, workspace_root};
 use rustix::process::Signal;
 use std::ffi::OsStr;
 use std::path::Path;
@@ -28,6 +28,9 @@ fn last_tick_s(file: &Path) -> (f64, Ending) {
 
 #[test]
 fn a_killed_process_loses_at_most_a_second_of_its_recording() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let file = scratch.path().join("run.mcap");
     let scene = scratch.patient_scene(flotor_session::scene::DEMO);
@@ -150,6 +153,9 @@ impl Observer for Stuck {
 
 #[test]
 fn an_observer_that_does_not_keep_up_never_holds_up_the_loop_and_what_is_lost_is_counted() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scene = flotor_session::scene::DEMO
         .replace("rate_hz = 1000", "rate_hz = 10000")
         .replace("duration_s = 10", "duration_s = 3")

@@ -4,7 +4,7 @@
 //! (That the Rust code in them compiles and runs is seen to by the doctests of this crate.)
 
 use flotor_hal::conformance::Rule;
-use flotor_tests::{files_under, workspace_root};
+use flotor_tests::{TestSize, files_under, workspace_root};
 use std::path::{Path, PathBuf};
 
 /// Documents outside the book.
@@ -266,6 +266,9 @@ fn a_term_is_found_in_every_form_in_which_it_can_be_written() {
 
 #[test]
 fn no_text_uses_a_term_that_the_glossary_replaces() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let terms = glossary();
     let is_left_out = |file: &Path| HISTORY.iter().any(|folder| file.starts_with(folder));
     let files =

@@ -243,6 +243,9 @@ fn one_signal_ends_a_process_that_waits_for_a_plugin_before_a_run() {
 
 #[test]
 fn a_replacement_that_hangs_does_not_keep_a_host_alive() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let runtime = scratch.folder("runtime");
     let hanging = plugin_that(&scratch, "model", "IN_CREATE=hang();").display().to_string();
@@ -311,6 +314,9 @@ fn a_model_from_outside_runs_in_a_process_of_its_own_where_a_hand_is_and_only_th
 
 #[test]
 fn every_extension_works_in_a_process_of_its_own_with_the_same_bits() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let spring = "plugin = \"spring\"\n";
     let wall = "plugin = \"wall\"\n[model.parameters]\nshape = \"sphere\"\n";
     let membrane = "plugin = \"membrane\"\n[model.field]\nrate_hz = 200\n";

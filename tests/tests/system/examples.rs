@@ -4,7 +4,7 @@ use flotor_session::scene::Scene;
 use flotor_tests::program::Flotor;
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tools::{Tool, required, skipped};
-use flotor_tests::{files_under, workspace_root};
+use flotor_tests::{TestSize, files_under, workspace_root};
 use std::process::Command;
 
 /// Environment variable: a Python interpreter with the packages that the page names.
@@ -37,6 +37,9 @@ fn run(commands: &[String]) -> String {
 
 #[test]
 fn every_command_of_the_examples_runs() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let (python, cxx) = (std::env::var(PYTHON).ok(), required(Tool::Cxx));
     // The solver of the gel is in Python, without any package.
     let solver = required(Tool::Python);
@@ -76,6 +79,9 @@ fn every_command_of_the_examples_runs() {
 
 #[test]
 fn the_workflow_of_the_examples_tests_the_files_beside_it() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let workflow = text("examples/ci/workflow.yml");
     let folder = workspace_root().join("examples/ci");
     let test = workflow.lines().find_map(|line| line.trim().strip_prefix("- run: flotor test "));

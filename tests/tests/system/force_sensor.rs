@@ -5,6 +5,7 @@ use flotor_hal::Fault;
 use flotor_servo::Clock;
 use flotor_servo::RunEnd;
 use flotor_tests::watched::{Watched, watch_on};
+use flotor_tests::TestSize;
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
 use std::time::Duration;
@@ -49,6 +50,9 @@ fn run_beside_a_sensor(answers: u32, duration_s: f64, timeout_ms: u32) -> Watche
 
 #[test]
 fn a_slow_sensor_costs_the_handle_nothing() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let run = run_beside_a_sensor(u32::MAX, 3.0, 10_000);
     assert_eq!(run.outcome.end, RunEnd::Finished);
     assert!(!run.records.iter().any(|record| record.events.intersects(Events::HOLDING)));
@@ -64,6 +68,9 @@ fn a_slow_sensor_costs_the_handle_nothing() {
 
 #[test]
 fn a_sensor_that_falls_silent_is_a_fault() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     // A machine may delay the three answers; the run ends with the silence, long before its time.
     let run = run_beside_a_sensor(3, 20.0, 1000);
     assert_eq!(run.outcome.end, RunEnd::DeviceFault(Fault::Timeout));

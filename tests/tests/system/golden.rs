@@ -8,6 +8,7 @@ use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tables::POSE_HEADER;
 use flotor_tests::workspace_root;
+use flotor_tests::TestSize;
 use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -119,6 +120,9 @@ fn all() -> BTreeMap<String, String> {
 
 #[test]
 fn every_machine_has_these_bits() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let file = workspace_root().join("tests/data/golden.txt");
     let found = all();
     if std::env::var_os("FLOTOR_WRITE_GOLDEN").is_some() {

@@ -99,6 +99,9 @@ fn every_defect_is_found_by_the_judge_that_the_card_names() {
 
 #[test]
 fn where_there_is_no_defect_none_is_found() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let model = library();
     // Cost is the machine's as well: a loaded one may note it.
     let found = found_by(&model, "none", &["--symmetry", "mirror-x"]);
@@ -111,6 +114,9 @@ fn where_there_is_no_defect_none_is_found() {
 /// The pose and the time are told, and the measures after it are made.
 #[test]
 fn a_call_that_does_not_return_is_named_and_the_score_goes_on() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let measures = measures(
         &library(),
         &["--set", "defect=endless-slab", "--timeout", "1s", "--only", "M0", "--only", "M5", "--only", "M10"],

@@ -160,6 +160,9 @@ fn a_client_sees_every_tick_or_knows_how_many_not() {
 
 #[test]
 fn a_frozen_a_killed_and_a_talkative_watcher_change_no_bit() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let frozen = run_watched(Clock::Virtual, watch_all, |_, _| {});
     assert_eq!(frozen.0, unwatched_digest(), "frozen: it never reads");
 

@@ -13,6 +13,7 @@ use flotor_tests::process::Owned;
 use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{watch, watch_strong};
+use flotor_tests::TestSize;
 use rustix::process::Signal;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -192,6 +193,9 @@ fn a_device_is_calibrated_over_the_ml_api() {
 
 #[test]
 fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let sensor = scratch.path().join("force");
     let rig = ["--calibration-rig", sensor.to_str().unwrap(), "--rig-stop-s", "60"];
@@ -306,6 +310,9 @@ fn hang_and_wake_a_host(transport: &'static str) {
 
 #[test]
 fn a_hung_host_loses_its_session_and_is_told_when_it_wakes_up() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     // Both at once: most of it is waiting.
     std::thread::scope(|scope| {
         scope.spawn(|| hang_and_wake_a_host("pty"));

@@ -265,6 +265,9 @@ fn a_force_whose_client_hears_no_ticks_any_more_ends_in_a_landing() {
 
 #[test]
 fn a_flotor_that_somebody_left_in_the_air_is_taken_over() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let controller = Controller::start("ml-api", &["--on-silence", "ignore"]);
     let mut client = controller.client();
     let gravity = carried_by_a_force(&mut client);
@@ -414,6 +417,9 @@ fn outcome(fault: &str) -> Outcome {
 
 #[test]
 fn what_goes_wrong_in_each_state_is_the_right_fault_and_others_are_served() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     use Outcome::{Closed, Faulted, Flies, Grounded};
     let cases = [
         ("silence@landed", Closed("did not answer in time")),

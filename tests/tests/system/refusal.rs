@@ -19,6 +19,7 @@ use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{Watched, watch};
 use flotor_tests::workspace_root;
+use flotor_tests::TestSize;
 use std::path::{Path, PathBuf};
 
 const MODEL: &str = "fixture-faulty-model";
@@ -706,6 +707,9 @@ fn validate_survives_a_plugin_that_ends_the_process_and_checks_the_other_rules()
 
 #[test]
 fn validate_survives_a_plugin_that_hangs() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let arguments = ["validate".into(), plugin_file(MODEL).into_os_string(), "--timeout".into(), "3s".into()];
     let ran = Flotor::with(arguments).env(fixture_faulty_model::FAULT_VARIABLE, "hangs").run();
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");

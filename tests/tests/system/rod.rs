@@ -50,6 +50,9 @@ fn servo_rod_meets_its_bounds_before_buckling() {
 /// Reached by going there step by step from rest: the plates force the rod through its buckling.
 #[test]
 fn tight_rod_is_the_reference_past_buckling() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let stable = |row: &Row| row["stable_spatial"] == "1";
     for compared in [
         rod("c_postbuckling_planar.csv", "tight", "fixed", stable),

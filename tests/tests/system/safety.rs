@@ -370,6 +370,9 @@ fn paced(rate_hz: u32, model: &str) -> String {
 
 #[test]
 fn a_device_sets_the_pace_from_100_hz_to_10_khz_and_every_sample_is_a_tick_or_missed() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     for rate_hz in [100, 1000, 10_000] {
         let run = watch_in_real_time(&paced(rate_hz, ""));
         assert_eq!(run.outcome.end, RunEnd::Finished);

@@ -76,6 +76,9 @@ fn made(scratch: &Scratch, changes: &[(&str, &str)]) -> PathBuf {
 
 #[test]
 fn the_model_of_the_generator_passes_and_has_a_workflow() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     if !required(Tool::Cc) {
         return;
     }
@@ -205,6 +208,9 @@ fn what_is_wrong_in_a_file_is_told_before_anything_runs() {
 
 #[test]
 fn a_reference_and_a_golden_recording_are_compared_within_a_tolerance() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     for (fault, code) in [("none", exit_code::OK), ("pumps", exit_code::OTHER)] {
         let scratch = faulty(
             "[expect]\nend = \"finished\"\n[golden]\nrecording = \"golden.mcap\"\nwithin_n = 1e-9\n\
@@ -287,6 +293,9 @@ fn a_name_that_xml_has_to_escape_comes_back_as_it_was() {
 
 #[test]
 fn the_number_of_jobs_changes_nothing() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = faulty(WITH_A_CRASH);
     let report = |jobs: &str| {
         let ran = test(scratch.path(), &["--jobs", jobs, "--json", "-", "--junit", "results.xml"]);
@@ -299,6 +308,9 @@ fn the_number_of_jobs_changes_nothing() {
 
 #[test]
 fn the_order_of_the_files_changes_nothing() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = faulty(WITH_A_CRASH);
     let second = format!("scene = \"scene.toml\"\n{WITH_A_CRASH}").replace("[50]", "[60]");
     let _ = scratch.file("another.test.toml", second);
@@ -330,6 +342,9 @@ fn the_parts_add_up_to_the_whole() {
 
 #[test]
 fn reports_of_parts_add_up_to_that_of_the_whole() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = faulty(&format!("seeds = [1, 2]\n{WITH_A_CRASH}"));
     let reported = |arguments: &[&str]| {
         let _ = test(scratch.path(), &[&["--junit", "results.xml"], arguments].concat());

@@ -387,6 +387,9 @@ fn person(screen: &str, lines: &str, arguments: &[&str], out: &Path) -> Ran {
 /// A person at a keyboard: breaks off, goes on, and the log says the same as the bare state machine with their answers.
 #[test]
 fn a_person_goes_through_the_same_sitting() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let out = scratch.path().join("data");
     // Ready, two springs, an answer that is none, a note, an answer; then enough for today.

@@ -95,7 +95,8 @@ fn no_wrench_of_a_million_is_over_a_limit_jumps_or_comes_after_a_stop() {
     let scratch = Scratch::default();
     let plugins = plugins(&scratch);
     let (scenes, ticks) = match TestSize::of_this_run() {
-        TestSize::Quick | TestSize::Daily => (24, 3000),
+        TestSize::Quick => (12, 2000),
+        TestSize::Daily => (24, 3000),
         TestSize::Full => (700, 20_000),
     };
     let rates = [100.0, 250.0, 500.0, 1000.0, 1000.0, 2000.0, 5000.0, 10_000.0];
