@@ -1,35 +1,34 @@
 //! A spring that merely stands on its seat: the lower plate rolls up on its rim and lifts off.
 //!
-//! The laws hold the lower plate. A real spring is only put down: as soon as the moment at the base exceeds
-//! the axial force times the radius of the seat, the plate tips over its rim, and it cannot be pulled at all.
-//! The base takes the tilt of least stored energy,
+//! The laws hold the lower plate. A real spring merely stands on it: it cannot be pulled, and its base tips over the rim as
+//! soon as the moment at the base exceeds the axial force times the radius of the seat. The base takes the tilt of least
+//! stored energy,
 //!
 //! ```text
 //! W_free(pose) = min over tilts of W(pose relative to the tilted base),
 //! ```
 //!
-//! so the free spring is conservative like the law it wraps, and its wrench is the law's at the relative pose
-//! (envelope theorem). A tilt is a vector `s` in the plane of the seat: the base turned by `|s|` over the rim
-//! point in the direction of `s`, which does not slip, its centre at `R ((1 - cos|s|) s/|s| + sin|s| z)`.
-//! Lifting costs `R P |s|` to first order, an energy with a tip at `s = 0`: that is what keeps the plate
+//! and the wrench is the law's at the relative pose (envelope theorem). So a free spring that rolls, but does not slide or
+//! fall over, is as conservative as the law. A tilt is a vector `s` in the plane of the seat: the base turned by `|s|` over the rim
+//! point in the direction of `s`, which does not slip; its centre is at `R ((1 - cos|s|) s/|s| + sin|s| z)`.
+//! To first order, lifting costs the energy `R P |s|`. This term has a kink at `s = 0`, called *tip* here; it keeps the plate
 //! seated while `|M_base| <= P R`.
 //!
-//! The rim rubs on the ground. Where the force along the ground and the torque about the base's normal, over the radius,
-//! together exceed the friction of the axial force, the base slides and spins until they do not, and stays there. That
-//! costs energy, and is the one thing here that is not conservative.
+//! The rim is subject to friction. If the force along the ground and the torque about the base's normal, divided by the radius,
+//! together exceed the friction limit, the base slides and spins until they are at the limit. That dissipates energy.
 //!
-//! A spring that would be pulled hangs from the upper plate, without load: its base goes, tilts and turns with it. It
+//! A spring that would be pulled hangs from the upper plate, without load: its base moves, tilts and turns with the plate. It
 //! touches down where its rim meets the ground, with no stored energy, and stands there as it hung. It leaves the ground
-//! where a hanging rim would. Coulomb's law alone lets a bent spring jam in its friction where the coefficient is above `D/L0`, and
-//! snap as it is lifted. What such a coefficient holds beyond `D/L0` is therefore a share of what a straight spring shortened as
-//! far would press down: as the hanging rim comes free, friction fades and with it all that it holds, so lifting off is continuous.
+//! where a hanging rim would. With a coefficient above `D/L0`, Coulomb's law alone would let a bent spring jam on its rim, and
+//! snap off while it is lifted. The part of the coefficient beyond `D/L0` therefore multiplies the force of a straight spring
+//! whose compression is the depth of the hanging rim below the ground. That force goes to zero as the hanging rim comes free,
+//! so lift-off is continuous.
 //!
-//! Pressed past buckling a base may lose the ground under a bent spring, or roll on without end. Where it cannot stand up as it
-//! would hang with the energy that it has, it falls over: wrench and energy fade together, a share a tick, and it carries nothing
-//! until it is lifted.
+//! If a spring is pressed past buckling, its base may lose contact with the ground or roll on without end. If the spring would
+//! need more energy to stand straight than it has, it falls over: wrench and energy fade together, by an equal part in each tick,
+//! and the spring carries nothing until it is lifted. That dissipates energy, too.
 //!
-//! One idea a module: `base`, where a base stands and what it feels there; `tilt`, the tilt of least energy; `friction`, what
-//! holds it.
+//! `base` has the pose of the base and the load on it; `tilt` finds the tilt of least energy; `friction` has the friction limit.
 //!
 //! Derivation: the book, chapter "The spring"; the step with a tip is the proximal Newton step of Lee, Sun
 //! and Saunders (2014); one bound for force and torque of friction: Howe and Cutkosky (1996), a limit surface.

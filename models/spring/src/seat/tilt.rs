@@ -1,13 +1,13 @@
-//! The tilt of least energy: a step of Newton's method on an energy with a tip.
+//! The tilt of least energy: a step of Newton's method on an energy with a kink at zero tilt, the tip.
 
 use flotor_hal::glam::{DMat2, DVec2};
 
 /// Newton steps on the secular equation; it is nearly straight, three give all digits.
 const SECULAR_STEPS: u32 = 8;
-/// Least surprise of the slope, in what the law leaves open of it, that says something about the curvature: the quotient
-/// of noise and a short step is any number.
-const LEAST_SURPRISE: f64 = 3.0;
-/// Least curvature assumed, of that of the spring at rest: a flatter model would take wild steps.
+/// Smallest deviation of the slope from its prediction that corrects the curvature, in units of the error that the law's
+/// solver tolerates. A smaller deviation is noise, and its quotient by a short step may be any number.
+const LEAST_DEVIATION: f64 = 3.0;
+/// Smallest curvature assumed, as a share of that of the spring at rest: with a smaller one the steps would be too large.
 const LEAST_CURVATURE: f64 = 1e-3;
 
 /// The energy by the tilt, without its tip, as a quadratic.
@@ -32,13 +32,13 @@ impl Quadratic {
 
     /// Symmetric rank-one correction of the curvature (Nocedal and Wright, *Numerical Optimization*, 6.2).
     pub(super) fn observe(&mut self, step: DVec2, change: DVec2, noise_rad: f64) {
-        let surprise = change - self.curvature * step;
-        if surprise.length() < LEAST_SURPRISE * noise_rad * self.stiffness_nm_per_rad {
+        let deviation = change - self.curvature * step;
+        if deviation.length() < LEAST_DEVIATION * noise_rad * self.stiffness_nm_per_rad {
             return;
         }
-        let along = surprise.dot(step);
-        if along.abs() > 1e-8 * surprise.length() * step.length() {
-            let update = DMat2::from_cols(surprise * surprise.x, surprise * surprise.y);
+        let along = deviation.dot(step);
+        if along.abs() > 1e-8 * deviation.length() * step.length() {
+            let update = DMat2::from_cols(deviation * deviation.x, deviation * deviation.y);
             self.curvature += update * (1.0 / along);
         }
     }
