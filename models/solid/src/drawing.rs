@@ -1,9 +1,10 @@
 //! What the solid looks like at a pose: its deformed surface, with the pressure of the contact, and the tool. Not real-time.
 //!
-//! A plate is drawn from the finite elements of its body. Under a punch the surface is that of a half-space under the punch's own
-//! tractions, under a sphere that of Hertz's contact (Johnson, *Contact Mechanics*, 1985, section 3.4 and 4.2) as deep as the law
-//! has it, both fading towards the fixed face: the part that the body adds to a half-space moves the surface by a few
-//! hundredths of the depth, and is in the force but not in the drawing.
+//! A plate is drawn from the finite elements of its body. Under a punch, the surface has the displacement of a half-space under
+//! the tractions of the punch. Under a sphere, it has the displacement of Hertz's contact (Johnson, *Contact Mechanics*, 1985,
+//! sections 3.4 and 4.2) at the depth that the force law gives. Both displacements fade to zero towards the fixed face. The body
+//! is not a half-space; the difference moves the surface by a few hundredths of the depth. The force contains this difference,
+//! the drawing does not.
 
 use crate::atlas::{Answer, Atlas};
 use crate::body;
@@ -160,7 +161,7 @@ struct Contact {
     normal: DVec3,
     /// Its radius, m; 0 without contact.
     radius_m: f64,
-    /// How far the rim of the contact has sunk, m.
+    /// Depression of the rim of the contact, m.
     rim_m: f64,
     /// Pressure in its middle, kPa.
     peak_kpa: f64,
@@ -207,7 +208,7 @@ impl Contact {
         SurfaceVertex { position_m: position_m.to_array(), normal: [0.0; 3], value }
     }
 
-    /// How far the surface has sunk at a distance from the middle: on the sphere inside, Hertz's outside.
+    /// Depression of the surface at a distance from the middle: inside the contact that of the sphere, outside that of Hertz.
     fn sunk_m(&self, distance_m: f64) -> f64 {
         if self.radius_m == 0.0 {
             return 0.0;
@@ -221,12 +222,12 @@ impl Contact {
     }
 }
 
-/// Radius of the contact of a sphere that has gone in so deep, m: Hertz's, less where the sphere is no parabola.
+/// Radius of the contact of a sphere at a depth, m: Hertz's radius, reduced at large depth, where a sphere is no paraboloid.
 fn contact_radius_m(sphere_m: f64, depth_m: f64) -> f64 {
     (sphere_m * depth_m).sqrt() / (1.0 + 0.12 * depth_m / sphere_m)
 }
 
-/// How far the surface has sunk outside Hertz's contact, over that of its rim, at a distance of `x` contact radii.
+/// Depression outside Hertz's contact, as a share of that at its rim, at a distance of `x` contact radii.
 fn outside(x: f64) -> f64 {
     ((2.0 - x * x) * math::asin(1.0 / x) + (x * x - 1.0).sqrt()) / FRAC_PI_2
 }
