@@ -38,7 +38,7 @@ pub enum LoadError {
     /// The library carries no metadata section.
     #[error(
         "{}: a shared library, but not a Flotor plugin (no `.flotor` section); \
-         export one with `export_model!`, `export_device!` or FLOTOR_METADATA", path.display()
+         a plugin needs `export_model!`, `export_device!` or FLOTOR_METADATA", path.display()
     )]
     NotAPlugin {
         /// The file.
