@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
     code is 0 whatever it finds."
 )]
 pub(crate) struct DoctorArguments {
-    /// Id of a device: look for what keeps it from starting
+    /// Id of a device: check why it does not start
     #[arg(long, value_name = "ID")]
     device: Option<String>,
     /// Parameter with which the device is opened (repeatable)

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 
-/// Run an unmodified program for another maker's device on the device of a scene, within the scene's limits.
+/// Run an unmodified program, written for another maker's device, on the device of a scene, within the scene's limits.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     flotor lend -- python3 my_openhaptics_script.py      on the simulated flotor, held by a hand\n  \

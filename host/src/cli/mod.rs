@@ -107,7 +107,7 @@ enum Command {
     Swap(swap::SwapArguments),
     /// Release the emergency stop of this machine: runs may start again
     Release(release::ReleaseArguments),
-    /// Publish a running host on a network, or show a remote one here
+    /// Publish a running host on a network, or show a remote host here
     Bridge(Separate),
     /// Sweep a model or a scene over parameters, poses and seeds into a Parquet table
     Sweep(Separate),
@@ -119,7 +119,7 @@ enum Command {
     Calibrate(Separate),
     /// Emulate the controller of a device, to use its plugin without hardware
     Emulate(emulate::EmulateArguments),
-    /// Run an unmodified program for another maker's device on the device of a scene, within the scene's limits
+    /// Run an unmodified program, written for another maker's device, on the device of a scene, within the scene's limits
     Lend(lend::LendArguments),
     /// Check this machine's real-time configuration and suggest fixes
     Doctor(doctor::DoctorArguments),

@@ -15,9 +15,9 @@ use std::time::Duration;
 /// Score the numerical stability of a force model.
 #[derive(Args)]
 #[command(after_help = "Ten measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity, \
-    M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism, M9 search for the worst; \
-    with --symmetry also M10. Each is made in its own process: a call that does not return costs one measure. \
-    `score` is the share of measures that passed; docs/src/stress.md has the criterion of each.\n\n\
+    M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism, M9 search for the worst case; \
+    with --symmetry also M10. Each measure runs in its own process, so a call that does not return fails only \
+    one measure. `score` is the share of measures that passed; docs/src/stress.md has the criterion of each.\n\n\
     Examples:\n  \
     flotor stress --model spring\n  \
     flotor stress --model spring --set variant=closed-form --json score.json --plot score.svg\n  \
@@ -29,16 +29,16 @@ pub(crate) struct StressArguments {
     /// Set a parameter of the model (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
-    /// How many poses, motions and seeds are tried
+    /// Number of poses, motions and seeds
     #[arg(long, value_enum, default_value = "short")]
     size: Size,
     /// Seed of poses and motions
     #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
     seed: u64,
-    /// A symmetry that the model is declared to have: M10 looks whether it keeps it
+    /// Symmetry that the model should have; M10 checks it
     #[arg(long, value_enum)]
     symmetry: Option<Symmetry>,
-    /// Make only this measure (repeatable)
+    /// Compute only this measure (repeatable)
     #[arg(long, value_parser = measure, value_name = "M0")]
     only: Vec<Part>,
     /// Time limit of one call: 10s, 500ms
