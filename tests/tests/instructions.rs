@@ -114,7 +114,7 @@ fn laws_cost_their_share_of_the_printed_one() {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // Four lanes an instruction, less what a single step gains by working on two components at once and what it takes
-        // to turn poses over. In time it is more or less of that: the spring's `examples/throughput.rs` measures it.
+        // to turn poses over. In time it is more or less of that: `examples/spring_throughput.rs` measures it.
         assert!(closed_batch <= closed / 2.5, "closed-form, batch: {:.2} times", closed / closed_batch);
         assert!(energy_batch <= energy / 2.0, "energy, batch: {:.2} times", energy / energy_batch);
     }

@@ -1,7 +1,8 @@
 //! What a tick of the solid costs, through the plugin's boundary: along the press of every open row of the sphere table, without
 //! contact, under a punch and a plate, and on three meshes; and what the shape for a picture costs.
 //!
-//! `cargo run --release -p flotor-solid --example tick`: compare the numbers of one run; a busy machine can only make them larger.
+//! `cargo run --release -p flotor-tests --features measurements --example solid_tick`: compare the numbers of one run; a busy
+//! machine can only make them larger.
 
 use flotor_hal::abi::loader::{Model, Plugin, Setting};
 use flotor_hal::{DQuat, DVec3, Input, Output, Pose, Wrench};
@@ -57,7 +58,7 @@ fn print(name: &str, [median, most]: [f64; 2]) {
 }
 
 fn main() {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/cases/solid/b_block_sphere.csv");
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/data/cases/solid/b_block_sphere.csv");
     let text = std::fs::read_to_string(file).expect("the table");
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();

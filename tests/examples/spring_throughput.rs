@@ -1,7 +1,7 @@
 //! How many poses a second, one by one and side by side, on one core:
 //!
 //! ```console
-//! $ cargo run --release -p flotor-spring --example throughput
+//! $ cargo run --release -p flotor-tests --features measurements --example spring_throughput
 //! ```
 //!
 //! One by one is the fastest way to a wrench that this crate has for a single pose: the very step of the plugin, with the

@@ -1,8 +1,8 @@
 //! How many masses one core updates in a millisecond: a 45 by 45 sheet (2 025 masses, each linked to its four neighbours)
 //! with a ball pressed into it, explicit steps, all active.
 //!
-//! `cargo run --release -p flotor-membrane --example nodes_per_ms` prints the best and the median of twenty runs: a busy
-//! machine can only make it slower.
+//! `cargo run --release -p flotor-tests --features measurements --example membrane_nodes` prints the best and the median of
+//! twenty runs: a busy machine can only make it slower.
 
 use flotor_hal::DVec3;
 use flotor_membrane::mesh::{Mesh, Sheet};
