@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 
 /// Longest record believed, bytes: a quarter of a second at 10 kHz is 2 MB, other tools' chunks are a few.
-const LONGEST_RECORD_BYTES: usize = 256 << 20;
+const LONGEST_RECORD_BYTES: usize = 32 << 20;
 
 /// Bytes asked of the file at a time.
 const READ_BYTES: usize = 64 << 10;

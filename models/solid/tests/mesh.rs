@@ -213,6 +213,9 @@ fn a_sphere_on_a_block_from_a_file() {
 
 #[test]
 fn a_punch_on_a_block_from_a_file_is_that_on_a_block() {
+    if crate::leaves_out_long_tests() {
+        return;
+    }
     let mesh = cube(Kind::Tetrahedron, 4).mesh();
     let tool = Tool::Punch { outline: Outline::Square { half_m: 0.01 }, bond: Bond::Bonded };
     let size = Size { half_x_m: 0.04, half_y_m: 0.04, height_m: 0.08 };
@@ -265,6 +268,9 @@ fn a_linear_field_on_the_outside_of_a_mesh_continues_inside() {
 /// Torsion of a round bar between bonded ends is G J / L; a bar has no direction across its axis.
 #[test]
 fn a_cylinder_twists_as_a_round_bar_does() {
+    if crate::leaves_out_long_tests() {
+        return;
+    }
     let (radius_m, height_m, poisson_ratio) = (0.02, 0.05, 0.3);
     let body = Body::Cylinder { radius_m, height_m };
     let description = Description { body, tool: Tool::Plate, poisson_ratio, resolution: STANDARD };

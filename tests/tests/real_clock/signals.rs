@@ -46,6 +46,9 @@ fn signals_stay_the_hosts_whatever_a_plugin_does() {
 
 #[test]
 fn before_anything_is_energised_the_first_signal_ends_the_process() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let _turn = crate::among_idle_ones();
     show_each(&[Where::InTheHost, Where::InAProcess], |place| {
         let (board, scratch) = (Board::start(), Scratch::default());

@@ -6,6 +6,7 @@ use flotor_core::trace::Events;
 use flotor_hal::Wrench;
 use flotor_servo::RunEnd;
 use flotor_session::registry::load_file;
+use flotor_tests::TestSize;
 use flotor_tests::library::compile_c_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -101,6 +102,9 @@ fn a_plugin_in_cpp_passes_validation() {
 
 #[test]
 fn a_mistake_in_c_is_told_in_one_line() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let wrong = [
         ("WITHOUT_STEP", "`flotor.force/1` lacks `step`; a plugin must offer it"),
         ("WITHOUT_TABLE", "`flotor.force/1` lacks its function table; a plugin must offer it"),

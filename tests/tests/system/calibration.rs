@@ -60,6 +60,9 @@ fn equal_seeds_give_equal_results_and_other_seeds_do_not() {
 
 #[test]
 fn a_written_file_is_read_and_does_what_it_said() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let (file, picture) = (scratch.path().join("c.toml"), scratch.path().join("c.svg"));
     let report =

@@ -7,6 +7,7 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Model, Plugin, Setting};
 use flotor_hal::{Demand, Input, LoopConfig, Output, Wrench};
 use flotor_session::scene::Scene;
+use flotor_tests::TestSize;
 use flotor_tests::watched::watch;
 use std::path::Path;
 
@@ -70,6 +71,9 @@ grid = { count = [4, 3, 14], spacing_mm = [1.5, 1.4, 1.3] }
 
 #[test]
 fn leaving_out_who_cannot_act_changes_no_bit() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let text = format!("{DEVICE}{BALLS}");
     let scene = Scene::parse(Path::new("balls.toml"), &text).expect("the scene is right");
     let places_m = &scene.models[0].places_m;

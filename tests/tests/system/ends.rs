@@ -108,6 +108,9 @@ fn a_model_that_ends_the_process_when_it_is_freed_costs_neither_the_recording_no
 /// `exit(0)` would else be a run that went well, and a crash one of which nobody says whose it was.
 #[test]
 fn a_plugin_that_ends_the_process_outside_the_loop_is_named_and_is_a_plugin_that_failed() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let (exit, abort, trap) = ("it called `exit`", "signal 6 (SIGABRT", "signal 4 (SIGILL");
     let cases = [
         (HONEST, "IN_CREATE=leave();", "`jelly`", "`create`", exit),
@@ -194,6 +197,9 @@ fn a_run_in_real_time_without_room_for_files_is_refused() {
 
 #[test]
 fn a_plugin_that_hangs_before_a_run_is_named_and_ends_it() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let cases = [
         (HONEST, "IN_INITIALISER=hang();", ".so", "its initialisers"),
         (HONEST, "IN_CREATE=hang();", "jelly", "`create`"),

@@ -4,11 +4,11 @@
 //! `FLOTOR_WRITE_GOLDEN=1 cargo test -p flotor-tests golden`. `FLOTOR_RUNNER` is a command that runs `flotor`, as an
 //! emulator of another processor does: `FLOTOR_RUNNER="qemu-x86_64 -cpu qemu64"`.
 
+use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tables::POSE_HEADER;
 use flotor_tests::workspace_root;
-use flotor_tests::TestSize;
 use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;

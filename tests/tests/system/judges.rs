@@ -172,6 +172,9 @@ fn the_page_has_the_card() {
 /// noted, not held against them here.
 #[test]
 fn shipped_models_pass() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let models: &[&[&str]] = match TestSize::of_this_run() {
         // `flotor test` judges the spring and the wall each day: `host/scenes` has a file for each.
         TestSize::Quick | TestSize::Daily => &[&["load"]],

@@ -8,12 +8,12 @@ use flotor_maglev::protocol::stream::{Received, StreamDecoder, coded};
 use flotor_maglev::protocol::{Answer, AnswerFrame, Mode, Request, RequestFrame, Status};
 use flotor_servo::RunEnd;
 use flotor_session::registry::load_file;
+use flotor_tests::TestSize;
 use flotor_tests::library::{build_folder, plugin_file, rules_of_a_device};
 use flotor_tests::process::Owned;
 use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{watch, watch_strong};
-use flotor_tests::TestSize;
 use rustix::process::Signal;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -109,6 +109,9 @@ fn number(line: &str, key: &str) -> u64 {
 
 #[test]
 fn one_scene_gives_one_trajectory_on_both_devices() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     // The finest published resolution of the device, and that over the radius of its bowl.
     const RESOLUTION_M: f64 = 2.0e-6;
     const RESOLUTION_RAD: f64 = RESOLUTION_M / 0.115;

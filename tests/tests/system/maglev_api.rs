@@ -105,6 +105,9 @@ fn rate_n_per_m(records: &[TickRecord]) -> f64 {
 
 #[test]
 fn one_scene_gives_one_trajectory_on_the_simulated_device_and_over_both_protocols() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     // The finest published resolution of the device; 20 µrad is more than that over the radius of its bowl.
     const RESOLUTION_M: f64 = 2.0e-6;
     const RESOLUTION_RAD: f64 = 20.0e-6;
@@ -175,6 +178,9 @@ fn a_run_that_ends_has_landed_and_the_next_one_takes_off_again() {
 
 #[test]
 fn every_rule_holds_with_the_emulator_at_the_other_end() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let controller = Controller::start("ml-api", &["--pace", "lockstep"]);
     let library = plugin_file("flotor-maglev").display().to_string();
     let address = format!("address={}", controller.address);

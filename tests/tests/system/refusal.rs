@@ -14,12 +14,12 @@ use flotor_servo::ModelHealth;
 use flotor_servo::RunEnd;
 use flotor_session::Outcome;
 use flotor_session::registry::load_file;
+use flotor_tests::TestSize;
 use flotor_tests::library::{compile_c, compile_c_file, patched, plugin_bytes, plugin_file};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{Watched, watch};
 use flotor_tests::workspace_root;
-use flotor_tests::TestSize;
 use std::path::{Path, PathBuf};
 
 const MODEL: &str = "fixture-faulty-model";
@@ -726,6 +726,9 @@ fn verdict(rule: &str, fault: &str) -> String {
 
 #[test]
 fn each_rule_of_a_loop_sees_the_model_that_breaks_it() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let good = r#"{"seen":null}"#;
     for rule in ["time-budget", "independent", "no-threads", "energy-gradient"] {
         assert_eq!(verdict(rule, "none"), good, "{rule}");

@@ -4,6 +4,7 @@
 use flotor_core::Clock;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_record::{NamedFile, Recorder, Recording, RunDescription};
+use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use serde_json::Value;
@@ -216,6 +217,9 @@ fn an_overrun_that_changed_nothing_is_no_cause() {
 
 #[test]
 fn fields_of_a_run_in_real_time_cannot_be_repeated() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let scene =
         format!("duration_s = 0.5\n{DEVICE}[[model]]\nplugin = \"membrane\"\n[model.field]\nrate_hz = 200\n");

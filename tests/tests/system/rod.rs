@@ -34,6 +34,9 @@ fn rod(file: &str, accuracy: &str, seat: &str, keep: fn(&Row) -> bool) -> Vec<(R
 
 #[test]
 fn tight_rod_is_the_reference_before_buckling() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let (force_n, torque_nm) = worst(&rod("b_exact_rod_prebuckling.csv", "tight", "fixed", |_| true));
     assert!(force_n <= 1.0e-9 && torque_nm <= 1.0e-11, "{force_n} N, {torque_nm} N m");
 }
@@ -68,6 +71,9 @@ fn tight_rod_is_the_reference_past_buckling() {
 
 #[test]
 fn a_free_base_rolls_as_the_reference_does() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let compared = rod("e_unseating_planar.csv", "tight", "free", |_| true);
     let (force_n, _) = worst(&compared);
     assert!(force_n <= 1.0e-6, "{force_n} N");

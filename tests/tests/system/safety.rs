@@ -14,7 +14,7 @@ use flotor_tests::{TestSize, holds_ticks, workspace_root};
 use rustix::process::{Signal, kill_process_group};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::{Duration, Instant};
 
 /// The faulty model on the faulty device, with their faults and further tables of the scene. At 1 kHz for 0.2 s.
@@ -101,10 +101,17 @@ fn a_handle_that_is_too_fast_is_driven_no_further() {
 
 // ---------------------------------------------------------------- signals and the watchdog, in real time
 
-/// One run in real time at a time: a plugin that hangs there takes a core at real-time priority from all others.
-fn alone() -> MutexGuard<'static, ()> {
-    static ALONE: Mutex<()> = Mutex::new(());
-    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+/// Who runs in real time: many that wait, or one that does not.
+static IN_REAL_TIME: RwLock<()> = RwLock::new(());
+
+/// For a plugin that hangs or is late: it takes a core at real-time priority from all others.
+fn alone() -> RwLockWriteGuard<'static, ()> {
+    IN_REAL_TIME.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// For plugins that return at once.
+fn beside_others() -> RwLockReadGuard<'static, ()> {
+    IN_REAL_TIME.read().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Runs a scene in real time in this process.
@@ -136,9 +143,9 @@ fn in_real_time(scratch: &Scratch, scene: &str, json: &OsStr) -> Flotor {
     Flotor::with(arguments).env("FIXTURE_STOP_FILE", &stop_file.display().to_string())
 }
 
-/// Runs it to its end, alone; `meanwhile` gets it once the loop runs.
+/// Runs it to its end; `meanwhile` gets it once the loop runs.
 fn run_meanwhile(scratch: &Scratch, flotor: Flotor, meanwhile: impl FnOnce(&Running)) -> Ran {
-    let _alone = alone();
+    let _beside_others = beside_others();
     let running = flotor.start();
     wait_for(&recording_in(scratch));
     meanwhile(&running);
@@ -148,6 +155,12 @@ fn run_meanwhile(scratch: &Scratch, flotor: Flotor, meanwhile: impl FnOnce(&Runn
 /// Runs a scene in real time, for longer than any test waits; `meanwhile` gets it once it runs.
 fn run_in_real_time(scratch: &Scratch, scene: &str, meanwhile: impl FnOnce(&Running)) -> Ran {
     run_meanwhile(scratch, in_real_time(scratch, scene, "-".as_ref()), meanwhile)
+}
+
+/// Runs a scene whose plugin hangs, to its end.
+fn run_alone(scratch: &Scratch, scene: &str) -> Ran {
+    let _alone = alone();
+    in_real_time(scratch, scene, "-".as_ref()).run()
 }
 
 /// Waits until a recording holds ticks: the loop runs then.
@@ -327,7 +340,7 @@ fn an_emergency_stop_has_its_exit_code_also_where_nobody_reads_the_summary() {
 fn a_model_that_hangs_costs_the_run_and_is_named_and_the_device_is_stopped() {
     let scratch = Scratch::default();
     let hangs = scene("", "fault = \"hangs\"\nat_tick = 400", "[limits]\nwatchdog_ms = 500");
-    let ran = run_in_real_time(&scratch, &hangs, |_| ());
+    let ran = run_alone(&scratch, &hangs);
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
     let told =
         "error: `block` did not return from `step` in tick 400; the watchdog stopped the device after 500 ms";
@@ -343,7 +356,7 @@ fn a_model_that_hangs_costs_the_run_and_is_named_and_the_device_is_stopped() {
 fn a_device_that_hangs_is_a_device_fault() {
     let scratch = Scratch::default();
     let hangs = scene("fault = \"hangs-in-read\"\nat_tick = 400", "", "[limits]\nwatchdog_ms = 500");
-    let ran = run_in_real_time(&scratch, &hangs, |_| ());
+    let ran = run_alone(&scratch, &hangs);
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
     assert!(last_line(&ran).starts_with("error: `device` did not return from `read`"), "{ran:?}");
 }
@@ -352,7 +365,7 @@ fn a_device_that_hangs_is_a_device_fault() {
 fn a_model_that_comes_back_late_leaves_a_whole_report_and_the_run_is_over_all_the_same() {
     let scratch = Scratch::default();
     let late = scene("", "fault = \"hangs-once\"\nat_tick = 400", "[limits]\nwatchdog_ms = 50"); // for 300 ms
-    let ran = run_in_real_time(&scratch, &late, |_| ());
+    let ran = run_alone(&scratch, &late);
     assert_eq!((ran.code, end(&ran).as_str()), (Some(exit_code::DEVICE_FAULT), "watchdog"), "{ran:?}");
 }
 

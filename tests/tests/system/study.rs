@@ -199,6 +199,9 @@ fn a_device_that_cannot_be_felt_is_refused() {
 /// told to be where it feels a spring, it is, and that is said with subject and trial.
 #[test]
 fn a_weight_is_felt_within_the_range() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let felt =
         ["force", "--way", "felt", "--replications", "2", "--no-demo", "--feel", "300ms", "--subjects", "2"];
@@ -264,6 +267,9 @@ fn log_of(out: &Path, number: u16) -> PathBuf {
 /// movements of the hand included.
 #[test]
 fn kills_at_any_moment_lose_no_completed_trial() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let (whole, killed) = (scratch.path().join("whole"), scratch.path().join("killed"));
     let kills = TestSize::of_this_run().pick(12, 200);
@@ -573,6 +579,9 @@ fn peak_kb(subjects: &str, out: &Path) -> f64 {
 /// Eight times the subjects need no more memory: nothing is kept of what is on disk.
 #[test]
 fn memory_does_not_grow_with_the_subjects() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let (few, many) = (scratch.path().join("few"), scratch.path().join("many"));
     let (few, many) = (peak_kb("2", &few), peak_kb("16", &many));

@@ -2,6 +2,7 @@
 //! `cargo deny` checks the same and the advisories; this needs no network and no further tool.
 
 use cargo_metadata::{Metadata, MetadataCommand, Package};
+use flotor_tests::TestSize;
 use flotor_tests::tools::VARIABLE;
 use flotor_tests::workspace_root;
 use std::collections::BTreeSet;
@@ -104,6 +105,9 @@ fn complaint(rules: &Table, package: &Package) -> Option<String> {
 
 #[test]
 fn every_crate_has_a_licence_that_the_list_allows() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let (rules, _) = rules();
     for workspace in WORKSPACES {
         let Some(metadata) = locked(workspace) else {

@@ -81,7 +81,8 @@ pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Res
     let segments = header.program_headers(endian, data).map_err(not_a_library)?;
     let sections = header.sections(endian, data).map_err(not_a_library)?;
     // `dlopen` maps them all and dies of SIGBUS in a file that is shorter.
-    let ends = segments.iter().map(|segment| segment.p_offset(endian).saturating_add(segment.p_filesz(endian)));
+    let ends =
+        segments.iter().map(|segment| segment.p_offset(endian).saturating_add(segment.p_filesz(endian)));
     let ranges = sections.iter().filter_map(|section| section.file_range(endian));
     let need = ends.chain(ranges.map(|(offset, size)| offset.saturating_add(size))).max().unwrap_or(0);
     if need > length {

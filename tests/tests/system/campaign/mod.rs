@@ -123,9 +123,16 @@ fn no_wrench_of_a_million_is_over_a_limit_jumps_or_comes_after_a_stop() {
 
 #[test]
 fn no_wrench_in_real_time_is_over_a_limit_jumps_or_comes_after_a_stop() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
     let scratch = Scratch::default();
     let plugins = plugins(&scratch);
-    let runs = TestSize::of_this_run().pick(8, 200);
+    let runs = match TestSize::of_this_run() {
+        TestSize::Quick => 4,
+        TestSize::Daily => 8,
+        TestSize::Full => 200,
+    };
     let run = |seed: u64| {
         let scratch = Scratch::default();
         let mut dice = Dice::new(seed);
