@@ -284,8 +284,8 @@ impl Making {
             let (mut engine, mapping) = (self.engine(budget_ns, progress)?, mapping.at(*place_m));
             if pushes_at_home(&engine.workspace_bounds(), &mapping) {
                 let problem = format!(
-                    "at {:?} mm the model ends before the home of its device, and the wall at its end would push there; move it \
-                     (`position_mm`) or make it longer",
+                    "at {:?} mm the workspace limits of the model exclude the home of its device, and the wall at these \
+                     limits would push there; move the model (`position_mm`) or choose parameters that extend its limits",
                     place_m.map(|m| m * 1.0e3)
                 );
                 return Err(complain(model, &problem).into());

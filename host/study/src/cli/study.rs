@@ -132,7 +132,7 @@ struct Common {
     /// Varied parameter: MODEL.PARAMETER (default: spring.gamma_n; in `study force`: load.force_n)
     #[arg(long, value_name = "MODEL.KEY")]
     stimulus: Option<String>,
-    /// First modality, vision and haptics (vh) or haptics alone (h)
+    /// Modality that comes first: vision and haptics (vh), haptics alone (h), or by the number of the subject
     #[arg(long, value_enum, default_value_t, value_name = "MODALITY")]
     first: FirstChoice,
     /// If the handle leaves its range: repeat the trial (at most three times) or keep its answer

@@ -52,7 +52,7 @@ pub(super) enum ProcedureChoice {
     /// Kaernbach's rule, as in the thesis
     #[default]
     WeightedUpDown,
-    /// A fixed number of trials, placed for the most information
+    /// A fixed number of trials, each at the difference of the largest expected information
     Questplus,
 }
 
