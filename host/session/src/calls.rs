@@ -116,7 +116,7 @@ impl fmt::Display for Notice {
                 write!(f, "waiting for `{who}` to return from {call}, for up to {} s", limit.as_secs_f64())
             }
             Self::Changed { who, what } => {
-                write!(f, "`{who}` changed {} of the host; put back", what.join(", "))
+                write!(f, "`{who}` changed {} of the host; restored by the host", what.join(", "))
             }
             Self::Unguarded => f.write_str(
                 "the watchdog process is gone; nothing stops the devices if this program is killed",

@@ -94,7 +94,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// A wrench with a number that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a wrench has a number that is not finite; the one before stays")]
+#[error("a wrench has a number that is not finite; the previous wrench stays until it expires")]
 pub struct NotFinite;
 
 /// The program's end: where it says what it wants the hand to feel, in the model's frame. Any thread may use it.

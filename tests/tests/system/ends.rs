@@ -415,7 +415,7 @@ fn what_a_plugin_changes_of_the_process_while_it_is_made_is_put_back_and_named()
         let scratch = Scratch::default();
         let ran = run(&scratch, &scene_of(&scratch, HONEST, habit, ""), "virtual");
         assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-        let told = format!("note: `jelly` changed {what} of the host; put back\n");
+        let told = format!("note: `jelly` changed {what} of the host; restored by the host\n");
         assert!(ran.stderr.starts_with(&told), "{ran:?}");
     }
 }
