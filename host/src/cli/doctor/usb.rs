@@ -26,6 +26,8 @@ struct Seen {
     place: String,
     vendor: u16,
     product: u16,
+    /// The kind that it is one of.
+    kind: UsbKind,
     access: UsbAccess,
 }
 
@@ -72,9 +74,10 @@ impl Seen {
         let is_one = |kind: &&UsbKind| {
             kind.vendor() == vendor && kind.product().is_none_or(|wanted| wanted == product)
         };
-        let access = kinds.iter().find(is_one)?.access()?;
+        let kind = *kinds.iter().find(is_one)?;
+        let access = kind.access()?;
         let place = folder.file_name()?.to_str()?.to_owned();
-        Some(Self { folder: folder.to_path_buf(), place, vendor, product, access })
+        Some(Self { folder: folder.to_path_buf(), place, vendor, product, kind, access })
     }
 
     /// Its interfaces: `1-4.2:1.0`, in order.
@@ -112,20 +115,18 @@ impl Seen {
         Some(machine.root.join("dev").join(name))
     }
 
-    /// The line for udev that lets the person at the machine use it.
+    /// The line for udev that lets the person at the machine use it, and no other product of a vendor who has many.
     fn rule(&self) -> String {
-        let Self { vendor, access, .. } = self;
-        match access {
-            UsbAccess::Raw => {
-                format!("SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{vendor:04x}\", TAG+=\"uaccess\"")
-            }
-            UsbAccess::Serial => format!(
-                "SUBSYSTEM==\"tty\", ATTRS{{idVendor}}==\"{vendor:04x}\", ENV{{{IGNORED}}}=\"1\", TAG+=\"uaccess\""
-            ),
-            UsbAccess::Hid => {
-                format!("KERNEL==\"hidraw*\", ATTRS{{idVendor}}==\"{vendor:04x}\", TAG+=\"uaccess\"")
-            }
-        }
+        let (begins, attribute, then) = match self.access {
+            UsbAccess::Raw => ("SUBSYSTEM==\"usb\"", "ATTR", String::new()),
+            UsbAccess::Serial => ("SUBSYSTEM==\"tty\"", "ATTRS", format!(" ENV{{{IGNORED}}}=\"1\",")),
+            UsbAccess::Hid => ("KERNEL==\"hidraw*\"", "ATTRS", String::new()),
+        };
+        let product = self
+            .kind
+            .product()
+            .map_or_else(String::new, |product| format!(" {attribute}{{idProduct}}==\"{product:04x}\","));
+        format!("{begins}, {attribute}{{idVendor}}==\"{:04x}\",{product}{then} TAG+=\"uaccess\"", self.vendor)
     }
 
     fn remedy_by_rule(&self) -> String {
@@ -136,7 +137,7 @@ impl Seen {
         )
     }
 
-    fn diagnose(&self, machine: &Machine) -> Vec<Diagnosis> {
+    fn diagnose(&self, machine: &Machine, is_open: bool) -> Vec<Diagnosis> {
         let mut diagnoses = vec![Diagnosis::good(
             "on USB",
             format!("{:04x}:{:04x} at {}", self.vendor, self.product, self.place),
@@ -148,8 +149,8 @@ impl Seen {
                 "connect it to a port of the computer: a hub delays the exchange, and resets what is behind it",
             ));
         }
-        diagnoses.extend(self.driver());
-        diagnoses.extend(self.permission(machine));
+        diagnoses.extend(self.driver(is_open));
+        diagnoses.extend(self.permission(machine, is_open));
         if self.access == UsbAccess::Serial && machine.runs("ModemManager") {
             diagnoses.push(match machine.keeps_modem_manager_away(self.vendor) {
                 true => Diagnosis::good("ModemManager", "leaves its port alone"),
@@ -163,30 +164,32 @@ impl Seen {
         diagnoses
     }
 
-    /// Who has it: a driver of the kernel, or another program.
-    fn driver(&self) -> Option<Diagnosis> {
+    /// Who has it: a driver of the kernel, or another program, which is this one while the device is open.
+    fn driver(&self, is_open: bool) -> Option<Diagnosis> {
         if self.access != UsbAccess::Raw {
             return None;
         }
         self.interfaces().into_iter().find_map(|interface| {
             let driver = read_link(interface.join("driver")).ok()?.file_name()?.to_str()?.to_owned();
             let interface = interface.file_name()?.to_str()?.to_owned();
-            Some(match driver.as_str() {
-                "usbfs" => Diagnosis::bad(
+            match driver.as_str() {
+                "usbfs" if is_open => None,
+                "usbfs" => Some(Diagnosis::bad(
                     "driver",
                     "another program has it open",
                     "end that program; one at a time has it",
-                ),
-                _ => Diagnosis::bad(
+                )),
+                _ => Some(hindrance(
+                    is_open,
                     "driver",
                     format!("the kernel's driver `{driver}` has it"),
                     format!("as root: `echo {interface} > /sys/bus/usb/drivers/{driver}/unbind`"),
-                ),
-            })
+                )),
+            }
         })
     }
 
-    fn permission(&self, machine: &Machine) -> Option<Diagnosis> {
+    fn permission(&self, machine: &Machine, is_open: bool) -> Option<Diagnosis> {
         let Some(node) = self.node(machine) else {
             let (what, module) = match self.access {
                 UsbAccess::Raw => return None,
@@ -203,12 +206,21 @@ impl Seen {
         Some(if (machine.may_use)(&node) {
             Diagnosis::good("permission", format!("this user may use {}", shown.display()))
         } else {
-            Diagnosis::bad(
+            hindrance(
+                is_open,
                 "permission",
                 format!("this user may not use {}", shown.display()),
                 self.remedy_by_rule(),
             )
         })
+    }
+}
+
+/// What keeps a program from a device; a note if it is open all the same, through a service or on another way.
+fn hindrance(is_open: bool, what: &'static str, found: String, remedy: String) -> Diagnosis {
+    match is_open {
+        true => Diagnosis::note(what, found, remedy),
+        false => Diagnosis::bad(what, found, remedy),
     }
 }
 
@@ -232,7 +244,7 @@ pub(super) fn connection(machine: &Machine, kinds: &[UsbKind], is_open: bool) ->
             ),
         }];
     }
-    seen.iter().flat_map(|seen| seen.diagnose(machine)).collect()
+    seen.iter().flat_map(|seen| seen.diagnose(machine, is_open)).collect()
 }
 
 fn wanted(kind: &UsbKind) -> String {
@@ -288,8 +300,12 @@ mod tests {
 
         /// What is wrong or worth a note: what, found, remedy.
         fn told(&self, may_use: fn(&Path) -> bool) -> Vec<(&'static str, Grade, String)> {
+            self.told_of(may_use, false)
+        }
+
+        fn told_of(&self, may_use: fn(&Path) -> bool, is_open: bool) -> Vec<(&'static str, Grade, String)> {
             let machine = Machine { root: self.0.path().to_path_buf(), may_use };
-            let diagnoses = connection(&machine, KINDS, false);
+            let diagnoses = connection(&machine, KINDS, is_open);
             let told = diagnoses.into_iter().filter(|diagnosis| diagnosis.grade != Grade::Good);
             told.map(|told| {
                 (told.what, told.grade, format!("{} -> {}", told.found, told.remedy.unwrap_or_default()))
@@ -356,6 +372,35 @@ mod tests {
         );
     }
 
+    /// A raw device is claimed through the same driver by this program as by another one.
+    #[test]
+    fn a_device_that_is_open_is_not_taken_for_another_programs() {
+        let fixture = Fixture::new("1-4", ["1451", "0402"]);
+        fixture.driven_by("1-4", "usbfs");
+        assert_eq!(fixture.told_of(|_| true, true), []);
+    }
+
+    #[test]
+    fn what_did_not_keep_a_device_from_opening_is_a_note() {
+        let fixture = Fixture::new("1-4", ["1451", "0402"]);
+        fixture.driven_by("1-4", "ftdi_sio");
+        let told = fixture.told_of(|_| false, true);
+        let grades: Vec<_> = told.iter().map(|(what, grade, _)| (*what, *grade)).collect();
+        assert_eq!(grades, [("driver", Grade::Note), ("permission", Grade::Note)]);
+    }
+
+    #[test]
+    fn a_rule_is_for_one_product_where_the_plugin_names_one() {
+        let fixture = Fixture::new("1-4", ["0403", "cb48"]);
+        let machine = Machine { root: fixture.0.path().to_path_buf(), may_use: |_| false };
+        let kinds = [UsbKind::new(0x0403, 0xcb48, UsbAccess::Raw)];
+        let diagnoses = connection(&machine, &kinds, false);
+        let remedy = diagnoses.into_iter().find_map(|diagnosis| diagnosis.remedy).expect("it is refused");
+        let line =
+            "`SUBSYSTEM==\"usb\", ATTR{idVendor}==\"0403\", ATTR{idProduct}==\"cb48\", TAG+=\"uaccess\"`";
+        assert!(remedy.contains(line), "{remedy}");
+    }
+
     #[test]
     fn a_serial_port_that_is_missing_is_the_drivers() {
         let fixture = Fixture::new("1-4", ["2988", "0302"]);
@@ -374,8 +419,8 @@ mod tests {
         let told = fixture.told(|_| true);
         let (what, grade, words) = one(&told);
         assert_eq!((what, grade), ("ModemManager", Grade::Bad));
-        let line =
-            "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"2988\", ENV{ID_MM_DEVICE_IGNORE}=\"1\", TAG+=\"uaccess\"";
+        let line = "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"2988\", ATTRS{idProduct}==\"0302\", \
+                    ENV{ID_MM_DEVICE_IGNORE}=\"1\", TAG+=\"uaccess\"";
         assert!(words.contains(line), "{words}");
         fixture.file("etc/udev/rules.d/70-flotor.rules", &format!("# {line}\n"));
         assert_eq!(fixture.told(|_| true).len(), 1, "a comment is no rule");
