@@ -3,11 +3,10 @@
 use crate::exchange::{Exchange, ForceSwitch};
 use crate::message::Sample;
 use crate::session::{GripRequest, Request, Session};
-use crate::trouble::Trouble;
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Conditions, Cycle, DVec3, Device, DeviceInfo, DeviceState,
-    IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal, Settings, StoppedState,
-    Tick, Twist, Wrench, export_device, math, rotation_vector,
+    ActiveDevice, Axes, Capabilities, Conditions, ConnectionDevice, Cycle, DVec3, Device, DeviceInfo,
+    DeviceState, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal, Settings,
+    StoppedState, Tick, Twist, UsbAccess, UsbKind, Wrench, export_device, math, rotation_vector,
 };
 use std::f64::consts::{PI, TAU};
 use std::time::{Duration, Instant};
@@ -95,6 +94,32 @@ impl Options {
             parameters,
         }
     }
+
+    /// Opens a session on a device that nobody commands.
+    fn open(&self) -> Result<Session, Refusal> {
+        let mut session = Session::open(&self.request).map_err(Refusal::resource)?;
+        self.idle(&mut session)?;
+        Ok(session)
+    }
+
+    /// A sample of the device without commands; those of an earlier session are valid for a moment.
+    fn idle(&self, session: &mut Session) -> Result<Sample, Refusal> {
+        let started = Instant::now();
+        loop {
+            let sample = session.look().map_err(|trouble| {
+                Refusal::resource(format!("the Inverse Service at {}: {trouble}", self.request.address))
+            })?;
+            if !sample.is_commanded {
+                return Ok(sample);
+            }
+            if started.elapsed() >= COMMANDS_FADE {
+                return Err(Refusal::resource(
+                    "another program commands this Inverse3, and the forces of both would add up; end that one first",
+                ));
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
 }
 
 /// An Inverse3, opened: a session of the service that commands nothing.
@@ -129,7 +154,7 @@ impl Device for Inverse3Device {
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let options = Options::new(settings);
-        let session = Session::open(&options.request).map_err(Refusal::resource)?;
+        let session = options.open()?;
         let has_grip = session.chosen().grip.is_some();
         Ok(Self { options, session: Some(session), has_grip, switch: ForceSwitch::default() })
     }
@@ -180,23 +205,9 @@ impl Inverse3Device {
     fn start(&mut self) -> Result<(Exchange, Sample), Refusal> {
         let mut session = match self.session.take() {
             Some(session) => session,
-            None => Session::open(&self.options.request).map_err(Refusal::resource)?,
+            None => self.options.open()?,
         };
-        let failed = |trouble: Trouble| {
-            Refusal::resource(format!("the Inverse Service at {}: {trouble}", self.options.request.address))
-        };
-        let (mut sample, started) = (session.look().map_err(failed)?, Instant::now());
-        // The last commands of this session are valid for a moment.
-        while sample.is_commanded && started.elapsed() < COMMANDS_FADE {
-            std::thread::sleep(LOOK);
-            sample = session.look().map_err(failed)?;
-        }
-        if sample.is_commanded {
-            self.session = Some(session);
-            return Err(Refusal::resource(
-                "another program commands this Inverse3, and the forces of both would add up; end that one first",
-            ));
-        }
+        let sample = self.options.idle(&mut session)?;
         self.switch.rearm();
         let exchange = Exchange::start(session, &self.switch).map_err(Refusal::resource)?;
         Ok((exchange, sample))
@@ -273,4 +284,10 @@ impl IndependentStopDevice for Inverse3Device {
     }
 }
 
-export_device!(Inverse3Device, independent_stop);
+impl ConnectionDevice for Inverse3Device {
+    /// The service has these ports: of the arm, and of the receiver of a grip.
+    const USB: &'static [UsbKind] =
+        &[UsbKind::new(0x16c0, 0x0483, UsbAccess::Serial), UsbKind::new(0x2fe3, 0x0100, UsbAccess::Serial)];
+}
+
+export_device!(Inverse3Device, connection, independent_stop);

@@ -4,6 +4,9 @@ use crate::json::Malformed;
 use flotor_hal::Fault;
 use std::fmt;
 
+/// What to do about messages that are not those of the documented interface.
+const UPDATE: &str = "update the service to 3.5 or newer";
+
 /// What went wrong, as a closed set; after each the session is over and its force with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
@@ -57,16 +60,18 @@ impl From<Malformed> for Trouble {
 impl fmt::Display for Trouble {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Gone => f.write_str("it closed the connection"),
-            Self::Silent => f.write_str("it does not answer"),
-            Self::Unfinished => f.write_str("a state of it does not end"),
-            Self::TooLong(bytes) => write!(f, "a message of {bytes} bytes is no state of a device"),
-            Self::NoFrame => f.write_str("what it sends is no whole message of a WebSocket"),
-            Self::NoState => f.write_str("what it sends is no state of a device"),
-            Self::Missing(field) => write!(f, "its state has no `{field}`"),
-            Self::Infinite(field) => write!(f, "`{field}` of its state is no finite number"),
-            Self::Unplugged => f.write_str("the device is no longer there"),
-            Self::NotReady => f.write_str("the device has no power, or is not calibrated"),
+            Self::Gone => f.write_str("it closed the connection; start it again"),
+            Self::Silent => f.write_str("it does not answer; start it again"),
+            Self::Unfinished => f.write_str("a state of it does not end; start it again"),
+            Self::TooLong(bytes) => write!(f, "a message of {bytes} bytes is no state of a device; {UPDATE}"),
+            Self::NoFrame => write!(f, "what it sends is no whole message of a WebSocket; {UPDATE}"),
+            Self::NoState => write!(f, "what it sends is no state of a device; {UPDATE}"),
+            Self::Missing(field) => write!(f, "its state has no `{field}`; {UPDATE}"),
+            Self::Infinite(field) => write!(f, "`{field}` of its state is no finite number; {UPDATE}"),
+            Self::Unplugged => f.write_str("the device is no longer there; connect it, and switch it on"),
+            Self::NotReady => f.write_str(
+                "the device has no power, or is not calibrated; switch it on, and wait until it is, up to 25 s",
+            ),
             Self::ForeignForce => f.write_str("another program pushes the device, too; end that one first"),
         }
     }

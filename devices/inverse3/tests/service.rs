@@ -1,7 +1,7 @@
 //! The plugin against a service that breaks its promises, through the contract as a host meets it.
 
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
-use flotor_hal::{Axes, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_hal::{Axes, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, UsbAccess, Wrench};
 use flotor_inverse3::stand_in::{ARM, GRIP, OTHER_ARM, Said, StandIn, configured, frame, state};
 use std::time::{Duration, Instant};
 
@@ -224,42 +224,111 @@ fn a_stop_from_another_thread_takes_the_force_and_the_handle_is_still_seen() {
 #[test]
 fn what_cannot_be_opened_is_refused_in_one_sentence_with_what_to_do() {
     let plain = || until(usize::MAX, Said::Nothing);
-    let answering = |text: String| {
-        StandIn::start(move |number, _| match number {
-            0 => Said::Text(state(HELD_M, DVec3::ZERO)),
-            _ => Said::Text(text.clone()),
-        })
-        .expect("there is a port")
-    };
-    let no_device = "{\"session_id\":1,\"inverse3\":[],\"verse_grip\":[]}".to_owned();
-    let empty = StandIn::start(move |_, _| Said::Text(no_device.clone())).expect("there is a port");
-    let gone = plain();
-    let nobody = format!("{}0", &gone.address[..gone.address.len() - 5]);
     for (service, more, words) in [
         (
             plain(),
             vec![("device", "")],
             format!("several devices; say with `device` which: {OTHER_ARM}, {ARM}"),
         ),
-        (plain(), vec![("device", "1234")], format!("no device 1234, but {OTHER_ARM}, {ARM}")),
         (plain(), vec![("grip", "1234")], format!("no grip 1234, but {GRIP}")),
-        (empty, vec![("device", "")], "it has no device; is one connected".to_owned()),
-        (answering(configured(0.3)), vec![], "`config.filters.force_gate.gain` of the device".to_owned()),
-        (answering("nonsense".to_owned()), vec![], "is no state of a device".to_owned()),
-        (plain(), vec![("address", nobody.as_str())], "start Haply's service, or `flotor emulate".to_owned()),
+        (answering(1, configured(0.3)), vec![], "`config.filters.force_gate.gain` of the device".to_owned()),
     ] {
-        let refused = open(&service, &more).err().unwrap_or_default();
-        assert!(refused.contains(&words) && refused.lines().count() == 1, "{words}: {refused}");
+        refused_with(&service, &more, &[&words]);
     }
-    let busy = StandIn::start(move |number, _| match number {
+}
+
+/// A service that answers as it should, but this from the message of this number on.
+fn answering(from: usize, text: String) -> StandIn {
+    StandIn::start(move |number, _| match number {
+        _ if number >= from => Said::Text(text.clone()),
         1 => Said::Text(configured(0.0)),
-        _ => Said::Text(
-            state(HELD_M, DVec3::ZERO).replace("\"control_mode\":\"idle\"", "\"control_mode\":\"force\""),
-        ),
-    });
-    let opened = open(&busy.expect("there is a port"), &[]).expect("the service agrees");
+        _ => Said::Text(state(HELD_M, DVec3::ZERO)),
+    })
+    .expect("there is a port")
+}
+
+/// That it is refused when it is opened, in one line with all of these words: what `flotor doctor` shows as `opening`.
+fn refused_with(service: &StandIn, more: &[(&str, &str)], words: &[&str]) {
+    let refused = open(service, more).err().unwrap_or_default();
+    assert!(words.iter().all(|words| refused.contains(words)), "{words:?}: {refused}");
+    assert_eq!(refused.lines().count(), 1, "{refused}");
+}
+
+/// What the service says while another session commands the arm.
+fn commanded() -> String {
+    state(HELD_M, DVec3::ZERO).replace("\"control_mode\":\"idle\"", "\"control_mode\":\"force\"")
+}
+
+const BUSY: &str =
+    "another program commands this Inverse3, and the forces of both would add up; end that one first";
+
+#[test]
+fn where_no_service_listens_the_address_and_what_to_start_are_named() {
+    let service = until(usize::MAX, Said::Nothing);
+    refused_with(
+        &service,
+        &[("address", "127.0.0.1:1")],
+        &["127.0.0.1:1", "refused", "start Haply's service, or `flotor emulate haply-service`"],
+    );
+}
+
+#[test]
+fn a_service_without_a_device_asks_for_cable_and_power() {
+    let empty = answering(0, "{\"session_id\":1,\"inverse3\":[],\"verse_grip\":[]}".to_owned());
+    refused_with(&empty, &[("device", "")], &["it has no device; is one connected, and its power on?"]);
+}
+
+#[test]
+fn a_service_without_the_wanted_device_lists_those_it_has() {
+    let listed = format!("no device 1234, but {OTHER_ARM}, {ARM}");
+    refused_with(&until(usize::MAX, Said::Nothing), &[("device", "1234")], &[&listed, "must be one of them"]);
+}
+
+#[test]
+fn messages_of_another_version_are_told_with_the_version_that_is_needed() {
+    const UPDATE: &str = "update the service to 3.5 or newer";
+    let of_old = |text: &str| answering(1, text.to_owned());
+    refused_with(&of_old("nonsense"), &[], &["what it sends is no state of a device", UPDATE]);
+    // It knows no presets.
+    let told = configured(0.0).replace("\"preset\":\"arm_front_centered\",", "");
+    refused_with(&of_old(&told), &[], &["`config.preset` of the device", "is nothing", UPDATE]);
+    // Its states have another name for a field.
+    let told = state(HELD_M, DVec3::ZERO).replace("cursor_velocity", "velocity");
+    refused_with(&answering(2, told), &[], &["its state has no `cursor_velocity`", UPDATE]);
+}
+
+#[test]
+fn a_device_without_power_is_not_opened() {
+    let told = state(HELD_M, DVec3::ZERO).replace("\"power_supply\":true", "\"power_supply\":false");
+    refused_with(&answering(2, told), &[], &["no power, or is not calibrated; switch it on"]);
+}
+
+#[test]
+fn a_device_that_another_session_commands_is_not_opened() {
+    refused_with(&answering(2, commanded()), &[], &[BUSY]);
+}
+
+#[test]
+fn a_device_that_another_session_commands_after_it_was_opened_is_not_activated() {
+    let service = answering(3, commanded());
+    let opened = open(&service, &[]).expect("the service agrees, and nobody commands it");
     let refused = opened.activate(&CONFIG).err().map(|(_, refusal)| refusal.to_string()).unwrap_or_default();
-    assert!(refused.contains("another program commands this Inverse3"), "{refused}");
+    assert!(refused.contains(BUSY), "{refused}");
+    assert_eq!(commanded_n(&service).unwrap_or(DVec3::ZERO), DVec3::ZERO, "nothing pushed");
+}
+
+#[test]
+fn a_device_that_is_well_is_opened_without_a_command_and_says_what_it_is() {
+    let plugin = Plugin::in_process(&flotor_inverse3::FLOTOR_ENTRY).expect("it is a plugin");
+    let kinds: Vec<_> =
+        plugin.usb_kinds().iter().map(|kind| (kind.vendor(), kind.product(), kind.access())).collect();
+    let serial = Some(UsbAccess::Serial);
+    assert_eq!(kinds, [(0x16c0, Some(0x0483), serial), (0x2fe3, Some(0x0100), serial)]);
+    let service = until(usize::MAX, Said::Nothing);
+    let mut opened = open(&service, &[]).expect("nothing is wrong");
+    let told = opened.capabilities().expect("they are legal");
+    assert_eq!((told.sensed, told.actuated), (Axes::ALL, Axes::TRANSLATION));
+    assert_eq!(commanded_n(&service), None, "{:?}", service.heard());
 }
 
 #[test]
