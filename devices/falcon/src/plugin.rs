@@ -1,7 +1,7 @@
 //! The device as a plugin: positions from counts, words from wrenches, buttons.
 
 use crate::boot;
-use crate::chip::Chip;
+use crate::chip::{Chip, PRODUCT, VENDOR};
 use crate::exchange::{Exchange, ForceSwitch};
 use crate::firmware;
 use crate::kinematics::{CENTRE_M, Posture, RANGE_M, angles_rad, posture, resolution_m};
@@ -10,9 +10,9 @@ use crate::remote::RemoteChip;
 use crate::trouble::Trouble;
 use crate::usb;
 use flotor_hal::{
-    ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo,
-    DeviceState, LoopConfig, Parameter, Pose, Refusal, Settings, Tick, Twist, VerticalCalibration, Wrench,
-    choices, export_device, math,
+    ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, ConnectionDevice, Cycle, DQuat, DVec3,
+    Device, DeviceInfo, DeviceState, LoopConfig, Parameter, Pose, Refusal, Settings, Tick, Twist, UsbAccess,
+    UsbKind, VerticalCalibration, Wrench, choices, export_device, math,
 };
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -25,6 +25,9 @@ const TCP: &str = "tcp:";
 const SLEW_N_PER_S: f64 = 8000.0;
 /// A command and its report over full-speed USB, a frame of 1 ms each, s.
 const LATENCY_S: f64 = 2.0e-3;
+/// What whoever cannot wait is told.
+const NOT_HOMED: &str = "the Falcon does not know where its handle is: start it with `homing_s` of 10 or more, and while its \
+                         lamp is red, push the handle in as far as it goes, pull it out as far as it goes";
 /// Time between two commands while the device looks for its ends.
 const HOMING_NAP: Duration = Duration::from_millis(2);
 
@@ -54,7 +57,7 @@ const SCHEMA: &[Parameter] = &[
         0.0,
         600.0,
         30.0,
-        "How long it waits for the handle to be pushed in and pulled out",
+        "How long it waits for the handle to be pushed in and pulled out; 0: it must have been before",
     ),
     Parameter::real(
         "velocity_cutoff_hz",
@@ -230,8 +233,11 @@ impl FalconDevice {
     fn connect(&mut self) -> Result<Arc<dyn Chip>, Refusal> {
         let chip = self.options.open()?;
         let firmware = self.options.firmware.as_deref();
-        boot::start(&*chip, firmware)
+        let report = boot::start(&*chip, firmware)
             .map_err(|failure| Refusal::resource(format!("the Falcon: {failure}")))?;
+        if self.options.homing.is_zero() && report.homed != ALL_HOMED {
+            return Err(Refusal::resource(NOT_HOMED));
+        }
         self.chip = Some(Arc::clone(&chip));
         Ok(chip)
     }
@@ -276,10 +282,7 @@ impl FalconDevice {
             match newest {
                 Some(report) if report.homed == ALL_HOMED => return Ok(report),
                 _ if started.elapsed() > patience => {
-                    return Err(Refusal::resource(
-                        "the Falcon does not know where its handle is: while its lamp is red, push the handle in as far as it \
-                         goes, pull it out as far as it goes, and start again",
-                    ));
+                    return Err(Refusal::resource(NOT_HOMED));
                 }
                 _ => {}
             }
@@ -390,4 +393,8 @@ impl CalibrationDevice for FalconDevice {
     }
 }
 
-export_device!(FalconDevice, calibration);
+impl ConnectionDevice for FalconDevice {
+    const USB: &'static [UsbKind] = &[UsbKind::new(VENDOR, PRODUCT, UsbAccess::Raw)];
+}
+
+export_device!(FalconDevice, calibration, connection);

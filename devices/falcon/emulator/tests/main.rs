@@ -3,5 +3,6 @@
 mod boot;
 mod contract;
 mod exchange;
+mod findings;
 #[cfg(target_os = "linux")]
 mod kernel;
