@@ -11,17 +11,21 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 /// The emulator in a process of its own; ended with the test.
-struct Emulator {
+pub(super) struct Emulator {
     process: Owned,
-    address: String,
+    pub(super) address: String,
 }
 
 impl Emulator {
-    fn start() -> Self {
+    pub(super) fn start(arguments: &[&str]) -> Self {
         let program = build_folder().join(format!("flotor-falcon-emulator{}", std::env::consts::EXE_SUFFIX));
         let mut command = Command::new(program);
         let mut process = Owned::start(
-            command.args(["--listen", "127.0.0.1:0"]).stdout(Stdio::piped()).stderr(Stdio::piped()),
+            command
+                .args(["--listen", "127.0.0.1:0"])
+                .args(arguments)
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped()),
         );
         let mut first = String::new();
         let output = process.stdout.take().expect("a pipe was requested");
@@ -33,7 +37,7 @@ impl Emulator {
 
 #[test]
 fn with_an_emulator_every_rule_is_checked_and_holds() {
-    let emulator = Emulator::start();
+    let emulator = Emulator::start(&[]);
     let library = plugin_file("flotor-falcon").display().to_string();
     let address = format!("address={}", emulator.address);
     let ran = Flotor::with([
@@ -54,7 +58,7 @@ fn with_an_emulator_every_rule_is_checked_and_holds() {
 /// The demo with the two lines of the device changed; then the cable is pulled.
 #[test]
 fn the_demo_runs_on_it_with_two_changed_lines_and_ends_when_it_is_gone() {
-    let emulator = Emulator::start();
+    let emulator = Emulator::start(&[]);
     let text = std::fs::read_to_string(workspace_root().join("host/scenes/demo.toml")).expect("it is there");
     let changed = text
         .replace("plugin = \"simulated\"", "plugin = \"falcon\"")

@@ -11,6 +11,8 @@ mod changes;
 mod composition;
 mod crash;
 mod determinism;
+#[cfg(feature = "drop-ins")]
+mod doctor;
 mod documents;
 #[cfg(feature = "drop-ins")]
 mod drop_ins;
