@@ -7,7 +7,7 @@
 use crate::chip::{Chip, payload};
 use crate::protocol::{Command, Frames, Heard, Report};
 use crate::trouble::Trouble;
-use flotor_hal::SafeStop;
+pub use flotor_force_switch::ForceSwitch;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -64,36 +64,6 @@ impl Shared {
     }
 }
 
-/// Takes the force away, from any thread.
-#[derive(Clone, Debug, Default)]
-pub struct ForceSwitch {
-    is_stopped: Arc<AtomicBool>,
-    thread: Arc<Mutex<Option<Thread>>>,
-}
-
-impl ForceSwitch {
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.is_stopped.load(Ordering::Acquire)
-    }
-
-    /// Force may begin again.
-    pub(crate) fn rearm(&self) {
-        self.is_stopped.store(false, Ordering::Release);
-    }
-}
-
-impl SafeStop for ForceSwitch {
-    fn safe_stop(&self) {
-        self.is_stopped.store(true, Ordering::Release);
-        // Never waits. Who is not woken looks by itself.
-        if let Ok(thread) = self.thread.try_lock()
-            && let Some(thread) = &*thread
-        {
-            thread.unpark();
-        }
-    }
-}
-
 /// A device whose reports are read and whose commands are sent.
 pub struct Exchange {
     shared: Arc<Shared>,
@@ -112,7 +82,7 @@ impl Exchange {
         let thread = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let writer = thread("flotor-falcon-out").spawn(move || write(&*chips, &theirs, &stop, timeout))?;
         let waking = writer.thread().clone();
-        *switch.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(waking.clone());
+        switch.wakes(waking.clone());
         let mut exchange = Self { shared, writer: Some(writer), reader: None };
         let (theirs, chips) = (Arc::clone(&exchange.shared), Arc::clone(chip));
         exchange.reader = Some(thread("flotor-falcon-in").spawn(move || read(&*chips, &theirs, &waking))?);

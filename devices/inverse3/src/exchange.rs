@@ -6,11 +6,12 @@
 use crate::message::Sample;
 use crate::session::Session;
 use crate::trouble::Trouble;
-use flotor_hal::{DVec3, SafeStop};
+use flotor_force_switch::ForceSwitch;
+use flotor_hal::DVec3;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::{JoinHandle, Thread};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// How often a thread without a command looks whether it is still wanted.
@@ -34,36 +35,6 @@ struct Shared {
     is_over: AtomicBool,
 }
 
-/// Takes the force away, from any thread.
-#[derive(Clone, Debug, Default)]
-pub struct ForceSwitch {
-    is_stopped: Arc<AtomicBool>,
-    thread: Arc<Mutex<Option<Thread>>>,
-}
-
-impl ForceSwitch {
-    pub(crate) fn is_stopped(&self) -> bool {
-        self.is_stopped.load(Ordering::Acquire)
-    }
-
-    /// Force may begin again.
-    pub(crate) fn rearm(&self) {
-        self.is_stopped.store(false, Ordering::Release);
-    }
-}
-
-impl SafeStop for ForceSwitch {
-    fn safe_stop(&self) {
-        self.is_stopped.store(true, Ordering::Release);
-        // Never waits. Who is not woken looks by itself.
-        if let Ok(thread) = self.thread.try_lock()
-            && let Some(thread) = &*thread
-        {
-            thread.unpark();
-        }
-    }
-}
-
 /// A session in a thread of its own.
 #[derive(Debug)]
 pub(crate) struct Exchange {
@@ -78,7 +49,7 @@ impl Exchange {
         let (theirs, stop) = (Arc::clone(&shared), switch.clone());
         let thread = std::thread::Builder::new().name("flotor-inverse3".to_owned());
         let thread = thread.spawn(move || run(session, &theirs, &stop))?;
-        *switch.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread.thread().clone());
+        switch.wakes(thread.thread().clone());
         Ok(Self { shared, thread: Some(thread) })
     }
 

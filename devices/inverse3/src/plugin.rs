@@ -1,8 +1,9 @@
 //! The device as a plugin: positions from the service, forces to it, the grip's orientation and buttons.
 
-use crate::exchange::{Exchange, ForceSwitch};
+use crate::exchange::Exchange;
 use crate::message::Sample;
 use crate::session::{GripRequest, Request, Session};
+use flotor_force_switch::ForceSwitch;
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Conditions, ConnectionDevice, Cycle, DVec3, Device, DeviceInfo,
     DeviceState, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal, Settings,

@@ -17,8 +17,8 @@ use std::process;
 enum Role {
     Contract,
     Plugin,
-    /// What device plugins over a vendor's SDK share.
-    VendorSdk,
+    /// What several device plugins share.
+    OfDevices,
     /// The other end of a device's link, without hardware.
     Emulator,
     /// What emulators plug devices into a kernel with.
@@ -63,14 +63,15 @@ enum Role {
 
 use Role::{
     Cable, Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab,
-    Live, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync, Tests,
-    VendorSdk, Viewer,
+    Live, OfDevices, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync,
+    Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
 const CRATES: &[(&str, Role, &[Role])] = &[
     ("hal", Contract, &[]),
-    ("devices/vendor-sdk", VendorSdk, &[Contract]),
+    ("devices/force-switch", OfDevices, &[Contract]),
+    ("devices/vendor-sdk", OfDevices, &[Contract]),
     ("devices/usbip", Cable, &[]),
     ("host/sync", Sync, &[]),
     ("host/core", Core, &[Contract, Sync]),
@@ -141,7 +142,7 @@ impl Role {
     /// The roles a crate of this role may depend on.
     fn may_use(self) -> &'static [Role] {
         match self {
-            Plugin => &[Contract, VendorSdk],
+            Plugin => &[Contract, OfDevices],
             Fixture => &[Contract],
             Emulator => &[Contract, Plugin, Cable],
             _ => CRATES.iter().find(|(_, role, _)| *role == self).map_or(&[], |(.., used)| used),

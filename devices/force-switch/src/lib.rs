@@ -1,0 +1,67 @@
+//! What takes the force away, from any thread, where a thread of the plugin has the device: it is woken, finds the switch stopped,
+//! and commands zero force by itself.
+
+use flotor_hal::SafeStop;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::Thread;
+
+/// Takes the force away, from any thread. Its clones are the same switch.
+#[derive(Clone, Debug, Default)]
+pub struct ForceSwitch {
+    is_stopped: Arc<AtomicBool>,
+    thread: Arc<Mutex<Option<Thread>>>,
+}
+
+impl ForceSwitch {
+    /// Whether no force may be commanded. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        self.is_stopped.load(Ordering::Acquire)
+    }
+
+    /// Force may begin again. Real-time: bounded, no allocation.
+    pub fn rearm(&self) {
+        self.is_stopped.store(false, Ordering::Release);
+    }
+
+    /// A stop wakes this thread from now on, and no other. Not real-time.
+    pub fn wakes(&self, thread: Thread) {
+        *self.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
+    }
+}
+
+impl SafeStop for ForceSwitch {
+    fn safe_stop(&self) {
+        self.is_stopped.store(true, Ordering::Release);
+        // Never waits. Who is not woken looks by itself.
+        if let Ok(thread) = self.thread.try_lock()
+            && let Some(thread) = &*thread
+        {
+            thread.unpark();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_wakes_the_thread_and_stays_until_it_is_rearmed() {
+        let switch = ForceSwitch::default();
+        let waiting = switch.clone();
+        let thread = std::thread::spawn(move || {
+            while !waiting.is_stopped() {
+                // For ever, unless it is woken.
+                std::thread::park();
+            }
+        });
+        switch.wakes(thread.thread().clone());
+        switch.safe_stop();
+        thread.join().expect("it is woken");
+        assert!(switch.is_stopped());
+        switch.rearm();
+        assert!(!switch.is_stopped());
+    }
+}
