@@ -190,8 +190,8 @@ struct JndArguments {
     /// First reversal whose difference counts for the threshold
     #[arg(long, default_value_t = 4, value_parser = count(1..=1000_u32), value_name = "N")]
     average_from: u32,
-    /// Trials whose mean difference is the threshold: from the first counted reversal to the last, both included, or
-    /// without the trial of the first, or without that of the last
+    /// The threshold is the mean difference of the trials from the first counted reversal to the last: with the trials of
+    /// both reversals, without that of the first, or without that of the last
     #[arg(long, value_enum, default_value_t)]
     averaging: Averaging,
     /// Step size used at a reversal that halves the step size

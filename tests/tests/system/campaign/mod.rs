@@ -128,11 +128,7 @@ fn no_wrench_in_real_time_is_over_a_limit_jumps_or_comes_after_a_stop() {
     }
     let scratch = Scratch::default();
     let plugins = plugins(&scratch);
-    let runs = match TestSize::of_this_run() {
-        TestSize::Quick => 4,
-        TestSize::Daily => 8,
-        TestSize::Full => 200,
-    };
+    let runs = TestSize::of_this_run().pick(8, 200);
     let run = |seed: u64| {
         let scratch = Scratch::default();
         let mut dice = Dice::new(seed);

@@ -15,8 +15,8 @@ const OBSERVERS: [(f64, f64); 7] =
 #[derive(Args)]
 #[command(
     after_help = "Three estimators of the threshold. thesis: mean of the differences from the 4th to the 8th \
-    reversal; map: that of the observer (threshold and criterion) with the maximum posterior probability, for the \
-    same trials; questplus: 18 trials, each at the difference of the largest expected information.\n\n\
+    reversal; map: the threshold of the observer model (threshold and criterion) with the maximum posterior \
+    probability given the same trials; questplus: 18 trials, each at the difference of the largest expected information.\n\n\
     Examples:\n  \
     flotor study bias --runs 1000\n  \
     flotor study bias --tracks 1 --json bias.json"
