@@ -404,7 +404,7 @@ fn a_device_that_fails_ends_the_run_by_name_and_the_force_goes() {
         let scratch = Scratch::default();
         let library = api.broken(&scratch, "fails", &[macros, &["AFTER=400"]].concat());
         let file = scratch.path().join("log");
-        let parameters = format!("library = {library:?}\ntimeout_ms = 100\n{LOAD}");
+        let parameters = format!("library = {library:?}\ntimeout_ms = 500\n{LOAD}");
         let scene = api.scene(&scratch, 5.0, &parameters, "").display().to_string();
         let ran = Flotor::with(["run", &scene]).env("SDK_LOG", &file.display().to_string()).run();
         assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{macros:?}: {ran:?}");
