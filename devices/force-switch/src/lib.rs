@@ -1,5 +1,5 @@
-//! What takes the force away, from any thread, where a thread of the plugin has the device: it is woken, finds the switch stopped,
-//! and commands zero force by itself.
+//! A switch that any thread uses to end the force of a device whose I/O runs on a thread of the plugin: it wakes this I/O thread,
+//! which then commands zero force.
 
 use flotor_hal::SafeStop;
 use std::sync::atomic::{AtomicBool, Ordering};

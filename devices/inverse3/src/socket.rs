@@ -99,7 +99,7 @@ impl Socket {
         if is_agreed && lines.any(proves_it) { Ok(()) } else { Err(no_service()) }
     }
 
-    /// Sends a text. Real-time but for the system: bounded, no allocation.
+    /// Sends a text. Real-time except for the system call: bounded, no allocation.
     ///
     /// # Errors
     /// [`Trouble::Gone`].
