@@ -11,6 +11,7 @@ use crate::abi::layout::layout;
 use crate::abi::loader::Model;
 use crate::abi::{Instance, ModelPlug, Str};
 use crate::{DVec3, ForceModel, Input, Pose};
+#[cfg(feature = "loader")]
 use std::ptr::null;
 
 /// The form of a [`Primitive`]. In C as a number of this value.
@@ -262,6 +263,7 @@ layout! {
 }
 
 impl ShapeView {
+    #[cfg(feature = "loader")]
     const EMPTY: Self = Self {
         primitives: null(),
         vertices: null(),
@@ -341,6 +343,7 @@ impl std::fmt::Display for InvalidShape {
 impl std::error::Error for InvalidShape {}
 
 /// Most corners, triangles or primitives that are read.
+#[cfg(feature = "loader")]
 const MOST: u32 = 1 << 20;
 /// Longest name or unit.
 #[cfg(feature = "loader")]
