@@ -28,6 +28,10 @@
 //! need more energy to stand straight than it has, it falls over: wrench and energy fade together, by an equal part in each tick,
 //! and the spring carries nothing until it is lifted. That dissipates energy, too.
 //!
+//! A tick in which the base slides ends where rolling and sliding agree: the tilt of least energy at a pull that friction just
+//! holds. The two take turns. If a tick begins with the base pulled off the ground, the base gives way only as far along the
+//! straight line to the place where it would hang as is needed to stand again; so the force has no step there.
+//!
 //! `base` has the pose of the base and the load on it; `tilt` finds the tilt of least energy; `friction` has the friction limit.
 //!
 //! Derivation: the book, chapter "The spring"; the step with a tip is the proximal Newton step of Lee, Sun
@@ -67,6 +71,10 @@ const LONGEST_WAY_RAD: f64 = 0.1;
 const LARGEST_TILT_RAD: f64 = 0.9;
 /// Share of its wrench that a spring which falls over loses in a tick.
 const FALL_PER_TICK: f64 = 1.0 / 32.0;
+/// Change of the tilt (rad) that is left of one that has rolled as far as it will, for the series of slides to be summed.
+const SETTLED_RAD: f64 = 3e-7;
+/// Largest ratio of successive excesses of the pull whose series is summed.
+const MOST_RATIO: f64 = 0.9;
 /// Change of the tilt (rad) below which it is clear whether the base slides: one that has not rolled as far as it will is
 /// pulled harder.
 const ROLLED_RAD: f64 = 3e-4;
@@ -89,6 +97,37 @@ struct Stood {
     response: Response,
     stored_j: f64,
     slope: Option<DVec2>,
+}
+
+/// A slide that is tried, from where the pull exceeded the friction limit by so much (N): that way, so far (m); or as far as
+/// rolling and sliding in turns would lead.
+struct Slide {
+    excess_n: f64,
+    along: Option<(DVec3, f64)>,
+}
+
+/// A base that lost the ground where it stood. It may stand where it would have hung, or on the way there, with less energy.
+struct Lost {
+    at: Standing,
+    stored_j: f64,
+    missing_n: [f64; 2],
+    trial: Trial,
+}
+
+/// The place that is tried next for a base that lost the ground.
+#[derive(Clone, Copy)]
+enum Trial {
+    Hanging,
+    OnTheWay,
+    /// Where it would have hung, whatever the answer.
+    Last,
+}
+
+/// Part of the way on which nothing is missing any more, from what is missing at both ends.
+fn part_of_the_way(here_n: [f64; 2], there_n: [f64; 2]) -> f64 {
+    let part =
+        |here_n: f64, there_n: f64| if here_n > 0.0 { here_n / (here_n - there_n).max(here_n) } else { 0.0 };
+    part(here_n[0], there_n[0]).max(part(here_n[1], there_n[1]))
 }
 
 impl Seat {
@@ -174,10 +213,10 @@ impl Seat {
         let (noise_rad, started_rad) = (spring.noise_rad(), self.at.tilt_rad);
         // The last place of the base in this tick at which it stood, and what was felt there.
         let mut last: Option<Stood> = None;
-        let mut slid: Option<(f64, f64)> = None;
+        let mut slid: Option<Slide> = None;
+        let mut slid_from: Option<(Standing, f64)> = None;
         let mut tip_nm = None;
-        // Where it lost the ground, and the energy it may have at most where it stands up.
-        let mut lost: Option<(Standing, f64)> = None;
+        let mut lost: Option<Lost> = None;
         let (mut failures, mut has_rolled) = (0, false);
         for _ in 0..MOST_EVALUATIONS {
             let base = self.base();
@@ -212,19 +251,33 @@ impl Seat {
                     spring.go_back();
                     continue;
                 }
-            } else if let Some((at, most_j)) = lost {
-                if !has_settled || stored_j > most_j {
-                    self.at = at;
-                    spring.go_back();
-                    return self.fall(spring, pose, demand);
-                }
-                if response.force_n.z <= 0.0 {
+            } else if let Some(Lost { at, stored_j: most_j, missing_n, trial }) = &mut lost {
+                let may_stand = has_settled && stored_j <= *most_j && response.force_n.z > 0.0;
+                match trial {
+                    Trial::Hanging if !has_settled || stored_j > *most_j => {
+                        self.at = *at;
+                        spring.go_back();
+                        return self.fall(spring, pose, demand);
+                    }
                     // It merely touches the ground.
-                    return without_load(demand);
+                    Trial::Hanging if !may_stand => return without_load(demand),
+                    Trial::Hanging => {
+                        let there_n = self.missing_n(&base, pose, &response, height_m);
+                        self.at = at.toward(&hanging, part_of_the_way(*missing_n, there_n));
+                        *trial = Trial::OnTheWay;
+                        continue;
+                    }
+                    Trial::OnTheWay if !may_stand => {
+                        self.at = hanging;
+                        *trial = Trial::Last;
+                        continue;
+                    }
+                    Trial::OnTheWay | Trial::Last => {}
                 }
             } else if response.force_n.z <= 0.0 {
-                // Nothing holds it there any more: it stands as it would have hung, where that costs nothing.
-                lost = Some((self.at, stored_j));
+                // Nothing holds it there any more: it gives way towards where it would have hung.
+                let missing_n = self.missing_n(&base, pose, &response, height_m);
+                lost = Some(Lost { at: self.at, stored_j, missing_n, trial: Trial::Hanging });
                 spring.mark();
                 spring.unload();
                 self.stand(hanging);
@@ -253,14 +306,17 @@ impl Seat {
             let friction_n = self.grip.holds_n(response.force_n.z, height_m);
             let excess_n = pull_n.length() - friction_n;
             let tolerance_n = friction::TOLERANCE * friction_n;
-            if let (Some((distance_m, before_n)), Some(stood)) = (slid.take(), &last) {
-                self.grip.observe((before_n - excess_n) / distance_m);
+            if let (Some(Slide { excess_n: before_n, along }), Some(stood)) = (slid.take(), &last) {
+                if let Some((way, distance_m)) = along {
+                    self.grip.observe(before_n - excess_n, distance_m, way);
+                }
                 if excess_n < -tolerance_n {
                     // Friction holds it short of here: by the straight line between the two.
                     let part = before_n / (before_n - excess_n);
                     self.at = stood.at.toward(&self.at, part);
                     spring.go_back();
-                    slid = Some((distance_m * part, before_n));
+                    let along = along.map(|(way, distance_m)| (way, distance_m * part));
+                    slid = Some(Slide { excess_n: before_n, along });
                     continue;
                 }
             }
@@ -271,7 +327,18 @@ impl Seat {
             last = Some(Stood { at, response, stored_j, slope: (!slides).then_some(slope) });
             spring.mark();
             if slides {
-                slid = Some((self.slide(pull_n, excess_n), excess_n));
+                let from = slid_from.take();
+                if step.length() < SETTLED_RAD {
+                    slid_from = Some((at, excess_n));
+                }
+                slid = Some(match (from, slid_from) {
+                    // As it rolls on it is pulled again, in the same ratio each time: the rest of the series at once.
+                    (Some((from, before_n)), Some(_)) if excess_n < MOST_RATIO * before_n => {
+                        self.at = from.toward(&at, before_n / (before_n - excess_n));
+                        Slide { excess_n, along: None }
+                    }
+                    _ => self.slide(pull_n, excess_n),
+                });
                 continue;
             }
             if step.length() <= noise_rad.max(TOLERANCE_RAD) {
@@ -314,18 +381,24 @@ impl Seat {
         only(response, demand)
     }
 
+    /// What a base lacks to stand: a force onto the ground, and friction (N). Nothing where negative.
+    fn missing_n(&self, base: &Base, pose: &Pose, response: &Response, height_m: f64) -> [f64; 2] {
+        let pressed_n = response.force_n.z;
+        [-pressed_n, base.pull_n(pose, response).length() - self.grip.holds_n(pressed_n, height_m)]
+    }
+
     /// The base as it is now.
     fn base(&self) -> Base {
         Base::new(&self.at, &self.lengths)
     }
 
-    /// Slides and turns the base the way it is pulled; returns how far (m).
-    fn slide(&mut self, pull_n: DVec3, excess_n: f64) -> f64 {
-        let distance_m = self.grip.slide_m(excess_n);
-        let way_m = pull_n * (distance_m / pull_n.length());
-        self.at.slide_m += way_m.truncate();
-        self.at.turn_rad += way_m.z / self.lengths.rim_radius_m;
-        distance_m
+    /// Slides and turns the base the way it is pulled.
+    fn slide(&mut self, pull_n: DVec3, excess_n: f64) -> Slide {
+        let way = pull_n / pull_n.length();
+        let distance_m = self.grip.slide_m(excess_n, way);
+        self.at.slide_m += way.truncate() * distance_m;
+        self.at.turn_rad += way.z * distance_m / self.lengths.rim_radius_m;
+        Slide { excess_n, along: Some((way, distance_m)) }
     }
 
     /// The sections of the spring where its base is now: `draw` gives those of the held spring at a pose. Not

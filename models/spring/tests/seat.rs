@@ -305,7 +305,7 @@ fn a_tilted_plate_lifts_off_without_a_jump() {
         let (depth, tilts) = if preset == Preset::Slender {
             (0.03, &[0.035, 0.1][..])
         } else {
-            (0.08, &[0.035, 0.1, 0.2][..])
+            (0.08, &[0.035, 0.1, 0.2, 0.35][..])
         };
         let mut most = 0.0f64;
         for friction in [0.3, 1.0, 10.0] {

@@ -1,5 +1,7 @@
 //! Friction between the base and the ground, and how far a base slides.
 
+use flotor_hal::glam::DVec3;
+
 use super::base::Lengths;
 use crate::rigidity::Spring;
 
@@ -8,8 +10,7 @@ use crate::rigidity::Spring;
 const BY_HEIGHT: f64 = 0.8;
 /// Share of the friction by which the force along the ground may exceed it: no coefficient is known as well.
 pub(super) const TOLERANCE: f64 = 1e-6;
-/// A sliding base is moved by what the stiffness along the ground makes of the excess; as observed, but within this
-/// factor of that at rest.
+/// A sliding base is moved by what the stiffness makes of the excess; as observed, but within this factor of that at rest.
 const STIFFNESS_RANGE: f64 = 8.0;
 /// Longest slide between evaluations, in free lengths.
 const LONGEST_SLIDE: f64 = 0.05;
@@ -34,9 +35,11 @@ pub(super) struct Grip {
     by_height: f64,
     axial_n_per_m: f64,
     longest_m: f64,
-    /// Stiffness along the ground at rest, and as observed (N/m).
+    /// Stiffness along the ground, and about the base's normal over the square of the radius, at rest (N/m).
     lateral_n_per_m: f64,
-    sliding_n_per_m: f64,
+    turning_n_per_m: f64,
+    /// Stiffness as observed, of that at rest.
+    observed: f64,
 }
 
 impl Grip {
@@ -52,13 +55,14 @@ impl Grip {
             axial_n_per_m: spring.axial_stiffness_n_per_m(),
             longest_m: LONGEST_SLIDE * free_length_m,
             lateral_n_per_m: spring.lateral_stiffness_n_per_m(),
-            sliding_n_per_m: spring.lateral_stiffness_n_per_m(),
+            turning_n_per_m: spring.rigidities().tau_n_m2 / (free_length_m * rim_radius_m * rim_radius_m),
+            observed: 1.0,
         }
     }
 
     /// Forgets what was observed.
     pub(super) fn restart(&mut self) {
-        self.sliding_n_per_m = self.lateral_n_per_m;
+        self.observed = 1.0;
     }
 
     /// What it holds (N), of a force onto the ground and a hanging rim so high above it.
@@ -67,15 +71,21 @@ impl Grip {
         self.by_force * pressed_n + self.by_height * straight_n
     }
 
-    /// How far a base slides that is pulled by so much more (m).
-    pub(super) fn slide_m(&self, excess_n: f64) -> f64 {
-        (excess_n / self.sliding_n_per_m).min(self.longest_m)
+    /// How far a base slides that is pulled that way by so much more (m).
+    pub(super) fn slide_m(&self, excess_n: f64, way: DVec3) -> f64 {
+        (excess_n / (self.observed * self.at_rest_n_per_m(way))).min(self.longest_m)
     }
 
-    pub(super) fn observe(&mut self, stiffness_n_per_m: f64) {
-        let (least, most) = (self.lateral_n_per_m / STIFFNESS_RANGE, self.lateral_n_per_m * STIFFNESS_RANGE);
-        if stiffness_n_per_m.is_finite() {
-            self.sliding_n_per_m = stiffness_n_per_m.clamp(least, most);
+    /// Learns from a slide that way, of a length, that relieved the base by so much.
+    pub(super) fn observe(&mut self, relieved_n: f64, distance_m: f64, way: DVec3) {
+        let observed = relieved_n / (distance_m * self.at_rest_n_per_m(way));
+        if observed.is_finite() {
+            self.observed = observed.clamp(1.0 / STIFFNESS_RANGE, STIFFNESS_RANGE);
         }
+    }
+
+    /// Stiffness that a base at rest meets on a way: along the ground, and as it turns.
+    fn at_rest_n_per_m(&self, way: DVec3) -> f64 {
+        self.lateral_n_per_m * way.truncate().length_squared() + self.turning_n_per_m * way.z * way.z
     }
 }
