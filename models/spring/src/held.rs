@@ -18,6 +18,11 @@ pub trait HeldSpring {
         0.0
     }
 
+    /// What the last answer cost, in evaluations of an energy. Real-time: bounded, no allocation.
+    fn cost(&self) -> u32 {
+        1
+    }
+
     /// Marks the last answer as one that [`Self::go_back`] returns to. Real-time: bounded, no allocation.
     fn mark(&mut self) {}
 
@@ -42,6 +47,10 @@ impl HeldSpring for Rod {
 
     fn noise_rad(&self) -> f64 {
         Rod::noise_rad(self)
+    }
+
+    fn cost(&self) -> u32 {
+        self.work().cost()
     }
 
     fn mark(&mut self) {
@@ -93,6 +102,10 @@ impl<L: HeldSpring> HeldSpring for Held<L> {
 
     fn noise_rad(&self) -> f64 {
         self.law.noise_rad()
+    }
+
+    fn cost(&self) -> u32 {
+        self.law.cost()
     }
 
     fn mark(&mut self) {

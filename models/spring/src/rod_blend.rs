@@ -174,6 +174,10 @@ impl HeldSpring for RodBlend {
         if self.share > 0.0 { self.rod.noise_rad() } else { 0.0 }
     }
 
+    fn cost(&self) -> u32 {
+        if self.share > 0.0 { 1 + self.rod.work().cost() } else { 1 }
+    }
+
     fn mark(&mut self) {
         self.rod.mark();
         self.marked = (self.share, self.follows);

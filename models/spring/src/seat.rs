@@ -54,6 +54,8 @@ mod base;
 mod friction;
 mod tilt;
 
+/// What the evaluations of a tick may cost, in evaluations of an energy, before the last begins.
+const MOST_COST: u32 = 50;
 /// Evaluations of the law per tick at most.
 const MOST_EVALUATIONS: u32 = 24;
 /// Change of the tilt that counts as none (rad), of a law that leaves nothing open.
@@ -64,6 +66,8 @@ const ENERGY_TOLERANCE: f64 = 1e-13;
 const SHORTER: f64 = 0.25;
 /// Largest change of the tilt between evaluations (rad).
 const LONGEST_STEP_RAD: f64 = 0.05;
+/// Least that is left of it where shorter and shorter steps were tried in vain.
+const LEAST_STRIDE_RAD: f64 = 1e-5;
 /// Longest way of the tilt in a tick that ends in no equilibrium (rad).
 const LONGEST_WAY_RAD: f64 = 0.1;
 /// Largest tilt (rad) of a base that stands: slender springs roll as far as 0.78 and stay there, and beyond 1.1 no law knows
@@ -89,6 +93,8 @@ pub struct Seat {
     lifted: bool,
     /// Share of its wrench that is left as it falls over: 1 while it stands, 0 where it lies.
     hold: f64,
+    /// Longest change of the tilt between evaluations (rad): shorter in the ticks after one that tried in vain.
+    stride_rad: f64,
 }
 
 /// Where a base stood in a tick, what was felt there, and the slope of the energy without its tip.
@@ -142,6 +148,7 @@ impl Seat {
             grip: Grip::new(spring, friction),
             lifted: false,
             hold: 1.0,
+            stride_rad: LONGEST_STEP_RAD,
         }
     }
 
@@ -217,10 +224,16 @@ impl Seat {
         let mut slid_from: Option<(Standing, f64)> = None;
         let mut tip_nm = None;
         let mut lost: Option<Lost> = None;
-        let (mut failures, mut has_rolled) = (0, false);
+        let (mut failures, mut has_rolled, mut cost) = (0, false, 0);
         for _ in 0..MOST_EVALUATIONS {
+            if cost > MOST_COST && last.is_some() {
+                let shorter = (0..failures).fold(self.stride_rad, |stride_rad, _| stride_rad * SHORTER);
+                self.stride_rad = shorter.max(LEAST_STRIDE_RAD);
+                break;
+            }
             let base = self.base();
             let response = base.respond(spring, pose, Demand::WrenchAndEnergy);
+            cost += spring.cost();
             let has_settled = matches!(response.validity, Validity::Ok | Validity::Clamped);
             if !has_settled && last.is_none() && lost.is_none() {
                 // It snaps between its plates: the base waits for it.
@@ -261,7 +274,7 @@ impl Seat {
                     }
                     // It merely touches the ground.
                     Trial::Hanging if !may_stand => return without_load(demand),
-                    Trial::Hanging => {
+                    Trial::Hanging if cost <= MOST_COST => {
                         let there_n = self.missing_n(&base, pose, &response, height_m);
                         self.at = at.toward(&hanging, part_of_the_way(*missing_n, there_n));
                         *trial = Trial::OnTheWay;
@@ -272,7 +285,7 @@ impl Seat {
                         *trial = Trial::Last;
                         continue;
                     }
-                    Trial::OnTheWay | Trial::Last => {}
+                    Trial::Hanging | Trial::OnTheWay | Trial::Last => {}
                 }
             } else if response.force_n.z <= 0.0 {
                 // Nothing holds it there any more: it gives way towards where it would have hung.
@@ -295,12 +308,11 @@ impl Seat {
                 self.quadratic.observe(self.at.tilt_rad - at.tilt_rad, slope - *before, noise_rad);
             }
             let goal = self.quadratic.least(self.at.tilt_rad, slope, tip_nm, LARGEST_TILT_RAD);
-            let mut step = (goal - self.at.tilt_rad).clamp_length_max(LONGEST_STEP_RAD);
+            let mut step = (goal - self.at.tilt_rad).clamp_length_max(self.stride_rad);
             let whole_slope = slope + tip_nm * base.direction;
             if base.angle_rad > 0.0 && step.dot(whole_slope) > 0.0 {
                 // Where the curvature is no cup the model's best is not downhill.
-                step =
-                    (whole_slope / -self.quadratic.stiffness_nm_per_rad).clamp_length_max(LONGEST_STEP_RAD);
+                step = (whole_slope / -self.quadratic.stiffness_nm_per_rad).clamp_length_max(self.stride_rad);
             }
             let pull_n = base.pull_n(pose, &response);
             let friction_n = self.grip.holds_n(response.force_n.z, height_m);
@@ -349,6 +361,9 @@ impl Seat {
             }
             if (self.at.tilt_rad + step).distance(started_rad) > LONGEST_WAY_RAD {
                 break;
+            }
+            if failures == 0 {
+                self.stride_rad = (2.0 * self.stride_rad).min(LONGEST_STEP_RAD);
             }
             failures = 0;
             self.at.tilt_rad += step;

@@ -140,6 +140,12 @@ pub struct Work {
 }
 
 impl Work {
+    /// In evaluations of the energy: a matrix costs as much as nine, a factoring as three.
+    #[must_use]
+    pub(crate) fn cost(&self) -> u32 {
+        self.evaluations + 9 * self.matrices + 3 * self.factorings
+    }
+
     /// Both together.
     fn and(self, other: &Self) -> Self {
         Self {
