@@ -91,6 +91,27 @@ impl ActiveRegion {
 }
 
 /// A force model that acts in a bounded region only: a scene may hold thousands of them.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Foam { depth_m: f64, look: Shape }
+/// # impl ForceModel for Foam {
+/// #     const INFO: ModelInfo = ModelInfo::new("foam", "Foam", "A soft ball");
+/// #     fn create(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Self { depth_m: 0.0, look: Shape::default() })
+/// #     }
+/// #     fn step(&mut self, _: &Input) -> Output { Wrench::ZERO.into() }
+/// # }
+/// /// A ball of foam, 10 mm in radius, 12 mm below home: `export_model!(Foam, active_region)`.
+/// impl ActiveRegionModel for Foam {
+///     fn active_region(&self) -> ActiveRegion {
+///         ActiveRegion::sphere([0.0, 0.0, -0.012], 0.01)
+///     }
+/// }
+/// # let foam = Foam { depth_m: 0.0, look: Shape::default() };
+/// assert!(foam.active_region().contains(DVec3::Z * -0.005));
+/// assert!(!foam.active_region().contains(DVec3::ZERO));
+/// ```
 pub trait ActiveRegionModel: ForceModel {
     /// Where it may act, with the parameters now in force. Real-time: bounded, no allocation (asked again after
     /// each live parameter).

@@ -143,6 +143,38 @@ impl VerticalCalibration {
 }
 
 /// A device whose vertical force can be corrected.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Crank { samples: u64, ledger: EnergyLedger }
+/// # impl Device for Crank {
+/// #     const INFO: DeviceInfo = DeviceInfo::new("crank", "Crank", "A handle that turns");
+/// #     type Active = Crank;
+/// #     type Stop = NothingToStop;
+/// #     fn open(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Crank { samples: 0, ledger: EnergyLedger::default() })
+/// #     }
+/// #     fn capabilities(&self) -> Capabilities { Capabilities::UNDRIVEN }
+/// #     fn stopper(&self) -> NothingToStop { NothingToStop }
+/// #     fn activate(self, _: &LoopConfig) -> Result<Crank, (Self, Refusal)> { Ok(self) }
+/// # }
+/// # impl ActiveDevice for Crank {
+/// #     type Opened = Crank;
+/// #     fn read(&mut self, _: &Tick, _: &mut DeviceState) -> Cycle { Cycle::Fresh }
+/// #     fn write(&mut self, _: &Tick, _: &Wrench) -> Cycle { Cycle::Fresh }
+/// #     fn deactivate(self) -> Crank { self }
+/// # }
+/// /// `export_device!(Crank, calibration)`
+/// impl CalibrationDevice for Crank {
+///     fn serial(&self) -> String {
+///         "0042".to_owned()
+///     }
+///
+///     fn calibrate_vertical(&mut self, _: &VerticalCalibration) -> Result<(), Refusal> {
+///         Err(Refusal::unsupported("a crank has no vertical force to correct"))
+///     }
+/// }
+/// ```
 pub trait CalibrationDevice: Device {
     /// Serial number of the piece of hardware; empty if it has none. Not real-time.
     fn serial(&self) -> String;

@@ -45,6 +45,38 @@ impl CenterlineInfo {
 }
 
 /// A force model with a shape. Not real-time.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Foam { depth_m: f64, look: Shape }
+/// # impl ForceModel for Foam {
+/// #     const INFO: ModelInfo = ModelInfo::new("foam", "Foam", "A soft ball");
+/// #     fn create(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Self { depth_m: 0.0, look: Shape::default() })
+/// #     }
+/// #     fn step(&mut self, _: &Input) -> Output { Wrench::ZERO.into() }
+/// # }
+/// /// A tube from home to the handle: `export_model!(Foam, centerline)`.
+/// impl CenterlineModel for Foam {
+///     fn centerline_info(&self) -> CenterlineInfo {
+///         let mut info = CenterlineInfo::default();
+///         info.tube_radius_m = 0.002;
+///         info
+///     }
+///
+///     fn centerline(&mut self, input: &Input, points: &mut [Pose]) -> usize {
+///         let last = points.len().saturating_sub(1).max(1) as f64;
+///         for (number, point) in points.iter_mut().enumerate() {
+///             *point = Pose::new(input.pose.position() * (number as f64 / last), DQuat::IDENTITY);
+///         }
+///         points.len()
+///     }
+/// }
+/// # let mut foam = Foam { depth_m: 0.0, look: Shape::default() };
+/// let (handle, mut points) = (Pose::new(DVec3::Z * -0.004, DQuat::IDENTITY), [Pose::HOME; 5]);
+/// assert_eq!(foam.centerline(&Input::at_rest(handle), &mut points), 5);
+/// assert_eq!(points[2].position(), DVec3::Z * -0.002); // halfway
+/// ```
 pub trait CenterlineModel: ForceModel {
     /// How to draw the body with the parameters now in force.
     fn centerline_info(&self) -> CenterlineInfo;

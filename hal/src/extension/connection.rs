@@ -76,6 +76,34 @@ impl UsbKind {
 }
 
 /// A device that says how it is connected.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Crank { samples: u64, ledger: EnergyLedger }
+/// # impl Device for Crank {
+/// #     const INFO: DeviceInfo = DeviceInfo::new("crank", "Crank", "A handle that turns");
+/// #     type Active = Crank;
+/// #     type Stop = NothingToStop;
+/// #     fn open(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Crank { samples: 0, ledger: EnergyLedger::default() })
+/// #     }
+/// #     fn capabilities(&self) -> Capabilities { Capabilities::UNDRIVEN }
+/// #     fn stopper(&self) -> NothingToStop { NothingToStop }
+/// #     fn activate(self, _: &LoopConfig) -> Result<Crank, (Self, Refusal)> { Ok(self) }
+/// # }
+/// # impl ActiveDevice for Crank {
+/// #     type Opened = Crank;
+/// #     fn read(&mut self, _: &Tick, _: &mut DeviceState) -> Cycle { Cycle::Fresh }
+/// #     fn write(&mut self, _: &Tick, _: &Wrench) -> Cycle { Cycle::Fresh }
+/// #     fn deactivate(self) -> Crank { self }
+/// # }
+/// /// On a serial port of the kernel, behind a USB bridge: `export_device!(Crank, connection)`. `flotor doctor --device crank`
+/// /// looks for it before it opens the device.
+/// impl ConnectionDevice for Crank {
+///     const USB: &'static [UsbKind] = &[UsbKind::new(0x1209, 0x0001, UsbAccess::Serial)];
+/// }
+/// assert_eq!(Crank::USB[0].product(), Some(1));
+/// ```
 pub trait ConnectionDevice: Device {
     /// What it is on USB: any of these.
     const USB: &'static [UsbKind];

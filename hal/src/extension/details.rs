@@ -68,6 +68,32 @@ impl Detail {
 }
 
 /// A force model that has numbers about its answers.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Foam { depth_m: f64, look: Shape }
+/// # impl ForceModel for Foam {
+/// #     const INFO: ModelInfo = ModelInfo::new("foam", "Foam", "A soft ball");
+/// #     fn create(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Self { depth_m: 0.0, look: Shape::default() })
+/// #     }
+/// #     fn step(&mut self, _: &Input) -> Output { Wrench::ZERO.into() }
+/// # }
+/// use flotor_hal::extension::details::Detail;
+///
+/// /// A column of `flotor eval --details`: `export_model!(Foam, details)`.
+/// impl DetailsModel for Foam {
+///     const DETAILS: &'static [Detail] = &[Detail::number("depth", "m", "Depth of the handle in the foam")];
+///
+///     fn details(&self, values: &mut [f64]) {
+///         values.iter_mut().for_each(|value| *value = self.depth_m);
+///     }
+/// }
+/// # let foam = Foam { depth_m: 0.003, look: Shape::default() };
+/// let mut values = [f64::NAN];
+/// foam.details(&mut values);
+/// assert_eq!(values, [0.003]);
+/// ```
 pub trait DetailsModel: ForceModel {
     /// What there is to know, in order.
     const DETAILS: &'static [Detail];

@@ -42,6 +42,36 @@ impl EnergyLedger {
 }
 
 /// An active device with a known plant.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Crank { samples: u64, ledger: EnergyLedger }
+/// # impl Device for Crank {
+/// #     const INFO: DeviceInfo = DeviceInfo::new("crank", "Crank", "A handle that turns");
+/// #     type Active = Crank;
+/// #     type Stop = NothingToStop;
+/// #     fn open(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Crank { samples: 0, ledger: EnergyLedger::default() })
+/// #     }
+/// #     fn capabilities(&self) -> Capabilities { Capabilities::UNDRIVEN }
+/// #     fn stopper(&self) -> NothingToStop { NothingToStop }
+/// #     fn activate(self, _: &LoopConfig) -> Result<Crank, (Self, Refusal)> { Ok(self) }
+/// # }
+/// # impl ActiveDevice for Crank {
+/// #     type Opened = Crank;
+/// #     fn read(&mut self, _: &Tick, _: &mut DeviceState) -> Cycle { Cycle::Fresh }
+/// #     fn write(&mut self, _: &Tick, _: &Wrench) -> Cycle { Cycle::Fresh }
+/// #     fn deactivate(self) -> Crank { self }
+/// # }
+/// /// For a simulated plant, which knows its energy: `export_device!(Crank, energy_ledger)`.
+/// impl EnergyLedgerDevice for Crank {
+///     fn energy_ledger(&self) -> EnergyLedger {
+///         self.ledger
+///     }
+/// }
+/// # let crank = Crank { samples: 0, ledger: EnergyLedger::default() };
+/// assert_eq!(crank.energy_ledger().residual_j(), 0.0);
+/// ```
 pub trait EnergyLedgerDevice: ActiveDevice {
     /// The energy balance since activation. Real-time: bounded, no allocation.
     fn energy_ledger(&self) -> EnergyLedger;

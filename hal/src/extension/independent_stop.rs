@@ -68,6 +68,34 @@ impl IndependentStop {
 }
 
 /// A device that is stopped even if nothing of the host is left.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Crank { samples: u64, ledger: EnergyLedger }
+/// # impl Device for Crank {
+/// #     const INFO: DeviceInfo = DeviceInfo::new("crank", "Crank", "A handle that turns");
+/// #     type Active = Crank;
+/// #     type Stop = NothingToStop;
+/// #     fn open(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Crank { samples: 0, ledger: EnergyLedger::default() })
+/// #     }
+/// #     fn capabilities(&self) -> Capabilities { Capabilities::UNDRIVEN }
+/// #     fn stopper(&self) -> NothingToStop { NothingToStop }
+/// #     fn activate(self, _: &LoopConfig) -> Result<Crank, (Self, Refusal)> { Ok(self) }
+/// # }
+/// # impl ActiveDevice for Crank {
+/// #     type Opened = Crank;
+/// #     fn read(&mut self, _: &Tick, _: &mut DeviceState) -> Cycle { Cycle::Fresh }
+/// #     fn write(&mut self, _: &Tick, _: &Wrench) -> Cycle { Cycle::Fresh }
+/// #     fn deactivate(self) -> Crank { self }
+/// # }
+/// /// The board removes the force 20 ms after the last command: `export_device!(Crank, independent_stop)`.
+/// impl IndependentStopDevice for Crank {
+///     fn independent_stop(&self) -> IndependentStop {
+///         IndependentStop::by_itself(StoppedState::Zero, 20_000_000)
+///     }
+/// }
+/// ```
 pub trait IndependentStopDevice: Device {
     /// How. Asked once, after opening; it holds until the device is closed. Not real-time.
     fn independent_stop(&self) -> IndependentStop;

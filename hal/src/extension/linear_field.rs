@@ -101,6 +101,39 @@ fn shortened(displacement: DVec3, longest: f64) -> (DVec3, bool) {
 }
 
 /// A force model that can say how its wrench changes around a pose.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Foam { depth_m: f64, look: Shape }
+/// # impl ForceModel for Foam {
+/// #     const INFO: ModelInfo = ModelInfo::new("foam", "Foam", "A soft ball");
+/// #     fn create(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Self { depth_m: 0.0, look: Shape::default() })
+/// #     }
+/// #     fn step(&mut self, _: &Input) -> Output { Wrench::ZERO.into() }
+/// # }
+/// /// A stiffness of 200 N/m along z about the pose of the question: `export_model!(Foam, linear_field)`.
+/// impl LinearFieldModel for Foam {
+///     fn linear_field(&mut self, input: &Input) -> LinearField {
+///         let mut stiffness = [[0.0; 6]; 6];
+///         stiffness[2][2] = 200.0; // N/m
+///         let force_n = DVec3::Z * -200.0 * input.pose.position().z;
+///         LinearField {
+///             anchor: input.pose,
+///             wrench: Wrench::from_force(force_n),
+///             stiffness,
+///             valid_m: 0.002,
+///             valid_rad: 0.1,
+///             time_ns: input.time_ns,
+///         }
+///     }
+/// }
+/// # let mut foam = Foam { depth_m: 0.0, look: Shape::default() };
+/// let field = foam.linear_field(&Input::at_rest(Pose::new(DVec3::Z * -0.005, DQuat::IDENTITY)));
+/// // A millimetre deeper, a host that has no newer field takes this one.
+/// let (wrench, _) = field.at(&Pose::new(DVec3::Z * -0.006, DQuat::IDENTITY));
+/// assert!((wrench.force().z - 1.2).abs() < 1e-12);
+/// ```
 pub trait LinearFieldModel: ForceModel {
     /// The field at an input, the time since the call before (`input.dt_ns`) having passed. A run uses either this or
     /// [`ForceModel::step`] of an instance, never both. Not real-time, but bounded: a call takes less than the period

@@ -34,6 +34,44 @@ impl SampleWait {
 }
 
 /// An active device that can set the pace of the loop.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Crank { samples: u64, ledger: EnergyLedger }
+/// # impl Device for Crank {
+/// #     const INFO: DeviceInfo = DeviceInfo::new("crank", "Crank", "A handle that turns");
+/// #     type Active = Crank;
+/// #     type Stop = NothingToStop;
+/// #     fn open(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Crank { samples: 0, ledger: EnergyLedger::default() })
+/// #     }
+/// #     fn capabilities(&self) -> Capabilities { Capabilities::UNDRIVEN }
+/// #     fn stopper(&self) -> NothingToStop { NothingToStop }
+/// #     fn activate(self, _: &LoopConfig) -> Result<Crank, (Self, Refusal)> { Ok(self) }
+/// # }
+/// # impl ActiveDevice for Crank {
+/// #     type Opened = Crank;
+/// #     fn read(&mut self, _: &Tick, _: &mut DeviceState) -> Cycle { Cycle::Fresh }
+/// #     fn write(&mut self, _: &Tick, _: &Wrench) -> Cycle { Cycle::Fresh }
+/// #     fn deactivate(self) -> Crank { self }
+/// # }
+/// /// Samples arrive in a thread of their own, which counts them: `export_device!(Crank, pacing)`.
+/// impl PacingDevice for Crank {
+///     fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
+///         match std::mem::take(&mut self.samples) {
+///             // A real device waits here until a sample comes.
+///             0 => {
+///                 std::thread::sleep(std::time::Duration::from_nanos(timeout_ns));
+///                 SampleWait::TimedOut
+///             }
+///             samples => SampleWait::Arrived { samples },
+///         }
+///     }
+/// }
+/// # let mut crank = Crank { samples: 2, ledger: EnergyLedger::default() };
+/// assert_eq!(crank.wait_for_sample(0), SampleWait::Arrived { samples: 2 });
+/// assert_eq!(crank.wait_for_sample(0), SampleWait::TimedOut);
+/// ```
 pub trait PacingDevice: ActiveDevice {
     /// Blocks until there is a sample that no earlier wait has told of, or until `timeout_ns` have passed. Asked before
     /// each `read` of a run that the device paces. Real-time but for the waiting: no allocation.

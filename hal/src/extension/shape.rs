@@ -211,6 +211,31 @@ pub struct Shape {
 }
 
 /// A force model with a shape of any form. Not real-time.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Foam { depth_m: f64, look: Shape }
+/// # impl ForceModel for Foam {
+/// #     const INFO: ModelInfo = ModelInfo::new("foam", "Foam", "A soft ball");
+/// #     fn create(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Self { depth_m: 0.0, look: Shape::default() })
+/// #     }
+/// #     fn step(&mut self, _: &Input) -> Output { Wrench::ZERO.into() }
+/// # }
+/// /// A ball, and the tool in the hand: `export_model!(Foam, shape)`.
+/// impl ShapeModel for Foam {
+///     fn shape(&mut self, input: &Input) -> &Shape {
+///         let ball = Pose::new(DVec3::Z * -0.012, DQuat::IDENTITY);
+///         self.look.primitives.clear();
+///         self.look.primitives.push(Primitive::sphere(Part::Body, ball, 0.01));
+///         self.look.primitives.push(Primitive::sphere(Part::Tool, input.pose, 0.001));
+///         &self.look
+///     }
+/// }
+/// # let mut foam = Foam { depth_m: 0.0, look: Shape::default() };
+/// let shape = foam.shape(&Input::at_rest(Pose::HOME));
+/// assert_eq!(shape.primitives[1].pose(), Pose::HOME);
+/// ```
 pub trait ShapeModel: ForceModel {
     /// The shape with the handle at an input, with the parameters now in force. The model keeps it until the next call, so that a
     /// picture allocates nothing. A model with a history shows where it comes to rest if the handle stays there.

@@ -42,6 +42,26 @@ impl VariantInfo {
 }
 
 /// A force model whose settings decide what it serves and whether it remembers.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Foam { depth_m: f64, look: Shape }
+/// # impl ForceModel for Foam {
+/// #     const INFO: ModelInfo = ModelInfo::new("foam", "Foam", "A soft ball");
+/// #     fn create(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Self { depth_m: 0.0, look: Shape::default() })
+/// #     }
+/// #     fn step(&mut self, _: &Input) -> Output { Wrench::ZERO.into() }
+/// # }
+/// /// [`ForceModel::INFO`] holds for all settings; this instance remembers nothing: `export_model!(Foam, variant)`.
+/// impl VariantModel for Foam {
+///     fn variant_info(&self) -> VariantInfo {
+///         VariantInfo::new(Self::INFO.serves(), Memory::Stateless)
+///     }
+/// }
+/// # let foam = Foam { depth_m: 0.0, look: Shape::default() };
+/// assert_eq!(foam.variant_info().memory(), Memory::Stateless);
+/// ```
 pub trait VariantModel: ForceModel {
     /// About this instance, with the settings it was created with. Not real-time.
     fn variant_info(&self) -> VariantInfo;

@@ -54,6 +54,26 @@ impl WorkspaceBounds {
 }
 
 /// A force model with an end.
+///
+/// ```
+/// # use flotor_hal::*;
+/// # struct Foam { depth_m: f64, look: Shape }
+/// # impl ForceModel for Foam {
+/// #     const INFO: ModelInfo = ModelInfo::new("foam", "Foam", "A soft ball");
+/// #     fn create(_: &Settings<'_>) -> Result<Self, Refusal> {
+/// #         Ok(Self { depth_m: 0.0, look: Shape::default() })
+/// #     }
+/// #     fn step(&mut self, _: &Input) -> Output { Wrench::ZERO.into() }
+/// # }
+/// /// A cube of 40 mm about home, at whose sides a host renders a wall: `export_model!(Foam, workspace_bounds)`.
+/// impl WorkspaceBoundsModel for Foam {
+///     fn workspace_bounds(&self) -> WorkspaceBounds {
+///         WorkspaceBounds::between([-0.02; 3], [0.02; 3])
+///     }
+/// }
+/// # let foam = Foam { depth_m: 0.0, look: Shape::default() };
+/// assert_eq!(foam.workspace_bounds().beyond(DVec3::X * 0.025), DVec3::X * (0.025 - 0.02));
+/// ```
 pub trait WorkspaceBoundsModel: ForceModel {
     /// Where it ends, with the parameters now in force. Real-time: bounded, no allocation (asked again after each live
     /// parameter).
