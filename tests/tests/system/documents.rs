@@ -32,6 +32,65 @@ fn prose(markdown: &str) -> String {
     markdown.lines().filter(outside).flat_map(|line| [line, "\n"]).collect()
 }
 
+// ---------------------------------------------------------------- commands
+
+/// Files and folders that a command of the book writes: the value of such an option, or a new plugin.
+fn written_by(command: &str) -> Vec<&str> {
+    const OUTPUTS: [&str; 10] = [
+        "--out",
+        "--curve-scene",
+        "--json",
+        "--junit",
+        "--plots",
+        "--plot",
+        "--record",
+        "--csv",
+        "--html",
+        "--screenshot",
+    ];
+    let words: Vec<&str> = command.split_whitespace().take_while(|word| !word.starts_with('#')).collect();
+    let of_option = words.windows(2).filter(|pair| OUTPUTS.contains(&pair[0])).map(|pair| pair[1]);
+    let new = words.windows(3).filter(|three| three[0] == "new").map(|three| three[2]);
+    of_option.chain(new).filter(|name| !name.starts_with(['-', '/'])).collect()
+}
+
+#[test]
+fn what_the_commands_of_the_book_write_is_nothing_to_commit() {
+    let ignored = read(".gitignore");
+    let is_ignored = |name: &str| {
+        let ending = Path::new(name).extension().map(|ending| ending.display().to_string());
+        let patterns = [format!("/{name}"), format!("/{name}/")].into_iter();
+        let of_ending = ending.into_iter().flat_map(|ending| [format!("*.{ending}"), format!("/*.{ending}")]);
+        patterns.chain(of_ending).any(|pattern| ignored.lines().any(|line| line == pattern))
+    };
+    let mut seen = 0;
+    for chapter in chapters() {
+        let text = read(&chapter);
+        for command in text.lines().filter_map(|line| line.strip_prefix("$ flotor ")) {
+            for name in written_by(command) {
+                assert!(is_ignored(name), "{}: {command}: {name} is not in .gitignore", chapter.display());
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen >= 30, "only {seen} files and folders found");
+}
+
+/// A study refuses a folder that holds a complete one: a reader of two chapters would meet that.
+#[test]
+fn no_two_chapters_put_a_study_into_one_folder() {
+    let mut owners = std::collections::BTreeMap::new();
+    for chapter in chapters() {
+        let text = read(&chapter);
+        let studies = text.lines().filter_map(|line| line.strip_prefix("$ flotor study "));
+        for name in studies.flat_map(written_by).filter(|name| Path::new(name).extension().is_none()) {
+            let owner = owners.entry(name.to_owned()).or_insert_with(|| chapter.clone());
+            assert_eq!(*owner, chapter, "both write the study {name}");
+        }
+    }
+    assert!(owners.len() >= 8, "{owners:?}");
+}
+
 // ---------------------------------------------------------------- paths
 
 /// What stands in backticks and looks like a path: with a slash or the ending of a file, made of characters of
