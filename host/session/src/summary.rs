@@ -150,6 +150,9 @@ pub struct RunSummary {
     pub warnings: Vec<String>,
     /// The plugins and every parameter in force.
     pub plugins: Vec<PluginSummary>,
+    /// The models in force at the end in place of those of the scene, after a hot swap; not those that the seed chose.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub replacements: Vec<PluginSummary>,
 }
 
 /// Parts of a tick.
@@ -385,6 +388,7 @@ impl RunSummary {
                 .map(|(number, plugin)| plugin_summary(number, plugin, outcome))
                 .chain(outcome.misbehaved.iter().map(misbehaved_summary))
                 .collect(),
+            replacements: outcome.replacements.iter().map(|plugin| replacement(plugin, outcome)).collect(),
         }
     }
 
@@ -471,6 +475,9 @@ impl RunSummary {
             for (name, value) in &plugin.estimates {
                 row("", format!("{name} {value:.1e}, by the model's own estimate"));
             }
+        }
+        for PluginSummary { name, id, version, file, .. } in &self.replacements {
+            row("model", format!("{id} {version} ({file}), in place of `{name}` at the end"));
         }
         for warning in &self.warnings {
             row("warning", warning.clone());
@@ -574,6 +581,18 @@ fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> Pl
 /// A plugin that was put in while the run was on.
 fn misbehaved_summary(Misbehaved { plugin, health, words }: &Misbehaved) -> PluginSummary {
     summary_of(plugin, health_words(health, words))
+}
+
+/// A plugin that a hot swap put there, in force at the end.
+fn replacement(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
+    let same = |known: &&Misbehaved| {
+        known.plugin.name == plugin.name && known.plugin.metadata.path == plugin.metadata.path
+    };
+    outcome
+        .misbehaved
+        .iter()
+        .find(same)
+        .map_or_else(|| summary_of(plugin, "ok".to_owned()), misbehaved_summary)
 }
 
 fn summary_of(plugin: &PluginReport, health: String) -> PluginSummary {

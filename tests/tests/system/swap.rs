@@ -119,6 +119,34 @@ fn a_recording_with_replacements_replays_bit_for_bit() {
 }
 
 #[test]
+fn the_summary_names_the_model_in_force_at_the_end_but_not_one_that_the_seed_chose() {
+    let scratch = Scratch::default();
+    let told = |by: &str| {
+        let text = format!("duration_s = 0.5\n{SPRING}[[change]]\nat_s = 0.2\nswap = \"spring\"\n{by}\n");
+        let scene = scratch.file("scene.toml", text).display().to_string();
+        let [text, json] = [&[][..], &["--json"]].map(|more| {
+            let ran = Flotor::with([&["run", &scene, "--clock", "virtual"], more].concat()).run();
+            assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+            ran.stdout
+        });
+        (text, serde_json::from_str::<Value>(&json).expect("the summary is JSON"))
+    };
+    let (text, json) = told("plugin = \"wall\"");
+    let line = text.lines().find(|line| line.ends_with("in place of `spring` at the end")).expect(&text);
+    assert!(line.starts_with("  model      wall "), "{line}");
+    assert_eq!(
+        (&json["plugins"][1]["id"], &json["replacements"][0]["id"]),
+        (&"spring".into(), &"wall".into())
+    );
+
+    let (text, json) = told(
+        "either = [{ plugin = \"wall\" }, { plugin = \"wall\", parameters = { damping_ns_per_m = 1 } }]",
+    );
+    assert!(!text.contains("in place of"), "{text}");
+    assert_eq!(json.get("replacements"), None);
+}
+
+#[test]
 fn the_seed_chooses_one_of_several_and_a_pair_of_seeds_gets_each() {
     let alternatives =
         ["parameters = { gamma_n = 5 }", "plugin = \"wall\", parameters = { stiffness_n_per_m = 300 }"];

@@ -152,6 +152,8 @@ pub(super) struct Settled {
     pub(super) first: Vec<(ModelHealth, String)>,
     /// Of those that came later the ones that did not behave.
     pub(super) misbehaved: Vec<Misbehaved>,
+    /// Of those that came later the ones in place at the end.
+    pub(super) replacements: Vec<PluginReport>,
     /// The first that was not freed in time.
     pub(super) hung: Option<Unresponsive>,
 }
@@ -344,7 +346,7 @@ impl Controls {
         let made = made.inspect_err(|_| supervised.release(&numbers))?;
         for (number, (layer, report)) in numbers.into_iter().zip(made) {
             supervised.warnings.extend(report.warning());
-            let generation = parts.put_in(number, report);
+            let generation = parts.put_in(number, report, ChosenBy::Name);
             let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
             let replacement = Replacement { model, generation, layer: Box::new(layer) };
             // There is room: at most one of each model is on its way.
@@ -401,7 +403,8 @@ impl Controls {
                 _ => later.push(misbehaved.clone()),
             }
         }
-        Settled { first, misbehaved: later, hung: supervised.hung.take() }
+        let replacements = parts.replacements();
+        Settled { first, misbehaved: later, replacements, hung: supervised.hung.take() }
     }
 }
 
@@ -421,10 +424,20 @@ pub(super) struct Versions {
     in_place: u16,
 }
 
+/// Who chose a replacement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ChosenBy {
+    /// The scene, or a person.
+    Name,
+    /// The seed, among several: nobody is told which.
+    Seed,
+}
+
 /// A plugin that took the place of another.
 struct Version {
     generation: u16,
     report: PluginReport,
+    chosen_by: ChosenBy,
     /// The loop has handed it back.
     is_back: bool,
 }
@@ -437,10 +450,10 @@ impl Versions {
 
     /// One more, and its generation. After the last number comes that of the first replacement again: whose it was is
     /// long forgotten then. 0 stays with the plugin of the scene.
-    fn put_in(&mut self, report: PluginReport) -> u16 {
+    fn put_in(&mut self, report: PluginReport, chosen_by: ChosenBy) -> u16 {
         self.newest = self.newest.checked_add(1).unwrap_or(1);
         self.current = self.newest;
-        self.later.push_back(Version { generation: self.newest, report, is_back: false });
+        self.later.push_back(Version { generation: self.newest, report, chosen_by, is_back: false });
         self.newest
     }
 
@@ -508,10 +521,10 @@ impl Parts {
     }
 
     /// The hot swap of a model: changes are checked against it from now on. Its generation.
-    pub(super) fn put_in(&self, model: usize, report: PluginReport) -> u16 {
+    pub(super) fn put_in(&self, model: usize, report: PluginReport, chosen_by: ChosenBy) -> u16 {
         let mut list = self.lock();
         let devices = devices(&list);
-        list.get_mut(devices + model).map_or(0, |versions| versions.put_in(report))
+        list.get_mut(devices + model).map_or(0, |versions| versions.put_in(report, chosen_by))
     }
 
     /// Which plugin of a place changes are checked against.
@@ -526,6 +539,16 @@ impl Parts {
     fn plugin(&self, model: usize, generation: u16) -> Option<PluginReport> {
         let list = self.lock();
         list.get(devices(&list) + model).map(|versions| versions.get(generation).clone())
+    }
+
+    /// The plugins in place of the first ones, but for those that the seed chose.
+    fn replacements(&self) -> Vec<PluginReport> {
+        let in_place = |versions: &Versions| {
+            let mut later = versions.later.iter();
+            let version = later.find(|version| version.generation == versions.in_place)?;
+            (version.chosen_by == ChosenBy::Name).then(|| version.report.clone())
+        };
+        self.lock().iter().filter_map(in_place).collect()
     }
 
     /// The loop has handed back the one of this number: it may be forgotten.

@@ -36,7 +36,7 @@ impl Epilogue {
         // No tick will take them any more.
         let waiting = swaps.into_layers().into_iter();
         let (layers, reports) = last_words(model_names, (forces, controls.take_retired()), &mut unresponsive);
-        let Settled { first: health, misbehaved, hung } = controls.settle(reports);
+        let Settled { first: health, misbehaved, replacements, hung } = controls.settle(reports);
         unresponsive = unresponsive.or(hung);
         let models = model_names.iter().cloned().zip(health);
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
@@ -64,6 +64,7 @@ impl Epilogue {
             couplings,
             models,
             misbehaved,
+            replacements,
             unresponsive,
             remains,
         }

@@ -246,6 +246,8 @@ pub struct Outcome {
     pub models: Vec<(String, ModelHealth, String)>,
     /// Of the plugins that took the place of a model later, those that did not behave.
     pub misbehaved: Vec<Misbehaved>,
+    /// The plugins in place of models after a hot swap, at the end; not those that the seed chose among several.
+    pub replacements: Vec<PluginReport>,
     /// What people should know, a sentence each: first what was known before the run.
     pub warnings: Vec<String>,
     /// How many of them were told then, or at once.
@@ -276,6 +278,7 @@ impl Outcome {
             couplings: Vec::new(),
             models: Vec::new(),
             misbehaved: Vec::new(),
+            replacements: Vec::new(),
             warnings: Vec::new(),
             known_before: 0,
             unresponsive: None,

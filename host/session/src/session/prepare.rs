@@ -1,7 +1,7 @@
 //! From a scene to what a loop is made of: plugins loaded, their settings checked, everything paired.
 
 use super::choice::chosen;
-use super::controls::{ControlError, NewValue, Parts, understands};
+use super::controls::{ChosenBy, ControlError, NewValue, Parts, understands};
 use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::calls::{Call, Progress, attended_while, is_to_begin, keeping_machine, limit};
@@ -577,7 +577,8 @@ pub(super) fn schedule(
                     if let Some(others) = passed_over.get_mut(number) {
                         *others = made.into_iter().map(|(_, report)| report).collect();
                     }
-                    let generation = parts.put_in(number, report);
+                    let chosen_by = if by.len() > 1 { ChosenBy::Seed } else { ChosenBy::Name };
+                    let generation = parts.put_in(number, report, chosen_by);
                     let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
                     let replacement = Replacement { model, generation, layer: Box::new(layer) };
                     scheduled.replacements.push((time_ns, replacement));
