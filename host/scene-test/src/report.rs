@@ -86,6 +86,9 @@ fn escaped(text: &str) -> String {
 
 /// Removes the results of an earlier call: one that is killed must leave none.
 pub(crate) fn remove(path: &Path) -> Result<(), CommandError> {
+    if is_special(path) {
+        return Ok(());
+    }
     match std::fs::remove_file(path) {
         Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {
             Err(CommandError::file(path, "cannot remove the earlier result", cause))
@@ -94,8 +97,17 @@ pub(crate) fn remove(path: &Path) -> Result<(), CommandError> {
     }
 }
 
+/// A pipe or a device, such as /dev/null: it is written to, and never replaced.
+fn is_special(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|known| !known.is_file() && !known.is_dir())
+}
+
 /// Writes a file that appears whole.
 pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), CommandError> {
+    if is_special(path) {
+        return std::fs::write(path, text)
+            .map_err(|cause| CommandError::file(path, "cannot write the result", cause));
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let written = tempfile::NamedTempFile::new_in(folder).and_then(|mut file| {
         file.write_all(text.as_bytes())?;

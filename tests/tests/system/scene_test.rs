@@ -376,6 +376,19 @@ fn a_killed_test_leaves_no_report_not_even_an_old_one() {
 }
 
 #[test]
+fn a_pipe_for_a_report_is_written_to_and_not_replaced() {
+    let scratch = faulty("[expect]\nlate_ticks = 0\n");
+    let script = "mkfifo pipe && { cat pipe > read & } && \"$@\" && wait && test -p pipe";
+    let ran = Flotor::with(["test", "--junit", "pipe"])
+        .inside(scratch.path())
+        .through_shell(script)
+        .inside(scratch.path());
+    let ran = ran.run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    assert_eq!(junit(&scratch.path().join("read")), (1, 0));
+}
+
+#[test]
 fn blessing_changes_the_numbers_and_writes_digests_only_where_asked() {
     let scratch = faulty("[expect]\npeak_force_n = { value = 100.0, within = 0.001 } # of the hand\n");
     let text = || std::fs::read_to_string(scratch.path().join("faulty.test.toml")).expect("it is there");
