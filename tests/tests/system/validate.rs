@@ -208,6 +208,13 @@ fn no_shipped_plugin_is_accused() {
 }
 
 #[test]
+fn a_file_that_is_not_there_is_told_as_such() {
+    let ran = Flotor::with(["validate", "none.so"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    assert!(ran.error().contains("`none.so` does not exist; `flotor plugins` lists"), "{ran:#?}");
+}
+
+#[test]
 fn a_model_that_gives_its_energy_back_with_interest_is_found_in_rust_too() {
     let library = plugin_file("fixture-faulty-model");
     let arguments = ["validate".as_ref(), library.as_os_str()];

@@ -57,8 +57,9 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
         return Ok(());
     }
     if !arguments.plugin.is_file() {
+        let what = if arguments.plugin.exists() { "is not a file" } else { "does not exist" };
         return Err(CommandError::Usage(format!(
-            "`{}` is not a plugin file; `flotor plugins` lists the file of each id",
+            "`{}` {what}; `flotor plugins` lists the file of each id",
             arguments.plugin.display()
         )));
     }
