@@ -5,10 +5,13 @@ use clap::{Args, Command, Parser, ValueEnum};
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_servo::Core;
 use flotor_session::Strength;
+use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
 pub use flotor_session::scene::{KeyValue, PluginKeyValue};
+use std::ffi::OsStr;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// The arguments of this process. A negative number is the value of its option, whose parser says what is legal: without
@@ -49,6 +52,61 @@ impl StrengthOption {
     #[must_use]
     pub fn strength(self) -> Strength {
         if self.allow_strong { Strength::Strong } else { Strength::UnderCeiling }
+    }
+}
+
+/// `--plugin-path`, of each command that searches for plugins.
+#[derive(Args, Clone, Debug, Default)]
+pub struct PluginPathOption {
+    /// Folder to search for plugins before all others (repeatable)
+    #[arg(long = "plugin-path", value_parser = folder, value_name = "FOLDER")]
+    folders: Vec<PathBuf>,
+}
+
+impl PluginPathOption {
+    /// The folders that were given, in their order.
+    #[must_use]
+    pub fn folders(&self) -> &[PathBuf] {
+        &self.folders
+    }
+
+    /// The plugins of these folders, and of those that are always searched. Not real-time.
+    #[must_use]
+    pub fn registry(&self) -> Registry {
+        Registry::search(&self.folders)
+    }
+
+    /// Puts the folders before those that the scene names.
+    pub fn put_before_those_of(&self, scene: &mut Scene) {
+        scene.plugin_folders.splice(0..0, self.folders.iter().cloned());
+    }
+
+    /// The option with its values, for another process of Flotor.
+    pub fn arguments(&self) -> impl Iterator<Item = &OsStr> {
+        self.folders.iter().flat_map(|folder| [OsStr::new("--plugin-path"), folder.as_os_str()])
+    }
+}
+
+/// `--json`, of each command with a result for programs. Without a file, or with `-`, the JSON is all that appears on standard
+/// output.
+#[derive(Args, Clone, Debug, Default)]
+pub struct JsonOption {
+    /// Write the result as JSON: to a file, or without one (or with -) to standard output
+    #[arg(long, value_name = "FILE.json", num_args = 0..=1, default_missing_value = "-", value_parser = json_output)]
+    json: Option<PathBuf>,
+}
+
+impl JsonOption {
+    /// Where the JSON goes, `-` being standard output; `None` if none is asked for.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        self.json.as_deref()
+    }
+
+    /// True if the JSON is all that appears on standard output.
+    #[must_use]
+    pub fn is_on_standard_output(&self) -> bool {
+        self.file().is_some_and(|file| file.as_os_str() == "-")
     }
 }
 
@@ -137,6 +195,35 @@ pub fn svg_file(text: &str) -> Result<PathBuf, String> {
 /// If it cannot be written, or its name ends like that of another kind of file.
 pub fn mcap_file(text: &str) -> Result<PathBuf, String> {
     file_of(text, "mcap")?.ok_or_else(|| "the recording is an MCAP file; name it FILE.mcap".to_owned())
+}
+
+/// A file for JSON. Its name ends in `.json`: an option whose file may be left out would else overwrite the argument after it.
+///
+/// # Errors
+/// If it cannot be written, or is named like another kind of file.
+pub fn json_file(text: &str) -> Result<PathBuf, String> {
+    let file = new_file(text)?;
+    let is_json = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
+    // A pipe or a device, such as /dev/stderr.
+    let is_special = || std::fs::metadata(&file).is_ok_and(|known| !known.is_file() && !known.is_dir());
+    if is_json || is_special() { Ok(file) } else { Err("the result is JSON; name it FILE.json".to_owned()) }
+}
+
+/// The value of `--json`.
+fn json_output(text: &str) -> Result<PathBuf, String> {
+    if text == "-" {
+        return Ok(text.into());
+    }
+    json_file(text).map_err(|problem| format!("{problem}, or write - for standard output"))
+}
+
+/// A folder that exists.
+///
+/// # Errors
+/// If it does not.
+pub fn folder(text: &str) -> Result<PathBuf, String> {
+    let folder = PathBuf::from(text);
+    if folder.is_dir() { Ok(folder) } else { Err("no such folder".to_owned()) }
 }
 
 /// A new file, if it has this extension or none.
@@ -231,6 +318,17 @@ mod tests {
         );
         assert!(svg_file("a.mcap").is_err());
         assert_eq!(mcap_file("r.txt"), Err("the recording is an MCAP file; name it FILE.mcap".to_owned()));
+    }
+
+    #[test]
+    fn the_argument_after_json_is_not_overwritten() {
+        assert_eq!(json_output("-"), Ok("-".into()));
+        assert_eq!(json_output("run.json"), Ok("run.json".into()));
+        assert_eq!(json_output("/dev/full"), Ok("/dev/full".into()));
+        for other in ["scene.toml", "spring", "libmy_model.so", "/tmp"] {
+            let told = "the result is JSON; name it FILE.json, or write - for standard output";
+            assert_eq!(json_output(other), Err(told.to_owned()), "{other}");
+        }
     }
 
     #[test]

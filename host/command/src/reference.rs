@@ -57,6 +57,13 @@ fn usage(argument: &Arg) -> String {
     let values = names.join(" ");
     match argument.get_long() {
         None => cell(&values),
+        Some(long)
+            if argument
+                .get_num_args()
+                .is_some_and(|values| values.min_values() == 0 && values.takes_values()) =>
+        {
+            cell(&format!("--{long} [{values}]"))
+        }
         Some(long) if argument.get_action().takes_values() => cell(&format!("--{long} {values}")),
         Some(long) => format!("--{long}"),
     }

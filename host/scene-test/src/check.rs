@@ -79,6 +79,7 @@ pub(crate) fn run_arguments(
     let mut arguments: Vec<String> =
         ["run", &scene, "--clock", "virtual", "--seed"].into_iter().map(str::to_owned).collect();
     arguments.push(seed.to_string());
+    arguments.extend(file.plugin_path.arguments().map(|word| word.to_string_lossy().into_owned()));
     for (key, value) in set {
         arguments.extend(["--set".to_owned(), format!("{key}={value}")]);
     }

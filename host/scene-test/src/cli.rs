@@ -8,7 +8,7 @@ use crate::numbers::misspelt;
 use crate::process::{Flotor, Ran};
 use crate::report::{Report, deliver, is_output, remove};
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use flotor_command::options::{count, duration_s, new_file};
+use flotor_command::options::{JsonOption, PluginPathOption, count, duration_s, new_file};
 use flotor_command::{CommandError, exit_code_of, options, print_error_line, report_line};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -61,9 +61,10 @@ struct TestArguments {
     /// Longest time of one run, evaluation, validation or stress test
     #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "5min")]
     timeout: f64,
-    /// Write the results as JSON (- for standard output)
-    #[arg(long, value_parser = result_file, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
     /// Write the results as JUnit XML
     #[arg(long, value_parser = new_file, value_name = "FILE")]
     junit: Option<PathBuf>,
@@ -76,10 +77,6 @@ struct TestArguments {
     /// With --bless: write the digest of every run too
     #[arg(long, requires = "bless")]
     digest: bool,
-}
-
-fn result_file(text: &str) -> Result<PathBuf, String> {
-    if text == "-" { Ok(text.into()) } else { new_file(text) }
 }
 
 /// The command with its arguments. Not real-time.
@@ -96,9 +93,11 @@ pub fn main() -> ExitCode {
 }
 
 fn run(arguments: &TestArguments) -> Result<(), CommandError> {
-    let results = [&arguments.json, &arguments.junit].into_iter().flatten();
-    results.filter(|path| !is_output(path)).try_for_each(|path| remove(path))?;
-    let files = all_or_errors(found(&arguments.paths)?.iter().map(|path| TestFile::read(path)))?;
+    let results = [arguments.json.file(), arguments.junit.as_deref()].into_iter().flatten();
+    results.filter(|path| !is_output(path)).try_for_each(remove)?;
+    let files = all_or_errors(
+        found(&arguments.paths)?.iter().map(|path| TestFile::read(path, &arguments.plugin_path)),
+    )?;
     let cases: Vec<Case<'_>> =
         files.iter().flat_map(Case::of).filter(|case| chosen(case, arguments)).collect();
     if cases.is_empty() && arguments.shard.is_none() {
@@ -125,7 +124,7 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
         bless(&files, &cases, &mut outcomes, blessed)?;
     }
     let report = Report::new(outcomes);
-    deliver(&report, arguments.json.as_deref(), arguments.junit.as_deref())?;
+    deliver(&report, arguments.json.file(), arguments.junit.as_deref())?;
     match report.failed {
         0 => Ok(()),
         failed => Err(CommandError::Failed(format!("{failed} of {} cases failed", report.cases.len()))),

@@ -4,7 +4,7 @@ use crate::bound::{Bound, number};
 use crate::curve::Points;
 use crate::numbers::did_you_mean;
 use flotor_command::CommandError;
-use flotor_command::options::duration_s;
+use flotor_command::options::{PluginPathOption, duration_s};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,6 +21,8 @@ pub(crate) struct TestFile {
     pub(crate) name: String,
     pub(crate) text: String,
     pub(crate) scene: PathBuf,
+    /// Folders to search for plugins before all others.
+    pub(crate) plugin_path: PluginPathOption,
     pub(crate) seeds: Vec<u64>,
     pub(crate) duration: Option<String>,
     /// `PLUGIN.PARAMETER` and the values it takes: the cases are their product.
@@ -161,11 +163,12 @@ impl TestFile {
     ///
     /// # Errors
     /// `FILE:LINE: what is wrong`.
-    pub(crate) fn read(path: &Path) -> Result<Self, CommandError> {
+    pub(crate) fn read(path: &Path, plugin_path: &PluginPathOption) -> Result<Self, CommandError> {
         let text = std::fs::read_to_string(path)
             .map_err(|cause| CommandError::Usage(format!("{}: cannot read: {cause}", path.display())))?;
-        Self::parse(path, &text)
-            .map_err(|(at, wrong)| CommandError::Usage(format!("{}: {wrong}", place(path, &text, at))))
+        let file = Self::parse(path, &text)
+            .map_err(|(at, wrong)| CommandError::Usage(format!("{}: {wrong}", place(path, &text, at))))?;
+        Ok(Self { plugin_path: plugin_path.clone(), ..file })
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, Wrong> {
@@ -234,6 +237,7 @@ impl TestFile {
             stress_of(stress.into_inner()).map_err(|wrong| (at, wrong))
         });
         let file = Self {
+            plugin_path: PluginPathOption::default(),
             path: path.to_owned(),
             name: path.display().to_string().trim_end_matches(SUFFIX).to_owned(),
             text: text.to_owned(),
@@ -387,8 +391,9 @@ mod tests {
         std::fs::write(folder.path().join("scene.toml"), "").unwrap();
         let path = folder.path().join("jelly.test.toml");
         std::fs::write(&path, format!("scene = \"scene.toml\"\n{rest}")).unwrap();
-        let error =
-            TestFile::read(&path).map(|_| "nothing".to_owned()).unwrap_or_else(|error| error.to_string());
+        let error = TestFile::read(&path, &PluginPathOption::default())
+            .map(|_| "nothing".to_owned())
+            .unwrap_or_else(|error| error.to_string());
         error.replace(&path.display().to_string(), "F")
     }
 

@@ -4,14 +4,14 @@ mod device;
 mod usb;
 
 use clap::Args;
-use flotor_command::options::KeyValue;
+use flotor_command::options::{JsonOption, KeyValue, PluginPathOption};
 use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
 use flotor_servo::{Privilege, RealTimeReport, probe_real_time};
 use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::fs::read_to_string;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Check this machine's real-time configuration, or why a device does not start, and suggest fixes.
 #[derive(Args)]
@@ -30,9 +30,10 @@ pub(crate) struct DoctorArguments {
     /// Folder that is looked at as the root of the machine's files
     #[arg(long, value_name = "DIR", default_value = "/", hide = true)]
     root: PathBuf,
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
 }
 
 /// How serious a finding is.
@@ -73,15 +74,19 @@ impl Diagnosis {
 }
 
 pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
+    let registry = arguments.plugin_path.registry();
     let (diagnoses, subject) = match &arguments.device {
         Some(id) => (
-            device::diagnose(id, &arguments.sets, &usb::Machine::at(&arguments.root))?,
+            device::diagnose(&registry, id, &arguments.sets, &usb::Machine::at(&arguments.root))?,
             "to start this device",
         ),
-        None => (machine(), "for real time"),
+        None => (machine(&registry), "for real time"),
     };
-    if arguments.json {
-        return write_json(Path::new("-"), &diagnoses);
+    if let Some(file) = arguments.json.file() {
+        write_json(file, &diagnoses)?;
+    }
+    if arguments.json.is_on_standard_output() {
+        return Ok(());
     }
     for diagnosis in &diagnoses {
         let grade = match diagnosis.grade {
@@ -107,10 +112,10 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
 }
 
 /// The real-time configuration.
-fn machine() -> Vec<Diagnosis> {
+fn machine(registry: &Registry) -> Vec<Diagnosis> {
     let mut diagnoses = vec![cores(), isolated_cores(), kernel(), throttling(), governor()];
     diagnoses.extend(privileges(&probe_real_time()));
-    diagnoses.push(plugins());
+    diagnoses.push(plugins(registry));
     diagnoses
 }
 
@@ -193,12 +198,15 @@ fn privileges(report: &RealTimeReport) -> [Diagnosis; 2] {
     [diagnose("SCHED_FIFO", &report.fifo, fifo), diagnose("memory lock", &report.memory_lock, lock)]
 }
 
-fn plugins() -> Diagnosis {
-    let registry = Registry::search(&[]);
+fn plugins(registry: &Registry) -> Diagnosis {
     let ids: Vec<&str> = registry.found().iter().map(|plugin| plugin.id.as_str()).collect();
     let broken = registry.broken().len();
     match (ids.is_empty(), broken) {
-        (true, _) => Diagnosis::bad("plugins", "none found", "build with `cargo build --release`"),
+        (true, _) => Diagnosis::bad(
+            "plugins",
+            "none found",
+            "build with `cargo build --release`; `flotor plugins` lists the folders that are searched",
+        ),
         (false, 0) => Diagnosis::good("plugins", ids.join(", ")),
         (false, _) => Diagnosis::note(
             "plugins",

@@ -5,11 +5,12 @@ mod program;
 mod service;
 
 use clap::{Args, ValueEnum};
-use flotor_command::options::{mcap_file, whole};
+use flotor_command::options::{PluginPathOption, json_file, mcap_file, whole};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note, say};
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::spawn_unblocked;
+use flotor_session::registry::PATH_VARIABLE;
 use program::Program;
 use rustix::process::{Pid, Signal, kill_process};
 use service::Service;
@@ -46,9 +47,11 @@ pub(crate) struct LendArguments {
     /// Record every tick to an MCAP file
     #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
-    /// Write the summary as JSON
-    #[arg(long, value_name = "FILE")]
+    /// Write the summary as JSON; standard output is for the program
+    #[arg(long, value_parser = json_file, value_name = "FILE.json")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
     /// Scene file (TOML); without it, a simulated flotor held by a hand
     scene: Option<PathBuf>,
     /// The program and its arguments
@@ -350,6 +353,16 @@ fn told(
     }
     if let Some(json) = &arguments.json {
         command.env("FLOTOR_JSON", absolute(json)?);
+    }
+    if !arguments.plugin_path.folders().is_empty() {
+        let before = std::env::var_os(PATH_VARIABLE);
+        let before =
+            before.iter().flat_map(std::env::split_paths).filter(|folder| !folder.as_os_str().is_empty());
+        let folders = arguments.plugin_path.folders().iter().map(|folder| absolute(folder));
+        let folders = folders.chain(before.map(Ok)).collect::<Result<Vec<_>, CommandError>>()?;
+        let folders = std::env::join_paths(folders)
+            .map_err(|error| CommandError::Usage(format!("--plugin-path: {error}")))?;
+        command.env(PATH_VARIABLE, folders);
     }
     command.env("FLOTOR_PACE", if arguments.pace == PaceOption::Real { "real" } else { "lockstep" });
     command.env("FLOTOR_SEED", arguments.seed.to_string());

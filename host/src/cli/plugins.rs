@@ -1,7 +1,7 @@
 //! `flotor plugins`: the installed plugins, read from their files without running any of them.
 
 use clap::Args;
-use flotor_command::options::{KeyValue, settings};
+use flotor_command::options::{JsonOption, KeyValue, PluginPathOption, settings};
 use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
 use flotor_hal::abi::PluginKind;
@@ -10,7 +10,6 @@ use flotor_hal::{Input, Mutability, Output, Parameter, ParameterKind, Pose, Wren
 use flotor_session::estimates;
 use flotor_session::registry::{PATH_VARIABLE, Registry, SkippedFolder};
 use serde::Serialize;
-use std::path::Path;
 use std::time::Instant;
 
 /// List the installed plugins, without running any of them.
@@ -26,9 +25,10 @@ pub(crate) struct PluginsArguments {
     /// Setting with which the model's own error and its time are told (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "id", conflicts_with = "json")]
     sets: Vec<KeyValue>,
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
 }
 
 #[derive(Serialize)]
@@ -43,14 +43,14 @@ struct Listed<'a> {
 }
 
 pub(crate) fn run(arguments: &PluginsArguments) -> Result<(), CommandError> {
-    let registry = Registry::search(&[]);
+    let registry = arguments.plugin_path.registry();
     match &arguments.id {
-        Some(id) => describe(&registry, id, &arguments.sets, arguments.json),
-        None => list(&registry, arguments.json),
+        Some(id) => describe(&registry, id, &arguments.sets, &arguments.json),
+        None => list(&registry, &arguments.json),
     }
 }
 
-fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
+fn list(registry: &Registry, json: &JsonOption) -> Result<(), CommandError> {
     let listed: Vec<Listed<'_>> = registry
         .found()
         .iter()
@@ -64,8 +64,11 @@ fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
             file: plugin.path.display().to_string(),
         })
         .collect();
-    if json {
-        return write_json(Path::new("-"), &listed);
+    if let Some(file) = json.file() {
+        write_json(file, &listed)?;
+    }
+    if json.is_on_standard_output() {
+        return Ok(());
     }
     for kind in [PluginKind::Device, PluginKind::Model] {
         say!("{}", style::title(&format!("{}s", kind.word())));
@@ -93,7 +96,7 @@ fn list(registry: &Registry, json: bool) -> Result<(), CommandError> {
     if listed.is_empty() {
         let folders: Vec<String> =
             registry.folders().iter().map(|folder| folder.display().to_string()).collect();
-        say!("no plugins found in {}; add folders with {PATH_VARIABLE}", folders.join(", "));
+        say!("no plugins found in {}; add folders with --plugin-path or {PATH_VARIABLE}", folders.join(", "));
     }
     Ok(())
 }
@@ -111,11 +114,14 @@ struct Described<'a> {
     doc: &'a str,
 }
 
-fn describe(registry: &Registry, id: &str, sets: &[KeyValue], json: bool) -> Result<(), CommandError> {
+fn describe(registry: &Registry, id: &str, sets: &[KeyValue], json: &JsonOption) -> Result<(), CommandError> {
     let plugin = registry.load_any(id)?;
     let parameters: Vec<Described<'_>> = plugin.parameters().iter().map(described).collect();
-    if json {
-        return write_json(Path::new("-"), &parameters);
+    if let Some(file) = json.file() {
+        write_json(file, &parameters)?;
+    }
+    if json.is_on_standard_output() {
+        return Ok(());
     }
     print_description(&plugin, &parameters);
     if plugin.metadata().kind == PluginKind::Model {

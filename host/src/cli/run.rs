@@ -3,7 +3,8 @@
 use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_command::options::{
-    ClockOption, PluginKeyValue, StrengthOption, core, duration_s, mcap_file, rate_hz, svg_file, whole,
+    ClockOption, JsonOption, PluginKeyValue, PluginPathOption, StrengthOption, core, duration_s, mcap_file,
+    rate_hz, svg_file, whole,
 };
 use flotor_command::stopping::{Keys, stop_on_signals, stop_run_on_signals};
 use flotor_command::{
@@ -59,15 +60,16 @@ pub(crate) struct RunArguments {
     /// Plot the run
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Write the summary as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
     /// Set a parameter of a plugin of the scene (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
     /// The controller of the Maglev 200 as one more model of the first device, for programs of the ML API that connect there
     #[arg(long, hide = true, value_name = "HOST:PORT")]
     ml_api: Option<String>,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
     #[command(flatten)]
     strength: StrengthOption,
 }
@@ -80,7 +82,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // program was.
     let stop = if arguments.ml_api.is_some() { stop_on_signals() } else { stop_run_on_signals() };
     stop_waits_with(&stop);
-    if arguments.json.as_deref().is_some_and(|json| json.as_os_str() == "-") {
+    if arguments.json.is_on_standard_output() {
         keep_results_apart()?;
     }
     if arguments.ml_api.is_some() {
@@ -141,7 +143,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         Ok(outcome) => outcome,
         Err(error) => {
             let recorded = recording.finish(&[]).map_err(Into::into);
-            let told = match (&error, &arguments.json) {
+            let told = match (&error, arguments.json.file()) {
                 (RunError::Hung { who, stuck, .. }, Some(json)) => {
                     let elapsed_ns = tally.last_ns();
                     let facts = RunFacts {
@@ -187,7 +189,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         _ => Ok(()),
     };
     let text = || format!("{}\n{}", style::title(&summary.title), summary.to_text());
-    let printed = print_result(arguments.json.as_deref(), &summary, text);
+    let printed = print_result(arguments.json.file(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
     outcome.later_warnings().iter().for_each(note);
     if let (RunEnd::EmergencyStop(_), Some(latch)) = (outcome.end, latch) {
@@ -284,6 +286,7 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
         let added = Scene::parse(Path::new("--ml-api"), ML_API).map_err(RunError::Scene)?.models;
         scene.models.extend(added.iter().map(|model| model.replaced_by(None, &[("listen", listen)])));
     }
+    arguments.plugin_path.put_before_those_of(&mut scene);
     for set in &arguments.sets {
         set.apply(&mut scene).map_err(CommandError::Usage)?;
     }

@@ -2,6 +2,7 @@
 
 use super::bridge::{BRIDGE, Way, is_remote};
 use clap::Args;
+use flotor_command::options::PluginPathOption;
 use flotor_command::separate::{Running, SeparateProgram};
 use flotor_command::{CommandError, note};
 use flotor_record::{Ending, Recording};
@@ -48,6 +49,8 @@ pub(crate) struct ViewArguments {
     #[arg(long, value_name = "SECONDS", conflicts_with = "screenshot")]
     measure: Option<String>,
     #[command(flatten)]
+    plugin_path: PluginPathOption,
+    #[command(flatten)]
     way: Way,
 }
 
@@ -65,7 +68,9 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     if let Some(file) = file {
         // Opened here as well: an error in the file is reported before another program starts.
         let recording = Recording::open(file)?;
-        plugin_files(&recording).into_iter().for_each(|plugin| add("--plugin", plugin.into()));
+        plugin_files(&recording, &arguments.plugin_path.registry())
+            .into_iter()
+            .for_each(|plugin| add("--plugin", plugin.into()));
         if arguments.screenshot.is_some() {
             tell_damage(file, recording);
         }
@@ -123,8 +128,7 @@ fn tell_damage(file: &Path, mut recording: Recording) {
 }
 
 /// Files of the plugins of a recording that were found; the viewer reports the missing ones.
-fn plugin_files(recording: &Recording) -> Vec<PathBuf> {
-    let registry = Registry::search(&[]);
+fn plugin_files(recording: &Recording, registry: &Registry) -> Vec<PathBuf> {
     let plugins = recording.run().plugins.iter();
     let found = plugins.filter_map(|plugin| registry.found().iter().find(|known| known.id == plugin.id));
     found.map(|metadata| metadata.path.clone()).collect()

@@ -1,6 +1,7 @@
 //! `flotor-sweep`, what `flotor sweep` starts.
 
 use clap::Parser;
+use flotor_command::options::{JsonOption, PluginPathOption};
 use flotor_sweep::executor::execute;
 use flotor_sweep::plan::Plan;
 use flotor_sweep::store::Store;
@@ -36,9 +37,10 @@ struct Arguments {
     /// Answers to draw (default: the first four numbers)
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     draw: Vec<String>,
-    /// Write a summary as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
 }
 
 /// Exit codes of the `flotor` commands: 2 is usage or configuration, 1 anything else.
@@ -61,7 +63,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let usage = |error: &dyn std::fmt::Display| Failure::Usage(error.to_string());
     let other = |error: &dyn std::fmt::Display| Failure::Other(error.to_string());
     let plan = Plan::load(&arguments.plan).map_err(|error| usage(&error))?;
-    let sweep = Sweep::prepare(plan, &[]).map_err(|error| usage(&error))?;
+    let sweep = Sweep::prepare(plan, arguments.plugin_path.folders()).map_err(|error| usage(&error))?;
     let out = arguments.out.clone().unwrap_or_else(|| arguments.plan.with_extension(""));
     let store = Store::open(&out).map_err(|error| other(&error))?;
     let jobs =
@@ -88,7 +90,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         "wall_s": started.elapsed().as_secs_f64(),
         "results": results,
     });
-    match &arguments.json {
+    match arguments.json.file() {
         Some(path) if path.as_os_str() == "-" => println!("{summary:#}"),
         Some(path) => std::fs::write(path, format!("{summary:#}\n"))
             .map_err(|cause| Failure::Other(format!("{}: {cause}", path.display())))?,

@@ -135,8 +135,7 @@ impl Sweep {
                 scene.duration_s = duration_s.unwrap_or(scene.duration_s);
                 context.update(scene.text.as_bytes());
                 context.update(&scene.duration_s.to_bits().to_le_bytes());
-                let mut all_folders = scene.plugin_folders.clone();
-                all_folders.extend_from_slice(folders);
+                let all_folders = [folders, &scene.plugin_folders].concat();
                 for metadata in used_plugins(&scene, &Registry::search(&all_folders))? {
                     digest_file(&mut context, &metadata)?;
                 }

@@ -11,6 +11,7 @@ use flotor_hal::{Demand as Demanded, DeviceState, Input, Output, Tick};
 use flotor_lab::bench::{BenchDevice, WholeTick};
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::Observer;
+use flotor_session::registry::Registry;
 use flotor_simulated::machine::{Machine, MachineParameters};
 use flotor_simulated::plant::{State, Wrench};
 use flotor_simulated::simulation::{Setup, Simulation};
@@ -61,7 +62,7 @@ fn twice(first: u32, second: u32, mut work: impl FnMut()) {
 }
 
 fn whole_ticks(device: BenchDevice) {
-    let mut ticks = WholeTick::prepare(device, "spring").expect("the spring is built");
+    let mut ticks = WholeTick::prepare(device, Registry::search(&[]), "spring").expect("the spring is built");
     for count in [1024, 3072] {
         one_counted_part(&mut || ticks.run(count));
     }

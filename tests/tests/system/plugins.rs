@@ -28,6 +28,50 @@ fn every_plugin_is_listed_without_being_opened() {
     }
 }
 
+#[test]
+fn every_command_searches_the_folders_of_plugin_path_first() {
+    // Whoever finds this spring, and not the one of the installation, cannot load it.
+    let scratch = Scratch::default();
+    let library = plugin_file("flotor-spring");
+    let bytes = patched(std::fs::read(&library).expect("it is built"), b"\0libc.so.6\0", b"\0libX.so.6\0");
+    let _ = scratch.file("libother.so", &bytes);
+    let folder = scratch.path().display().to_string();
+    let out = scratch.path().join("data").display().to_string();
+    for command in [
+        &["run", "--clock", "virtual"][..],
+        &["plugins", "spring"],
+        &["eval", "--model", "spring", "--poses", "-"],
+        &["stress", "--model", "spring"],
+        &["bench"],
+        &["jitter"],
+        &["study", "jnd", "--out", &out],
+        &["study", "explore"],
+    ] {
+        let ran = Flotor::with([command, &["--plugin-path", &folder]].concat()).run();
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{command:?}: {ran:?}");
+        assert!(ran.error().contains(&folder), "{command:?}: {ran:?}");
+    }
+    let ran = Flotor::with(["plugins", "--plugin-path", "nosuch"]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.stderr.contains("no such folder"), "{ran:?}");
+}
+
+#[test]
+fn json_goes_to_standard_output_or_to_a_file_but_never_over_the_next_argument() {
+    let scratch = Scratch::default();
+    let at = |arguments: &[&str]| Flotor::with(arguments).inside(scratch.path()).run();
+    let all = at(&["plugins", "wall", "--json"]);
+    assert_eq!((all.code, at(&["plugins", "wall", "--json", "-"])), (Some(exit_code::OK), all.clone()));
+    let both = at(&["plugins", "wall", "--json", "wall.json"]);
+    assert!(both.stdout.starts_with("wall "), "{both:?}");
+    let written = std::fs::read_to_string(scratch.path().join("wall.json")).expect("it was written");
+    assert_eq!(written, all.stdout);
+    let scene = scratch.file("scene.toml", "[device]\nplugin = \"simulated\"\n");
+    let ran = at(&["run", "--json", "scene.toml"]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(std::fs::read_to_string(scene).expect("it is there").starts_with("[device]"));
+}
+
 /// A model that estimates its own error is believed aloud: before a run and after it.
 #[test]
 fn a_model_tells_its_estimate_of_its_own_error() {

@@ -26,18 +26,97 @@ fn committed(chapter: &str, text: &str) {
     );
 }
 
-#[test]
-fn commands() {
-    let head = "# Reference: commands\n\nEvery command with its arguments, as `--help` says it. \
-                [Command line](../command-line.md) tells what they are for.\n\n";
+fn all_commands() -> String {
     let mut separate = [
         flotor_lab::cli::command(),
         flotor_study::cli::command(),
         flotor_calibration::cli::command(),
         flotor_test::cli::command(),
     ];
-    let commands = flotor_command::reference(flotor::cli::command(), &mut separate);
+    flotor_command::reference(flotor::cli::command(), &mut separate)
+}
+
+#[test]
+fn commands() {
+    let head = "# Reference: commands\n\nEvery command with its arguments, as `--help` says it. \
+                [Command line](../command-line.md) tells what they are for.\n\n";
+    let commands = all_commands();
     committed("commands.md", &format!("{NOTE}{head}{commands}"));
+}
+
+/// Commands with an option, and what the reference says of it there.
+fn with_option<'a>(reference: &'a str, option: &str) -> Vec<(&'a str, &'a str)> {
+    let (mut command, mut found) = ("", Vec::new());
+    for line in reference.lines() {
+        command = line
+            .trim_start_matches('#')
+            .strip_prefix(" `flotor ")
+            .map_or(command, |name| name.trim_end_matches('`'));
+        if line.starts_with(&format!("| `{option}")) {
+            found.push((command, line));
+        }
+    }
+    found
+}
+
+#[test]
+fn an_option_of_many_commands_is_the_same_in_each() {
+    let reference = all_commands();
+    for (option, row, commands) in [
+        (
+            "--json",
+            "| `--json [FILE.json]` |  | Write the result as JSON: to a file, or without one (or with -) to standard output |",
+            &[
+                "run",
+                "replay",
+                "plugins",
+                "validate",
+                "test",
+                "jitter",
+                "stability",
+                "bench",
+                "stress",
+                "study spring",
+                "study bias",
+                "analyse",
+                "calibrate vertical",
+                "calibrate verify",
+                "doctor",
+            ][..],
+        ),
+        (
+            "--plugin-path",
+            "| `--plugin-path FOLDER` |  | Folder to search for plugins before all others (repeatable) |",
+            &[
+                "run",
+                "replay",
+                "view",
+                "eval",
+                "plugins",
+                "test",
+                "jitter",
+                "stability",
+                "bench",
+                "stress",
+                "study jnd",
+                "study magnitude",
+                "study force",
+                "study explore",
+                "calibrate vertical",
+                "calibrate verify",
+                "lend",
+                "doctor",
+            ],
+        ),
+    ] {
+        // The standard output of `lend` belongs to the program that it runs.
+        let found: Vec<_> = with_option(&reference, option)
+            .into_iter()
+            .filter(|found| *found.0 != *"lend" || option != "--json")
+            .collect();
+        assert_eq!(found.iter().map(|(command, _)| *command).collect::<Vec<_>>(), commands, "{option}");
+        found.iter().for_each(|(command, told)| assert_eq!(*told, row, "{command}"));
+    }
 }
 
 fn sections() -> Vec<SectionReference> {

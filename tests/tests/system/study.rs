@@ -222,7 +222,12 @@ fn a_subject_who_has_been_there_is_refused() {
     let scratch = Scratch::default();
     let out = scratch.path().join("data");
     let arguments: Vec<&str> = SMALL.into_iter().chain(["--subjects", "2", "--apparatus", "none"]).collect();
-    assert_eq!(study(&arguments, &out).run().code, Some(exit_code::OK));
+    let ran = study(&arguments, &out).run();
+    assert_eq!(ran.code, Some(exit_code::OK));
+    assert!(
+        ran.stderr.starts_with("note: simulating about "),
+        "off a terminal it says that it works: {ran:?}"
+    );
     let again = study(&arguments, &out).run();
     assert_eq!(again.code, Some(exit_code::CONFIGURATION));
     assert!(again.error().contains("already complete"), "{again:?}");

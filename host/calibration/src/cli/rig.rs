@@ -4,16 +4,14 @@ use super::refused;
 use crate::rig::{DeviceRig, SimulatedRig, Waiting};
 use crate::sensor::{ForceSensor, SERIAL_SENSOR};
 use clap::{ArgGroup, Args};
-use flotor_command::options::{KeyValue, duration_s, number, settings, whole};
+use flotor_command::options::{KeyValue, PluginPathOption, duration_s, number, settings, whole};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar};
 use flotor_hal::abi::PluginKind;
 use flotor_servo::StopSwitch;
-use flotor_session::registry::Registry;
 use flotor_session::{LatchGuard, LatchWatch};
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::time::Duration;
 
 /// The device that is calibrated in a simulated rig.
@@ -50,9 +48,8 @@ pub(super) struct RigArguments {
     /// Seed of the simulated sensor's noise
     #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N", conflicts_with = "device")]
     pub(super) seed: u64,
-    /// Folder to search for plugins (repeatable)
-    #[arg(long = "plugin-path", value_name = "FOLDER")]
-    folders: Vec<PathBuf>,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
 }
 
 /// Shows the next height of the sensor; breaks if the user stops the procedure.
@@ -65,7 +62,7 @@ impl RigArguments {
     }
 
     pub(super) fn simulated_rig(&self) -> Result<SimulatedRig, CommandError> {
-        let registry = Registry::search(&self.folders);
+        let registry = self.plugin_path.registry();
         Ok(SimulatedRig::new(registry.load(SIMULATED, PluginKind::Device)?, self.seed))
     }
 
@@ -73,7 +70,7 @@ impl RigArguments {
     pub(super) fn device_rig(&self, stops: u64) -> Result<(DeviceRig<Guide>, ProgressBar), CommandError> {
         // Before a plugin is loaded: a thread that is there already would still take Ctrl-C.
         let stop = stop_on_signals();
-        let registry = Registry::search(&self.folders);
+        let registry = self.plugin_path.registry();
         let plugin = registry.load(self.plugin(), PluginKind::Device)?;
         let sensor_plugin = registry.load(&self.sensor_plugin, PluginKind::Device)?;
         let settings = settings(&plugin, &self.sets)?;

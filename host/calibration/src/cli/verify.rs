@@ -5,6 +5,7 @@ use super::rig::RigArguments;
 use crate::procedure::{Plan, measure};
 use crate::verify::{ErrorCurve, PROBE_N};
 use clap::Args;
+use flotor_command::options::JsonOption;
 use flotor_command::{CommandError, print_result, progress_bar, style};
 use flotor_hal::VerticalCalibration;
 use flotor_session::calibration_file::{CalibrationFile, CalibrationFileError};
@@ -20,9 +21,8 @@ pub(super) struct VerifyArguments {
     file: PathBuf,
     #[command(flatten)]
     rig: RigArguments,
-    /// Write the result as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
 }
 
 /// The JSON output of `verify`.
@@ -42,7 +42,7 @@ pub(super) fn run(arguments: &VerifyArguments) -> Result<(), CommandError> {
     let report = VerifyReport { error_before_percent: before, error_after_percent: after };
     let title = style::title("error of the vertical force over all heights, peak to peak");
     let text = || format!("{title}\n  without {before:>8.3} %\n  with    {after:>8.3} %");
-    print_result(arguments.json.as_deref(), &report, text)
+    print_result(arguments.json.file(), &report, text)
 }
 
 fn usage(error: CalibrationFileError) -> CommandError {

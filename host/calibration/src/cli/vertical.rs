@@ -7,7 +7,7 @@ use crate::procedure::{Plan, Reading, measure};
 use crate::verify::{ErrorCurve, PROBE_N};
 use crate::{picture, thesis};
 use clap::Args;
-use flotor_command::options::{count, new_file, number, svg_file};
+use flotor_command::options::{JsonOption, count, new_file, number, svg_file};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
 use flotor_hal::VerticalCalibration;
 use flotor_session::calibration_file::{
@@ -51,9 +51,8 @@ pub(super) struct VerticalArguments {
     /// Plot readings, fit, residuals and the error before and after
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Write the result as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
 }
 
 /// The JSON output of `vertical`.
@@ -219,7 +218,7 @@ fn report_on(arguments: &VerticalArguments, measured: &Measured) -> Result<(), C
         readings: readings.len(),
         seed,
     };
-    print_result(arguments.json.as_deref(), &for_machines, || to_text(fit, &rows, readings.len()))?;
+    print_result(arguments.json.file(), &for_machines, || to_text(fit, &rows, readings.len()))?;
     let curves: Vec<_> = curves.iter().map(|(name, curve)| (*name, curve)).collect();
     write_text(arguments.plot.as_deref(), || picture::to_svg(readings, fit, report, &curves))?;
     if let Some(path) = &arguments.out {

@@ -98,6 +98,7 @@ impl Host {
             None => Scene::parse(Path::new("built-in scene of programs"), SCENE),
         };
         let mut scene = scene.map_err(|error| error.to_string())?;
+        scene.plugin_folders.splice(0..0, settings.plugin_folders.iter().cloned());
         scene.plugin_folders.extend(plugin_folders(&folder));
         scene.duration_s = NO_END_S;
         let connected = program::connect(&mut scene);

@@ -18,6 +18,8 @@ pub enum Pace {
 pub struct Settings {
     /// `FLOTOR_SCENE`: the scene; without it a simulated flotor with a hand.
     pub scene: Option<PathBuf>,
+    /// Folders to search for plugins before those of the scene.
+    pub plugin_folders: Vec<PathBuf>,
     /// `FLOTOR_RECORD`: the recording (MCAP).
     pub record: Option<PathBuf>,
     /// `FLOTOR_REPORT`: where the summary goes, for people; `-` is standard error. While the program runs there is one so far
@@ -92,6 +94,7 @@ impl Settings {
         };
         Ok(Self {
             scene: file("FLOTOR_SCENE"),
+            plugin_folders: Vec::new(),
             record: file("FLOTOR_RECORD"),
             report: file("FLOTOR_REPORT"),
             json: file("FLOTOR_JSON"),

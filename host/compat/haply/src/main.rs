@@ -26,7 +26,7 @@ mod state;
 mod view;
 
 use clap::{Parser, ValueEnum};
-use flotor_command::options::{arguments, mcap_file, whole};
+use flotor_command::options::{PluginPathOption, arguments, json_file, mcap_file, whole};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, exit_code_of, say};
 use flotor_compat::{Pace, Settings, prepare};
@@ -63,8 +63,10 @@ struct Arguments {
     #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
     /// Write the summary as JSON
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_parser = json_file, value_name = "FILE.json")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
     /// End with the process that started this one, however that ends
     #[arg(long, hide = true)]
     lent: bool,
@@ -95,6 +97,7 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     }
     let mut settings = Settings::from_environment().map_err(CommandError::Usage)?.of_own_process();
     settings.scene = arguments.scene.or(settings.scene);
+    settings.plugin_folders = arguments.plugin_path.folders().to_vec();
     settings.record = arguments.record.or(settings.record);
     settings.json = arguments.json.or(settings.json);
     settings.seed = arguments.seed.unwrap_or(settings.seed);

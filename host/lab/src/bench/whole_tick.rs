@@ -84,12 +84,12 @@ pub struct WholeTick {
 }
 
 impl WholeTick {
-    /// A model, by id or file, on a device. Not real-time.
+    /// A model of the registry, by id or file, on a device. Not real-time.
     ///
     /// # Errors
     /// [`RunError`] if the model is unknown, refused, or does not fit.
-    pub fn prepare(device: BenchDevice, model: &str) -> Result<Self, RunError> {
-        let registry = Registry::search(&[]).with_linked(&SCRIPTED_ENTRY)?;
+    pub fn prepare(device: BenchDevice, registry: Registry, model: &str) -> Result<Self, RunError> {
+        let registry = registry.with_linked(&SCRIPTED_ENTRY)?;
         let scene = Scene::parse(Path::new("bench"), &device.scene(model))?;
         let options = RunOptions { clock: Clock::Virtual, seed: 1 };
         let session = Session::prepare(&scene, &registry, &options)?;

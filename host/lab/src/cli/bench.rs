@@ -4,13 +4,12 @@ use super::ProgressLine;
 use crate::Size;
 use crate::bench::{BenchDevice, Case, Hand, Plan, Split, TickCost, WholeTick, measure, time_round_trips};
 use clap::Args;
-use flotor_command::options::{KeyValue, new_file, number, svg_file};
+use flotor_command::options::{JsonOption, KeyValue, PluginPathOption, new_file, number, svg_file};
 use flotor_command::tables::table;
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::Detail;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
-use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -62,9 +61,10 @@ pub(crate) struct BenchArguments {
     /// Plot error over time
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Write the measurements as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
 }
 
 /// Cases of the spring that ships with Flotor: every variant and setting of it.
@@ -137,7 +137,8 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
     };
     let row = |device: BenchDevice| {
         let batches = if device == BenchDevice::Isolated { batches / SLOWER } else { batches };
-        let cost = WholeTick::prepare(device, &arguments.model)?.time(batches);
+        let cost =
+            WholeTick::prepare(device, arguments.plugin_path.registry(), &arguments.model)?.time(batches);
         Ok(TickRow { device, cost })
     };
     let rows = BenchDevice::ALL.into_iter().map(row).collect::<Result<Vec<_>, CommandError>>()?;
@@ -159,11 +160,11 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
             .concat()
             .join("\n")
     };
-    print_result(arguments.json.as_deref(), &report, text)
+    print_result(arguments.json.file(), &report, text)
 }
 
 fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
-    let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
+    let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
     let is_spring = plugin.metadata().id == "spring" && arguments.cases.is_empty();
     let cases: Vec<&str> = match (arguments.cases.is_empty(), is_spring) {
         (false, _) => arguments.cases.iter().map(String::as_str).collect(),
@@ -211,7 +212,7 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     line.0.finish_and_clear();
 
     let title = || style::title(&format!("{} {}", report.model, report.version));
-    print_result(arguments.json.as_deref(), &report, || format!("{}\n{}", title(), report.to_text()))?;
+    print_result(arguments.json.file(), &report, || format!("{}\n{}", title(), report.to_text()))?;
     write_text(arguments.csv.as_deref(), || report.to_csv())?;
     write_text(arguments.plot.as_deref(), || report.to_svg())
 }

@@ -3,12 +3,12 @@
 use crate::evaluate::{Answer, Details, EvaluateError, Evaluation, Travel};
 use crate::poses::Poses;
 use clap::Args;
-use flotor_command::options::{KeyValue, new_file, settings};
+use flotor_command::options::{KeyValue, PluginPathOption, new_file, settings};
 use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, progress_bar, write_text};
 use flotor_hal::Detail;
 use flotor_hal::abi::PluginKind;
-use flotor_session::registry::{Registry, is_same_file};
+use flotor_session::registry::is_same_file;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -46,6 +46,8 @@ pub(crate) struct EvalArguments {
     /// Append the details of the model, one column per detail
     #[arg(long)]
     details: bool,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
 }
 
 pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
@@ -53,7 +55,7 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
         let out = arguments.out.display();
         return Err(CommandError::Usage(format!("--out {out}: holds the poses; choose another file")));
     }
-    let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
+    let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
     let settings = settings(&plugin, &arguments.sets)?;
     // A refused setting is told before a long file is read.
     let details = if arguments.details { plugin.create_model(&settings)?.details() } else { &[] };

@@ -2,12 +2,11 @@
 
 use crate::replay::{Compared, Coverage, Difference, DivergenceCause, Replay};
 use clap::Args;
-use flotor_command::options::{KeyValue, PluginKeyValue, svg_file};
+use flotor_command::options::{JsonOption, KeyValue, PluginKeyValue, PluginPathOption, svg_file};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
 use flotor_hal::{DVec3, Wrench};
 use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_record::Ending;
-use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -16,8 +15,9 @@ use std::time::Instant;
 #[derive(Args)]
 #[command(
     after_help = "Without a change the wrench must equal the recorded one bit for bit: the exit code is 1 if it does not. With --set \
-    or --model a difference is the expected result.\n\n\
-    Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.variant=closed-form --plot difference.svg\n  \
+    or --model a difference is the expected result. If the scene of the run named a plugin by its file, give the folder of \
+    that file with --plugin-path.\n\n\
+    Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.preset=thesis-3 --plot difference.svg\n  \
     flotor replay run.mcap --model spring=./libmy_spring.so --json -\n  \
     flotor replay run.mcap --plugin-path target/release"
 )]
@@ -31,12 +31,10 @@ pub(crate) struct ReplayArguments {
     /// of the other
     #[arg(long = "model", value_name = "NAME=PLUGIN")]
     models: Vec<KeyValue>,
-    /// Folder to search for plugins (repeatable); needed if the scene of the run named a plugin by its file
-    #[arg(long = "plugin-path", value_name = "FOLDER")]
-    folders: Vec<PathBuf>,
-    /// Write the difference as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
+    #[command(flatten)]
+    json: JsonOption,
     /// Plot recorded and replayed force
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -69,7 +67,7 @@ struct Report {
 }
 
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
-    let registry = Registry::search(&arguments.folders);
+    let registry = arguments.plugin_path.registry();
     let replay = Replay::open(&arguments.recording, &registry, &arguments.models, &arguments.sets)?;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let progress = progress_bar((replay.run().duration_s * 1.0e3) as u64, "{percent:>3} %  replaying");
@@ -99,7 +97,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
         recorded_s,
         wall_s: started.elapsed().as_secs_f64(),
     };
-    print_result(arguments.json.as_deref(), &report, || to_text(arguments, &report))?;
+    print_result(arguments.json.file(), &report, || to_text(arguments, &report))?;
     write_text(arguments.plot.as_deref(), || picture(&samples))?;
     if let Some((_, words)) = health.iter().find(|(health, _)| health.panicked_at.is_some()) {
         return Err(CommandError::PluginRefused(format!("a model of the recording failed: {words}")));

@@ -3,13 +3,12 @@
 use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
 use crate::stability::{Case, Grip, LoopError, Row, default_cases, measure};
 use clap::Args;
-use flotor_command::options::{count, number, rate_hz, svg_file};
+use flotor_command::options::{JsonOption, PluginPathOption, count, number, rate_hz, svg_file};
 use flotor_command::tables::{table, to_csv};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_json, write_text};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Plugin;
 use flotor_plot::{Axis, Figure, Panel, Series};
-use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -43,9 +42,10 @@ pub(crate) struct StabilityArguments {
     /// Grip of the hand on the handle
     #[arg(long, value_enum, default_value_t)]
     hand: Grip,
-    /// Write the rows as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
     /// Write the rows as CSV (- for standard output)
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -68,7 +68,7 @@ struct Report<'a> {
 
 pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
     let cases = cases(arguments);
-    let plugin = Registry::search(&[]).load(DEVICE, PluginKind::Device)?;
+    let plugin = arguments.plugin_path.registry().load(DEVICE, PluginKind::Device)?;
     let progress = progress_bar(cases.len() as u64, "{percent:>3} %  case {pos} of {len}");
     let rows = measure(&plugin, &cases, || progress.inc(1)).map_err(refused)?;
     progress.finish_and_clear();
@@ -79,8 +79,8 @@ pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
     // A table for machines on standard output is all that is there.
     let csv = arguments.csv.as_deref();
     if csv.is_none_or(|path| path.as_os_str() != "-") {
-        print_result(arguments.json.as_deref(), &report, || to_text(&rows, worst_deviation))?;
-    } else if let Some(path) = &arguments.json {
+        print_result(arguments.json.file(), &report, || to_text(&rows, worst_deviation))?;
+    } else if let Some(path) = arguments.json.file() {
         write_json(path, &report)?;
     }
     write_text(csv, || to_csv([], &rows))?;

@@ -3,11 +3,12 @@
 use super::ProgressLine;
 use crate::Size;
 use clap::{Args, ValueEnum};
-use flotor_command::options::{KeyValue, duration_s, settings, svg_file, whole};
+use flotor_command::options::{
+    JsonOption, KeyValue, PluginPathOption, duration_s, settings, svg_file, whole,
+};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::abi::PluginKind;
 use flotor_judge::stress::{Part, Reach, StressOptions, Symmetry, deliver, score_in_processes};
-use flotor_session::registry::Registry;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -47,9 +48,10 @@ pub(crate) struct StressArguments {
     /// Make one measure in this process, and write the result into the file that is standard input
     #[arg(long, hide = true, value_parser = part)]
     deliver: Option<Part>,
-    /// Write the score as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
     /// Plot the score
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -64,7 +66,7 @@ fn part(word: &str) -> Result<Part, String> {
 }
 
 pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
-    let plugin = Registry::search(&[]).load(&arguments.model, PluginKind::Model)?;
+    let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
     let settings = settings(&plugin, &arguments.sets)?;
     let StressArguments { size, seed, symmetry, .. } = *arguments;
     let options = StressOptions { size, seed, reach: Reach::default(), symmetry };
@@ -81,7 +83,7 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
         let mut command = Command::new(&program);
         command.args(["stress", "--deliver", part.word(), "--size", size.word()]);
         command.arg(format!("--seed={seed}")).arg(format!("--timeout={}", arguments.timeout));
-        command.arg("--model").arg(&arguments.model);
+        command.arg("--model").arg(&arguments.model).args(arguments.plugin_path.arguments());
         for (key, value) in arguments.sets.iter().map(KeyValue::pair) {
             command.arg("--set").arg(format!("{key}={value}"));
         }
@@ -92,6 +94,6 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
     };
     let report = score_in_processes(&plugin, &settings, &options, &arguments.only, patience, one_part)?;
     let text = || format!("{}\n{}", style::title(&report.subject()), report.to_text());
-    print_result(arguments.json.as_deref(), &report, text)?;
+    print_result(arguments.json.file(), &report, text)?;
     write_text(arguments.plot.as_deref(), || report.to_svg())
 }

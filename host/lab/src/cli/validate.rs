@@ -1,7 +1,7 @@
 //! `flotor validate`: a plugin file against the rules of the contract.
 
 use clap::Args;
-use flotor_command::options::{KeyValue, duration_s};
+use flotor_command::options::{JsonOption, KeyValue, duration_s};
 use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
 use flotor_judge::validate::{Check, Figures, Finding, Verdict, check, validate};
@@ -21,9 +21,8 @@ pub(crate) struct ValidateArguments {
     /// Set a parameter of the checked instances, such as the port of a device (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonOption,
     /// Check only this rule of the contract (repeatable)
     #[arg(long, value_parser = rule, value_name = "RULE")]
     only: Vec<Check>,
@@ -76,9 +75,10 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     let findings =
         validate(&arguments.plugin, &arguments.only, Duration::from_secs_f64(arguments.timeout), one_rule);
     let violated = findings.iter().filter(|finding| finding.violation.is_some()).count();
-    if arguments.json {
-        write_json(Path::new("-"), &findings)?;
-    } else {
+    if let Some(file) = arguments.json.file() {
+        write_json(file, &findings)?;
+    }
+    if !arguments.json.is_on_standard_output() {
         say!("{}", style::title(&arguments.plugin.display().to_string()));
         findings.iter().for_each(print);
         if let Some(first) = findings.iter().find_map(|finding| finding.unchecked.as_ref()) {

@@ -11,11 +11,12 @@ use flotor_session::registry::Registry;
 
 /// What is to be known of a device before it runs. Opens it, without force.
 pub(super) fn diagnose(
+    registry: &Registry,
     id: &str,
     sets: &[KeyValue],
     machine: &Machine,
 ) -> Result<Vec<Diagnosis>, CommandError> {
-    let plugin = Registry::search(&[]).load_any(id)?;
+    let plugin = registry.load_any(id)?;
     if plugin.metadata().kind != PluginKind::Device {
         return Err(CommandError::Usage(format!(
             "--device: `{id}` is a model; `flotor plugins` lists the devices"

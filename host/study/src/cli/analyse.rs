@@ -6,6 +6,7 @@ use crate::blinding::Codes;
 use crate::dataset::Dataset;
 use crate::protocol::RatingScale;
 use clap::{Args, ValueEnum};
+use flotor_command::options::JsonOption;
 use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, print_result, style, write_text};
 use flotor_statistics::anova::SumOfSquares;
@@ -24,9 +25,8 @@ pub(crate) struct AnalyseArguments {
     /// Folder given to `study --out`
     #[arg(value_name = "DIR")]
     data: PathBuf,
-    /// Write the result as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
     /// Write an HTML page with figures and all numbers
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         let title = format!("{} of {}", protocol.task(), protocol.stimulus());
         format!("{}\n{}", style::title(&title), analysis.to_text())
     };
-    print_result(arguments.json.as_deref(), &analysis, text)?;
+    print_result(arguments.json.file(), &analysis, text)?;
     write_text(arguments.html.as_deref(), || html(&first.begin, &subjects, &analysis))?;
     write_text(arguments.csv.as_deref(), || to_csv([], analysis.responses()))
 }
@@ -94,6 +94,6 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
 /// Results under codes.
 fn tell_blinded(arguments: &AnalyseArguments, analysis: &BlindedAnalysis) -> Result<(), CommandError> {
     let text = || format!("{}\n{}", style::title(analysis.task), analysis.to_text());
-    print_result(arguments.json.as_deref(), analysis, text)?;
+    print_result(arguments.json.file(), analysis, text)?;
     write_text(arguments.csv.as_deref(), || to_csv([], &analysis.responses))
 }

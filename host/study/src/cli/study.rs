@@ -22,7 +22,9 @@ use choices::{
     BoundaryChoice, FirstChoice, ForceWay, NoiseOption, PresentationOption, ProcedureChoice, range,
 };
 use clap::{Args, Subcommand, ValueEnum};
-use flotor_command::options::{PluginKeyValue, StrengthOption, count, duration_s, real, whole};
+use flotor_command::options::{
+    PluginKeyValue, PluginPathOption, StrengthOption, count, duration_s, real, whole,
+};
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, progress_bar, style};
@@ -32,6 +34,7 @@ use flotor_session::scene::Scene;
 use serde_json::json;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::Once;
 
 /// Run a perception experiment
 #[derive(Args)]
@@ -41,7 +44,7 @@ use std::path::PathBuf;
     flotor study magnitude --subjects 8 --seed 3 --out ratings\n  \
     flotor study jnd --bases 20,40 --target 0.8 --side random --out other\n  \
     flotor study jnd --out data --resume\n  \
-    flotor study jnd --observer human --subject 3 --scene mlhd.toml --out people\n  \
+    flotor study jnd --observer human --subject 3 --scene maglev.toml --out people\n  \
     flotor study jnd --observer human --subject 3 --out people --resume\n  \
     flotor study magnitude --stimulus spring.gamma_n --range 10-40 --out d\n  \
     flotor study bias --runs 1000")]
@@ -138,6 +141,8 @@ struct Common {
     /// If the handle leaves its range: repeat the trial (at most three times) or keep its answer
     #[arg(long, value_enum, default_value_t)]
     boundary: BoundaryChoice,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
     #[command(flatten)]
     strength: StrengthOption,
 }
@@ -304,6 +309,7 @@ impl Common {
             None => (Scene::study(&stimulus.model), way.map(ForceWay::hand)),
         };
         let mut scene = scene.map_err(RunError::Scene)?;
+        self.plugin_path.put_before_those_of(&mut scene);
         set(&mut scene, hand.unwrap_or_default())?;
         self.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
         set(&mut scene, way.map(ForceWay::load).unwrap_or_default())?;
@@ -414,7 +420,17 @@ fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) 
             .transpose()?;
         Ok(Box::new(Rig::start(apparatus, (common.seed, subject), kinematics, files, common.feel)?))
     };
-    let watch = || progress.inc(1);
+    let first = Once::new();
+    let watch = || {
+        progress.inc(1);
+        // Off a terminal nothing else would say for half a minute that it works.
+        first.call_once(|| {
+            if progress.is_hidden() {
+                let root = dataset.root().display();
+                flotor_command::note(format_args!("simulating about {about} presentations into {root}"));
+            }
+        });
+    };
     let result = cohort.run(&dataset, jobs, &presenter, &watch, &stop);
     progress.finish_and_clear();
     result.map_err(refused)?;

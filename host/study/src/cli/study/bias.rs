@@ -2,10 +2,9 @@
 
 use crate::bias::{BiasRow, observer_of, rows};
 use clap::Args;
-use flotor_command::options::{count, whole};
+use flotor_command::options::{JsonOption, count, whole};
 use flotor_command::{CommandError, print_result, progress_bar, style};
 use rayon::prelude::*;
-use std::path::PathBuf;
 
 /// Observers: true threshold as a share of the base, and criterion. First the two of the default population, then one
 /// threshold over the range of criteria.
@@ -31,9 +30,8 @@ pub(super) struct BiasArguments {
     /// Seed of the answers
     #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
     seed: u64,
-    /// Write the rows as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
 }
 
 pub(super) fn run(arguments: &BiasArguments) -> Result<(), CommandError> {
@@ -47,7 +45,7 @@ pub(super) fn run(arguments: &BiasArguments) -> Result<(), CommandError> {
     let rows: Vec<BiasRow> = OBSERVERS.into_par_iter().flat_map_iter(of_one).collect();
     progress.finish_and_clear();
     let title = format!("{} tracks per estimate, {} estimates", arguments.tracks, arguments.runs);
-    print_result(arguments.json.as_deref(), &rows, || format!("{}\n{}", style::title(&title), to_text(&rows)))
+    print_result(arguments.json.file(), &rows, || format!("{}\n{}", style::title(&title), to_text(&rows)))
 }
 
 fn to_text(rows: &[BiasRow]) -> String {

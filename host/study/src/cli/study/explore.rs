@@ -5,7 +5,7 @@ use super::front::lines_of;
 use crate::apparatus::watch::Shared;
 use crate::kinematics::{KinematicsMeter, StimulusKinematics};
 use clap::Args;
-use flotor_command::options::{PluginKeyValue, StrengthOption};
+use flotor_command::options::{PluginKeyValue, PluginPathOption, StrengthOption};
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note, style};
@@ -49,6 +49,8 @@ pub(super) struct ExploreArguments {
     /// Set a parameter of a plugin of the scene (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
     #[command(flatten)]
     strength: StrengthOption,
 }
@@ -119,6 +121,7 @@ fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
         ),
     };
     let mut scene = scene.map_err(RunError::Scene)?;
+    arguments.plugin_path.put_before_those_of(&mut scene);
     arguments.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
     scene.duration_s = 86_400.0;
     Ok(scene)

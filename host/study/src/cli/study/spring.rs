@@ -3,7 +3,7 @@
 
 use crate::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use clap::Args;
-use flotor_command::options::{new_file, number, svg_file};
+use flotor_command::options::{JsonOption, new_file, number, svg_file};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::{TextProblem, read_text};
 use flotor_plot::{Axis, Figure, Panel, Series};
@@ -37,9 +37,8 @@ pub(super) struct SpringArguments {
     /// Write a scene with the measured curve itself, and the table that it reads
     #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     curve_scene: Option<PathBuf>,
-    /// Write the fit as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
 }
 
 pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
@@ -62,7 +61,7 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
         None => None,
     };
     let title = style::title(&path.display().to_string());
-    print_result(arguments.json.as_deref(), &fit, || format!("{title}\n{}", to_text(&fit, &served)))?;
+    print_result(arguments.json.file(), &fit, || format!("{title}\n{}", to_text(&fit, &served)))?;
     write_text(arguments.plot.as_deref(), || picture(&curve, &fit, &served))?;
     if let Some((path, text)) = fitted {
         write_text(Some(path), || text)?;
