@@ -259,3 +259,8 @@ archive() {
     rm -rf "$trial"
     .ci/archive.d/trial "$(.ci/archive)" "$trial"
 }
+
+# Every crate that is meant to be published compiles from its package alone. Needs the network, for the registry's index.
+packages() {
+    cargo publish --workspace --dry-run --locked
+}
