@@ -253,11 +253,18 @@ bridge() {
     cargo clippy --release --all-targets --manifest-path host/bridge/Cargo.toml --target-dir target/bridge -- -D warnings
 }
 
-# The archive of a release, unpacked into an empty folder: the demo and the scenes of the repository, without a network.
+# The archive of a release, unpacked into an empty folder: the demo and the scenes of the repository, and a picture by the viewer,
+# without a network. The wheel, in a Python of its own: the demo, with the plugins that it contains.
 archive() {
-    local trial=target/ci/archive
+    local trial=target/ci/archive made
     rm -rf "$trial"
-    .ci/archive.d/trial "$(.ci/archive)" "$trial"
+    cargo build --release --locked -p flotor-viewer
+    made=$(.ci/archive)
+    .ci/archive.d/trial "${made%%$'\n'*}" "$trial"
+    [ "$made" != "${made##*$'\n'}" ] || return 0
+    python3 -m venv --clear target/ci/installed
+    target/ci/installed/bin/pip install --quiet "${made##*$'\n'}"
+    (cd target/ci && env -u FLOTOR_PLUGIN_PATH installed/bin/python -c 'import flotor; print(flotor.run(duration_s=1)["peak_force_n"], "N")')
 }
 
 # Every crate that is meant to be published compiles from its package alone. Needs the network, for the registry's index.
