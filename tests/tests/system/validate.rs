@@ -201,8 +201,10 @@ fn no_shipped_plugin_is_accused() {
         rayon::ThreadPoolBuilder::new().num_threads(size.pick(1, 8)).build().expect("threads can be started");
     pool.install(|| {
         runs.par_iter().for_each(|(library, settings)| {
-            let arguments = ["validate".as_ref(), library.as_os_str(), "--json".as_ref()];
-            let ran = Flotor::with(arguments.into_iter().chain(settings.iter().map(AsRef::as_ref))).run();
+            // Creating the solid is ten seconds of work without optimisation, and of waiting on a loaded machine.
+            let limit = ["--timeout", "120s", "--json"].map(AsRef::as_ref);
+            let arguments = ["validate".as_ref(), library.as_os_str()].into_iter().chain(limit);
+            let ran = Flotor::with(arguments.chain(settings.iter().map(AsRef::as_ref))).run();
             assert_eq!(ran.code, Some(exit_code::OK), "{}: {ran:#?}", library.display());
             // What needs hardware that is not here says so; everything else is checked.
             let findings: Vec<Value> = serde_json::from_str(&ran.stdout).expect("the findings are JSON");
