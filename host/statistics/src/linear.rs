@@ -59,7 +59,7 @@ impl Matrix {
         (0..self.rows.min(self.columns)).map(|k| self.at(k, k)).sum()
     }
 
-    /// Trace of the square of a symmetric matrix.
+    /// Trace of the square of a symmetric matrix: the sum of the squares of all its numbers, as of any other.
     pub(crate) fn trace_of_square(&self) -> f64 {
         self.values.iter().map(|value| value * value).sum()
     }

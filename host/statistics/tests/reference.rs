@@ -169,3 +169,25 @@ fn tails_and_quantiles() {
         near(&format!("normal {z}"), normal_below(z), &row["below"]);
     }
 }
+
+/// Each subject's responses divided by their mean: what differs between subjects is gone, and no F is made of what is left.
+#[test]
+fn an_effect_that_scaling_removed_is_not_tested() {
+    let responses: Vec<Vec<f64>> = (0..16)
+        .map(|subject| {
+            let raw: Vec<f64> =
+                (0..6).map(|cell| 2.0 + f64::from(subject * 7 % 5) + f64::from(cell * subject % 3)).collect();
+            let mean = raw.iter().sum::<f64>() / 6.0;
+            raw.iter().map(|value| value / mean).collect()
+        })
+        .collect();
+    let order =
+        BetweenFactor { name: "order".to_owned(), groups: (0..16).map(|subject| subject % 2).collect() };
+    let within = WithinFactor { name: "stimulus".to_owned(), levels: 6 };
+    let design = Design::new(vec![order], vec![within], &responses).unwrap();
+    let effects = analyse(&design, SumOfSquares::Three);
+    let order = effects.iter().find(|effect| effect.effect == "order").unwrap();
+    assert!(!order.is_testable() && order.p.is_nan() && order.partial_eta_squared.is_nan(), "{order:?}");
+    assert!(effects.iter().filter(|effect| effect.effect != "order").all(|effect| effect.is_testable()));
+    assert!(serde_json::to_string(order).unwrap().contains(r#""f":null,"p":null"#));
+}

@@ -47,17 +47,29 @@ pub struct Effect {
     pub error_sum_of_squares: f64,
     /// Degrees of freedom of the error.
     pub error_df: f64,
-    /// F.
+    /// F; NaN (`null` in JSON) where there is nothing to test: effect and error are rounding errors of the responses.
     pub f: f64,
-    /// Probability of a larger F without the effect.
+    /// Probability of a larger F without the effect; NaN as [`Self::f`].
     pub p: f64,
-    /// Share of what the effect and its error explain together.
+    /// Share of what the effect and its error explain together; NaN as [`Self::f`].
     pub partial_eta_squared: f64,
     /// Share of what the effect and all errors explain together (Olejnik and Algina 2003, all factors manipulated).
     pub generalised_eta_squared: f64,
     /// Corrections where the effect has more than one contrast within subjects.
     pub sphericity: Option<Sphericity>,
 }
+
+impl Effect {
+    /// Whether there was anything to test: an effect that scaling has removed from all responses has no F.
+    #[must_use]
+    pub fn is_testable(&self) -> bool {
+        !self.f.is_nan()
+    }
+}
+
+/// Squares below this share of those of the responses are rounding errors, whose relative size is 1e-16: an effect of them is
+/// none, and neither is an error.
+const ROUNDING: f64 = 1.0e-20;
 
 /// How unequally the contrasts of an effect vary, and p-values that include it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -80,6 +92,7 @@ pub struct Sphericity {
 pub fn analyse(design: &Design, kind: SumOfSquares) -> Vec<Effect> {
     let between = design.between_terms();
     let full = Basis::of(&columns(design, between.iter()));
+    let rounding = ROUNDING * design.responses().trace_of_square();
     let mut effects = Vec::new();
     let mut error_total = 0.0;
     for within in design.within_terms() {
@@ -94,7 +107,13 @@ pub fn analyse(design: &Design, kind: SumOfSquares) -> Vec<Effect> {
             let hypothesis = larger.products_beyond(&smaller, &contrasts);
             let term_df = larger.rank() - smaller.rank();
             let name = design.name(term, &within);
-            effects.push(test(name, &hypothesis, &error, term_df, design.subjects() - full.rank()));
+            effects.push(test(
+                name,
+                (&hypothesis, &error),
+                term_df,
+                design.subjects() - full.rank(),
+                rounding,
+            ));
         }
     }
     for effect in &mut effects {
@@ -119,11 +138,18 @@ fn columns<'a>(design: &Design, terms: impl Iterator<Item = &'a Term>) -> Matrix
     terms.fold(empty, |columns, term| columns.beside(&design.coded(term)))
 }
 
-fn test(effect: String, hypothesis: &Matrix, error: &Matrix, term_df: usize, residual_df: usize) -> Effect {
+fn test(
+    effect: String,
+    (hypothesis, error): (&Matrix, &Matrix),
+    term_df: usize,
+    residual_df: usize,
+    rounding: f64,
+) -> Effect {
     let contrasts = error.columns();
     let (df, error_df) = (count(term_df * contrasts), count(residual_df * contrasts));
     let (squares, error_squares) = (hypothesis.trace(), error.trace());
-    let f = (squares / df) / (error_squares / error_df);
+    let is_testable = squares > rounding || error_squares > rounding;
+    let f = if is_testable { (squares / df) / (error_squares / error_df) } else { f64::NAN };
     Effect {
         effect,
         sum_of_squares: squares,
@@ -131,10 +157,11 @@ fn test(effect: String, hypothesis: &Matrix, error: &Matrix, term_df: usize, res
         error_sum_of_squares: error_squares,
         error_df,
         f,
-        p: fisher_above(f, df, error_df),
-        partial_eta_squared: squares / (squares + error_squares),
+        p: if is_testable { fisher_above(f, df, error_df) } else { f64::NAN },
+        partial_eta_squared: if is_testable { squares / (squares + error_squares) } else { f64::NAN },
         generalised_eta_squared: f64::NAN, // known once all errors are
-        sphericity: (contrasts > 1).then(|| sphericity(error, f, df, error_df, count(residual_df))),
+        sphericity: (contrasts > 1 && is_testable)
+            .then(|| sphericity(error, f, df, error_df, count(residual_df))),
     }
 }
 

@@ -105,7 +105,8 @@ impl Page {
         self.gap();
         self.row(&format!("Effects on {what}"), "here", "thesis");
         for effect in table {
-            let known = published.iter().find(|(name, _)| *name == effect.effect);
+            let known =
+                published.iter().find(|(name, _)| *name == effect.effect).filter(|_| effect.is_testable());
             self.row(&effect.effect, &effect_text(effect), known.map_or("", |(_, text)| text));
         }
     }
@@ -126,6 +127,9 @@ fn interval_text(value: &MeanInterval) -> String {
 }
 
 pub(super) fn effect_text(effect: &Effect) -> String {
+    if !effect.is_testable() {
+        return "not testable: nothing of it is left in the responses".to_owned();
+    }
     let corrected = effect.sphericity.map_or(String::new(), |s| format!(" (GG {})", p_text(s.p_gg)));
     format!("F({}, {}) = {:.2}, {}{corrected}", effect.df, effect.error_df, effect.f, p_text(effect.p))
 }

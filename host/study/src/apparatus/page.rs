@@ -3,7 +3,8 @@
 
 use super::figures;
 use crate::analysis::{
-    Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, p_text, published,
+    Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, effect_text,
+    p_text, published,
 };
 use crate::log::Begin;
 use crate::protocol::{Protocol, Stimulus};
@@ -228,6 +229,12 @@ impl Page {
     fn effects(&mut self, effects: &[Effect], report: &[published::Published]) {
         self.table(&["Effect", "F", "p", "ε (GG)", "p (GG)", "η² partial", "thesis"], |rows| {
             for effect in effects {
+                if !effect.is_testable() {
+                    let name = effect.effect.replace(':', " × ");
+                    let blank = String::new;
+                    rows.row(&[name, effect_text(effect), blank(), blank(), blank(), blank(), blank()]);
+                    continue;
+                }
                 let beside = report.iter().find(|(name, _)| *name == effect.effect);
                 let corrected = |value: fn(&flotor_statistics::anova::Sphericity) -> String| {
                     effect.sphericity.as_ref().map_or(String::new(), value)
