@@ -42,6 +42,12 @@ pub enum CommandError {
          `flotor doctor`, or raise `[limits] watchdog_ms`", .0.tick
     )]
     Watchdog(Stuck),
+    /// The force of a device swung between its limits.
+    #[error(
+        "the force swung between its limits, and went on when it was damped: the loop is unstable; lower the stiffness or the \
+         gain of the scene (`flotor stability` says what the device can render)"
+    )]
+    Oscillation,
     /// The watchdog process was gone, without which the scene does not run.
     #[error(
         "the watchdog process is gone; nothing stops the devices if this program is killed, so the run was ended, as `[limits] require_independent_stop` asks"
@@ -131,6 +137,7 @@ impl CommandError {
             | Self::RunFault { .. }
             | Self::EmergencyStop(_)
             | Self::TooFast { .. }
+            | Self::Oscillation
             | Self::Watchdog(_) => 4,
             Self::Unguarded | Self::File { .. } | Self::Record(_) | Self::Failed(_) => 1,
         }

@@ -14,6 +14,7 @@ mod clock;
 pub mod coupling;
 pub mod limits;
 pub mod mapping;
+pub mod oscillation;
 pub mod peer;
 mod random;
 pub mod trace;

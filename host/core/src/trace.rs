@@ -63,8 +63,11 @@ impl Events {
     /// The other end of a coupling, on another host, claimed more than is believed: a motion too fast, or too much energy.
     pub const PARTNER_LIMITED: Events = Events { bits: 1 << 23 };
 
+    /// The force swung between its limits: only a part of it was let through.
+    pub const OSCILLATION_DAMPED: Events = Events { bits: 1 << 24 };
+
     /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 24] = [
+    pub const NAMES: [&'static str; 25] = [
         "stale_sample",
         "not_finite",
         "force_limited",
@@ -89,6 +92,7 @@ impl Events {
         "implausible_sample",
         "float_environment",
         "partner_limited",
+        "oscillation_damped",
     ];
 
     /// Adds events. Real-time: bounded, no allocation.

@@ -2,7 +2,8 @@
 //!
 //! Order: guard (a number that is not finite becomes zero) -> gate (the start-up ramp and the other
 //! [states of the run](super::state)) -> velocity limit -> [boundary wall](super::boundary) -> force and torque limits
-//! -> [passivity](super::passivity), and the limits once more if it took something away -> slew limit.
+//! -> [damping of an oscillation](flotor_core::oscillation) -> [passivity](super::passivity), and the limits once more if it took something
+//! away -> slew limit.
 //!
 //! The slew limit is last, so that no fault upstream, not even a model that vanishes, makes the force jump; the limits
 //! hold after it too, because the limited [regions](region) are convex and the slew limit only moves along the line from the
@@ -15,6 +16,7 @@ use super::passivity::Passivity;
 use super::state::Gate;
 use crate::port_energy::Controller;
 use flotor_core::limits::{Bound, Boundary, Limits};
+use flotor_core::oscillation::Oscillation;
 use flotor_core::trace::Events;
 use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench};
 use region::Region;
@@ -31,6 +33,7 @@ pub struct Envelope {
     slew_per_s: [f64; 2],
     wall: BoundaryWall,
     passivity: Passivity,
+    oscillation: Oscillation,
     period_ns: u64,
     last: Wrench,
 }
@@ -62,6 +65,7 @@ impl Envelope {
                 },
                 most,
             ),
+            oscillation: Oscillation::NONE,
             period_ns,
             last: Wrench::ZERO,
         }
@@ -90,7 +94,8 @@ impl Envelope {
         let walled = self.add_boundary(driven, gate, state, events);
         // Before passivity: what cannot be sent anyway may be too large to be squared.
         let bounded = self.limit_wrench(walled, events);
-        let passive = self.limit_energy(bounded, state, events);
+        let calmed = self.limit_oscillation(&walled, bounded, tick, events);
+        let passive = self.limit_energy(calmed, state, events);
         let sent = self.limit_slew(passive, tick, events);
         self.last = sent;
         sent
@@ -101,6 +106,14 @@ impl Envelope {
     #[must_use]
     pub fn port_energy_j(&self) -> f64 {
         self.passivity.energy_j()
+    }
+
+    /// Whether the force swung between its limits and went on when it was damped: the run has to end. Real-time: bounded, no
+    /// allocation.
+    #[inline]
+    #[must_use]
+    pub fn is_unstable(&self) -> bool {
+        self.oscillation.is_given_up()
     }
 
     /// Scales force components along the velocity down above the velocity limit, linearly to zero at twice the limit;
@@ -141,6 +154,25 @@ impl Envelope {
             events.insert(Events::TORQUE_LIMITED);
         }
         Wrench::new(force, torque)
+    }
+
+    /// Lets a part of the force through while it swings between its limits.
+    #[inline]
+    fn limit_oscillation(
+        &mut self,
+        wanted: &Wrench,
+        bounded: Wrench,
+        tick: &Tick,
+        events: &mut Events,
+    ) -> Wrench {
+        let [force, torque] =
+            [Events::FORCE_LIMITED, Events::TORQUE_LIMITED].map(|cut| events.intersects(cut));
+        if force || torque {
+            self.oscillation.note(wanted, force, torque, tick.time_ns);
+        }
+        let Some(gain) = self.oscillation.gain(tick.time_ns) else { return bounded };
+        events.insert(Events::OSCILLATION_DAMPED);
+        bounded * gain
     }
 
     /// Takes away what would bring out more energy than there is, if the scene asks for that.

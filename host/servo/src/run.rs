@@ -23,6 +23,8 @@ pub enum RunEnd {
     NotPaced,
     /// A tick took so long that the watchdog stopped the device; then it came back.
     Watchdog(Stuck),
+    /// The force of a device swung between its limits, and went on when it was damped.
+    Oscillation,
     /// The watchdog process was gone, without which the scene does not run: it ended in order.
     Unguarded,
 }
@@ -44,6 +46,7 @@ impl RunEnd {
         match (run, heart.bitten()) {
             (RunState::Faulted(Cause::Device(fault)), _) => Self::DeviceFault(fault),
             (RunState::Faulted(Cause::Watchdog), Some(stuck)) => Self::Watchdog(stuck),
+            (RunState::Faulted(Cause::Oscillation), _) => Self::Oscillation,
             (RunState::EmergencyStopped(source), _) => Self::EmergencyStop(source),
             _ => Self::Stopped,
         }

@@ -148,6 +148,10 @@ impl Servo {
         let gate = self.run.gate(tick.time_ns, self.config.ramp_ns);
         for (station, port) in self.stations.iter_mut().zip(&mut self.ports) {
             station.limit(tick, gate, port);
+            if station.envelope.is_unstable() {
+                let failed = RunEvent::Failed(Cause::Oscillation);
+                self.run = self.run.after(failed, tick.time_ns, self.config.ramp_ns);
+            }
         }
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Envelope);
 

@@ -70,6 +70,8 @@ pub enum Cause {
     Device(Fault),
     /// The loop had not finished a tick for too long, and the watchdog had stopped the device.
     Watchdog,
+    /// The force of a device swung between its limits, and went on when it was damped.
+    Oscillation,
 }
 
 /// Where a run stands.

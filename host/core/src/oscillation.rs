@@ -1,0 +1,176 @@
+//! A force that swings between its limits: a loop that is unstable, such as a stiffness the device cannot render. It is damped
+//! first; if it goes on, the run has to end, whether anybody watches or not.
+//!
+//! What counts is a reversal at the limits: what is requested is cut, and points against what was cut before. A hand between two
+//! stiff walls makes a few in a second; an unstable loop makes tens.
+
+use flotor_hal::{DVec3, Wrench};
+
+/// Reversals in a row that are an oscillation.
+const REVERSALS: usize = 10;
+/// The time in which they come, ns: 10 Hz and more, which no hand makes against the full force of a device.
+const WINDOW_NS: u64 = 500_000_000;
+/// What is left of the force while it is damped.
+const DAMPED: f64 = 0.25;
+/// Time without a reversal after which the force comes back, and the time it takes to, ns.
+const CALM_NS: u64 = 2_000_000_000;
+const RETURN_NS: u64 = 1_000_000_000;
+
+/// The last reversals of force or torque.
+#[derive(Clone, Copy, Debug)]
+struct Swing {
+    last: DVec3,
+    times_ns: [u64; REVERSALS],
+    count: usize,
+}
+
+impl Swing {
+    const NONE: Swing = Swing { last: DVec3::ZERO, times_ns: [0; REVERSALS], count: 0 };
+
+    /// Takes in what was cut; true if that was a reversal.
+    fn note(&mut self, cut: DVec3, now_ns: u64) -> bool {
+        let is_reversal = cut.dot(self.last) < 0.0;
+        self.last = cut;
+        if is_reversal {
+            if let Some(time_ns) = self.times_ns.get_mut(self.count % REVERSALS) {
+                *time_ns = now_ns;
+            }
+            self.count += 1;
+        }
+        is_reversal
+    }
+
+    /// Whether the last reversals came within the window; the count begins anew then.
+    fn is_oscillation(&mut self, now_ns: u64) -> bool {
+        let oldest = self.times_ns.get(self.count % REVERSALS).copied().unwrap_or(0);
+        let is_one = self.count >= REVERSALS && now_ns.saturating_sub(oldest) <= WINDOW_NS;
+        if is_one {
+            self.count = 0;
+        }
+        is_one
+    }
+}
+
+/// How the force is let through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Whole,
+    /// With the time of the last reversal.
+    Damped {
+        since_ns: u64,
+    },
+    GivenUp,
+}
+
+/// Watches the limited force of one device.
+pub struct Oscillation {
+    force: Swing,
+    torque: Swing,
+    stage: Stage,
+}
+
+impl Oscillation {
+    /// Nothing has happened yet.
+    pub const NONE: Oscillation =
+        Oscillation { force: Swing::NONE, torque: Swing::NONE, stage: Stage::Whole };
+
+    /// Takes in a wrench whose force or torque, by these, had to be cut. Real-time: bounded, no allocation.
+    #[inline(never)] // seldom called
+    pub fn note(&mut self, wrench: &Wrench, cuts_force: bool, cuts_torque: bool, now_ns: u64) {
+        let force = cuts_force && self.force.note(wrench.force(), now_ns);
+        let torque = cuts_torque && self.torque.note(wrench.torque(), now_ns);
+        if !(force || torque) {
+            return;
+        }
+        let is_one = self.force.is_oscillation(now_ns) | self.torque.is_oscillation(now_ns);
+        self.stage = match self.stage {
+            Stage::Whole if is_one => Stage::Damped { since_ns: now_ns },
+            Stage::Damped { .. } if is_one => Stage::GivenUp,
+            Stage::Damped { .. } => Stage::Damped { since_ns: now_ns },
+            stage => stage,
+        };
+    }
+
+    /// What is let through, 0 to 1; `None` for all of it. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn gain(&mut self, now_ns: u64) -> Option<f64> {
+        match self.stage {
+            Stage::Whole => None,
+            Stage::GivenUp => Some(0.0),
+            Stage::Damped { since_ns } => {
+                let calm_ns = now_ns.saturating_sub(since_ns);
+                if calm_ns >= CALM_NS + RETURN_NS {
+                    self.stage = Stage::Whole;
+                    return None;
+                }
+                let part = calm_ns.saturating_sub(CALM_NS) as f64 / RETURN_NS as f64;
+                Some(DAMPED + (1.0 - DAMPED) * part)
+            }
+        }
+    }
+
+    /// Whether damping was not enough: the run has to end. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn is_given_up(&self) -> bool {
+        self.stage == Stage::GivenUp
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn calm() -> Oscillation {
+        Oscillation::NONE
+    }
+
+    /// Reverses a force at its limit so often a second, for so long; when it was damped and given up, s.
+    fn swing(oscillation: &mut Oscillation, per_s: f64, from_s: f64, length_s: f64) -> [Option<f64>; 2] {
+        let (mut damped, mut given_up) = (None, None);
+        let ticks = (length_s * 1000.0) as u64;
+        for tick in 0..ticks {
+            let now_s = from_s + tick as f64 * 1.0e-3;
+            let sign = if (now_s * per_s).floor() % 2.0 == 0.0 { 1.0 } else { -1.0 };
+            let now_ns = (now_s * 1.0e9) as u64;
+            let wrench = Wrench::new(DVec3::new(0.0, 0.0, 100.0 * sign), DVec3::ZERO);
+            oscillation.note(&wrench, true, false, now_ns);
+            if oscillation.gain(now_ns).is_some() && damped.is_none() {
+                damped = Some(now_s);
+            }
+            if oscillation.is_given_up() && given_up.is_none() {
+                given_up = Some(now_s);
+            }
+        }
+        [damped, given_up]
+    }
+
+    #[test]
+    fn an_unstable_loop_is_damped_within_half_a_second_and_ended_in_a_second() {
+        for per_s in [25.0, 100.0, 500.0] {
+            let [damped, given_up] = swing(&mut calm(), per_s, 0.0, 2.0);
+            assert!(damped.is_some_and(|at_s| at_s <= 0.5), "{per_s}: {damped:?}");
+            assert!(given_up.is_some_and(|at_s| at_s <= 1.0), "{per_s}: {given_up:?}");
+        }
+    }
+
+    #[test]
+    fn a_hand_between_two_walls_is_let_alone() {
+        assert_eq!(swing(&mut calm(), 16.0, 0.0, 20.0), [None, None]);
+        // Pressed against one wall for ever, with however many ticks at the limit.
+        assert_eq!(swing(&mut calm(), 1.0e-3, 0.0, 20.0), [None, None]);
+    }
+
+    #[test]
+    fn the_force_comes_back_after_two_calm_seconds_within_one() {
+        let mut oscillation = calm();
+        let [damped, given_up] = swing(&mut oscillation, 100.0, 0.0, 0.12);
+        assert!(damped.is_some() && given_up.is_none(), "{damped:?} {given_up:?}");
+        assert_eq!(oscillation.gain(2_000_000_000), Some(DAMPED));
+        let half = oscillation.gain(2_610_000_000).expect("on its way");
+        assert!((0.5..0.8).contains(&half), "{half}");
+        assert_eq!(oscillation.gain(3_200_000_000), None);
+        assert_eq!(oscillation.gain(3_200_000_001), None);
+    }
+}
