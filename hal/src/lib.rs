@@ -62,6 +62,7 @@ pub use extension::pacing::{PacingDevice, SampleWait};
 pub use extension::shape::{
     Form, InvalidShape, Part, Primitive, ScalarField, Shape, ShapeModel, Sides, Surface, SurfaceVertex,
 };
+pub use extension::soft_range::{SoftRange, SoftRangeModel};
 pub use extension::variant::{VariantInfo, VariantModel};
 pub use extension::workspace_bounds::{WorkspaceBounds, WorkspaceBoundsModel};
 pub use frame::{Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_vector};

@@ -1,7 +1,7 @@
 //! A running host, as the window sees it: a thread that reads, and what it has read since the last picture.
 
 use flotor_core::trace::TickRecord;
-use flotor_live::{Answer, Ask, Asker, ChangeMessage, Client, End, Event, Greeting, LiveError};
+use flotor_live::{Answer, Ask, Asker, ChangeMessage, Client, End, EndKind, Event, Greeting, LiveError};
 use flotor_record::RunDescription;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -23,7 +23,7 @@ pub enum FeedState {
     /// Ticks come.
     Running,
     /// The run is over, and how.
-    Ended(String),
+    Ended(String, EndKind),
     /// The host went without a word, or is not understood.
     Lost(String),
 }
@@ -159,10 +159,16 @@ impl Waiting {
                     self.dropped_here += 1;
                 }
             }
-            Ok(Some(Event::Change(change))) if changes.len() < MOST_ARRIVALS => changes.push(change),
+            Ok(Some(Event::Change(change))) => {
+                // The newest says what is in force.
+                if changes.len() == MOST_ARRIVALS {
+                    changes.remove(0);
+                }
+                changes.push(change);
+            }
             Ok(Some(Event::Answer(answer))) if answers.len() < MOST_ARRIVALS => answers.push(answer),
-            Ok(Some(Event::Change(_) | Event::Answer(_))) => {}
-            Ok(Some(Event::End(End { words }))) => self.state = FeedState::Ended(words),
+            Ok(Some(Event::Answer(_))) => {}
+            Ok(Some(Event::End(End { words, kind }))) => self.state = FeedState::Ended(words, kind),
             Err(error) => self.state = FeedState::Lost(error.to_string()),
         }
         self.state == FeedState::Running

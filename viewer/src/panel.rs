@@ -42,8 +42,8 @@ pub struct Knob {
     pub standing: Standing,
     /// The value the loop has.
     in_force: Value,
-    /// Changes sent of which nothing has been heard.
-    sent: u32,
+    /// What was requested and is not in force yet: the loop moves a number there in a while.
+    wanted: Option<Value>,
 }
 
 /// Whether the panel is for a run that can still be changed.
@@ -66,6 +66,8 @@ pub struct Panel {
     pub knobs: Vec<Knob>,
     /// Why the last change was not taken.
     pub refusal: Option<String>,
+    /// What was there before each change of a person, with the index of its parameter.
+    earlier: Vec<(usize, Value)>,
 }
 
 impl Panel {
@@ -83,13 +85,14 @@ impl Panel {
             in_force: Value::read(parameter, &parameter.value),
             standing: if parameter.live && purpose == Use::Change { Standing::Free } else { Standing::Fixed },
             parameter: parameter.clone(),
-            sent: 0,
+            wanted: None,
         };
         Self {
             name: plugin.name.clone(),
             id: plugin.id.clone(),
             knobs: plugin.parameters.iter().zip(&plain).map(knob).collect(),
             refusal: None,
+            earlier: Vec::new(),
         }
     }
 
@@ -103,12 +106,11 @@ impl Panel {
         };
         match change.outcome {
             Outcome::Applied => {
-                knob.in_force = Value::read(&knob.parameter, &change.value);
-                knob.settle();
+                knob.settle(Value::read(&knob.parameter, &change.value));
                 self.refusal = None;
             }
             Outcome::Refused => {
-                knob.settle();
+                knob.give_up();
                 let name = &knob.name;
                 self.refusal =
                     Some(format!("{name} = {} does not fit the other values; it stays", change.value));
@@ -144,16 +146,45 @@ impl Panel {
 
     /// The host did not pass a change on: what is in force is shown again.
     pub fn take_back(&mut self) {
-        for knob in self.knobs.iter_mut().filter(|knob| knob.sent > 0) {
-            knob.sent = 0;
-            knob.value = knob.in_force.clone();
+        self.knobs.iter_mut().filter(|knob| knob.wanted.is_some()).for_each(Knob::give_up);
+    }
+
+    /// A person begins to change a parameter that had this value: it can be undone.
+    pub fn begin(&mut self, index: usize, before: Value) {
+        const MOST: usize = 100;
+        if self.earlier.len() == MOST {
+            self.earlier.remove(0);
         }
+        self.earlier.push((index, before));
+    }
+
+    /// Whether there is a change to undo.
+    #[must_use]
+    pub fn can_undo(&self) -> bool {
+        !self.earlier.is_empty()
+    }
+
+    /// Shows again what was there before the last change; the index of its parameter, to be sent.
+    pub fn undo(&mut self) -> Option<usize> {
+        let (index, before) = self.earlier.pop()?;
+        let knob = self.knobs.get_mut(index).filter(|knob| knob.standing == Standing::Free)?;
+        knob.value = before;
+        Some(index)
+    }
+
+    /// Shows the value of a parameter that the run began with; true if that is another one, to be sent.
+    pub fn reset(&mut self, index: usize) -> bool {
+        let Some(knob) = self.knobs.get(index).filter(|knob| knob.is_moved()) else { return false };
+        let (before, first) = (knob.value.clone(), Value::read(&knob.parameter, &knob.parameter.first));
+        self.begin(index, before);
+        self.knobs[index].value = first;
+        true
     }
 
     /// A change to send, with the value shown.
     pub fn change(&mut self, index: usize) -> Option<SetValue> {
         let knob = self.knobs.get_mut(index)?;
-        knob.sent += 1;
+        knob.wanted = Some(knob.value.clone());
         Some(SetValue {
             plugin: self.name.clone(),
             parameter: knob.parameter.id.clone(),
@@ -163,12 +194,30 @@ impl Panel {
 }
 
 impl Knob {
-    /// One change has been heard of: when it was the last, what is in force is shown. Before that a hand is still pulling.
-    fn settle(&mut self) {
-        self.sent = self.sent.saturating_sub(1);
-        if self.sent == 0 {
-            self.value = self.in_force.clone();
+    /// A value is in force. What was requested stays in sight while the loop is on the way there, and not if it goes elsewhere.
+    fn settle(&mut self, now: Value) {
+        if let Some(wanted) = &self.wanted
+            && (wanted.is_about(&now) || wanted.distance(&now) > wanted.distance(&self.in_force))
+        {
+            self.wanted = None;
         }
+        self.in_force = now;
+        self.value = self.wanted.clone().unwrap_or_else(|| self.in_force.clone());
+    }
+
+    /// What was requested does not come: what is in force is shown.
+    fn give_up(&mut self) {
+        self.wanted = None;
+        self.value = self.in_force.clone();
+    }
+
+    /// Whether it is free and shows another value than the run began with.
+    #[must_use]
+    pub fn is_moved(&self) -> bool {
+        let first = &self.parameter.first;
+        self.standing == Standing::Free
+            && !first.is_empty()
+            && !Value::read(&self.parameter, first).is_about(&self.value)
     }
 
     /// Its unit for people; empty for numbers that have none.
@@ -207,6 +256,22 @@ fn plain_name(parameter: &PanelParameter) -> String {
 }
 
 impl Value {
+    /// Whether it is the same but for the digits that a text leaves out.
+    fn is_about(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Number(one), Self::Number(two)) => (one - two).abs() <= 1.0e-9 * one.abs().max(two.abs()),
+            _ => self == other,
+        }
+    }
+
+    /// How far two numbers are apart, in their unit; 0 where they are none.
+    fn distance(&self, other: &Self) -> f64 {
+        match (self, other) {
+            (Self::Number(one), Self::Number(two)) => (one - two).abs(),
+            _ => 0.0,
+        }
+    }
+
     fn read(parameter: &PanelParameter, typed: &str) -> Self {
         let read = match &parameter.shape {
             ParameterShape::Real { .. } => typed.parse().ok().map(Self::Number),
@@ -231,6 +296,8 @@ mod tests {
             shape: ParameterShape::Real { min: 0.0, max: 10.0, default: 1.0 },
             live: true,
             value: "2.5".to_owned(),
+            first: "2.5".to_owned(),
+            soft: None,
         }
     }
 
@@ -281,8 +348,10 @@ mod tests {
         assert_eq!(panel.knobs[0].value, Value::Number(4.0));
         panel.knobs[0].value = Value::Number(9.0);
         assert_eq!(panel.change(0).map(|set| set.value), Some("9".to_owned()));
+        panel.take_in(&change("5", Outcome::Applied));
+        assert_eq!(panel.knobs[0].value, Value::Number(9.0), "the loop is on its way");
         panel.take_in(&change("9", Outcome::Refused));
-        assert_eq!(panel.knobs[0].value, Value::Number(4.0));
+        assert_eq!(panel.knobs[0].value, Value::Number(5.0), "as far as it came");
         assert!(panel.refusal.is_some_and(|reason| reason.contains("gamma = 9")));
         assert_eq!(Panel::new(&plugin, Use::Read).knobs[0].standing, Standing::Fixed);
     }

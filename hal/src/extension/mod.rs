@@ -12,6 +12,7 @@ pub mod independent_stop;
 pub mod linear_field;
 pub mod pacing;
 pub mod shape;
+pub mod soft_range;
 pub mod variant;
 pub mod workspace_bounds;
 
@@ -51,6 +52,7 @@ extensions! {
         details: DetailsTable,
         linear_field: LinearFieldTable,
         shape: ShapeTable,
+        soft_range: SoftRangeTable,
         variant: VariantTable,
         workspace_bounds: WorkspaceBoundsTable,
     }

@@ -50,27 +50,30 @@ pub fn attach(
         let publication = Publication::open(directory, greeting, &run, Arc::new(remote.errand()))?;
         tell(&format!("`{title}` is at {}; `flotor view` shows it", publication.path().display()));
         let lost_before = remote.lost();
-        let words = show(remote, &publication, stop);
+        let End { words, kind } = show(remote, &publication, stop);
         let lost = remote.lost() - lost_before;
         tell(&match lost {
             0 => words.clone(),
             lost => format!("{words}; {lost} ticks were lost on the way"),
         });
-        publication.end(&words);
+        publication.end(&words, kind);
     }
     Ok(())
 }
 
 /// Shows one run; how it ended.
-fn show(remote: &Remote, publication: &Publication, stop: &AtomicBool) -> String {
+fn show(remote: &Remote, publication: &Publication, stop: &AtomicBool) -> End {
     while !stop.load(Ordering::Relaxed) {
         match remote.next(LOOK_PERIOD) {
             None => {}
             Some(Told::Tick(record)) => publication.observe(&record),
             Some(Told::Change(change)) => publication.change(&change),
-            Some(Told::End(end)) => return end.words,
-            Some(Told::Gone) => return "the bridge cannot be seen any more".to_owned(),
+            Some(Told::End(end)) => return end,
+            Some(Told::Gone) => {
+                let words = "the bridge cannot be seen any more".to_owned();
+                return End { words, kind: EndKind::Failed };
+            }
         }
     }
-    "stopped watching".to_owned()
+    End { words: "stopped watching".to_owned(), kind: EndKind::InOrder }
 }

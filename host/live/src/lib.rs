@@ -67,8 +67,8 @@ pub use directory::{Directory, DirectoryError, Found, Listener};
 pub use frame::{Frames, Kind, LongFrame, MOST_PAYLOAD, frame, ticks_from_payload, ticks_to_payload};
 pub use latch::{Latch, LatchState, Pressed};
 pub use message::{
-    Answer, Ask, ChangeMessage, End, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape,
-    RefusalCause, Request, SetValue, Subject, WrenchLimits,
+    Answer, Ask, ChangeMessage, End, EndKind, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape,
+    RefusalCause, Request, SetValue, SoftLimits, Subject, WrenchLimits,
 };
 pub use peer_socket::{CALL_PERIOD, FoundCoupling, PeerSocket};
 pub use server::{Publication, PublishError, Serve};

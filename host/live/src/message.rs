@@ -1,7 +1,7 @@
 //! What is said, as JSON.
 
 use flotor_core::{Change, ChangeOutcome, ChangeSubject};
-use flotor_hal::{Mutability, Parameter, ParameterKind};
+use flotor_hal::{Mutability, Parameter, ParameterKind, SoftRange};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::PathBuf;
@@ -66,6 +66,29 @@ pub struct PanelParameter {
     pub live: bool,
     /// The value in force, as a person would type it.
     pub value: String,
+    /// The value it began the run with, as a person would type it; empty if that is not known.
+    #[serde(default)]
+    pub first: String,
+    /// Where a number is usefully moved by hand.
+    #[serde(default)]
+    pub soft: Option<SoftLimits>,
+}
+
+/// Where a number is usefully moved by hand: a slider goes no farther, and a larger number is typed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SoftLimits {
+    /// Smallest.
+    pub min: f64,
+    /// Largest.
+    pub max: f64,
+    /// The step of a key.
+    pub step: f64,
+}
+
+impl From<&SoftRange> for SoftLimits {
+    fn from(range: &SoftRange) -> Self {
+        Self { min: range.min(), max: range.max(), step: range.step() }
+    }
 }
 
 /// What values a parameter takes.
@@ -117,24 +140,27 @@ impl PanelPlugin {
         file: PathBuf,
         schema: &[Parameter],
         values: &[(String, String)],
+        soft: &[Option<SoftRange>],
     ) -> Self {
         let value = |id: &str| {
             let known = values.iter().find(|(key, _)| key == id);
             known.map(|(_, value)| value.clone()).unwrap_or_default()
         };
-        let parameter = |parameter: &Parameter| PanelParameter {
+        let parameter = |(index, parameter): (usize, &Parameter)| PanelParameter {
             id: parameter.id().to_owned(),
             unit: parameter.unit().to_owned(),
             doc: parameter.doc().to_owned(),
             shape: ParameterShape::of(parameter),
             live: parameter.mutability() == Mutability::Live,
             value: value(parameter.id()),
+            first: value(parameter.id()),
+            soft: soft.get(index).and_then(|range| range.as_ref()).map(SoftLimits::from),
         };
         Self {
             name: name.to_owned(),
             id: id.to_owned(),
             file,
-            parameters: schema.iter().map(parameter).collect(),
+            parameters: schema.iter().enumerate().map(parameter).collect(),
         }
     }
 }
@@ -285,6 +311,20 @@ pub enum RefusalCause {
 pub struct End {
     /// One line for people.
     pub words: String,
+    /// Whether that is as it should be.
+    #[serde(default)]
+    pub kind: EndKind,
+}
+
+/// Whether a run ended as it should.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EndKind {
+    /// Its time was over, or somebody stopped it.
+    #[default]
+    InOrder,
+    /// A fault, or an emergency stop.
+    Failed,
 }
 
 /// A parameter that changed, or was to.

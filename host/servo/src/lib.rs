@@ -49,8 +49,8 @@ pub use last_stop::{LastStop, Unwound};
 pub use models::ModelHealth;
 pub use models::{Layer, LayerReport, Replacement, pushes_at_home};
 pub use parameters::{
-    ChangeReport, ChangeSender, PLUGIN, ParameterChange, ParameterQueue, ReportReceiver, ScheduledChange,
-    WEIGHT,
+    ChangeReport, ChangeSender, PLUGIN, Pace, ParameterChange, ParameterQueue, ReportReceiver,
+    ScheduledChange, WEIGHT,
 };
 pub use plausibility::{Implausible, ImplausibleSamples, PlausibilityCheck, Trust};
 pub use queue::{drain, queue};

@@ -3,11 +3,19 @@
 //! A change is applied at a tick boundary, before the device is read, so that every model of the tick sees it.
 //! Changes that were sent together are applied together. For each one a report goes out, ahead of the record of
 //! its tick; nothing is ever applied that could not be reported, so a recording holds every change.
+//!
+//! A number may be sent with a rate: it then moves to its new value over many ticks, because a hand feels a jump. Each step is
+//! a change with a report of its own, so a replay needs no rate.
+
+mod gradual;
+
+pub use gradual::Pace;
 
 use super::queue::queue;
 use flotor_core::ChangeOutcome;
 use flotor_hal::Tick;
 use flotor_hal::abi::CallStatus;
+use gradual::Movements;
 use rtrb::{Consumer, Producer};
 
 /// Changes other threads may have waiting at a time.
@@ -29,6 +37,8 @@ pub struct ParameterChange {
     pub parameter: u32,
     /// The value; for a choice, its index.
     pub value: f64,
+    /// How fast it gets there.
+    pub pace: Pace,
 }
 
 /// What became of a change.
@@ -75,6 +85,7 @@ pub struct ParameterQueue {
     /// The next of the schedule.
     next: usize,
     sent: Consumer<ParameterChange>,
+    movements: Movements,
     reports: Producer<ChangeReport>,
 }
 
@@ -90,7 +101,8 @@ impl ParameterQueue {
         let (sender, sent) = queue(WAITING_CHANGES);
         // Room for the whole schedule and for twice what may wait, so that what is scheduled is never delayed.
         let (reports, receiver) = queue(schedule.len() + replacements + 2 * WAITING_CHANGES);
-        (Self { schedule: schedule.into(), next: 0, sent, reports }, sender, receiver)
+        let movements = Movements::with_room(schedule.len() + WAITING_CHANGES);
+        (Self { schedule: schedule.into(), next: 0, sent, movements, reports }, sender, receiver)
     }
 
     /// How many changes wait at this moment. Real-time: bounded, no allocation.
@@ -102,12 +114,14 @@ impl ParameterQueue {
     /// Whether anything is to be applied at this tick. Real-time: bounded, no allocation.
     pub fn is_due(&self, tick: &Tick) -> bool {
         let is_scheduled = self.schedule.get(self.next).is_some_and(|due| due.time_ns <= tick.time_ns);
-        is_scheduled || !self.sent.is_empty()
+        is_scheduled || self.movements.moving() > 0 || !self.sent.is_empty()
     }
 
     /// Reports that a plugin was replaced. Real-time: bounded, no allocation.
     pub fn report_replaced(&mut self, tick: &Tick, plugin: u16, generation: u16) {
-        let change = ParameterChange { plugin, generation, parameter: PLUGIN, value: f64::from(generation) };
+        self.movements.forget_others(plugin, generation);
+        let value = f64::from(generation);
+        let change = ParameterChange { plugin, generation, parameter: PLUGIN, value, pace: Pace::AtOnce };
         let _ = self.reports.push(ChangeReport {
             tick: tick.index,
             time_ns: tick.time_ns,
@@ -116,10 +130,10 @@ impl ParameterQueue {
         });
     }
 
-    /// Applies what is due at this tick, oldest first, and at most `waiting` of those that were sent; reports it; true
-    /// if there was anything.
+    /// Applies what is due at this tick, oldest first, and at most `waiting` of those that were sent, and moves numbers on
+    /// that are on their way; reports it; true if there was anything.
     ///
-    /// Real-time: bounded by the schedule, `waiting`, and `apply`; no allocation.
+    /// Real-time: bounded by the schedule, `waiting`, the numbers on their way, and `apply`; no allocation.
     #[inline]
     pub fn apply_due(
         &mut self,
@@ -127,21 +141,37 @@ impl ParameterQueue {
         waiting: usize,
         mut apply: impl FnMut(&ParameterChange) -> CallStatus,
     ) -> bool {
-        let Self { schedule, next, sent, reports } = self;
+        let Self { schedule, next, sent, movements, reports } = self;
         let mut any = false;
         let mut take = |reports: &mut Producer<ChangeReport>, change: ParameterChange| {
             any = true;
             let outcome = outcome(apply(&change));
-            // It fits: the queue has room for the schedule, and what was sent is only looked at when all of it does.
+            // It fits: the queue has room for the schedule, and the rest is only looked at when all of it does.
             let _ = reports.push(ChangeReport { tick: tick.index, time_ns: tick.time_ns, change, outcome });
+            outcome
         };
         while let Some(due) = schedule.get(*next).filter(|due| due.time_ns <= tick.time_ns) {
-            take(reports, due.change);
+            let outcome = take(reports, due.change);
+            movements.note(&due.change, outcome);
             *next += 1;
         }
-        // The queue of reports must have room for what was sent; else that waits.
-        if waiting > 0 && reports.slots() >= schedule.len() - *next + sent.buffer().capacity() {
-            (0..waiting).map_while(|_| sent.pop().ok()).for_each(|change| take(reports, change));
+        // The queue of reports must have room for what was sent; else that waits, and so does what is on its way.
+        let left = schedule.len() - *next;
+        if waiting > 0 && reports.slots() >= left + sent.buffer().capacity() {
+            for change in (0..waiting).map_while(|_| sent.pop().ok()) {
+                let Pace::Gradual { from, per_s } = change.pace else {
+                    let outcome = take(reports, change);
+                    movements.note(&change, outcome);
+                    continue;
+                };
+                if !movements.begin(&change, from, per_s) {
+                    let (tick, time_ns, outcome) = (tick.index, tick.time_ns, ChangeOutcome::Refused);
+                    let _ = reports.push(ChangeReport { tick, time_ns, change, outcome });
+                }
+            }
+        }
+        if reports.slots() >= left + movements.moving() {
+            movements.advance(tick, |change| take(reports, change));
         }
         any
     }

@@ -347,6 +347,7 @@ impl RunSummary {
                 RunEnd::TooFast(_) => "too_fast",
                 RunEnd::NotPaced => "not_paced",
                 RunEnd::Watchdog(_) => "watchdog",
+                RunEnd::Oscillation => "oscillation",
                 RunEnd::Unguarded => "unguarded",
             },
             clock: facts.clock,

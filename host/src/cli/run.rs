@@ -12,7 +12,7 @@ use flotor_command::{
 };
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_live::{Directory, Latch};
+use flotor_live::{Directory, EndKind, Latch};
 use flotor_record::{Note, Recorder, Severity, TraceDigest};
 use flotor_servo::RunEnd;
 use flotor_servo::coupling::Line;
@@ -168,7 +168,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let carried: Vec<(String, LinkCounts)> =
         links.into_iter().map(|(name, link)| (name, link.finish())).collect();
     if let Some(publication) = publication {
-        publication.end(&end_words(&outcome, scene.rate_hz));
+        publication.end(&end_words(&outcome, scene.rate_hz), end_kind(outcome.end));
     }
     let facts = RunFacts {
         title: &scene.title,
@@ -251,6 +251,7 @@ fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) ->
         }
         RunEnd::NotPaced => Err(CommandError::NotPaced),
         RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
+        RunEnd::Oscillation => Err(CommandError::Oscillation),
         RunEnd::Unguarded => Err(CommandError::Unguarded),
         RunEnd::Finished | RunEnd::Stopped => broken_plugins(outcome, summary),
     }
@@ -311,6 +312,11 @@ fn peer_links(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLi
     lines.into_iter().map(link).collect()
 }
 
+/// Whether a run ended as it should, for its clients.
+fn end_kind(end: RunEnd) -> EndKind {
+    if matches!(end, RunEnd::Finished | RunEnd::Stopped) { EndKind::InOrder } else { EndKind::Failed }
+}
+
 /// How a run ended, for its clients.
 fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
     match outcome.end {
@@ -327,6 +333,7 @@ fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
         RunEnd::TooFast(samples_per_s) => CommandError::TooFast { samples_per_s, rate_hz }.to_string(),
         RunEnd::NotPaced => CommandError::NotPaced.to_string(),
         RunEnd::Watchdog(stuck) => CommandError::Watchdog(stuck).to_string(),
+        RunEnd::Oscillation => CommandError::Oscillation.to_string(),
         RunEnd::Unguarded => CommandError::Unguarded.to_string(),
     }
 }

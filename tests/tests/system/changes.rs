@@ -3,12 +3,15 @@
 
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome};
+use flotor_record::Recorder;
 use flotor_servo::{Clock, StopSwitch};
-use flotor_session::{ControlError, Controls, NewValue, Observer};
+use flotor_session::scene::Scene;
+use flotor_session::{ControlError, Controls, NewValue, Observer, RunOptions, RunRecording};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{prepared, watch};
 use serde_json::Value;
+use std::path::Path;
 
 /// Two springs side by side on the simulated flotor, held by a hand.
 const TWO_SPRINGS: &str = r#"
@@ -113,11 +116,84 @@ fn meddle(act: &dyn Fn(&Controls)) -> (Vec<Change>, u64) {
 fn what_is_sent_together_is_applied_together() {
     let (changes, _) = meddle(&|controls| {
         let value = |plugin, value| NewValue { plugin, parameter: "gamma_n", value };
-        controls.set_parameters(&[value("first", "20"), value("second", "21")]).expect("both are right");
+        let both = [value("first", "20"), value("second", "21")];
+        controls.set_parameters_at_once(&both).expect("both are right");
     });
     let told: Vec<(&str, &str)> = changes.iter().map(|c| (c.plugin.as_str(), c.value.as_str())).collect();
     assert_eq!(told, [("first", "20"), ("second", "21")]);
     assert_eq!(changes[0].tick, changes[1].tick);
+}
+
+/// A slider that jumps to the end of its range must not make the force jump: from 16.97 to 10 000 N in two ticks was a limit
+/// cycle of 140 N at the hand.
+#[test]
+fn a_live_request_moves_at_the_rate_of_the_soft_range_and_every_step_is_reported() {
+    let (changes, _) = meddle(&|controls| {
+        let value = |plugin, value| NewValue { plugin, parameter: "gamma_n", value };
+        controls.set_parameters(&[value("first", "10000"), value("second", "17.5")]).expect("both are legal");
+    });
+    let of =
+        |plugin| changes.iter().filter(move |change| change.plugin == plugin).map(|change| change.number);
+    let (first, second): (Vec<f64>, Vec<f64>) = (of("first").collect(), of("second").collect());
+    // From a third of 16.97 N to three times it, a tenth of that in 50 ms: 0.0905 N in a tick.
+    let most = (3.0 - 1.0 / 3.0) * 16.97 * 2.0 * 1.0e-3;
+    let steps = |values: &[f64]| values.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    assert!(first[0] - 16.97 <= most * 1.001 && steps(&first) <= most * 1.001, "{most}: {first:?}");
+    let last = *first.last().expect("it moves");
+    assert!(last > 16.97 && last < 16.97 + 2.0 * 2.0 * (3.0 - 1.0 / 3.0) * 16.97, "{last} after two seconds");
+    assert_eq!(second.last(), Some(&17.5), "what is near is reached: {second:?}");
+    assert!(changes.iter().all(|change| change.outcome == ChangeOutcome::Applied));
+}
+
+/// Steps are changes of the recording: a replay needs no rate, and is not slowed.
+#[test]
+fn a_recording_of_a_live_request_replays_bit_for_bit() {
+    let scratch = Scratch::default();
+    let path = scratch.path().join("moved.mcap");
+    let session = prepared(Clock::Virtual, TWO_SPRINGS);
+    let scene = Scene::parse(Path::new("scene.toml"), TWO_SPRINGS).expect("the scene is right");
+    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
+    let run = flotor_session::describe(&scene, &options, session.plugins());
+    struct Recording<'a>(Meddler<'a>, RunRecording);
+    impl Observer for Recording<'_> {
+        fn observe(&mut self, record: &TickRecord) {
+            self.0.observe(record);
+            self.1.observe(record);
+        }
+        fn change(&mut self, change: &Change) {
+            self.0.change(change);
+            self.1.change(change);
+        }
+    }
+    let act: &dyn Fn(&Controls) =
+        &|controls| controls.set_parameter("first", "gamma_n", "40").expect("it is legal");
+    let meddler = Meddler { controls: session.controls(), at_tick: 100, act, changes: Vec::new(), ticks: 0 };
+    let recorder = Recorder::create(&path, &run).expect("a scratch file");
+    let mut both = Recording(meddler, RunRecording::new(Some(recorder)));
+    session.run(&mut both, &StopSwitch::default()).expect("it runs");
+    both.1.finish(&[]).expect("the disk is not full");
+    assert!(both.0.changes.len() > 20, "{}", both.0.changes.len());
+    let ran = Flotor::with(["replay", &path.display().to_string(), "--json", "-"]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let summary: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
+    assert_eq!(summary["bit_exact"], Value::from(true), "{summary}");
+}
+
+/// A spring the device cannot render: the force swings between its limits, is damped, and the run is ended with the reason,
+/// although nobody watches.
+#[test]
+fn a_run_whose_force_swings_between_its_limits_is_damped_and_ended() {
+    let scratch = Scratch::default();
+    let scene = scratch.file("scene.toml", TWO_SPRINGS).display().to_string();
+    let sets = ["--set", "first.gamma_n=10000", "--set", "second.gamma_n=10000"];
+    let arguments = ["run", &scene, "--clock", "virtual", "--duration", "20s", "--json", "-"];
+    let ran = Flotor::with(arguments.into_iter().chain(sets)).run();
+    assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
+    assert!(ran.stderr.contains("swung between its limits"), "{ran:?}");
+    let summary: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
+    assert_eq!(summary["end"], Value::from("oscillation"), "{summary}");
+    assert!(summary["events"]["oscillation_damped"].as_u64() > Some(0), "{summary}");
+    assert!(summary["elapsed_s"].as_f64() < Some(10.0), "{summary}");
 }
 
 #[test]
@@ -151,7 +227,8 @@ fn what_is_wrong_with_a_change_is_said_before_it_reaches_the_loop() {
 fn a_sender_is_told_when_the_loop_is_busy_and_when_it_is_over() {
     let session = prepared(Clock::Virtual, TWO_SPRINGS);
     let controls = session.controls();
-    let send = || controls.set_parameter("first", "gamma_n", "20");
+    let value = NewValue { plugin: "first", parameter: "gamma_n", value: "20" };
+    let send = || controls.set_parameters_at_once(&[value]);
     let sent = std::iter::repeat_with(send).take(10_000).take_while(Result::is_ok).count();
     assert!((1..10_000).contains(&sent));
     assert_eq!(send(), Err(ControlError::Busy));

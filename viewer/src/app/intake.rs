@@ -84,9 +84,16 @@ impl Viewer {
                 self.bell.ring();
             }
         }
+        let mut drawn: Vec<&ChangeMessage> = Vec::new();
         for change in &arrivals.changes {
-            self.follow(change);
+            self.panels.iter_mut().for_each(|panel| panel.take_in(change));
+            // A number on its way changes with every tick; the last one is what is drawn.
+            drawn.retain(|earlier| {
+                (&earlier.plugin, &earlier.parameter) != (&change.plugin, &change.parameter)
+            });
+            drawn.push(change);
         }
+        drawn.into_iter().for_each(|change| self.follow(change));
         for answer in arrivals.answers {
             if let Some(reason) = answer.refused {
                 self.panels.iter_mut().for_each(Panel::take_back);
@@ -95,9 +102,8 @@ impl Viewer {
         }
     }
 
-    /// A parameter changed in the loop: panels and the drawn instance follow.
+    /// A parameter changed in the loop: the drawn instance follows, and what depends on it.
     fn follow(&mut self, change: &ChangeMessage) {
-        self.panels.iter_mut().for_each(|panel| panel.take_in(change));
         if change.outcome != Outcome::Applied || change.subject != Subject::Parameter {
             return;
         }

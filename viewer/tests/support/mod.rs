@@ -14,7 +14,7 @@ use flotor_core::Clock;
 use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_live::{
-    Answer, Ask, ChangeMessage, Directory, End, Frames, Greeting, Kind, Listener, Outcome, PROTOCOL,
+    Answer, Ask, ChangeMessage, Directory, End, EndKind, Frames, Greeting, Kind, Listener, Outcome, PROTOCOL,
     PanelPlugin, RefusalCause, Request, SetValue, Subject, WrenchLimits, frame, ticks_to_payload,
 };
 use flotor_record::{PluginDescription, Role, RunDescription};
@@ -81,9 +81,12 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
         ],
         couplings: Vec::new(),
     };
+    let number = |(_, value): &(String, String)| value.parse().unwrap_or(f64::NAN);
+    let values = parameters.iter().map(number);
+    let soft: Vec<_> = schema.iter().zip(values).map(|(one, value)| SoftRange::around(one, value)).collect();
     let panels = vec![
-        PanelPlugin::new("device", "simulated", PathBuf::new(), &[], &[]),
-        PanelPlugin::new("spring", "spring", file, schema, &parameters),
+        PanelPlugin::new("device", "simulated", PathBuf::new(), &[], &[], &[]),
+        PanelPlugin::new("spring", "spring", file, schema, &parameters, &soft),
     ];
     (run, panels)
 }
@@ -170,6 +173,16 @@ impl FakeHost {
         }
     }
 
+    /// Nothing has been asked that was not answered, as far as it has arrived.
+    pub(crate) fn nothing_is_asked(&mut self) {
+        let stream = self.stream.as_mut().expect("somebody watches");
+        stream.set_read_timeout(Some(Duration::from_millis(200))).expect("a time-out is legal");
+        let filled = self.frames.fill(stream);
+        stream.set_read_timeout(Some(PATIENCE)).expect("a time-out is legal");
+        let asked = self.frames.take().expect("they talk sense");
+        assert!(filled.is_err() && asked.is_none(), "something was asked: {asked:?}");
+    }
+
     /// The next request; answered with yes or the reason why not.
     pub(crate) fn request(&mut self, refused: Option<&str>) -> Ask {
         let until = Instant::now() + PATIENCE;
@@ -206,7 +219,12 @@ impl FakeHost {
 
     /// The run is over.
     pub(crate) fn end(&mut self, words: &str) {
-        let end = End { words: words.to_owned() };
+        self.end_as(words, EndKind::InOrder);
+    }
+
+    /// The run is over, in order or not.
+    pub(crate) fn end_as(&mut self, words: &str, kind: EndKind) {
+        let end = End { words: words.to_owned(), kind };
         self.send(Kind::End, &serde_json::to_vec(&end).expect("it is JSON"));
         self.stream = None;
     }

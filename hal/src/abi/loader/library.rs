@@ -7,7 +7,7 @@ use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file, sc
 use crate::abi::{
     ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, Entry, HOST_QUIET_PANICS, Host, MAGIC, PluginKind,
 };
-use crate::extension::DeviceExtensions;
+use crate::extension::{DeviceExtensions, ModelExtensions};
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use object::ReadCache;
 use std::ffi::CString;
@@ -217,6 +217,14 @@ impl Plugin {
         match &self.interface {
             Interface::Device { extensions, .. } => Some(extensions),
             Interface::Model(_) => None,
+        }
+    }
+
+    /// The extensions of a model; `None` for a device.
+    pub(crate) fn model_extensions(&self) -> Option<&ModelExtensions> {
+        match &self.interface {
+            Interface::Model(tables) => Some(&tables.extensions),
+            Interface::Device { .. } => None,
         }
     }
 

@@ -12,7 +12,8 @@ mod outbox;
 mod watcher;
 
 use crate::{
-    Ask, ChangeMessage, Directory, DirectoryError, End, Greeting, Kind, Listener, RefusalCause, frame,
+    Ask, ChangeMessage, Directory, DirectoryError, End, EndKind, Greeting, Kind, Listener, RefusalCause,
+    frame,
 };
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
@@ -130,8 +131,8 @@ impl Publication {
     }
 
     /// Notifies all clients of the end of the run and its outcome; no client can connect afterwards.
-    pub fn end(self, words: &str) {
-        let Ok(payload) = serde_json::to_vec(&End { words: words.to_owned() }) else { return };
+    pub fn end(self, words: &str, kind: EndKind) {
+        let Ok(payload) = serde_json::to_vec(&End { words: words.to_owned(), kind }) else { return };
         let bytes = frame(Kind::End, &payload);
         self.shared.watchers().iter().for_each(|watcher| watcher.outbox.last(bytes.clone()));
     }

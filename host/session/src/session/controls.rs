@@ -13,8 +13,8 @@ use flotor_hal::abi::loader::{Setting, SettingError};
 use flotor_hal::{LoopConfig, Mutability, Parameter};
 use flotor_live::RefusalCause;
 use flotor_servo::{
-    ChangeReport, ChangeSender, Clock, HostSwaps, Layer, LayerReport, ModelHealth, PLUGIN, ParameterChange,
-    Replacement, ReportReceiver, WEIGHT,
+    ChangeReport, ChangeSender, Clock, HostSwaps, Layer, LayerReport, ModelHealth, PLUGIN, Pace,
+    ParameterChange, Replacement, ReportReceiver, WEIGHT,
 };
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -267,7 +267,8 @@ impl Controls {
         plugins.iter().map(|plugin| (plugin.now().name.clone(), plugin.now().schema)).collect()
     }
 
-    /// Gives a live parameter a new value before the next tick. Not real-time.
+    /// Moves a live parameter to a new value, a tenth of its [soft range](flotor_hal::SoftRange) in 50 ms; what is no number
+    /// changes before the next tick. Not real-time.
     ///
     /// The plugin may still refuse it, if it does not fit its other values: observers are told what became of it
     /// ([`super::Observer::change`]).
@@ -278,11 +279,24 @@ impl Controls {
         self.set_parameters(&[NewValue { plugin, parameter, value }])
     }
 
-    /// Gives several live parameters new values, all before the same tick. Not real-time.
+    /// Moves several live parameters to new values, all from the same tick on; each as [`Controls::set_parameter`] does. Not
+    /// real-time.
     ///
     /// # Errors
     /// [`ControlError`]; then none of them changes.
     pub fn set_parameters(&self, values: &[NewValue<'_>]) -> Result<(), ControlError> {
+        let Shared { parts, .. } = &*self.shared;
+        let slowed = |change: &ParameterChange| ParameterChange { pace: parts.pace(change), ..*change };
+        let checked = values.iter().map(|value| parts.check(value)).collect::<Result<Vec<_>, _>>()?.concat();
+        self.send(&checked.iter().map(slowed).collect::<Vec<_>>())
+    }
+
+    /// Gives several live parameters new values, all before the same tick: for what no hand feels while it changes, such as the
+    /// next stimulus of an experiment. Not real-time.
+    ///
+    /// # Errors
+    /// [`ControlError`]; then none of them changes.
+    pub fn set_parameters_at_once(&self, values: &[NewValue<'_>]) -> Result<(), ControlError> {
         let checked = values.iter().map(|value| self.shared.parts.check(value));
         self.send(&checked.collect::<Result<Vec<_>, _>>()?.concat())
     }
@@ -603,7 +617,8 @@ impl Parts {
     ) -> Result<Vec<ParameterChange>, ControlError> {
         self.models(model)?;
         let value = weight.clamp(0.0, 1.0);
-        let change = |plugin| ParameterChange { plugin, generation: 0, parameter: WEIGHT, value };
+        let change =
+            |plugin| ParameterChange { plugin, generation: 0, parameter: WEIGHT, value, pace: Pace::AtOnce };
         Ok(self.numbers(model)?.into_iter().map(change).collect())
     }
 
@@ -618,7 +633,21 @@ impl Parts {
         let (part, generation) = (versions.now(), versions.current);
         let setting = live_setting(part, new)?;
         let parameter = u32::try_from(setting.index()).unwrap_or(u32::MAX); // schemas have tens of entries
-        Ok(ParameterChange { plugin, generation, parameter, value: setting.value() })
+        Ok(ParameterChange { plugin, generation, parameter, value: setting.value(), pace: Pace::AtOnce })
+    }
+
+    /// How fast a request of a person moves a number.
+    fn pace(&self, change: &ParameterChange) -> Pace {
+        let list = self.lock();
+        let part = list.get(usize::from(change.plugin)).map(|versions| versions.get(change.generation));
+        let index = change.parameter as usize;
+        part.and_then(|part| {
+            let range = part.soft_ranges.get(index)?.as_ref()?;
+            let (_, value) = part.parameters.get(index)?;
+            let from = value.parse().ok().or_else(|| part.schema.get(index).map(Parameter::default))?;
+            Some(Pace::Gradual { from, per_s: range.rate_per_s() })
+        })
+        .unwrap_or(Pace::AtOnce)
     }
 
     /// From numbers back to words.

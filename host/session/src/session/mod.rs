@@ -31,7 +31,7 @@ use flotor_core::limits::Limits;
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
-use flotor_hal::{Capabilities, Embodiment, EnergyLedger, Fault, LoopConfig, Parameter};
+use flotor_hal::{Capabilities, Embodiment, EnergyLedger, Fault, LoopConfig, Parameter, SoftRange};
 use flotor_hal::{Pose, Twist, Wrench};
 use flotor_live::{Directory, Pressed, WrenchLimits};
 use flotor_servo::coupling::{Line, Patience, Reach};
@@ -140,6 +140,8 @@ pub struct PluginReport {
     pub settings: Vec<(String, String)>,
     /// Every parameter with the value in force before the run, as text.
     pub parameters: Vec<(String, String)>,
+    /// Where each parameter is usefully moved by hand; none for what is no number.
+    pub soft_ranges: Vec<Option<SoftRange>>,
     /// Signals of the host that it took away while it was made, and that were taken back.
     pub signals_taken: TakenSignals,
     /// What a model says of its own error when it is ready ([`crate::estimates`]), by name.

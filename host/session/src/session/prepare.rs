@@ -16,7 +16,7 @@ use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting, Stopper};
 use flotor_hal::{
-    Axes, Capabilities, Embodiment, Independence, LoopConfig, Parameter, ParameterKind, Refusal,
+    Axes, Capabilities, Embodiment, Independence, LoopConfig, Parameter, ParameterKind, Refusal, SoftRange,
 };
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
@@ -412,15 +412,23 @@ fn report(
     value: impl FnMut(usize) -> f64,
 ) -> PluginReport {
     let written = used.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone()));
+    let parameters = in_force(plugin, settings, value);
     PluginReport {
         name: name.to_owned(),
         metadata: plugin.metadata().clone(),
         schema: plugin.parameters(),
         settings: written.collect(),
-        parameters: in_force(plugin, settings, value),
+        soft_ranges: soft_ranges(plugin, &parameters),
+        parameters,
         signals_taken: TakenSignals::default(),
         estimates: Vec::new(),
     }
+}
+
+/// Of every parameter the range it is moved in by hand, by its value in force.
+fn soft_ranges(plugin: &Plugin, values: &[(String, String)]) -> Vec<Option<SoftRange>> {
+    let number = |(_, value): &(String, String)| value.parse().unwrap_or(f64::NAN);
+    values.iter().map(number).enumerate().map(|(index, value)| plugin.soft_range(index, value)).collect()
 }
 
 /// Every parameter with its value in force, as text.

@@ -23,7 +23,7 @@ use crate::{ControlError, Controls, LatchGuard, NewValue, Observer, PluginReport
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::{
-    Ask, Directory, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, RefusalCause, Serve,
+    Ask, Directory, EndKind, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, RefusalCause, Serve,
 };
 use flotor_record::RunDescription;
 use flotor_servo::{EmergencySource, StopSwitch};
@@ -70,8 +70,8 @@ pub fn announce(
 }
 
 fn panel(report: &PluginReport) -> PanelPlugin {
-    let PluginReport { name, metadata, schema, parameters, .. } = report;
-    PanelPlugin::new(name, &metadata.id, metadata.path.clone(), schema, parameters)
+    let PluginReport { name, metadata, schema, parameters, soft_ranges, .. } = report;
+    PanelPlugin::new(name, &metadata.id, metadata.path.clone(), schema, parameters, soft_ranges)
 }
 
 /// An observer, and the clients of the telemetry server.
@@ -84,9 +84,9 @@ pub struct Watched<O> {
 
 impl<O> Watched<O> {
     /// Notifies the clients of the end of the run.
-    pub fn end(self, words: &str) {
+    pub fn end(self, words: &str, kind: EndKind) {
         if let Some(publication) = self.publication {
-            publication.end(words);
+            publication.end(words, kind);
         }
     }
 }

@@ -281,7 +281,7 @@ impl Apparatus {
         let value = value.to_string();
         match self.route {
             Route::Parameter => {
-                controls.set_parameters(&[NewValue { plugin: model, parameter, value: &value }])
+                controls.set_parameters_at_once(&[NewValue { plugin: model, parameter, value: &value }])
             }
             Route::Swap => controls.swap(&self.registry, model, None, &[(parameter, &value)]),
         }
