@@ -33,6 +33,7 @@ pub mod palette;
 pub mod panel;
 pub mod picture;
 pub mod player;
+pub mod pointer_order;
 pub mod quantity;
 pub mod raster;
 pub mod remembered;

@@ -4,6 +4,7 @@
 use clap::Parser;
 use flotor_live::Directory;
 use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::experiment::StopKey;
 use flotor_viewer::experiment::wire::at_standard_streams;
 use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
@@ -32,6 +33,9 @@ struct Arguments {
     /// Show the screens of an experiment, told and answered by lines of JSON on standard input and output
     #[arg(long, requires = "run", conflicts_with = "recording")]
     sitting: bool,
+    /// The key that is the emergency stop in a sitting
+    #[arg(long, value_enum, default_value_t, requires = "sitting")]
+    stop_key: StopKey,
     /// The picture is that of the whole window, with panels
     #[arg(long, requires = "screenshot")]
     window: bool,
@@ -96,7 +100,8 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
     if !arguments.sitting {
         return Ok(Start::Live(wanted));
     }
-    let prompt = at_standard_streams().map_err(Failure::file)?;
+    let mut prompt = at_standard_streams().map_err(Failure::file)?;
+    prompt.stop_key = arguments.stop_key;
     Ok(Start::Sitting(wanted, Box::new(prompt)))
 }
 

@@ -54,6 +54,8 @@ pub struct Palette {
     pub contact: Color,
     /// Something is wrong.
     pub warning: Color32,
+    /// A fault, or an emergency stop.
+    pub fault: Color32,
     /// All is well.
     pub well: Color32,
     /// How dark shadows are, 0 to 1.
@@ -95,6 +97,7 @@ impl Palette {
                 torque: [222, 142, 190, 255],
                 contact: [255, 84, 96, 255],
                 warning: Color32::from_rgb(255, 138, 96),
+                fault: Color32::from_rgb(255, 92, 92),
                 well: Color32::from_rgb(0, 190, 140),
                 shadow: 0.62,
             },
@@ -117,6 +120,7 @@ impl Palette {
                 torque: [196, 96, 158, 255],
                 contact: [226, 42, 62, 255],
                 warning: Color32::from_rgb(176, 54, 10),
+                fault: Color32::from_rgb(184, 16, 24),
                 well: Color32::from_rgb(0, 134, 100),
                 shadow: 0.34,
             },
@@ -256,7 +260,7 @@ mod tests {
         for look in [Look::Dark, Look::Light] {
             let palette = Palette::of(look);
             for behind in [rgb(palette.panel), palette.backdrop.top, palette.backdrop.bottom] {
-                for text in [palette.text, palette.faint, palette.warning] {
+                for text in [palette.text, palette.faint, palette.warning, palette.fault] {
                     let contrast = contrast(rgb(text), behind);
                     assert!(contrast >= 4.5, "{look:?}: {text:?} on {behind:?} has {contrast}");
                 }

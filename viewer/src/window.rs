@@ -3,6 +3,7 @@
 use crate::app::{Start, Viewer};
 use crate::cost::{self, Cost};
 use crate::palette::{Look, Palette};
+use crate::pointer_order::PointerOrder;
 use crate::remembered::Remembered;
 use egui::{Ui, ViewportBuilder};
 use std::any::Any;
@@ -110,6 +111,7 @@ pub fn open(start: Start, request: WindowOptions) -> Result<Option<Cost>, Window
                     viewer,
                     file,
                     kept: remembered,
+                    pointer: PointerOrder::default(),
                     measure: request.measure.map(|duration| (duration, tells)),
                 }))
             }),
@@ -157,6 +159,7 @@ struct Kept {
     viewer: Viewer,
     file: Option<PathBuf>,
     kept: Remembered,
+    pointer: PointerOrder,
     /// What is still to be watched, and who wants to know.
     measure: Option<(Duration, Sender<Cost>)>,
 }
@@ -178,6 +181,12 @@ impl eframe::App for Kept {
         if now != self.kept && !ui.input(|input| input.pointer.any_down()) {
             let _ = now.save(file); // a full disk costs the choices of the next time, and nothing now
             self.kept = now;
+        }
+    }
+
+    fn raw_input_hook(&mut self, context: &egui::Context, input: &mut egui::RawInput) {
+        if self.pointer.split(input) {
+            context.request_repaint();
         }
     }
 

@@ -20,6 +20,9 @@ impl Viewer {
         if ui.ctx().egui_wants_keyboard_input() {
             return;
         }
+        if ui.input(|input| input.modifiers.command && input.key_pressed(Key::Z)) {
+            self.undo();
+        }
         if !is_live && pressed(Key::Space) {
             self.player.toggle(false, span_s);
         }

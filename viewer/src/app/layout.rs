@@ -18,7 +18,7 @@ fn view_part(height_pt: f32) -> f32 {
 
 impl Viewer {
     pub(super) fn top(&mut self, ui: &mut Ui, palette: &Palette) {
-        let (standing, is_well) = self.standing();
+        let (standing, mood) = self.standing();
         let (title, subtitle) = match &self.source {
             Source::Waiting(_) => ("Flotor", ""),
             // Names of parameters are nothing for a subject's eyes.
@@ -29,7 +29,7 @@ impl Viewer {
             title,
             subtitle,
             standing: &standing,
-            is_well,
+            mood,
             can_stop: self.source.is_running(),
             has_panel: self.audience == Audience::Experimenter,
             look: self.look,
@@ -46,7 +46,12 @@ impl Viewer {
         let mut values: Vec<SetValue> = Vec::new();
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.set_max_width(ui.available_width() - 12.0); // room for the bar that scrolls
-            // Models first: they are what people came for.
+            // How close the hand is to the limits comes before anything that can be changed.
+            if let Some(sample) = self.history.at(self.player.now_s) {
+                standing::standing(ui, sample, &self.limits, &self.tally, palette);
+                ui.add_space(8.0);
+            }
+            // Models before devices: they are what people came for.
             let has_device = self.panels.len().min(1);
             let (device, models) = self.panels.split_at_mut(has_device);
             for panel in models.iter_mut().chain(device) {
@@ -54,12 +59,20 @@ impl Viewer {
                 values.extend(changed.into_iter().filter_map(|index| panel.change(index)));
                 ui.add_space(8.0);
             }
-            if let Some(sample) = self.history.at(self.player.now_s) {
-                standing::standing(ui, sample, &self.limits, &self.tally, palette);
-            }
         });
         if !values.is_empty() {
             self.ask(Ask::Set { values });
+        }
+    }
+
+    /// Takes back the last change of a panel: of the models first, they are what people change.
+    pub(super) fn undo(&mut self) {
+        let has_device = self.panels.len().min(1);
+        let (device, models) = self.panels.split_at_mut(has_device);
+        let mut panels = models.iter_mut().chain(device);
+        let undone = panels.find_map(|panel| panel.undo().and_then(|index| panel.change(index)));
+        if let Some(value) = undone {
+            self.ask(Ask::Set { values: vec![value] });
         }
     }
 

@@ -18,7 +18,8 @@ impl Viewer {
     /// Shows the screen of a sitting, and tells the experiment what the person does.
     pub(super) fn sit(&mut self, ui: &mut Ui, palette: &Palette) {
         let is_running = self.source.is_running();
-        if is_running && ui.input(|input| input.key_pressed(Key::Space)) {
+        let stop_key = self.sitting.as_ref().map(|prompt| prompt.stop_key.key());
+        if is_running && stop_key.is_some_and(|key| ui.input(|input| input.key_pressed(key))) {
             self.ask(Ask::EmergencyStop);
         }
         let Some(mut prompt) = self.sitting.take() else { return };

@@ -124,7 +124,7 @@ impl Parts {
         let panels = run.plugins.iter().map(|plugin| {
             let file = PathBuf::from(&plugin.file);
             let (name, id) = (plugin.name.as_str(), plugin.id.as_str());
-            Panel::new(&PanelPlugin::new(name, id, file, schema(id), &plugin.parameters), Use::Read)
+            Panel::new(&PanelPlugin::new(name, id, file, schema(id), &plugin.parameters, &[]), Use::Read)
         });
         let panels = panels.collect();
         Self { shapes, panels, missing: missing.iter().map(ToString::to_string).collect() }

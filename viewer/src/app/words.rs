@@ -5,31 +5,42 @@ use crate::feed::FeedState;
 use crate::history::Sample;
 use crate::player::Motion;
 use crate::ui::readout;
+use crate::ui::top_bar::Mood;
 use flotor_core::trace::Events;
+use flotor_live::EndKind;
 use flotor_record::Severity;
 use std::time::Duration;
 
 /// How long something that happened in one tick stays in sight, s.
 const IN_SIGHT_S: f64 = 1.0;
+/// What ends a run that should go on.
+const FATAL: Events = Events::from_bits(Events::EMERGENCY_STOP.bits() | Events::DEVICE_FAULT.bits());
 /// How long a remark stays in sight.
 const REMARK: Duration = Duration::from_secs(6);
 
 impl Viewer {
-    /// How the run stands, and whether that is well.
-    pub(super) fn standing(&self) -> (String, bool) {
+    /// How the run stands, and how well that is.
+    pub(super) fn standing(&self) -> (String, Mood) {
         let newest = self.history.at(f64::INFINITY);
         let events = newest.map_or(Events::NONE, |sample| sample.events);
         match &self.source {
-            Source::Waiting(_) => ("no run".to_owned(), true),
-            Source::Recording => ("recording".to_owned(), true),
+            Source::Waiting(_) => ("no run".to_owned(), Mood::Idle),
+            Source::Recording => ("recording".to_owned(), Mood::Idle),
             Source::Live { feed, .. } => match feed.state() {
-                FeedState::Ended(words) => (words, !events.intersects(Events::EMERGENCY_STOP)),
-                FeedState::Lost(_) => ("connection lost".to_owned(), false),
-                FeedState::Running if feed.is_stale() => ("no ticks come".to_owned(), false),
-                FeedState::Running if events.intersects(Events::HOLDING) => ("holding".to_owned(), false),
-                FeedState::Running if events.intersects(Events::RELEASING) => ("fading out".to_owned(), true),
-                FeedState::Running if events.intersects(Events::RAMPING) => ("fading in".to_owned(), true),
-                FeedState::Running => ("running".to_owned(), true),
+                FeedState::Ended(words, EndKind::InOrder) if !events.intersects(FATAL) => (words, Mood::Idle),
+                FeedState::Ended(words, _) => (words, Mood::Bad),
+                FeedState::Lost(_) => ("connection lost".to_owned(), Mood::Bad),
+                FeedState::Running if feed.is_stale() => ("no ticks come".to_owned(), Mood::Bad),
+                FeedState::Running if events.intersects(Events::HOLDING) => {
+                    ("holding".to_owned(), Mood::Careful)
+                }
+                FeedState::Running if events.intersects(Events::RELEASING) => {
+                    ("fading out".to_owned(), Mood::Well)
+                }
+                FeedState::Running if events.intersects(Events::RAMPING) => {
+                    ("fading in".to_owned(), Mood::Well)
+                }
+                FeedState::Running => ("running".to_owned(), Mood::Well),
             },
         }
     }

@@ -35,6 +35,30 @@ const MOST_DIGITS: usize = 8;
 /// How long a warning stays in sight after the last one.
 const WARNED: Duration = Duration::from_secs(2);
 
+/// The key that is the emergency stop in a sitting: not the largest one, which a person presses to go on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum StopKey {
+    /// Escape
+    #[default]
+    Escape,
+    /// The space bar
+    Space,
+    /// F12
+    F12,
+}
+
+impl StopKey {
+    /// The same for the window.
+    #[must_use]
+    pub fn key(self) -> egui::Key {
+        match self {
+            Self::Escape => egui::Key::Escape,
+            Self::Space => egui::Key::Space,
+            Self::F12 => egui::Key::F12,
+        }
+    }
+}
+
 /// The screen of the moment, and both ways to the experiment.
 #[derive(Debug)]
 pub struct Prompt {
@@ -48,6 +72,8 @@ pub struct Prompt {
     refused: Option<String>,
     is_lost: bool,
     waker: Waker,
+    /// What stops the device at once.
+    pub stop_key: StopKey,
 }
 
 /// Wakes the window when the experiment has said something: shared with who listens to it, and without effect until the window is
@@ -78,6 +104,7 @@ impl Prompt {
             refused: None,
             is_lost: false,
             waker: Waker::default(),
+            stop_key: StopKey::default(),
         }
     }
 
@@ -179,7 +206,7 @@ impl Prompt {
             Screen::Ready { .. } | Screen::Feel { .. } => None,
         };
         let input = match (question, key) {
-            (None | Some(Question::Nothing), StudyKey::Enter) => Some(Input::Continue),
+            (None, StudyKey::Enter) => Some(Input::Continue),
             (Some(_), StudyKey::Again) => Some(Input::Again),
             (Some(Question::WhichIsMore), StudyKey::Digit(1)) => answer(Response::First),
             (Some(Question::WhichIsMore), StudyKey::Digit(2)) => answer(Response::Second),

@@ -160,18 +160,20 @@ fn feel(trial: &TrialView, position: Option<Position>) -> Words {
 }
 
 fn ask(trial: &TrialView, question: Question) -> Words {
+    let is_practice = trial.phase == Phase::Practice;
     let (headline, text, keys) = match (question, trial.quality) {
-        (Question::Nothing, _) => {
-            ("That was one to practise", "", "Enter to go on          A  feel it again")
-        }
         (Question::WhichIsMore, quality) => (
             if quality == Quality::Stiffness { "Which one was stiffer?" } else { "Which one was stronger?" },
-            "",
+            if is_practice { "To practise: this answer does not count" } else { "" },
             "1  the first          2  the second          0  I don't know          A  feel them again",
         ),
         (Question::HowMuch, quality) => (
             if quality == Quality::Stiffness { "How stiff was it?" } else { "How strong was it?" },
-            "Type a number",
+            if is_practice {
+                "Type a number above 0; to practise, it does not count"
+            } else {
+                "Type a number above 0"
+            },
             "Enter when it is right          Backspace corrects          A  feel it again",
         ),
     };

@@ -21,7 +21,7 @@ impl Both {
         let sitting = Sitting::new(protocol, 1, SubjectNumber::new(subject).unwrap());
         let ((teller, told), (said, hears)) = (channel(), channel());
         let prompt = Prompt::new(told, said);
-        let experiment = Attended::new(sitting, protocol, 1, 30);
+        let experiment = Attended::new(sitting, protocol, 30);
         let mut both = Self { prompt, experiment, teller, hears, answers: Vec::new() };
         both.tell();
         both

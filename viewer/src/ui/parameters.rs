@@ -2,12 +2,25 @@
 
 use crate::palette::Palette;
 use crate::panel::{Knob, Panel, Standing, Value};
+use crate::ui::style;
 use crate::ui::style::SMALL_PT;
-use egui::{Align, CollapsingHeader, ComboBox, DragValue, Layout, RichText, Slider, Ui};
+use egui::{
+    Align, Button, CollapsingHeader, ComboBox, DragValue, Key, Layout, RichText, Slider, SliderClamping, Ui,
+};
 use flotor_live::ParameterShape;
 
 /// Ranges wider than this are travelled in steps of the same ratio.
 const LOGARITHMIC_FROM: f64 = 200.0;
+
+/// What a person did with a parameter.
+enum Edit {
+    /// Began to change it, from the value given; it may have changed already.
+    Begun(Value),
+    /// Goes on.
+    Goes,
+    /// The value it had at the start of the run.
+    Reset,
+}
 
 /// Shows a panel; gives the indices of the parameters a person has changed.
 pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
@@ -22,7 +35,22 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
                 panel.knobs.iter().enumerate().filter(standing).map(|(index, _)| index).collect()
             };
             for index in of(panel, |standing| *standing == Standing::Free) {
-                changed.extend(row(ui, &mut panel.knobs[index], palette).then_some(index));
+                let before = panel.knobs[index].value.clone();
+                match row(ui, &mut panel.knobs[index], palette) {
+                    Some(Edit::Begun(value)) => panel.begin(index, value),
+                    Some(Edit::Reset) => {
+                        changed.extend(panel.reset(index).then_some(index));
+                        continue;
+                    }
+                    Some(Edit::Goes) | None => {}
+                }
+                changed.extend((panel.knobs[index].value != before).then_some(index));
+            }
+            if panel.can_undo() {
+                let undo = ui.add(Button::new(RichText::new("Undo").size(SMALL_PT)).frame(false));
+                if undo.on_hover_text("The value before the last change (Ctrl+Z)").clicked() {
+                    changed.extend(panel.undo());
+                }
             }
             if let Some(refusal) = &panel.refusal {
                 ui.colored_label(palette.warning, format!("⚠ {refusal}"));
@@ -38,7 +66,7 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
             if !fixed.is_empty() {
                 CollapsingHeader::new(RichText::new("Fixed").size(SMALL_PT).color(palette.faint))
                     .id_salt((&panel.name, "fixed"))
-                    .default_open(fixed.len() == panel.knobs.len())
+                    .default_open(false)
                     .show(ui, |ui| {
                         fixed.into_iter().for_each(|index| fact(ui, &panel.knobs[index], palette))
                     });
@@ -53,33 +81,58 @@ fn heading(ui: &mut Ui, text: &str, palette: &Palette) {
     ui.label(RichText::new(text).size(SMALL_PT).color(palette.faint));
 }
 
-/// A parameter that can be pulled, or follows; true if it was pulled.
-fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> bool {
+/// A parameter that can be pulled, or follows, and what was done with it. The slider covers the soft range; a number beyond it
+/// is typed, and counts when Enter is pressed.
+fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> Option<Edit> {
     let (name, unit, help) = (knob.name.clone(), knob.unit().to_owned(), help(knob));
     let is_free = knob.standing == Standing::Free;
-    let shape = knob.parameter.shape.clone();
+    let (shape, soft, is_moved) = (knob.parameter.shape.clone(), knob.parameter.soft, knob.is_moved());
     match (&mut knob.value, shape) {
         (Value::Number(number), ParameterShape::Real { min, max, .. }) => {
             let before = *number;
-            let mut label = None;
+            let (mut label, mut wants_reset) = (None, false);
             ui.horizontal(|ui| {
                 let shown =
                     ui.label(RichText::new(&name).color(if is_free { palette.text } else { palette.faint }));
                 label = Some(shown.on_hover_text(&help).id);
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     ui.label(RichText::new(format!("{unit:<4}")).size(SMALL_PT).color(palette.faint));
-                    let drag = DragValue::new(number).range(min..=max).speed(speed(before)).max_decimals(4);
-                    let drag = ui.add_enabled(is_free, drag);
-                    label.map(|label| drag.labelled_by(label).on_hover_text(&help));
+                    let field = DragValue::new(number)
+                        .range(min..=max)
+                        .clamp_existing_to_range(false)
+                        .speed(0.0)
+                        .update_while_editing(false)
+                        .max_decimals(4);
+                    let field = ui.add_enabled(is_free, field);
+                    let is_left = field.lost_focus() && !ui.input(|input| input.key_pressed(Key::Enter));
+                    if is_left {
+                        *number = before; // half a number, perhaps
+                    }
+                    label.map(|label| field.labelled_by(label).on_hover_text(&help));
+                    if is_moved {
+                        let text = format!("{name} as in the scene");
+                        wants_reset = style::quiet(ui, "↺", &text).clicked();
+                    }
                 });
             });
             ui.spacing_mut().slider_width = ui.available_width() - 2.0;
-            let logarithmic = min > 0.0 && max / min > LOGARITHMIC_FROM;
-            let slider = Slider::new(number, min..=max).show_value(false).logarithmic(logarithmic);
+            let (low, high) = soft.map_or((min, max), |soft| (soft.min, soft.max));
+            let logarithmic = low > 0.0 && high / low > LOGARITHMIC_FROM;
+            let slider = Slider::new(number, low..=high)
+                .show_value(false)
+                .clamping(SliderClamping::Edits)
+                .logarithmic(logarithmic);
             let slider = ui.add_enabled(is_free, slider);
+            let (begins, is_pulled) = (slider.drag_started(), slider.dragged());
             label.map(|label| slider.labelled_by(label).on_hover_text(&help));
             ui.add_space(2.0);
-            *number != before
+            match *number != before {
+                _ if wants_reset => Some(Edit::Reset),
+                true if begins || !is_pulled => Some(Edit::Begun(Value::Number(before))),
+                true => Some(Edit::Goes),
+                false if begins => Some(Edit::Begun(Value::Number(before))),
+                false => None,
+            }
         }
         (Value::Choice(index), ParameterShape::Choice { choices, .. }) => {
             let before = *index;
@@ -95,11 +148,11 @@ fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> bool {
                     list.response.labelled_by(label.id);
                 });
             });
-            *index != before
+            (*index != before).then_some(Edit::Begun(Value::Choice(before)))
         }
         _ => {
             fact(ui, knob, palette);
-            false
+            None
         }
     }
 }
@@ -123,6 +176,9 @@ fn help(knob: &Knob) -> String {
     let mut help = format!("{}\n{}", knob.parameter.doc, knob.parameter.id);
     if let ParameterShape::Real { min, max, default } = knob.parameter.shape {
         help += &format!("  ·  {min} to {max} {unit}, default {default}", unit = knob.unit());
+        if knob.parameter.soft.is_some_and(|soft| soft.min > min || soft.max < max) {
+            help += "; beyond the slider by typing and Enter";
+        }
     }
     match &knob.standing {
         Standing::Free => {}
@@ -140,9 +196,4 @@ fn short(number: f64) -> f64 {
     let power = 10.0_f64.powi(DIGITS - 1 - number.abs().max(f64::MIN_POSITIVE).log10().floor() as i32);
     let rounded = (number * power).round() / power;
     if rounded.is_finite() { rounded } else { number }
-}
-
-/// Change of a number for a point of dragging: a thousandth of it.
-fn speed(number: f64) -> f64 {
-    (number.abs() * 2.0e-3).max(1.0e-4)
 }

@@ -41,3 +41,11 @@ pub fn apply(context: &Context, look: Look) {
         style.spacing.item_spacing = egui::vec2(8.0, 6.0);
     });
 }
+
+/// A button that is a sign, with what it does for those who ask.
+pub fn quiet(ui: &mut egui::Ui, sign: &str, help: &str) -> egui::Response {
+    let button =
+        ui.add(egui::Button::new(egui::RichText::new(sign).size(15.0)).frame(false)).on_hover_text(help);
+    button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, help));
+    button
+}

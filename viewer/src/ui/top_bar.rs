@@ -1,7 +1,7 @@
 //! The bar above everything: what is shown, how it stands, and the emergency stop.
 
 use crate::palette::{Look, Palette};
-use crate::ui::style::{BODY_PT, SMALL_PT};
+use crate::ui::style::{BODY_PT, SMALL_PT, quiet};
 use egui::{Align, Button, Color32, CornerRadius, Layout, RichText, Stroke, Ui, vec2};
 
 /// What stands in the bar.
@@ -12,14 +12,38 @@ pub struct TopBar<'a> {
     pub subtitle: &'a str,
     /// How the run stands, in a word or two.
     pub standing: &'a str,
-    /// Whether that is as it should be.
-    pub is_well: bool,
+    /// How well that is.
+    pub mood: Mood,
     /// Whether there is a run to stop.
     pub can_stop: bool,
     /// Whether there is a panel to put away.
     pub has_panel: bool,
     /// Light or dark.
     pub look: Look,
+}
+
+/// How well a run stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mood {
+    /// Nothing runs, and nothing is wrong.
+    Idle,
+    /// It runs.
+    Well,
+    /// It runs, and not as it should.
+    Careful,
+    /// It ended by a fault or an emergency stop, or is out of reach.
+    Bad,
+}
+
+impl Mood {
+    fn color(self, palette: &Palette) -> Color32 {
+        match self {
+            Self::Idle => palette.faint,
+            Self::Well => palette.well,
+            Self::Careful => palette.warning,
+            Self::Bad => palette.fault,
+        }
+    }
 }
 
 /// What was pressed.
@@ -56,11 +80,20 @@ impl TopBar<'_> {
                     request = Some(TopBarRequest::SwitchLook);
                 }
                 ui.add_space(6.0);
-                let color = if self.is_well { palette.text } else { palette.warning };
-                ui.label(RichText::new(self.standing).color(color));
-                let dot = if self.is_well { palette.well } else { palette.warning };
-                let (area, _) = ui.allocate_exact_size(vec2(10.0, 10.0), egui::Sense::hover());
-                ui.painter().circle_filled(area.center(), 4.0, dot);
+                let dot = self.mood.color(palette);
+                let color = if matches!(self.mood, Mood::Idle | Mood::Well) { palette.text } else { dot };
+                // A long reason leaves room for the title; all of it is below the pointer.
+                let most = (ui.available_width() * 0.6).max(80.0);
+                let standing = egui::Label::new(RichText::new(self.standing).color(color)).truncate();
+                ui.allocate_ui_with_layout(
+                    vec2(most, ui.available_height()),
+                    Layout::right_to_left(Align::Center),
+                    |ui| {
+                        ui.add(standing).on_hover_text(self.standing);
+                        let (area, _) = ui.allocate_exact_size(vec2(10.0, 10.0), egui::Sense::hover());
+                        ui.painter().circle_filled(area.center(), 4.0, dot);
+                    },
+                );
                 ui.add_space(6.0);
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     let text = RichText::new(self.subtitle).size(SMALL_PT).color(palette.faint);
@@ -70,12 +103,6 @@ impl TopBar<'_> {
         });
         request
     }
-}
-
-fn quiet(ui: &mut Ui, sign: &str, help: &str) -> egui::Response {
-    let button = ui.add(Button::new(RichText::new(sign).size(15.0)).frame(false)).on_hover_text(help);
-    button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, help));
-    button
 }
 
 /// The one button that must be found without looking for it: the same colours light and dark.

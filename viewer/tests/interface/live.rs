@@ -81,6 +81,79 @@ fn a_slider_reaches_the_host_and_follows_what_the_loop_says() {
     assert_eq!(number_of(&window, "gamma_n"), 30.0);
 }
 
+/// Typed key by key, `100` was 1, 10 and 100 N at the hand.
+#[test]
+fn a_typed_number_is_sent_when_enter_is_pressed_and_not_before() {
+    let (mut window, mut host, _folder) = live(&[]);
+    until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
+    let field = |window: &Window<'_>| window.get_by_role_and_label(Role::SpinButton, "gamma").rect();
+    window.get_by_role_and_label(Role::SpinButton, "gamma").click();
+    window.run_steps(2);
+    for key in [Key::A, Key::Num4, Key::Num8] {
+        if key == Key::A {
+            window.key_press_modifiers(egui::Modifiers::COMMAND, Key::A);
+        } else {
+            window.event(egui::Event::Text(key.name().to_owned()));
+        }
+        window.run_steps(2);
+    }
+    host.nothing_is_asked();
+    assert!(field(&window).width() > 0.0);
+    window.key_press(Key::Enter);
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
+    assert_eq!(values[0].value, "48");
+    // Half a number that is left is none.
+    window.get_by_role_and_label(Role::SpinButton, "gamma").click();
+    window.run_steps(2);
+    window.event(egui::Event::Text("1".to_owned()));
+    window.run_steps(1);
+    window.get_by_label("Parameters (P)").focus();
+    window.run_steps(3);
+    host.nothing_is_asked();
+    assert_eq!(number_of(&window, "gamma_n"), 48.0);
+}
+
+/// A slider covers the soft range, whatever is legal; what was there before comes back, and so does what the scene says.
+#[test]
+fn a_slider_stays_in_the_soft_range_and_what_was_there_comes_back() {
+    let (mut window, mut host, _folder) = live(&[]);
+    until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
+    let first = number_of(&window, "gamma_n");
+    window.get_by_role_and_label(Role::Slider, "gamma").set_value_accesskit(10_000.0);
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
+    let sent: f64 = values[0].value.parse().expect("a number");
+    assert!((sent - 3.0 * first).abs() < 1e-9 * first, "{sent} of {first}");
+    host.changed(&values[0], Outcome::Applied);
+    window.run_steps(2);
+    window.get_by_label("Undo").click();
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
+    assert_eq!(values[0].value.parse(), Ok(first));
+    window.get_by_role_and_label(Role::Slider, "gamma").set_value_accesskit(first * 1.5);
+    window.run_steps(2);
+    host.request(None);
+    window.get_by_label("gamma as in the scene").click();
+    window.run_steps(2);
+    let Ask::Set { values } = host.request(None) else { panic!("something else was asked") };
+    assert_eq!(values[0].value.parse(), Ok(first));
+    window.run_steps(2);
+    assert!(window.query_by_label("gamma as in the scene").is_none(), "it is as in the scene");
+}
+
+#[test]
+fn a_fault_is_red_and_its_reason_leaves_room_for_the_title() {
+    let (mut window, mut host, _folder) = live(&[]);
+    until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
+    let reason = "tick 1234 exceeded the time limit, and the watchdog stopped the device; check the machine with `flotor doctor`";
+    host.end_as(reason, flotor_live::EndKind::Failed);
+    until(&mut window, |window| window.query_by_label(reason).is_some());
+    assert!(
+        window.get_by_label(reason).rect().left() > window.get_by_label("A spring under test").rect().right()
+    );
+}
+
 #[test]
 fn a_refused_change_goes_back_and_says_why() {
     let (mut window, mut host, _folder) = live(&[]);

@@ -31,7 +31,7 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
     };
     let protocol = Protocol::Magnitude(magnitude);
     let sitting = Sitting::new(&protocol, 1, SubjectNumber::new(2).expect("a legal number"));
-    let mut experiment = Attended::new(sitting, &protocol, 1, 0);
+    let mut experiment = Attended::new(sitting, &protocol, 0);
     let ((teller, told), (said, hears)) = (channel(), channel());
     let prompt = Box::new(Prompt::new(told, said));
     let folder = tempfile::tempdir().expect("a scratch folder");
@@ -61,7 +61,6 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
             Screen::Ready { next, .. } if next.phase == Phase::Main => "From now on it counts",
             Screen::Ready { .. } => "A few to get used to it",
             Screen::Feel { .. } => "Feel the spring",
-            Screen::Ask { question: Question::Nothing, .. } => "That was one to practise",
             Screen::Ask { .. } => "How stiff was it?",
             Screen::Over => unreachable!("it ends the loop"),
         };
@@ -85,7 +84,7 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
         assert!(experiment.input(input, 1.0).is_ok());
     }
     let times = |what: &str| headlines.iter().filter(|headline| **headline == what).count();
-    assert_eq!((times("Feel the spring"), times("How stiff was it?"), seen), (8, 6, 4));
+    assert_eq!((times("Feel the spring"), times("How stiff was it?"), seen), (8, 8, 4));
 
     teller.send(Told::Warning { warning: Warning::OutOfRange }).expect("the window listens");
     until(&mut window, |window| window.query_by_label_contains("out of its range").is_some());
@@ -96,16 +95,7 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
 }
 
 fn trial(quality: Quality, stimuli: usize, object_is_shown: bool) -> TrialView {
-    TrialView {
-        number: 3,
-        of_about: 12,
-        phase: Phase::Main,
-        object_is_shown,
-        condition: "K".to_owned(),
-        repeat: 0,
-        stimuli,
-        quality,
-    }
+    TrialView { number: 3, of_about: 12, phase: Phase::Main, object_is_shown, repeat: 0, stimuli, quality }
 }
 
 /// Every screen there is: its headline and the keys that mean something, in sight, apart from each other, in a small window too.
@@ -136,7 +126,7 @@ fn every_screen_of_a_sitting_says_what_to_do_and_which_keys_do_it() {
         (feel(Some(Position::First), two.clone()), "First spring", "Enter when you have felt it"),
         (feel(Some(Position::Second), two.clone()), "Second spring", "Enter when you have felt it"),
         (feel(Some(Position::First), stronger.clone()), "First force", "Enter when you have felt it"),
-        (ask(Question::Nothing, practice), "That was one to practise", "A  feel it again"),
+        (ask(Question::HowMuch, practice), "How stiff was it?", "A  feel it again"),
         (ask(Question::HowMuch, one), "How stiff was it?", "Backspace corrects"),
         (ask(Question::HowMuch, strong), "How strong was it?", "Enter when it is right"),
         (ask(Question::WhichIsMore, two), "Which one was stiffer?", "0  I don't know"),
