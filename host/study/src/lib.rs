@@ -45,4 +45,5 @@ mod random;
 mod schedule;
 pub mod screen;
 pub mod sitting;
+pub mod time_of_day;
 pub mod trial;

@@ -1,6 +1,7 @@
 //! What is presented and what is answered.
 
 use crate::kinematics::StimulusKinematics;
+use crate::time_of_day::TimeOfDay;
 use serde::{Deserialize, Serialize};
 
 /// What a subject sees and feels.
@@ -180,4 +181,7 @@ pub struct Exploration {
     pub kinematics: Vec<StimulusKinematics>,
     /// Ticks the servo missed.
     pub missed_ticks: u64,
+    /// When the first stimulus could be felt; unknown for simulated observers.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub onset: Option<TimeOfDay>,
 }

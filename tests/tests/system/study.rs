@@ -10,7 +10,7 @@ use flotor_session::Observer;
 use flotor_session::scene::Scene;
 use flotor_study::apparatus::rig::{Rig, TrialFiles};
 use flotor_study::apparatus::{Apparatus, Kinematics};
-use flotor_study::log::SittingLog;
+use flotor_study::log::{Incident, SittingLog};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, Stimulus, SubjectNumber};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::{Exploration, Modality, Phase, Presented, Response, Trial};
@@ -370,7 +370,7 @@ fn an_edited_log_is_refused_with_line_and_reason() {
     }
 }
 
-const PERSON: [&str; 13] = [
+const PERSON: [&str; 15] = [
     "jnd",
     "--observer",
     "human",
@@ -383,6 +383,8 @@ const PERSON: [&str; 13] = [
     "--trials",
     "3",
     "--noise=off",
+    "--least-time=0s",
+    "--least-movement-mm=0",
     "--screen",
 ];
 
@@ -408,6 +410,7 @@ fn a_person_goes_through_the_same_sitting() {
     assert_eq!(first.code, Some(exit_code::OK), "{first:?}");
     assert!(first.stdout.contains("type 1, 2 or 0") && first.stdout.contains("--resume"), "{first:?}");
     assert!(!first.stdout.contains("26"), "blinded: {}", first.stdout);
+    assert!(!first.stdout.contains("condition") && !first.stdout.contains("object"), "{}", first.stdout);
     let log = SittingLog::read(&log_of(&out, 1)).unwrap();
     assert_eq!((log.trials.len(), log.complete), (1, false));
     assert!(log.notes.iter().any(|(_, text)| text == "cold hands"));
@@ -448,6 +451,78 @@ fn screens_travel_as_json_lines() {
     assert_eq!(names, ["ready", "feel", "feel", "ask", "feel"]);
     assert!(screens.iter().any(|line| line["refused"].is_string()), "nonsense is answered");
     assert_eq!(SittingLog::read(&log_of(&out, 1)).unwrap().trials.len(), 1);
+}
+
+/// Whoever presses the emergency stop in a sitting: what was felt ends at once, the log says so with the time of day, the exit code
+/// is that of a stopped device, and what was recorded of the trial stays when the sitting goes on.
+#[test]
+fn an_emergency_stop_in_a_sitting_leaves_a_line_and_a_recording() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let folder = Scratch::default();
+    let scene = folder.patient_scene(flotor_session::scene::STUDY).display().to_string();
+    let arguments = PERSON.into_iter().chain(["json", "--scene", &scene, "--no-demo", "--subject", "1"]);
+    let sitting = || {
+        let arguments: Vec<&str> = arguments.clone().collect();
+        // Standard input stays open after the first screen.
+        let script =
+            r#"mkfifo lines && exec 3<>lines && printf '{"input":"continue"}\n' >&3 && exec "$@" <&3"#;
+        study(&arguments, &out).through_shell(script).inside(scratch.path())
+    };
+    let motion = out.join("sourcedata/sub-01/motion");
+    let first = motion.join("sub-01_task-jnd_trial-0001_motion.mcap");
+    let running = sitting().start();
+    let until = Instant::now() + Duration::from_secs(60);
+    while !first.exists() {
+        assert!(Instant::now() < until, "no trial begins");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let log = std::fs::read_to_string(log_of(&out, 1)).unwrap();
+    assert!(log.lines().all(|line| line.contains(r#","time":"2"#)), "every line has its time of day: {log}");
+    running.signal(Signal::USR1);
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    let [(0, Some(_), Incident::EmergencyStop { source })] = log.incidents.as_slice() else {
+        panic!("{:?}", log.incidents)
+    };
+    assert_eq!(source, "signal");
+    let size = std::fs::metadata(&first).unwrap().len();
+
+    let go = r#"{"input":"continue"}"#;
+    let lines = [go, r#"{"input":"stop"}"#].join("\n") + "\n";
+    let arguments: Vec<&str> = arguments.clone().chain(["--resume"]).collect();
+    let ran = study(&arguments, &out).reading(lines).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert_eq!(std::fs::metadata(&first).unwrap().len(), size, "the recording of what was stopped is kept");
+    assert!(motion.join("sub-01_task-jnd_trial-0001_run-2_motion.mcap").exists());
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    assert_eq!(log.incidents.last().map(|(_, _, incident)| incident), Some(&Incident::Stopped));
+}
+
+/// A log that was copied into the folder of another subject would count twice.
+#[test]
+fn a_misplaced_log_is_refused() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let small = ["jnd", "--apparatus", "none", "--subjects", "2", "--bases", "26", "--replications", "2"];
+    assert_eq!(study(&small, &out).run().code, Some(exit_code::OK));
+    std::fs::copy(log_of(&out, 1), log_of(&out, 2)).unwrap();
+    let ran = Flotor::with(["analyse", out.to_str().unwrap()]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.error().contains("sub-02") && ran.error().contains("is a log of sub-01"), "{ran:?}");
+}
+
+/// A key pressed by accident or ahead is no answer: a stimulus has to be felt for a time.
+#[test]
+fn what_was_not_felt_is_not_answered() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let ran = person("terminal", "\n\n\n1\nq\n", &["--no-demo", "--least-time=30s"], &out);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(ran.stdout.contains("feel it a little longer"), "{ran:?}");
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    assert_eq!(log.trials.len(), 0, "three keys in a row were a trial");
 }
 
 /// A measured spring with play, both strokes and coils that touch, as a test bench gives it.

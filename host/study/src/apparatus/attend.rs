@@ -2,9 +2,46 @@
 
 use super::real_time_rig::RealTimeRig;
 use crate::conduct::{Ending, OutsideError};
-use crate::log::{Event, LogWriter, TrialEvent};
+use crate::log::{Event, Incident, LogWriter, TrialEvent};
 use crate::screen::{Attended, Input, Screen, Step};
+use crate::time_of_day::TimeOfDay;
 use std::time::Instant;
+
+/// What a front end has heard of a person.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Heard {
+    /// Nothing yet.
+    Nothing,
+    /// What the person did.
+    Input(Input),
+    /// The window is closed, or standard input is: nobody can be asked any more.
+    Closed,
+}
+
+/// The least that a stimulus must be felt before it counts: a key pressed by accident, or ahead, is no answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Least {
+    /// Time, s.
+    pub time_s: f64,
+    /// Way of the handle, up and down together, m.
+    pub way_m: f64,
+}
+
+impl Least {
+    /// Half a second, and twice a millimetre.
+    pub const USUAL: Least = Least { time_s: 0.5, way_m: 2.0e-3 };
+
+    /// Why a stimulus was not felt long or far enough, if so.
+    fn is_missed(&self, time_s: f64, way_m: Option<f64>) -> Option<&'static str> {
+        if time_s < self.time_s {
+            Some("feel it a little longer")
+        } else if way_m.is_some_and(|way_m| way_m < self.way_m) {
+            Some("move the handle to feel it")
+        } else {
+            None
+        }
+    }
+}
 
 /// Where a person sees screens and answers: a terminal, a pipe to a window, a test.
 pub trait FrontEnd {
@@ -14,12 +51,12 @@ pub trait FrontEnd {
     /// Nobody can be shown anything any more.
     fn show(&mut self, screen: &Screen) -> Result<(), OutsideError>;
 
-    /// What the person has done since, if anything; waits for it no longer than a moment, so that the handle can be
+    /// What the person has done since; waits for it no longer than a moment, so that the handle can be
     /// watched meanwhile.
     ///
     /// # Errors
     /// Nobody can be asked any more.
-    fn poll(&mut self, screen: &Screen) -> Result<Option<Input>, OutsideError>;
+    fn poll(&mut self, screen: &Screen) -> Result<Heard, OutsideError>;
 
     /// The handle has just been pushed out of its range: to be seen and heard at once.
     ///
@@ -34,7 +71,8 @@ pub trait FrontEnd {
     fn refuse(&mut self, why: &str) -> Result<(), OutsideError>;
 }
 
-/// Carries a sitting on to its end, or to where the person stops. `watch` is told of every trial that is on disk.
+/// Carries a sitting on to its end, or to where it is stopped; whatever stops or disturbs it is in the log. `watch` is told of
+/// every trial that is on disk.
 ///
 /// # Errors
 /// Apparatus, front end or log; what is in the log stays and can be resumed.
@@ -43,6 +81,23 @@ pub fn attend(
     log: &mut LogWriter,
     rig: &mut RealTimeRig<'_>,
     front: &mut dyn FrontEnd,
+    least: Least,
+    watch: &mut dyn FnMut(&TrialEvent),
+) -> Result<Ending, OutsideError> {
+    let result = sit(attended, log, rig, front, least, watch);
+    if let Err(error) = &result {
+        // The reason comes first; that it could not be written is the lesser trouble.
+        let _ = log.write(&Event::Incident(rig.incident_of(error.as_ref())));
+    }
+    result
+}
+
+fn sit(
+    attended: &mut Attended,
+    log: &mut LogWriter,
+    rig: &mut RealTimeRig<'_>,
+    front: &mut dyn FrontEnd,
+    least: Least,
     watch: &mut dyn FnMut(&TrialEvent),
 ) -> Result<Ending, OutsideError> {
     loop {
@@ -54,15 +109,34 @@ pub fn attend(
         }
         let felt = attended.stimulus();
         if let Some((trial, value)) = felt {
-            rig.begin(&trial, value)?;
+            if let Some(reason) = rig.begin(&trial, value)? {
+                log.write(&Event::Incident(Incident::NotRecorded { reason }))?;
+            }
+            attended.felt_from(TimeOfDay::now());
         }
         front.show(&screen)?;
         let shown = Instant::now();
         let step = loop {
-            let Some(input) = wait_for_input(rig, front, &screen)? else { break Step::Stopped };
-            let leaves = felt.is_some() && matches!(input, Input::Continue);
-            if leaves {
-                attended.felt(rig.end()?);
+            let input = match wait_for_input(rig, front, &screen, log)? {
+                Ok(input) => input,
+                Err(incident) => {
+                    log.write(&Event::Incident(incident))?;
+                    break Step::Stopped;
+                }
+            };
+            if input == Input::Stop {
+                log.write(&Event::Incident(Incident::Stopped))?;
+            }
+            if felt.is_some() && input == Input::Continue {
+                if let Some(why) = least.is_missed(shown.elapsed().as_secs_f64(), rig.way_m()) {
+                    front.refuse(why)?;
+                    continue;
+                }
+                let felt = rig.end()?;
+                if felt.missed_ticks > 0 {
+                    log.write(&Event::Incident(Incident::MissedTicks { ticks: felt.missed_ticks }))?;
+                }
+                attended.felt(felt);
             }
             match attended.input(input, shown.elapsed().as_secs_f64()) {
                 Ok(Step::Note(text)) => log.write(&Event::Note { text })?,
@@ -72,8 +146,11 @@ pub fn attend(
         };
         match step {
             Step::Answered(event) => {
-                rig.close_recording()?;
+                // The answer before the movement: it is small, and cannot be had again.
                 log.write(&Event::Trial(event.clone()))?;
+                if let Err(error) = rig.close_recording() {
+                    log.write(&Event::Incident(Incident::NotRecorded { reason: error.to_string() }))?;
+                }
                 watch(&event);
             }
             Step::Stopped => return Ok(Ending::Stopped),
@@ -82,23 +159,28 @@ pub fn attend(
     }
 }
 
-/// The next input; none if the run is to end. Warns once for each time the handle leaves its range.
+/// The next input, or what stops the sitting. Warns once for each time the handle leaves its range, and notes it.
 fn wait_for_input(
-    rig: &RealTimeRig<'_>,
+    rig: &mut RealTimeRig<'_>,
     front: &mut dyn FrontEnd,
     screen: &Screen,
-) -> Result<Option<Input>, OutsideError> {
+    log: &mut LogWriter,
+) -> Result<Result<Input, Incident>, OutsideError> {
     let mut warned = false;
     loop {
-        if let Some(input) = front.poll(screen)? {
-            return Ok(Some(input));
+        if let Some(incident) = rig.stopped_by() {
+            return Ok(Err(incident));
         }
-        if rig.is_stopping() {
-            return Ok(None);
+        match front.poll(screen)? {
+            Heard::Nothing => {}
+            Heard::Input(input) => return Ok(Ok(input)),
+            // The window is closed by an emergency stop, too: that is what has to be known.
+            Heard::Closed => return Ok(Err(rig.stopped_by().unwrap_or(Incident::WindowClosed))),
         }
         let out = rig.is_out_of_range() && matches!(screen, Screen::Feel { .. });
         if out && !warned {
             front.warn_out_of_range()?;
+            log.write(&Event::Incident(Incident::OutOfRange))?;
         }
         warned = out;
     }

@@ -4,13 +4,14 @@
 use super::watch::Shared;
 use super::{Apparatus, Kinematics};
 use crate::apparatus::rig::{RunEnded, StimulusRefused, TrialFiles};
-use crate::conduct::OutsideError;
+use crate::conduct::{Ending, OutsideError};
 use crate::kinematics::KinematicsMeter;
+use crate::log::Incident;
 use crate::screen::Felt;
 use crate::trial::Trial;
-use flotor_live::{Ask, Directory, RefusalCause, Serve};
+use flotor_live::{Ask, Directory, EndKind, RefusalCause, Serve};
 use flotor_record::Recorder;
-use flotor_servo::{Clock, StopSwitch};
+use flotor_servo::{Clock, RunEnd, StopSwitch};
 use flotor_session::telemetry::{Watched, announce, emergency_stop};
 use flotor_session::{
     ControlError, Controls, LatchGuard, Outcome, RunError, RunOptions, RunRecording, Session,
@@ -32,6 +33,8 @@ pub struct RealTimeRig<'a> {
     shared: Shared,
     unseen: Option<String>,
     run: Option<JoinHandle<Result<Outcome, RunError>>>,
+    /// How the run ended, once that is known.
+    ended: Option<RunEnd>,
 }
 
 /// A client of a study may end it, and nothing else.
@@ -80,10 +83,22 @@ impl<'a> RealTimeRig<'a> {
         let thread = std::thread::Builder::new().name("flotor-study".to_owned());
         let run = thread.spawn(move || {
             let outcome = session.run(&mut observers, &switch);
-            observers.end("the sitting has ended");
+            let is_in_order = outcome.as_ref().is_ok_and(|outcome| outcome.end == RunEnd::Stopped);
+            let kind = if is_in_order { EndKind::InOrder } else { EndKind::Failed };
+            observers.end("the sitting has ended", kind);
             outcome
         })?;
-        Ok(Self { apparatus, kinematics, files: None, controls, stop, shared, unseen, run: Some(run) })
+        Ok(Self {
+            apparatus,
+            kinematics,
+            files: None,
+            controls,
+            stop,
+            shared,
+            unseen,
+            run: Some(run),
+            ended: None,
+        })
     }
 
     /// From now on keeps every tick of every trial, in a file for each.
@@ -97,11 +112,11 @@ impl<'a> RealTimeRig<'a> {
         self.unseen.as_deref()
     }
 
-    /// Gives the object its value and lets it be felt.
+    /// Gives the object its value and lets it be felt; why the movement is not recorded, if it should be and cannot.
     ///
     /// # Errors
     /// The run has ended, or the model refused.
-    pub fn begin(&mut self, trial: &Trial, value: f64) -> Result<(), OutsideError> {
+    pub fn begin(&mut self, trial: &Trial, value: f64) -> Result<Option<String>, OutsideError> {
         self.check()?;
         self.set(value)?;
         {
@@ -119,9 +134,21 @@ impl<'a> RealTimeRig<'a> {
         }
         if let (Some(files), false) = (&self.files, watch.recording.is_on()) {
             let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);
-            watch.recording = RunRecording::new(Some(Recorder::create(&files.of(trial), &run)?));
+            // What was recorded before a sitting broke off is kept.
+            match Recorder::create(&files.next_of(trial), &run) {
+                Ok(recorder) => watch.recording = RunRecording::new(Some(recorder)),
+                Err(error) => return Ok(Some(error.to_string())),
+            }
         }
-        Ok(())
+        Ok(None)
+    }
+
+    /// Way of the handle since the stimulus can be felt, m; none before the first sample.
+    #[must_use]
+    pub fn way_m(&self) -> Option<f64> {
+        let watch = self.shared.lock();
+        let moved = watch.meter.as_ref()?.finish()?;
+        Some(moved.mean_speed_m_per_s * moved.duration_s)
     }
 
     /// Lets the object go; how it was felt.
@@ -155,9 +182,50 @@ impl<'a> RealTimeRig<'a> {
     }
 
     /// Whether somebody asked the run to stop, or it ended by itself.
-    #[must_use]
-    pub fn is_stopping(&self) -> bool {
+    fn is_stopping(&self) -> bool {
         self.stop.is_stop_asked() || self.run.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// What stops the sitting, if anything does: an emergency stop, a request to end, or the end of the run.
+    pub fn stopped_by(&mut self) -> Option<Incident> {
+        if let Some(source) = self.stop.emergency() {
+            return Some(Incident::EmergencyStop { source: source.word().to_owned() });
+        }
+        if self.stop.is_stop_asked() {
+            return Some(Incident::Signal);
+        }
+        self.check().err().map(|error| self.incident_of(error.as_ref()))
+    }
+
+    /// An error that ended the sitting, as an incident.
+    #[must_use]
+    pub fn incident_of(&self, error: &(dyn std::error::Error + Send + Sync + 'static)) -> Incident {
+        match error.downcast_ref::<RunEnded>().map(|ended| ended.0).or(self.ended) {
+            Some(RunEnd::EmergencyStop(source)) => {
+                Incident::EmergencyStop { source: source.word().to_owned() }
+            }
+            _ => Incident::RunEnded { reason: error.to_string() },
+        }
+    }
+
+    /// Ends the run of a sitting that was broken off; an error if a fault or an emergency stop had ended it. After the last
+    /// trial it goes on, so that the handle is held while the person is thanked.
+    ///
+    /// # Errors
+    /// How it ended.
+    pub fn finish_after(&mut self, ending: Ending) -> Result<Ending, OutsideError> {
+        if ending == Ending::Complete {
+            return Ok(ending);
+        }
+        self.stop.stop();
+        if let Some(run) = self.run.take() {
+            let outcome = run.join().map_err(|_| RunError::Thread("panicked"))?;
+            self.ended = Some(outcome?.end);
+        }
+        match self.ended {
+            None | Some(RunEnd::Finished | RunEnd::Stopped) => Ok(ending),
+            Some(end) => Err(RunEnded(end).into()),
+        }
     }
 
     fn set(&self, value: f64) -> Result<(), OutsideError> {
@@ -193,14 +261,16 @@ impl<'a> RealTimeRig<'a> {
 
     /// An error if the run has ended by itself.
     fn check(&mut self) -> Result<(), OutsideError> {
-        if !self.run.as_ref().is_some_and(JoinHandle::is_finished) {
-            return Ok(());
+        match (&self.run, self.ended) {
+            (Some(run), _) if !run.is_finished() => return Ok(()),
+            (None, Some(end)) => return Err(RunEnded(end).into()),
+            _ => {}
         }
-        let ended = self.run.take().map(JoinHandle::join);
-        match ended {
-            Some(Ok(outcome)) => Err(RunEnded(outcome?.end).into()),
-            Some(Err(_)) | None => Err(RunError::Thread("panicked").into()),
-        }
+        let outcome = self.run.take().map(JoinHandle::join).transpose();
+        let outcome = outcome.ok().flatten().ok_or(RunError::Thread("panicked"))?;
+        let end = outcome?.end;
+        self.ended = Some(end);
+        Err(RunEnded(end).into())
     }
 }
 

@@ -35,6 +35,7 @@ fn end_words(end: &RunEnd) -> String {
             format!("the device sends {samples_per_s} samples a second, too many")
         }
         RunEnd::NotPaced => "the device does not set the pace".to_owned(),
+        RunEnd::Oscillation => "the force swung between its limits".to_owned(),
         RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
         RunEnd::Unguarded => "the watchdog process was gone".to_owned(),
         RunEnd::Finished | RunEnd::Stopped => "it was stopped".to_owned(),
@@ -61,6 +62,17 @@ impl TrialFiles {
     pub fn make(folder: PathBuf, prefix: String) -> std::io::Result<Self> {
         std::fs::create_dir_all(&folder)?;
         Ok(Self { folder, prefix })
+    }
+
+    /// A file for a trial that does not exist yet: of a trial that was broken off and comes again, the first stays.
+    #[must_use]
+    pub fn next_of(&self, trial: &Trial) -> PathBuf {
+        let first = self.of(trial);
+        let again = |run: u32| {
+            self.folder.join(format!("{}_trial-{:04}_run-{run}_motion.mcap", self.prefix, trial.number))
+        };
+        let mut paths = std::iter::once(first.clone()).chain((2..=1000).map(again));
+        paths.find(|path| !path.exists()).unwrap_or(first)
     }
 
     /// The file of a trial.

@@ -126,6 +126,15 @@ struct Common {
     /// Screen for questions and answers (human)
     #[arg(long, value_enum, default_value_t)]
     screen: front::ScreenOption,
+    /// Key that is the emergency stop in the viewer's window (human)
+    #[arg(long, value_enum, default_value_t, value_name = "KEY")]
+    stop_key: front::StopKeyOption,
+    /// Least time for which each stimulus must be felt (human)
+    #[arg(long, default_value = "0.5s", value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
+    least_time: f64,
+    /// Least way of the handle while a stimulus is felt, up and down together, mm (human)
+    #[arg(long, default_value_t = 2.0, value_parser = real, allow_hyphen_values = true, value_name = "MM")]
+    least_movement_mm: f64,
     /// White noise on headphones (human)
     #[arg(long, value_enum, default_value_t)]
     noise: NoiseOption,
@@ -491,6 +500,7 @@ fn outside(
         Some(RunEnded(RunEnd::DeviceFault(fault))) => CommandError::DeviceFault(*fault),
         Some(RunEnded(RunEnd::EmergencyStop(source))) => CommandError::EmergencyStop(*source),
         Some(RunEnded(RunEnd::Watchdog(stuck))) => CommandError::Watchdog(*stuck),
+        Some(RunEnded(RunEnd::Oscillation)) => CommandError::Oscillation,
         _ => return CommandError::Failed(message.to_string()),
     };
     flotor_command::note(message);

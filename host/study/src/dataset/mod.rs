@@ -73,6 +73,18 @@ pub enum DatasetError {
         /// What differs.
         what: String,
     },
+    /// A log that lies where another one belongs: its subject would count twice, or as somebody else.
+    #[error("{}: is a log of {subject}, task {task}, and does not belong there; remove it, or move it to {}", path.display(), place.display())]
+    Misplaced {
+        /// The log.
+        path: PathBuf,
+        /// Whose it is.
+        subject: SubjectNumber,
+        /// Of which task.
+        task: &'static str,
+        /// Where such a log belongs.
+        place: PathBuf,
+    },
     /// A study that was begun otherwise than it is to go on.
     #[error("{}: {what}; use what it was begun with, or another folder", path.display())]
     Changed {
@@ -152,6 +164,11 @@ impl Dataset {
         let mut first: Option<(Begin, PathBuf)> = None;
         for path in self.log_paths()? {
             let log = SittingLog::read(&path)?;
+            let (subject, task) = (log.begin.subject, log.begin.protocol.task());
+            let place = self.log_path(subject, task);
+            if place != path {
+                return Err(DatasetError::Misplaced { path, subject, task, place });
+            }
             let (begin, other) = first.get_or_insert_with(|| (log.begin.clone(), path.clone()));
             if let Some(what) = begin.differs(&log.begin) {
                 return Err(DatasetError::Mixed { path, other: other.clone(), what });
@@ -215,7 +232,8 @@ impl Dataset {
         let folder = self.source_folder(begin.subject);
         self.file(&folder, "cannot make the folder", std::fs::create_dir_all(&folder))?;
         let sitting = Sitting::new(&begin.protocol, begin.seed, begin.subject);
-        let mut writer = LogWriter::create(&path)?;
+        let writer = LogWriter::create(&path)?;
+        let mut writer = if begin.is_of_a_person() { writer.stamped() } else { writer };
         writer.write(&Event::Begin(Box::new(begin)))?;
         Ok((sitting, writer))
     }
@@ -232,6 +250,10 @@ impl Dataset {
             if log.complete {
                 let path = self.table_path(log.begin.subject, log.begin.protocol.task());
                 self.replace(&path, &table::trials(&log))?;
+                if let Some(scans) = table::scans(&log) {
+                    let subject = log.begin.subject;
+                    self.replace(&self.root.join(format!("{subject}/{subject}_scans.tsv")), &scans)?;
+                }
             }
             first.get_or_insert(log.begin);
             Ok(())

@@ -5,6 +5,7 @@ use crate::kinematics::StimulusKinematics;
 use crate::log::{Begin, SittingLog, TrialRecord};
 use crate::protocol::Protocol;
 use crate::sitting::Verdict;
+use crate::time_of_day::TimeOfDay;
 use crate::trial::{Judgement, Phase, Position, Presented, Response};
 use serde_json::{Value, json};
 
@@ -12,7 +13,7 @@ use serde_json::{Value, json};
 const MISSING: &str = "n/a";
 
 /// Name and meaning of each column.
-const COLUMNS: [(&str, &str); 28] = [
+const COLUMNS: [(&str, &str); 29] = [
     ("trial", "Count of presentations in the sitting, from 1"),
     ("phase", "practice, or main: only main counts"),
     ("replication", "Replication, from 1; 0 for practice"),
@@ -41,17 +42,21 @@ const COLUMNS: [(&str, &str); 28] = [
     ("peak_force", "Largest force on the hand, N"),
     ("felt_stiffness", "Stiffness of each stimulus as the hand felt it, N/m, in order"),
     ("missed_ticks", "Ticks the servo missed"),
+    (
+        "onset",
+        "When the first stimulus could be felt, s after the begin of the sitting (acq_time in the list of scans)",
+    ),
 ];
 
 /// The table of one sitting.
 pub(super) fn trials(log: &SittingLog) -> String {
     let head: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
     let codes = Codes::new(&log.begin.protocol, log.begin.seed);
-    let rows = log.trials.iter().map(|record| row(record, &codes).join("\t"));
+    let rows = log.trials.iter().map(|record| row(record, &codes, log.began).join("\t"));
     [head.join("\t")].into_iter().chain(rows).fold(String::new(), |text, line| text + &line + "\n")
 }
 
-fn row(record: &TrialRecord, codes: &Codes) -> Vec<String> {
+fn row(record: &TrialRecord, codes: &Codes, began: Option<TimeOfDay>) -> Vec<String> {
     let event = &record.event;
     let trial = &event.trial;
     let number = |value: Option<f64>| value.map_or(MISSING.to_owned(), |value| value.to_string());
@@ -115,6 +120,7 @@ fn row(record: &TrialRecord, codes: &Codes) -> Vec<String> {
         number(any.then(|| felt.iter().map(|one| one.peak_force_n).fold(0.0, f64::max))),
         if any { stiffness.join(",") } else { MISSING.to_owned() },
         event.exploration.missed_ticks.to_string(),
+        number(event.exploration.onset.zip(began).map(|(onset, began)| onset.since_s(began))),
     ]
 }
 
@@ -144,16 +150,24 @@ pub(super) fn description(begin: &Begin) -> String {
     }))
 }
 
+/// The list of what was recorded of a subject, with the time of day; none where nobody knows it.
+pub(super) fn scans(log: &SittingLog) -> Option<String> {
+    let (subject, task) = (log.begin.subject, log.begin.protocol.task());
+    let began = log.began?;
+    Some(format!("filename\tacq_time\nbeh/{subject}_task-{task}_beh.tsv\t{began}\n"))
+}
+
 /// First line of the list of who took part.
 pub(super) const PARTICIPANTS_HEAD: &str =
-    "participant_id\tfirst_modality\tcomplete\tpresentations\tresumed\n";
+    "participant_id\tfirst_modality\tcomplete\tpresentations\tresumed\tincidents\n";
 
 /// One who took part: a line.
 pub(super) fn participant(log: &SittingLog) -> String {
     let subject = log.begin.subject;
     let first = log.begin.protocol.first_modality().of(subject).word();
     let complete = u8::from(log.complete);
-    format!("{subject}\t{first}\t{complete}\t{}\t{}\n", log.trials.len(), log.resumed)
+    let counts = [log.trials.len(), log.resumed as usize, log.incidents.len()].map(|count| count.to_string());
+    format!("{subject}\t{first}\t{complete}\t{}\n", counts.join("\t"))
 }
 
 /// What the columns of the list of participants mean.
@@ -163,6 +177,7 @@ pub(super) fn participant_columns() -> String {
         "complete": { "Description": "1 if the sitting came to its end" },
         "presentations": { "Description": "Presentations, practice and repeats included" },
         "resumed": { "Description": "How often the sitting was taken up again" },
+        "incidents": { "Description": "Interruptions and disturbances in the event log" },
     }))
 }
 

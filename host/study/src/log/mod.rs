@@ -3,26 +3,31 @@
 //! ```text
 //! {"chain":"<64 hexadecimal digits>","event":{"begin":{...}}}
 //! {"chain":"...","event":{"trial":{...}}}
+//! {"chain":"...","event":{"trial":{...}},"time":"2026-11-25T18:34:09.123Z"}    with a person
 //! ```
 //!
-//! `chain` is the SHA-256 of the chain of the line before and of the event's own text, so a changed, missing or
-//! exchanged line breaks the chain from there on. A last line without its end is what a killed process leaves: the
+//! `chain` is the SHA-256 of the chain of the line before and of all that follows it on its own line, so a changed, missing or
+//! exchanged line breaks the chain from there on: a guard against accidents. Whoever means to forge a log can compute the chain
+//! anew. A last line without its end is what a killed process leaves: the
 //! event it would have told never happened.
 
+mod incident;
 mod reader;
 mod writer;
 
+pub use incident::Incident;
 pub use reader::{LogError, LogProblem, SittingLog, TrialRecord};
 pub use writer::LogWriter;
 
 use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::Verdict;
+use crate::time_of_day::TimeOfDay;
 use crate::trial::{Exploration, Response, Trial};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// Revision of the format.
-pub const FORMAT: u32 = 1;
+/// Revision of the format: 2 has times of day and incidents.
+pub const FORMAT: u32 = 2;
 
 /// What a line says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +49,8 @@ pub enum Event {
         /// In their words.
         text: String,
     },
+    /// Something interrupted or disturbed the sitting.
+    Incident(Incident),
     /// Everything was presented.
     End {
         /// Presentations in all.
@@ -81,6 +88,12 @@ impl Begin {
             ("another apparatus".to_owned(), self.apparatus == earlier.apparatus),
         ];
         parts.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("begun with {what}"))
+    }
+
+    /// Whether a person sits, and times of day mean something.
+    #[must_use]
+    pub fn is_of_a_person(&self) -> bool {
+        self.observer == serde_json::json!("human")
     }
 
     /// Digest of the configuration: equal for sittings that differ in the subject only.
@@ -125,7 +138,18 @@ fn line(chain: &str, event: &str) -> String {
     format!("{{\"chain\":\"{chain}\",\"event\":{event}}}")
 }
 
-/// Chain and event of a line.
+/// What is chained of an event with a time.
+fn stamped(event: &str, time: TimeOfDay) -> String {
+    format!("{event},\"time\":\"{time}\"")
+}
+
+/// Event and time of what is chained; an event ends with a brace.
+fn unstamped(chained: &str) -> (&str, Option<&str>) {
+    let time = chained.strip_suffix('"').and_then(|rest| rest.rsplit_once(",\"time\":\""));
+    time.map_or((chained, None), |(event, time)| (event, Some(time)))
+}
+
+/// Chain of a line, and what is chained of it.
 fn parts(line: &str) -> Option<(&str, &str)> {
     let rest = line.strip_prefix("{\"chain\":\"")?;
     let (chain, rest) = rest.split_once("\",\"event\":")?;

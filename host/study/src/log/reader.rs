@@ -1,7 +1,8 @@
 //! Reads a log back, distrusting every line: chain, text, order, and whether the experiment really went so.
 
-use super::{Begin, CHAIN_START, Event, FORMAT, LogWriter, TrialEvent, chain, parts};
+use super::{Begin, CHAIN_START, Event, FORMAT, Incident, LogWriter, TrialEvent, chain, parts, unstamped};
 use crate::sitting::{AnswerError, Sitting, TrackResult};
+use crate::time_of_day::TimeOfDay;
 use crate::trial::{Response, Trial};
 use std::path::{Path, PathBuf};
 
@@ -47,7 +48,9 @@ pub enum LogProblem {
     )]
     Chain,
     /// A revision this program does not know.
-    #[error("format {found} is not supported, this version reads {FORMAT}; use the version that wrote it")]
+    #[error(
+        "format {found} is not supported, this version reads up to {FORMAT}; use the version that wrote it"
+    )]
     Format {
         /// The format found.
         found: u32,
@@ -97,6 +100,10 @@ pub struct SittingLog {
     pub trials: Vec<TrialRecord>,
     /// Notes of the experimenter, each with the trials before it.
     pub notes: Vec<(u32, String)>,
+    /// Interruptions and disturbances, each with the trials before it.
+    pub incidents: Vec<(u32, Option<TimeOfDay>, Incident)>,
+    /// When it began, with a person.
+    pub began: Option<TimeOfDay>,
     /// Whether the sitting came to its end.
     pub complete: bool,
     /// How often it was taken up again.
@@ -132,17 +139,20 @@ impl SittingLog {
             if found != before {
                 return Err(at(number, LogProblem::Chain));
             }
-            let event: Event = serde_json::from_str(event)
-                .map_err(|error| at(number, LogProblem::Text(error.to_string())))?;
+            let not_read = |error: &dyn std::fmt::Display| at(number, LogProblem::Text(error.to_string()));
+            let (event, time) = unstamped(event);
+            let time: Option<TimeOfDay> =
+                time.map(str::parse).transpose().map_err(|error| not_read(&error))?;
+            let event: Event = serde_json::from_str(event).map_err(|error| not_read(&error))?;
             match (&mut log, event) {
                 (None, Event::Begin(begin)) => {
-                    if begin.format != FORMAT {
+                    if !(1..=FORMAT).contains(&begin.format) {
                         return Err(at(number, LogProblem::Format { found: begin.format }));
                     }
-                    log = Some(Self::new(*begin, path));
+                    log = Some(Self { began: time, ..Self::new(*begin, path) });
                 }
                 (None, _) => return Err(at(number, LogProblem::Order("a log starts with `begin`"))),
-                (Some(log), event) => log.take_in(event).map_err(|problem| at(number, problem))?,
+                (Some(log), event) => log.take_in(event, time).map_err(|problem| at(number, problem))?,
             }
         }
         let mut log = log.ok_or_else(|| at(0, LogProblem::Empty))?;
@@ -157,6 +167,8 @@ impl SittingLog {
             begin,
             trials: Vec::new(),
             notes: Vec::new(),
+            incidents: Vec::new(),
+            began: None,
             complete: false,
             resumed: 0,
             sitting,
@@ -166,7 +178,7 @@ impl SittingLog {
         }
     }
 
-    fn take_in(&mut self, event: Event) -> Result<(), LogProblem> {
+    fn take_in(&mut self, event: Event, time: Option<TimeOfDay>) -> Result<(), LogProblem> {
         if self.complete && !matches!(event, Event::Note { .. }) {
             return Err(LogProblem::Order("after `end` only notes may follow"));
         }
@@ -182,6 +194,10 @@ impl SittingLog {
             }
             Event::Note { text } => {
                 self.notes.push((self.sitting.presented(), text));
+                Ok(())
+            }
+            Event::Incident(incident) => {
+                self.incidents.push((self.sitting.presented(), time, incident));
                 Ok(())
             }
             Event::End { trials } if !self.sitting.is_over() || trials != self.sitting.presented() => {
@@ -233,8 +249,13 @@ impl SittingLog {
     /// # Errors
     /// What the system said.
     pub fn annotate(self, text: &str) -> Result<(), LogError> {
-        let mut writer = LogWriter::append(&self.path, self.complete_bytes, self.chain)?;
-        writer.write(&Event::Note { text: text.to_owned() })
+        self.writer()?.write(&Event::Note { text: text.to_owned() })
+    }
+
+    /// The log to go on with; with a person, the time of day is in every line.
+    fn writer(&self) -> Result<LogWriter, LogError> {
+        let writer = LogWriter::append(&self.path, self.complete_bytes, self.chain.clone())?;
+        Ok(if self.begin.is_of_a_person() { writer.stamped() } else { writer })
     }
 
     /// The sitting where it stopped, and the log to go on with: a line that was never completed is cut off, and the
@@ -243,7 +264,7 @@ impl SittingLog {
     /// # Errors
     /// What the system said.
     pub fn resume(self, version: &str) -> Result<(Sitting, LogWriter), LogError> {
-        let mut writer = LogWriter::append(&self.path, self.complete_bytes, self.chain)?;
+        let mut writer = self.writer()?;
         let trials = self.sitting.presented();
         writer.write(&Event::Resume { trials, version: version.to_owned() })?;
         Ok((self.sitting, writer))

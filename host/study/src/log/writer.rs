@@ -1,6 +1,7 @@
 //! Adds lines to a log and does not return before they are on disk.
 
-use super::{CHAIN_START, Event, LogError, LogProblem, chain, line};
+use super::{CHAIN_START, Event, LogError, LogProblem, chain, line, stamped};
+use crate::time_of_day::TimeOfDay;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -10,6 +11,14 @@ pub struct LogWriter {
     file: File,
     path: PathBuf,
     chain: String,
+    stamps: Stamps,
+}
+
+/// Whether lines have a time of day.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stamps {
+    None,
+    TimeOfDay,
 }
 
 impl LogWriter {
@@ -24,7 +33,7 @@ impl LogWriter {
         if let Some(folder) = path.parent().and_then(|folder| File::open(folder).ok()) {
             let _ = folder.sync_all();
         }
-        Ok(Self { file, path: path.into(), chain: CHAIN_START.to_owned() })
+        Ok(Self { file, path: path.into(), chain: CHAIN_START.to_owned(), stamps: Stamps::None })
     }
 
     /// A log that goes on: after `complete_bytes`, whose chain is known. What lies behind is a line that was never
@@ -37,7 +46,13 @@ impl LogWriter {
             Ok(file)
         };
         let file = open().map_err(|cause| LogError::file(path, "cannot continue the log", cause))?;
-        Ok(Self { file, path: path.into(), chain })
+        Ok(Self { file, path: path.into(), chain, stamps: Stamps::None })
+    }
+
+    /// The same, with the time of day in every line from now on.
+    #[must_use]
+    pub fn stamped(self) -> Self {
+        Self { stamps: Stamps::TimeOfDay, ..self }
     }
 
     /// Writes an event. When this returns, it is on disk.
@@ -50,6 +65,10 @@ impl LogWriter {
             line: 0,
             problem: LogProblem::Text(error.to_string()),
         })?;
+        let text = match self.stamps {
+            Stamps::None => text,
+            Stamps::TimeOfDay => stamped(&text, TimeOfDay::now()),
+        };
         let next = chain(&self.chain, &text);
         let mut bytes = line(&next, &text).into_bytes();
         bytes.push(b'\n');

@@ -1,12 +1,12 @@
 //! The state machine behind the screens: which comes after which, and what an input does to a sitting.
 
 use super::{Input, Pause, Question, Screen, TrialView};
-use crate::blinding::Codes;
 use crate::kinematics::StimulusKinematics;
 use crate::log::TrialEvent;
 use crate::protocol::{Protocol, Quality};
 use crate::sitting::{AnswerError, Sitting, Verdict};
-use crate::trial::{Exploration, Modality, Phase, Position, Presented, Response, Trial};
+use crate::time_of_day::TimeOfDay;
+use crate::trial::{Exploration, Modality, Position, Presented, Response, Trial};
 
 /// What became of an input.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +39,9 @@ pub enum InputError {
     /// Nothing is asked now, or something is.
     #[error("{0}")]
     NotNow(&'static str),
+    /// A rating that no ratio scale has.
+    #[error("a rating is a number above 0")]
+    NotAbove0,
     /// The answer does not fit the question.
     #[error(transparent)]
     Answer(#[from] AnswerError),
@@ -57,7 +60,6 @@ enum Stage {
 #[derive(Clone, Debug)]
 pub struct Attended {
     sitting: Sitting,
-    codes: Codes,
     quality: Quality,
     stage: Stage,
     exploration: Exploration,
@@ -69,10 +71,9 @@ pub struct Attended {
 impl Attended {
     /// A sitting at its first trial, or where it broke off; a rest is offered after so many trials (0: never).
     #[must_use]
-    pub fn new(sitting: Sitting, protocol: &Protocol, seed: u64, rest_every: u32) -> Self {
+    pub fn new(sitting: Sitting, protocol: &Protocol, rest_every: u32) -> Self {
         Self {
             sitting,
-            codes: Codes::new(protocol, seed),
             quality: protocol.stimulus().quality(),
             stage: Stage::Ready(Pause::Welcome),
             exploration: Exploration::default(),
@@ -104,6 +105,11 @@ impl Attended {
         }
     }
 
+    /// A stimulus can be felt from this moment on; of a trial the first counts.
+    pub fn felt_from(&mut self, time: TimeOfDay) {
+        self.exploration.onset.get_or_insert(time);
+    }
+
     /// Takes in how the stimulus was felt that has just gone.
     pub fn felt(&mut self, felt: Felt) {
         self.exploration.kinematics.extend(felt.kinematics);
@@ -131,8 +137,8 @@ impl Attended {
                 self.go_to(if last { Stage::Ask } else { Stage::Feel(index + 1) })
             }
             (Stage::Ask, Input::Again) => self.go_to(Stage::Feel(0)),
-            (Stage::Ask, Input::Continue) if trial.phase == Phase::Practice => {
-                self.answer(&trial, Response::Seen, time_s)
+            (Stage::Ask, Input::Answer { response: Response::Rating(rating) }) if rating <= 0.0 => {
+                Err(InputError::NotAbove0)
             }
             (Stage::Ask, Input::Answer { response }) => self.answer(&trial, response, time_s),
             (Stage::Ask, Input::Continue) => Err(InputError::NotNow("an answer is expected")),
@@ -195,7 +201,6 @@ impl Attended {
             of_about: self.of_about.max(trial.number.into()),
             phase: trial.phase,
             object_is_shown: trial.modality == Modality::Vh,
-            condition: self.codes.condition(trial.modality, &trial.presented),
             repeat: trial.repeat,
             stimuli: trial.presented.values().len(),
             quality: self.quality,
@@ -212,10 +217,10 @@ fn position(trial: &Trial, index: usize) -> Option<Position> {
 }
 
 fn question(trial: &Trial) -> Question {
-    match (trial.phase, trial.presented) {
-        (Phase::Practice, _) => Question::Nothing,
-        (Phase::Main, Presented::Pair(_)) => Question::WhichIsMore,
-        (Phase::Main, Presented::One { .. }) => Question::HowMuch,
+    // In practice, too: what is asked for the first time should not count.
+    match trial.presented {
+        Presented::Pair(_) => Question::WhichIsMore,
+        Presented::One { .. } => Question::HowMuch,
     }
 }
 

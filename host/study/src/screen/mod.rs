@@ -2,7 +2,8 @@
 //!
 //! Made for any front end, a terminal or a window alike: show [`Attended::screen`], wait for an [`Input`], hand it to
 //! [`Attended::input`]. Screens and inputs are plain data (serde), so they also travel as lines of JSON ([`Told`], [`Said`]): the
-//! viewer's window is a program of its own. No screen says which stimulus it is: conditions are codes ([`crate::blinding`]).
+//! viewer's window is a program of its own. No screen says which stimulus it is, not even by a
+//! code: the answer to a code can be learnt.
 //!
 //! ```text
 //! Ready -> Feel (first) -> Feel (second) -> Ask -> Ready or Feel of the next trial ... -> Over
@@ -38,7 +39,7 @@ pub enum Screen {
         /// Which of a pair; none where there is only one.
         position: Option<Position>,
     },
-    /// A question; [`Input::Answer`], or [`Input::Continue`] where none is expected.
+    /// A question; [`Input::Answer`].
     Ask {
         /// The trial.
         trial: TrialView,
@@ -71,10 +72,8 @@ pub enum Pause {
 pub enum Question {
     /// Which had more of it: [`Response::First`], [`Response::Second`] or [`Response::DontKnow`].
     WhichIsMore,
-    /// How much: [`Response::Rating`], any number of one's own.
+    /// How much: [`Response::Rating`], any number above 0 of one's own.
     HowMuch,
-    /// Practice: nothing.
-    Nothing,
 }
 
 /// What a front end may know of a trial.
@@ -88,8 +87,6 @@ pub struct TrialView {
     pub phase: Phase,
     /// Whether the object is to be seen.
     pub object_is_shown: bool,
-    /// Code of the condition, for the experimenter.
-    pub condition: String,
     /// How often it had to be repeated.
     pub repeat: u32,
     /// How many stimuli it has: one to be rated, or two to be compared.

@@ -77,7 +77,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let (switch, mut observers) = (stop.clone(), Watched { observer: watch, publication: publication.ok() });
     let run = std::thread::spawn(move || {
         let outcome = session.run(&mut observers, &switch);
-        observers.end("the exploration ended");
+        observers.end("the exploration ended", flotor_live::EndKind::InOrder);
         outcome
     });
     say!("{}", style::title(&scene.title));
@@ -104,6 +104,7 @@ fn end(
         flotor_servo::RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
         flotor_servo::RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
         flotor_servo::RunEnd::NotPaced => Err(CommandError::NotPaced),
+        flotor_servo::RunEnd::Oscillation => Err(CommandError::Oscillation),
         flotor_servo::RunEnd::Unguarded => Err(CommandError::Unguarded),
         _ => Ok(()),
     }

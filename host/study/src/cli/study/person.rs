@@ -2,7 +2,7 @@
 
 use super::front::{JsonLines, ScreenOption, Terminal, Window, lines_of};
 use super::{Common, NoiseOption};
-use crate::apparatus::attend::{FrontEnd, attend};
+use crate::apparatus::attend::{FrontEnd, Least, attend};
 use crate::apparatus::noise::WhiteNoise;
 use crate::apparatus::real_time_rig::RealTimeRig;
 use crate::apparatus::rig::TrialFiles;
@@ -45,7 +45,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
     let mut rig = RealTimeRig::start(apparatus, kinematics, &stop)
         .map_err(|error| super::outside(error.as_ref(), &error))?;
-    let mut front = Front::open(common.screen, &rig)?;
+    let mut front = Front::open(common, &rig)?;
 
     let (sitting, mut log) = match earlier {
         None => dataset.begin(begin)?,
@@ -60,10 +60,20 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let text = format!("white noise: {}", noise.as_ref().map_or("none", WhiteNoise::player));
     log.write(&Event::Note { text }).map_err(failed)?;
 
-    let mut attended = Attended::new(sitting, protocol, common.seed, common.rest_every);
-    let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), &mut |_| ());
-    let ending = ending.map_err(|error| super::outside(error.as_ref(), &error))?;
-    dataset.write_tables()?;
+    let least = Least { time_s: common.least_time, way_m: common.least_movement_mm * 1.0e-3 };
+    let text = format!("least time {} s, least movement {} mm", least.time_s, common.least_movement_mm);
+    log.write(&Event::Note { text }).map_err(failed)?;
+
+    let mut attended = Attended::new(sitting, protocol, common.rest_every);
+    let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), least, &mut |_| ());
+    // What is in the log is in the tables, however the sitting ended.
+    let tables = dataset.write_tables();
+    let ended = ending.and_then(|ending| rig.finish_after(ending)).map_err(|error| {
+        note(broken_off(subject, &attended));
+        super::outside(error.as_ref(), &error)
+    });
+    let ending = ended?;
+    tables?;
     if let (Ending::Complete, Front::Window(window)) = (ending, front) {
         window.wait_closed(&stop); // the last screen thanks the person
     }
@@ -72,14 +82,19 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         (_, ScreenOption::Json) => Ok(()),
         (Ending::Complete, _) => super::tell(&dataset),
         (Ending::Stopped, _) => {
-            let presented = attended.presented();
-            say!(
-                "  {subject} stopped after {presented} presentations; continue with --subject {} --resume",
-                subject.get()
-            );
+            say!("  {}", broken_off(subject, &attended));
             Ok(())
         }
     }
+}
+
+/// How far a sitting came, and how it goes on.
+fn broken_off(subject: SubjectNumber, attended: &Attended) -> String {
+    let presented = attended.presented();
+    format!(
+        "{subject} stopped after {presented} presentations; continue with --subject {} --resume",
+        subject.get()
+    )
 }
 
 /// Screen for questions and answers.
@@ -90,10 +105,10 @@ enum Front {
 }
 
 impl Front {
-    fn open(screen: ScreenOption, rig: &RealTimeRig<'_>) -> Result<Self, CommandError> {
-        match screen {
+    fn open(common: &Common, rig: &RealTimeRig<'_>) -> Result<Self, CommandError> {
+        match common.screen {
             ScreenOption::Viewer => match rig.unseen() {
-                None => Ok(Self::Window(Window::open()?)),
+                None => Ok(Self::Window(Window::open(common.stop_key)?)),
                 Some(why) => Err(CommandError::Failed(format!("the viewer cannot show the session: {why}"))),
             },
             ScreenOption::Terminal => Terminal::listen().map(Self::Terminal).map_err(failed),

@@ -1,9 +1,10 @@
 use super::*;
 use crate::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
+use crate::trial::Phase;
 
 fn attended(protocol: &Protocol, rest_every: u32) -> Attended {
     let sitting = Sitting::new(protocol, 4, SubjectNumber::new(1).unwrap());
-    Attended::new(sitting, protocol, 4, rest_every)
+    Attended::new(sitting, protocol, rest_every)
 }
 
 /// A whole sitting through the screens gives the trials of the bare state machine, in its order.
@@ -29,7 +30,6 @@ fn screens_lead_through_every_trial_of_the_sitting() {
                 felt += 1;
                 Input::Continue
             }
-            Screen::Ask { question: Question::Nothing, .. } => Input::Continue,
             Screen::Ask { question, trial } => {
                 assert_eq!((question, trial.quality), (Question::HowMuch, Quality::Stiffness));
                 Input::Answer { response: Response::Rating(3.0) }
@@ -103,8 +103,27 @@ fn screens_and_inputs_travel_as_json_without_a_stimulus() {
     assert_eq!(serde_json::from_str::<Screen>(&text).unwrap(), screen);
     let (_, value) = person.stimulus().unwrap();
     assert!(!text.contains(&value.to_string()), "{text}");
+    assert!(!text.contains("condition") && !text.contains("code"), "a code is the stimulus: {text}");
     let rating = r#"{"input":"answer","response":{"rating":7.5}}"#;
     let expected = Input::Answer { response: Response::Rating(7.5) };
     assert_eq!(serde_json::from_str::<Input>(rating).unwrap(), expected);
     assert_eq!(serde_json::from_str::<Input>(r#"{"input":"continue"}"#).unwrap(), Input::Continue);
+}
+
+/// Practice asks what will count, and its answer does not; a rating is above 0 from the keyboard on.
+#[test]
+fn practice_asks_the_question_and_a_rating_is_above_0() {
+    let mut person = attended(&Protocol::Magnitude(MagnitudeProtocol::default()), 0);
+    person.input(Input::Continue, 0.0).unwrap();
+    person.input(Input::Continue, 0.0).unwrap();
+    let Screen::Ask { question, trial } = person.screen() else { panic!("{:?}", person.screen()) };
+    assert_eq!((question, trial.phase), (Question::HowMuch, Phase::Practice));
+    assert!(person.input(Input::Continue, 0.0).is_err());
+    for rating in [0.0, -2.0] {
+        let answer = Input::Answer { response: Response::Rating(rating) };
+        assert_eq!(person.input(answer, 0.0), Err(InputError::NotAbove0));
+    }
+    let answer = Input::Answer { response: Response::Rating(0.5) };
+    let Ok(Step::Answered(event)) = person.input(answer, 0.0) else { panic!("not taken") };
+    assert_eq!(event.verdict, Verdict::Taken);
 }

@@ -1,9 +1,9 @@
 //! Screens and inputs as lines of JSON, for a window that is another program.
 
 use super::MOMENT;
-use crate::apparatus::attend::FrontEnd;
+use crate::apparatus::attend::{FrontEnd, Heard};
 use crate::conduct::OutsideError;
-use crate::screen::{Input, Said, Screen, Told, Warning};
+use crate::screen::{Said, Screen, Told, Warning};
 use std::io::{ErrorKind, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
@@ -34,19 +34,19 @@ impl<W: Write> FrontEnd for JsonLines<W> {
         self.report(&Told::Screen(screen.clone()))
     }
 
-    fn poll(&mut self, _screen: &Screen) -> Result<Option<Input>, OutsideError> {
+    fn poll(&mut self, _screen: &Screen) -> Result<Heard, OutsideError> {
         let line = match self.lines.recv_timeout(MOMENT) {
             Ok(line) => line,
-            Err(RecvTimeoutError::Timeout) => return Ok(None),
+            Err(RecvTimeoutError::Timeout) => return Ok(Heard::Nothing),
             // The window is closed.
-            Err(RecvTimeoutError::Disconnected) => return Ok(Some(Input::Stop)),
+            Err(RecvTimeoutError::Disconnected) => return Ok(Heard::Closed),
         };
         match serde_json::from_str(&line) {
-            Ok(Said::Input(input)) => Ok(Some(input)),
-            Ok(Said::Window { .. }) => Ok(None),
+            Ok(Said::Input(input)) => Ok(Heard::Input(input)),
+            Ok(Said::Window { .. }) => Ok(Heard::Nothing),
             Err(error) => {
                 self.refuse(&error.to_string())?;
-                Ok(None)
+                Ok(Heard::Nothing)
             }
         }
     }

@@ -28,6 +28,29 @@ pub(super) enum ScreenOption {
     Json,
 }
 
+/// `--stop-key`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum StopKeyOption {
+    /// Escape
+    #[default]
+    Escape,
+    /// The space bar
+    Space,
+    /// F12
+    F12,
+}
+
+impl StopKeyOption {
+    /// As the viewer takes it.
+    fn word(self) -> &'static str {
+        match self {
+            Self::Escape => "escape",
+            Self::Space => "space",
+            Self::F12 => "f12",
+        }
+    }
+}
+
 /// Lines as they come.
 pub(super) fn lines_of(reader: impl BufRead + Send + 'static) -> std::io::Result<Receiver<String>> {
     let (sender, lines) = channel();

@@ -1,14 +1,14 @@
 //! Text on a terminal, answers by keyboard.
 
 use super::{MOMENT, lines_of};
-use crate::apparatus::attend::FrontEnd;
+use crate::apparatus::attend::{FrontEnd, Heard};
 use crate::conduct::OutsideError;
 use crate::protocol::Quality;
 use crate::screen::{Input, Pause, Question, Screen, TrialView};
 use crate::trial::{Phase, Position, Response};
 use flotor_command::say;
 use flotor_command::style;
-use std::io::BufReader;
+use std::io::{BufReader, IsTerminal};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
 /// A person at this terminal.
@@ -25,22 +25,26 @@ impl Terminal {
 
 impl FrontEnd for Terminal {
     fn show(&mut self, screen: &Screen) -> Result<(), OutsideError> {
+        // What was typed before there was something to answer is no answer. A script at a pipe knows what comes.
+        if std::io::stdin().is_terminal() {
+            while self.lines.try_recv().is_ok() {}
+        }
         say!("{}", words(screen));
         Ok(())
     }
 
-    fn poll(&mut self, screen: &Screen) -> Result<Option<Input>, OutsideError> {
+    fn poll(&mut self, screen: &Screen) -> Result<Heard, OutsideError> {
         let line = match self.lines.recv_timeout(MOMENT) {
             Ok(line) => line,
-            Err(RecvTimeoutError::Timeout) => return Ok(None),
+            Err(RecvTimeoutError::Timeout) => return Ok(Heard::Nothing),
             // Standard input is closed.
-            Err(RecvTimeoutError::Disconnected) => return Ok(Some(Input::Stop)),
+            Err(RecvTimeoutError::Disconnected) => return Ok(Heard::Closed),
         };
         match typed(&line, screen) {
-            Ok(input) => Ok(Some(input)),
+            Ok(input) => Ok(Heard::Input(input)),
             Err(why) => {
                 self.refuse(&why)?;
-                Ok(None)
+                Ok(Heard::Nothing)
             }
         }
     }
@@ -81,7 +85,6 @@ fn words(screen: &Screen) -> String {
                 Quality::Force => ("stronger", "strong"),
             };
             match question {
-                Question::Nothing => "  That was practice: Enter continues, a repeats it".to_owned(),
                 Question::WhichIsMore => {
                     format!("  Which was {more}?  1 first, 2 second, 0 I don't know; a repeats them")
                 }
@@ -95,9 +98,8 @@ fn words(screen: &Screen) -> String {
 }
 
 fn place(trial: &TrialView) -> String {
-    let phase = if trial.phase == Phase::Practice { "practice" } else { "counts" };
-    let seen = if trial.object_is_shown { "object shown" } else { "object hidden" };
-    format!("  {} of about {}  {phase}, {seen}, condition {}", trial.number, trial.of_about, trial.condition)
+    let phase = if trial.phase == Phase::Practice { "practice, does not count" } else { "counts" };
+    format!("  {} of about {}  {phase}", trial.number, trial.of_about)
 }
 
 fn pause(reason: Pause, next: &TrialView) -> &'static str {
@@ -134,7 +136,7 @@ fn typed(line: &str, screen: &Screen) -> Result<Input, String> {
         },
         Screen::Ask { question: Question::HowMuch, .. } => line.replace(',', ".").parse().map_or_else(
             |_| Err(format!("invalid number `{line}`")),
-            |rating| answer(Response::Rating(rating)),
+            |rating: f64| answer(Response::Rating(rating)),
         ),
         _ => Err("no question is open; Enter continues".to_owned()),
     }
@@ -150,7 +152,6 @@ mod tests {
             of_about: 2,
             phase: Phase::Main,
             object_is_shown: true,
-            condition: "A1".to_owned(),
             repeat: 0,
             stimuli: 2,
             quality: Quality::Stiffness,

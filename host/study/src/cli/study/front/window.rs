@@ -1,6 +1,6 @@
 //! The viewer's window: a process of its own that watches the run, shows what it is told and says what the person does.
 
-use super::{JsonLines, lines_of};
+use super::{JsonLines, StopKeyOption, lines_of};
 use flotor_command::CommandError;
 use flotor_command::separate::{Running, SeparateProgram};
 use flotor_servo::StopSwitch;
@@ -24,9 +24,10 @@ impl Window {
     ///
     /// # Errors
     /// There is no viewer, or it cannot open a window and has said why.
-    pub(in crate::cli::study) fn open() -> Result<Self, CommandError> {
+    pub(in crate::cli::study) fn open(stop_key: StopKeyOption) -> Result<Self, CommandError> {
         let mut command = SeparateProgram::VIEWER.command()?;
         command.arg("--sitting").arg("--run").arg(std::process::id().to_string());
+        command.arg("--stop-key").arg(stop_key.word());
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let failed =
             |cause| CommandError::file(SeparateProgram::VIEWER.program.as_ref(), "cannot be started", cause);

@@ -1,0 +1,53 @@
+//! What an ethics board asks about: whatever interrupted or disturbed a sitting.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// An interruption or a disturbance.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "incident", rename_all = "kebab-case")]
+pub enum Incident {
+    /// The emergency stop was pressed.
+    EmergencyStop {
+        /// Where: key, signal, window, device.
+        source: String,
+    },
+    /// The run ended by itself, or could not go on.
+    RunEnded {
+        /// Why.
+        reason: String,
+    },
+    /// The window in front of the person was closed, or standard input was.
+    WindowClosed,
+    /// The person, or somebody at the keyboard, had enough.
+    Stopped,
+    /// The program was asked to end.
+    Signal,
+    /// The handle was pushed back at the edge of its range.
+    OutOfRange,
+    /// Ticks of the servo were missed.
+    MissedTicks {
+        /// How many.
+        ticks: u64,
+    },
+    /// The movement of a trial could not be recorded; the sitting went on.
+    NotRecorded {
+        /// Why.
+        reason: String,
+    },
+}
+
+impl fmt::Display for Incident {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::EmergencyStop { source } => write!(f, "emergency stop ({source})"),
+            Self::RunEnded { reason } => write!(f, "the run ended: {reason}"),
+            Self::WindowClosed => f.write_str("the window was closed"),
+            Self::Stopped => f.write_str("stopped by the subject"),
+            Self::Signal => f.write_str("stopped by a signal"),
+            Self::OutOfRange => f.write_str("the handle left its range"),
+            Self::MissedTicks { ticks } => write!(f, "{ticks} ticks were missed"),
+            Self::NotRecorded { reason } => write!(f, "the movement was not recorded: {reason}"),
+        }
+    }
+}
