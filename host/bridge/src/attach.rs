@@ -3,7 +3,7 @@
 use crate::link::LinkError;
 use crate::remote::{Errand, Remote, Told};
 use crate::request::Request;
-use flotor_live::{Ask, Directory, Publication, PublishError, RefusalCause, Serve};
+use flotor_live::{Ask, Directory, End, EndKind, Publication, PublishError, RefusalCause, Serve};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

@@ -153,7 +153,7 @@ fn a_recording_of_a_live_request_replays_bit_for_bit() {
     let session = prepared(Clock::Virtual, TWO_SPRINGS);
     let scene = Scene::parse(Path::new("scene.toml"), TWO_SPRINGS).expect("the scene is right");
     let options = RunOptions { clock: Clock::Virtual, seed: 1 };
-    let run = flotor_session::describe(&scene, &options, session.plugins());
+    let run = flotor_session::run_description::describe(&scene, &options, session.plugins());
     struct Recording<'a>(Meddler<'a>, RunRecording);
     impl Observer for Recording<'_> {
         fn observe(&mut self, record: &TickRecord) {

@@ -72,7 +72,8 @@ fn one_number_is_the_largest_force_in_any_direction_and_three_are_those_along_th
     let [box_n, _] = peaks(&watch(&wild(10.0, "force_n = [5, 5, 5]")));
     assert!((7.0..=75.0_f64.sqrt() * SLACK).contains(&box_n), "{box_n} N");
     let [both_n, _] = peaks(&watch(&wild(4.0, "force_n = { norm = 5, axes = [5, 5, 1] }")));
-    assert!((4.5..=5.0 * SLACK).contains(&both_n), "{both_n} N of 4 N along each axis, 1 N along z");
+    // A force of any direction in every tick is an oscillation, and is damped after some twenty of them.
+    assert!((4.01..=5.0 * SLACK).contains(&both_n), "{both_n} N of 4 N along each axis, 1 N along z");
 }
 
 #[test]

@@ -74,7 +74,7 @@ fn run_watched<W>(
     let outcome = session.run(&mut published, &stop).expect("it runs");
     let Published { publication, digest, ticks, .. } = published;
     let started = Instant::now();
-    publication.end("over");
+    publication.end("over", flotor_live::EndKind::InOrder);
     assert!(started.elapsed() < PATIENCE, "nobody holds up the end");
     (digest.finish(), ticks, outcome, watcher)
 }
@@ -216,9 +216,12 @@ fn a_watcher_changes_parameters_and_is_told() {
     );
     assert_eq!(asked.refused, None);
     let (_, _, others) = rest(&mut client);
-    let [Event::Change(change), Event::End(end)] = others.as_slice() else { panic!("{others:?}") };
+    // Every step on the way there is told, the first before the second tick.
+    let [Event::Change(first), .., Event::Change(change), Event::End(end)] = others.as_slice() else {
+        panic!("{others:?}")
+    };
     assert_eq!((change.parameter.as_str(), change.number), ("gamma_n", 20.0));
-    assert_eq!((change.outcome, change.tick), (ChangeOutcome::Applied, 0));
+    assert_eq!((change.outcome, first.tick), (ChangeOutcome::Applied, 1));
     assert_eq!(end.words, "over");
 }
 

@@ -305,10 +305,11 @@ fn after_a_replacement_changes_are_for_the_new_model() {
     let session = prepared(Clock::Virtual, &format!("duration_s = 3\n{SPRING}"));
     let mut once = Once(session.controls(), &registry, Vec::new());
     assert!(session.run(&mut once, &StopSwitch::default()).is_ok());
-    let [replaced, set] = once.2.as_slice() else { panic!("{:?}", once.2) };
+    let [replaced, set, ..] = once.2.as_slice() else { panic!("{:?}", once.2) };
     assert_eq!((replaced.subject, replaced.parameter.as_str()), (ChangeSubject::Plugin, "wall"));
     assert_eq!((set.parameter.as_str(), set.outcome), ("friction", ChangeOutcome::Applied));
     assert_eq!(replaced.tick, set.tick, "in one tick, in order");
+    assert_eq!(once.2.last().map(|change| change.number), Some(0.5), "from the value of the new model on");
 }
 
 #[test]

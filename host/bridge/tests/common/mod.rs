@@ -121,7 +121,7 @@ impl FakeHost {
     }
 
     pub fn end(&mut self, words: &str) {
-        self.publication.take().expect("the run is on").end(words);
+        self.publication.take().expect("the run is on").end(words, flotor_live::EndKind::InOrder);
     }
 
     /// Ticks at 1 kHz in bursts of ten, as a host's observers see them.

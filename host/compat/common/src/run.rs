@@ -220,7 +220,7 @@ impl Facts {
             tell(&error.to_string());
         }
         if let Some(publication) = publication {
-            publication.end("the program ended");
+            publication.end("the program ended", flotor_live::EndKind::InOrder);
         }
         if let Some(path) = &settings.report {
             write(path, format!("{}\n{}\n  {}\n", summary.title, summary.to_text(), lines.join("\n  ")));
