@@ -15,7 +15,9 @@
 pub mod anova;
 pub mod describe;
 pub mod distribution;
+pub mod effect_size;
 mod linear;
+pub mod multiple;
 pub mod regression;
 mod special;
 pub mod t_test;

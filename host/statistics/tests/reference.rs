@@ -191,3 +191,50 @@ fn an_effect_that_scaling_removed_is_not_tested() {
     assert!(effects.iter().filter(|effect| effect.effect != "order").all(|effect| effect.is_testable()));
     assert!(serde_json::to_string(order).unwrap().contains(r#""f":null,"p":null"#));
 }
+
+/// Holm (1979), as `p.adjust(p, "holm")` of R: the example of its help, and what is no probability.
+#[test]
+fn several_tests_are_corrected_by_holm() {
+    use flotor_statistics::multiple::holm;
+    let corrected = holm(&[0.01, 0.04, 0.03, f64::NAN, 0.005]);
+    let expected = [0.03, 0.06, 0.06, f64::NAN, 0.02];
+    for (found, expected) in corrected.iter().zip(expected) {
+        assert!(found.is_nan() && expected.is_nan() || (found - expected).abs() < 1e-15, "{corrected:?}");
+    }
+    assert_eq!(holm(&[0.9, 0.8]), [1.0, 1.0]);
+    assert!(holm(&[]).is_empty());
+}
+
+/// Sizes of effects and their intervals, as SciPy's noncentral t and F give them by root finding.
+#[test]
+fn sizes_of_effects_have_the_intervals_of_the_noncentral_distributions() {
+    use flotor_statistics::effect_size::{EffectSize, of_pairs, partial_eta_squared};
+    use flotor_statistics::t_test::TTest;
+    let is = |found: EffectSize, expected: [f64; 3]| {
+        let found = [found.value, found.interval[0], found.interval[1]];
+        for (found, expected) in found.iter().zip(expected) {
+            // Ten digits of the reference.
+            assert!((found - expected).abs() < 1e-9, "{found} for {expected}");
+        }
+    };
+    for (value, df, expected) in T_SIZES {
+        is(of_pairs(&TTest { df, value, p: 0.0, difference: 0.0, interval: [0.0; 2] }), expected);
+    }
+    for (f, df, error_df, expected) in F_SIZES {
+        is(partial_eta_squared(f, df, error_df), expected);
+    }
+}
+
+const T_SIZES: [(f64, f64, [f64; 3]); 4] = [
+    (3.3, 15.0, [0.825, 0.244_200_668_6, 1.385_636_383_7]),
+    (0.4, 7.0, [0.141_421_356_2, -0.560_219_492_8, 0.833_282_324_2]),
+    (-2.5, 11.0, [-0.721_687_836_5, -1.348_467_143_6, -0.069_579_992_5]),
+    (12.0, 9.0, [3.794_733_192_2, 1.956_402_239_9, 5.614_578_461_6]),
+];
+
+const F_SIZES: [(f64, f64, f64, [f64; 3]); 4] = [
+    (11.94, 1.0, 14.0, [0.460_292_983_8, 0.067_559_447_1, 0.673_614_076_5]),
+    (23.01, 2.0, 28.0, [0.621_723_858_4, 0.340_832_843_6, 0.737_448_589_3]),
+    (0.5, 2.0, 28.0, [0.034_482_758_6, 0.0, 0.184_477_025_4]),
+    (3.1, 2.0, 28.0, [0.181_286_549_7, 0.0, 0.383_069_510_8]),
+];

@@ -29,8 +29,6 @@ pub mod analysis;
 pub mod apparatus;
 pub mod bias;
 pub mod blinding;
-#[cfg(feature = "program")]
-pub mod cli;
 pub mod cohort;
 pub mod conduct;
 pub mod curve;
@@ -39,6 +37,7 @@ pub mod estimate;
 pub mod kinematics;
 pub mod log;
 pub mod observer;
+pub mod power;
 pub mod procedure;
 pub mod protocol;
 mod random;

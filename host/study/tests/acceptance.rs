@@ -167,3 +167,22 @@ fn better_estimators_find_the_threshold() {
         assert!(map.rms_error <= half && quest.rms_error <= half, "{thesis:?} {map:?} {quest:?}");
     }
 }
+
+/// Every printed p is one: with equal observers in both modalities a paired test and the comparisons after Holm's correction
+/// say yes in 5 % of the studies.
+#[test]
+fn false_alarms_are_as_often_as_they_should_be_and_power_grows_with_the_subjects() {
+    use flotor_study::power::{population, power, study};
+    let protocol = JndProtocol { replications: 2, ..JndProtocol::default() };
+    let runs = 5 * studies();
+    let of = |ratio: f64, subjects: u16| {
+        let observers = population(ratio, 0.0);
+        let all = (0..runs).filter_map(|seed| study(&protocol, &observers, subjects, 7000 + seed).ok());
+        power(subjects, &all.collect::<Vec<_>>())
+    };
+    let none = of(1.0, 8);
+    let se = (0.05 * 0.95 / runs as f64).sqrt();
+    assert!((none.power - 0.05).abs() <= 3.0 * se, "{none:?}");
+    let (few, many) = (of(1.3, 5), of(1.3, 20));
+    assert!(few.power + 3.0 * few.standard_error < many.power, "{few:?} {many:?}");
+}

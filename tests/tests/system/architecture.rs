@@ -54,6 +54,7 @@ enum Role {
     /// Judges runs from outside.
     SceneTest,
     Study,
+    StudyProgram,
     Host,
     Viewer,
     Tests,
@@ -63,8 +64,8 @@ enum Role {
 
 use Role::{
     Cable, Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab,
-    Live, OfDevices, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, Sync,
-    Tests, Viewer,
+    Live, OfDevices, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
+    StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -93,7 +94,12 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
     // Neither the session nor the loader: everything it runs is a process of its own.
     ("host/scene-test", SceneTest, &[Core, Command]),
-    ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command]),
+    ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics]),
+    (
+        "host/study/program",
+        StudyProgram,
+        &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command, Study],
+    ),
     // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
     ("host", Host, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command, Plugin]),
     ("viewer", Viewer, &[Contract, Sync, Core, Record, Live, Plot, Study]),
@@ -117,6 +123,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
             Calibration,
             SceneTest,
             Study,
+            StudyProgram,
             Plugin,
             Emulator,
             Host,

@@ -29,7 +29,7 @@ fn committed(chapter: &str, text: &str) {
 fn all_commands() -> String {
     let mut separate = [
         flotor_lab::cli::command(),
-        flotor_study::cli::command(),
+        flotor_study_program::command(),
         flotor_calibration::cli::command(),
         flotor_test::cli::command(),
     ];

@@ -1,9 +1,10 @@
 //! Thresholds: Weber fractions, their difference between modalities, effects of base, modality and order.
 
 use super::kinematics::{KinematicMeasure, measures};
+use super::published::Beside;
 use super::{
-    AnalysisError, AnalysisOptions, CONFIDENCE, Estimator, ResponseRow, SubjectRecord, mean_responses,
-    order_factor, response_rows, within_factors,
+    AnalysisError, AnalysisOptions, CONFIDENCE, Estimator, PostHoc, ResponseRow, SubjectRecord,
+    mean_responses, order_factor, post_hoc, response_rows, within_factors,
 };
 use crate::estimate::{Observation, Prior, most_likely};
 use crate::protocol::JndProtocol;
@@ -72,8 +73,13 @@ pub struct JndAnalysis {
     pub pairs_per_subject: f64,
     /// Tracks that never came to a threshold; they are left out.
     pub unfinished_tracks: usize,
+    /// Thresholds of the modalities at each base, and Weber fractions of the bases: which differ.
+    pub post_hoc: Vec<PostHoc>,
     /// How people moved; empty without kinematics.
     pub kinematics: Vec<KinematicMeasure>,
+    /// What of the thesis may stand beside it.
+    #[serde(skip)]
+    pub beside: Beside,
     /// What the effects are computed from.
     #[serde(skip)]
     pub responses: Vec<ResponseRow>,
@@ -116,7 +122,17 @@ pub fn analyse_jnd(
             .collect(),
         pairs_per_subject: mean(&pairs),
         unfinished_tracks: subjects.iter().map(unfinished).sum(),
+        post_hoc: {
+            let both = |subject: &Fractions| {
+                subject.vh.iter().zip(&subject.h).map(|(vh, h)| 0.5 * (vh + h)).collect::<Vec<_>>()
+            };
+            let fractions: Vec<Vec<f64>> = fractions.iter().map(both).collect();
+            let modalities = post_hoc::modalities("base", &protocol.bases, &responses);
+            let bases = post_hoc::levels("fraction, base", &protocol.bases, &fractions);
+            modalities.into_iter().chain(bases).collect()
+        },
         kinematics: measures(&protocol.bases, subjects, options)?,
+        beside: Beside::jnd(protocol),
         responses: response_rows(subjects, &protocol.bases, &responses),
     })
 }

@@ -1,9 +1,10 @@
 //! Ratings: made comparable, their trend over the stimuli, effects of stimulus, modality and order.
 
 use super::kinematics::{KinematicMeasure, measures};
+use super::published::Beside;
 use super::{
-    AnalysisError, AnalysisOptions, ResponseRow, SubjectRecord, conditions, mean_responses, order_factor,
-    response_rows, within_factors,
+    AnalysisError, AnalysisOptions, PostHoc, ResponseRow, SubjectRecord, conditions, mean_responses,
+    order_factor, post_hoc, response_rows, within_factors,
 };
 use crate::protocol::{MagnitudeProtocol, RatingScale};
 use crate::trial::{Modality, Presented, Response};
@@ -44,8 +45,13 @@ pub struct MagnitudeAnalysis {
     pub trials_per_subject: f64,
     /// Presentations repeated because the handle left its range.
     pub repeated: usize,
+    /// Ratings of the modalities at each stimulus: which differ.
+    pub post_hoc: Vec<PostHoc>,
     /// How people moved; empty without kinematics.
     pub kinematics: Vec<KinematicMeasure>,
+    /// What of the thesis may stand beside it.
+    #[serde(skip)]
+    pub beside: Beside,
     /// What the effects are computed from.
     #[serde(skip)]
     pub responses: Vec<ResponseRow>,
@@ -85,7 +91,9 @@ pub fn analyse_magnitude(
             .collect(),
         trials_per_subject: mean(&counted),
         repeated: subjects.iter().map(repeats).sum(),
+        post_hoc: post_hoc::modalities("stimulus", stimuli, &rows),
         kinematics: measures(stimuli, subjects, options)?,
+        beside: Beside::magnitude(protocol),
         responses: response_rows(subjects, stimuli, &rows),
     })
 }

@@ -4,13 +4,17 @@ mod blinded;
 mod jnd;
 mod kinematics;
 mod magnitude;
+mod post_hoc;
 pub mod published;
+mod subject;
 mod text;
 
 pub use blinded::{BlindedAnalysis, BlindedCell, BlindedRow};
 pub use jnd::{JndAnalysis, ThresholdCell, WeberFractions, analyse_jnd};
 pub use kinematics::KinematicMeasure;
 pub use magnitude::{MagnitudeAnalysis, RatingCell, analyse_magnitude};
+pub use post_hoc::PostHoc;
+pub use subject::{SubjectCondition, SubjectQuality};
 
 use crate::log::{SittingLog, TrialEvent};
 use crate::protocol::{Protocol, SubjectNumber};
@@ -20,6 +24,11 @@ use flotor_statistics::StatisticsError;
 use flotor_statistics::anova::{BetweenFactor, Effect, SumOfSquares, WithinFactor};
 use flotor_statistics::describe::{MeanInterval, mean_interval};
 use serde::Serialize;
+
+/// A script in Python that repeats the tables from [`crate::dataset::trials_csv`].
+pub const SCRIPT_PYTHON: &str = include_str!("scripts/analysis.py");
+/// The same in R.
+pub const SCRIPT_R: &str = include_str!("scripts/analysis.R");
 
 /// Confidence of every interval.
 const CONFIDENCE: f64 = 0.95;

@@ -1,5 +1,60 @@
 //! What CMU-RI-TR-07-21 reports (section 4.3), to stand beside one's own results.
 
+use crate::protocol::{JndProtocol, MagnitudeProtocol, Stimulus};
+
+/// What of the thesis may stand beside a study: its numbers are of springs, at its bases and stimuli, and of nothing else.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Beside {
+    /// The study asks what the thesis asked.
+    Thesis,
+    /// It asks something else.
+    #[default]
+    Nothing,
+}
+
+impl Beside {
+    /// Beside a difference experiment: bases of 17, 26 and 35 N, larger comparisons, three of four correct.
+    #[must_use]
+    pub fn jnd(protocol: &JndProtocol) -> Self {
+        let usual = JndProtocol::default();
+        let is_same = is_of_springs(&protocol.stimulus)
+            && protocol.bases == usual.bases
+            && protocol.side == usual.side
+            && protocol.procedure.target() == usual.procedure.target();
+        if is_same { Self::Thesis } else { Self::Nothing }
+    }
+
+    /// Beside an experiment with ratings: twelve stimuli of 12 to 48 N.
+    #[must_use]
+    pub fn magnitude(protocol: &MagnitudeProtocol) -> Self {
+        let is_same =
+            is_of_springs(&protocol.stimulus) && protocol.values == MagnitudeProtocol::default().values;
+        if is_same { Self::Thesis } else { Self::Nothing }
+    }
+
+    /// What the thesis says, if it may stand there.
+    #[must_use]
+    pub fn text(self, text: &str) -> &str {
+        if self == Self::Thesis { text } else { "" }
+    }
+
+    /// The effects of the thesis, if they may stand there.
+    #[must_use]
+    pub fn effects(self, effects: &[Published]) -> &[Published] {
+        if self == Self::Thesis { effects } else { &[] }
+    }
+
+    /// The Weber fractions of the thesis, if they may stand there.
+    #[must_use]
+    pub fn weber(self) -> Option<[f64; 2]> {
+        (self == Self::Thesis).then_some(WEBER)
+    }
+}
+
+fn is_of_springs(stimulus: &Stimulus) -> bool {
+    (stimulus.model.as_str(), stimulus.parameter.as_str()) == ("spring", "gamma_n")
+}
+
 /// A statistic of the thesis, and its effect.
 pub type Published = (&'static str, &'static str);
 

@@ -1,15 +1,18 @@
 //! Results for people, next to what CMU-RI-TR-07-21 reports.
 
 use super::blinded::BlindedAnalysis;
-use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, published};
+use super::published::Beside;
+use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PostHoc, published};
 use crate::trial::Modality;
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
+use flotor_statistics::effect_size::{EffectSize, partial_eta_squared};
 
 pub(super) fn jnd(analysis: &JndAnalysis) -> String {
-    let mut page = Page::default();
+    let mut page = Page::beside(analysis.beside);
     let JndAnalysis { subjects, pairs_per_subject, .. } = analysis;
-    page.line(format!("{subjects} subjects, {pairs_per_subject:.1} pairs each (thesis: about 200)"));
+    let thesis = analysis.beside.text(" (thesis: about 200)");
+    page.line(format!("{subjects} subjects, {pairs_per_subject:.1} pairs each{thesis}"));
     page.gap();
     page.row("Weber fraction", "here", "thesis");
     let fractions =
@@ -30,6 +33,8 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
         page.columns(&name, &interval_text(&vh.threshold), &interval_text(&h.threshold));
     }
     page.effects("thresholds", &analysis.anova, &published::JND);
+    page.sizes(&analysis.anova);
+    page.post_hoc(&analysis.post_hoc);
     let constancy = [
         ("fraction over base, vh", &analysis.constancy.vh, published::CONSTANCY[0]),
         ("fraction over base, h", &analysis.constancy.h, published::CONSTANCY[1]),
@@ -48,9 +53,10 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
 }
 
 pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
-    let mut page = Page::default();
+    let mut page = Page::beside(analysis.beside);
     let MagnitudeAnalysis { subjects, trials_per_subject, repeated, linear_r2, .. } = analysis;
-    page.line(format!("{subjects} subjects, {trials_per_subject} ratings each (thesis: 72)"));
+    let thesis = analysis.beside.text(" (thesis: 72)");
+    page.line(format!("{subjects} subjects, {trials_per_subject} ratings each{thesis}"));
     page.line(format!("{repeated} presentations repeated because the handle left its range"));
     page.gap();
     page.row("Linear trend", &format!("R² = {linear_r2:.3}"), &format!("R² = {}", published::LINEAR_R2));
@@ -62,6 +68,8 @@ pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
         page.columns(&name, &interval_text(&vh.rating), &interval_text(&h.rating));
     }
     page.effects("ratings", &analysis.anova, &published::MAGNITUDE);
+    page.sizes(&analysis.anova);
+    page.post_hoc(&analysis.post_hoc);
     page.movements(analysis.task, &analysis.kinematics);
     page.end()
 }
@@ -81,9 +89,14 @@ pub(super) fn blinded(analysis: &BlindedAnalysis) -> String {
 #[derive(Default)]
 struct Page {
     lines: Vec<String>,
+    beside: Beside,
 }
 
 impl Page {
+    fn beside(beside: Beside) -> Self {
+        Self { lines: Vec::new(), beside }
+    }
+
     fn line(&mut self, text: String) {
         self.lines.push(format!("  {text}"));
     }
@@ -94,6 +107,7 @@ impl Page {
 
     /// Name, value here, and value in the thesis.
     fn row(&mut self, name: &str, here: &str, published: &str) {
+        let published = self.beside.text(published);
         self.lines.push(format!("  {name:<30}{here:<46}{published}").trim_end().to_owned());
     }
 
@@ -111,6 +125,28 @@ impl Page {
         }
     }
 
+    /// How large the effects are.
+    fn sizes(&mut self, table: &[Effect]) {
+        self.gap();
+        self.row("Partial eta squared", "with its 95 % interval", "");
+        for effect in table.iter().filter(|effect| effect.is_testable()) {
+            let size = partial_eta_squared(effect.f, effect.df, effect.error_df);
+            self.row(&effect.effect, &size_text(&size), "");
+        }
+    }
+
+    fn post_hoc(&mut self, comparisons: &[PostHoc]) {
+        if comparisons.is_empty() {
+            return;
+        }
+        self.gap();
+        self.columns("Comparisons", "paired t, p after Holm", "   Cohen's d of the pairs");
+        for PostHoc { comparison, t, p_holm, d } in comparisons {
+            let test = format!("t({}) = {:.2}, {}", t.df, t.value, p_text(*p_holm));
+            self.lines.push(format!("  {comparison:<30}{test:<26}{}", size_text(d)));
+        }
+    }
+
     fn movements(&mut self, task: &str, measures: &[KinematicMeasure]) {
         for measure in measures {
             self.effects(measure.measure, &measure.anova, published::movement(task, measure.measure));
@@ -120,6 +156,11 @@ impl Page {
     fn end(self) -> String {
         self.lines.join("\n")
     }
+}
+
+fn size_text(size: &EffectSize) -> String {
+    let [low, high] = size.interval;
+    format!("{:.2}  ({low:.2} to {high:.2})", size.value)
 }
 
 fn interval_text(value: &MeanInterval) -> String {

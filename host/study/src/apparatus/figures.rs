@@ -43,10 +43,13 @@ pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> String 
         let errors = cells(modality).flat_map(|cell| error_bar(centre(slot, cell.base), &cell.threshold));
         panel = panel.series(Series::line("", errors).slot(3));
     }
-    let report = MODALITIES.into_iter().enumerate().zip(published::WEBER).flat_map(|((slot, _), weber)| {
-        bases.iter().map(move |base| (centre(slot, *base), weber * base)).collect::<Vec<_>>()
-    });
-    panel = panel.series(Series::points("report: its Weber fraction times the base", report).slot(2));
+    if let Some(weber) = analysis.beside.weber() {
+        let of = |(slot, weber): (usize, f64)| {
+            bases.iter().map(move |base| (centre(slot, *base), weber * base)).collect::<Vec<_>>()
+        };
+        let thesis = weber.into_iter().enumerate().flat_map(of);
+        panel = panel.series(Series::points("thesis: its Weber fraction times the base", thesis).slot(2));
+    }
     Figure::new("Thresholds", Axis::linear(format!("Base {name}"), unit).levels(bases))
         .subtitle("Mean over subjects; strokes: one standard error each way")
         .panel_height_px(HEIGHT_PX)
@@ -69,11 +72,12 @@ pub(super) fn subjects(analysis: &JndAnalysis) -> String {
     let mean = flotor_statistics::describe::mean;
     let points: Vec<(f64, f64)> = points.iter().map(|(_, [vh, h])| (mean(vh), mean(h))).collect();
     let most = points.iter().flat_map(|(vh, h)| [*vh, *h]).fold(1.0, f64::max).ceil();
-    let [vh, h] = published::WEBER.map(|weber| weber * 100.0);
-    let panel = Panel::new(Axis::linear("Weber fraction, haptics alone", "%").range(0.0, most))
+    let mut panel = Panel::new(Axis::linear("Weber fraction, haptics alone", "%").range(0.0, most))
         .series(Series::points("a subject", points).slot(0))
-        .series(Series::points("report, mean", [(vh, h)]).slot(2))
         .series(Series::line("no difference", [(0.0, 0.0), (most, most)]).slot(3));
+    if let Some([vh, h]) = analysis.beside.weber().map(|weber| weber.map(|weber| weber * 100.0)) {
+        panel = panel.series(Series::points("thesis, mean", [(vh, h)]).slot(2));
+    }
     Figure::new("Subjects", Axis::linear("Weber fraction, vision + haptics", "%").range(0.0, most))
         .subtitle("Above the line: worse without vision")
         .panel_height_px(HEIGHT_PX)
@@ -122,7 +126,8 @@ pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Stri
     }
     let trend = &analysis.trend;
     let line = cells(Modality::Vh).map(|cell| (cell.stimulus, trend.intercept + trend.slope * cell.stimulus));
-    let label = format!("linear trend, R² {:.3} (report: {})", analysis.linear_r2, published::LINEAR_R2);
+    let thesis = format!(" (thesis: {})", published::LINEAR_R2);
+    let label = format!("linear trend, R² {:.3}{}", analysis.linear_r2, analysis.beside.text(&thesis));
     panel = panel.series(Series::line(label, line).slot(2));
     let (name, unit) = stimulus.name_and_unit();
     Figure::new("Perceived against real", Axis::linear(name, unit))

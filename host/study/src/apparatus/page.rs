@@ -2,6 +2,7 @@
 //! thesis's. One HTML file that needs no other.
 
 use super::figures;
+use crate::analysis::published::Beside;
 use crate::analysis::{
     Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, effect_text,
     p_text, published,
@@ -65,8 +66,13 @@ fn jnd_page(
     ));
     page.figure(
         &figures::thresholds(analysis, stimulus),
-        "Thresholds by base and modality, as figure 18 of CMU-RI-TR-07-21. Its bars are printed without numbers; the \
-         markers are its mean Weber fraction, 14.2 and 17.2 %, times the base.",
+        match analysis.beside {
+            Beside::Thesis => {
+                "Thresholds by base and modality, as figure 18 of CMU-RI-TR-07-21. Its bars are printed without numbers; \
+                 the markers are its mean Weber fraction, 14.2 and 17.2 %, times the base."
+            }
+            Beside::Nothing => "Thresholds by base and modality.",
+        },
     );
     page.heading("Weber fractions");
     page.table(&["", "this study", "95 % interval", "thesis"], |rows| {
@@ -78,7 +84,7 @@ fn jnd_page(
                 name.to_owned(),
                 percent(detail),
                 format!("{low:.1} to {high:.1} %"),
-                format!("{:.1} %", published * 100.0),
+                analysis.beside.text(&format!("{:.1} %", published * 100.0)).to_owned(),
             ]);
         }
         let t = &analysis.t;
@@ -88,11 +94,11 @@ fn jnd_page(
             "Difference".to_owned(),
             here,
             format!("{low:.1} to {high:.1} %"),
-            published::T.to_owned(),
+            analysis.beside.text(published::T).to_owned(),
         ]);
     });
     page.heading("Effects on thresholds");
-    page.effects(&analysis.anova, &published::JND);
+    page.effects(&analysis.anova, analysis.beside.effects(&published::JND));
     page.paragraph("Is the Weber fraction the same at every base? Within each modality, on fractions:");
     let constancy =
         [("Vision and haptics", &analysis.constancy.vh), ("Haptics alone", &analysis.constancy.h)];
@@ -104,7 +110,7 @@ fn jnd_page(
             beside.push((name, report));
         }
     }
-    page.effects(&lines, &beside);
+    page.effects(&lines, analysis.beside.effects(&beside));
     page.figure(
         &figures::subjects(analysis),
         "Each subject's Weber fraction without vision against that with it.",
@@ -112,7 +118,7 @@ fn jnd_page(
     if let Some(first) = subjects.first() {
         page.figure(&figures::tracks(first), "The adaptive tracks of one subject.");
     }
-    movements(page, analysis.task, &analysis.kinematics, levels, stimulus);
+    movements(page, (analysis.task, analysis.beside), &analysis.kinematics, levels, stimulus);
     if analysis.unfinished_tracks > 0 {
         let count = analysis.unfinished_tracks;
         page.paragraph(&format!("{count} tracks did not reach a threshold and are omitted."));
@@ -123,12 +129,12 @@ fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stim
     let trend = &analysis.trend;
     page.paragraph(&format!(
         "{} subjects gave {} ratings each; {} presentations were repeated because the handle left its range. The mean \
-         rating rises linearly with the stimulus: R² = {:.3} (thesis: {}), F({}, {}) = {:.2}, {}.",
+         rating rises linearly with the stimulus: R² = {:.3}{}, F({}, {}) = {:.2}, {}.",
         analysis.subjects,
         analysis.trials_per_subject,
         analysis.repeated,
         analysis.linear_r2,
-        published::LINEAR_R2,
+        analysis.beside.text(&format!(" (thesis: {})", published::LINEAR_R2)),
         trend.df,
         trend.error_df,
         trend.f,
@@ -136,16 +142,19 @@ fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stim
     ));
     page.figure(
         &figures::ratings(analysis, stimulus),
-        "Mean ratings over the stimulus, as figure 17 of CMU-RI-TR-07-21.",
+        match analysis.beside {
+            Beside::Thesis => "Mean ratings over the stimulus, as figure 17 of CMU-RI-TR-07-21.",
+            Beside::Nothing => "Mean ratings over the stimulus.",
+        },
     );
     page.heading("Effects on ratings");
-    page.effects(&analysis.anova, &published::MAGNITUDE);
-    movements(page, analysis.task, &analysis.kinematics, levels, stimulus);
+    page.effects(&analysis.anova, analysis.beside.effects(&published::MAGNITUDE));
+    movements(page, (analysis.task, analysis.beside), &analysis.kinematics, levels, stimulus);
 }
 
 fn movements(
     page: &mut Page,
-    task: &str,
+    (task, beside): (&str, Beside),
     measures: &[KinematicMeasure],
     levels: &[f64],
     stimulus: &Stimulus,
@@ -155,7 +164,7 @@ fn movements(
     page.figure(&figure, "Mean speed, acceleration and force along the vertical (thesis: section 4.3).");
     for measure in measures {
         page.paragraph(&format!("Effects on {}:", measure.measure));
-        page.effects(&measure.anova, published::movement(task, measure.measure));
+        page.effects(&measure.anova, beside.effects(published::movement(task, measure.measure)));
     }
 }
 

@@ -287,6 +287,12 @@ impl Dataset {
     }
 }
 
+/// All trials of all sittings as one table with commas, a row each, for other programs.
+#[must_use]
+pub fn trials_csv(logs: &[SittingLog]) -> String {
+    table::long(logs)
+}
+
 /// Whether a sitting belongs to the study of a log.
 fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
     let changed = |what| DatasetError::Changed { path: log.path().to_path_buf(), what };

@@ -56,6 +56,24 @@ pub(super) fn trials(log: &SittingLog) -> String {
     [head.join("\t")].into_iter().chain(rows).fold(String::new(), |text, line| text + &line + "\n")
 }
 
+/// All trials of all sittings as one table with commas, for other programs: subject and first modality before the columns of
+/// [`trials`]; a list in a cell has spaces.
+pub(super) fn long(logs: &[SittingLog]) -> String {
+    let head = COLUMNS.iter().map(|(name, _)| *name);
+    let mut text = ["subject", "first_modality"].into_iter().chain(head).collect::<Vec<_>>().join(",") + "\n";
+    for log in logs {
+        let codes = Codes::new(&log.begin.protocol, log.begin.seed);
+        let subject = log.begin.subject;
+        let first = log.begin.protocol.first_modality().of(subject).word();
+        for record in &log.trials {
+            let cells = row(record, &codes, log.began).into_iter().map(|cell| cell.replace(',', " "));
+            let cells = [subject.to_string(), first.to_owned()].into_iter().chain(cells);
+            text += &(cells.collect::<Vec<_>>().join(",") + "\n");
+        }
+    }
+    text
+}
+
 fn row(record: &TrialRecord, codes: &Codes, began: Option<TimeOfDay>) -> Vec<String> {
     let event = &record.event;
     let trial = &event.trial;

@@ -6,9 +6,11 @@
 
 mod most_likely;
 mod posterior;
+mod psychometric;
 
 pub use most_likely::most_likely;
 pub use posterior::{Posterior, PosteriorGrid};
+pub use psychometric::{Psychometric, psychometric};
 
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;

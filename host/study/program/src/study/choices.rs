@@ -1,9 +1,9 @@
 //! Choices of a protocol on the command line.
 
-use crate::protocol::{AtBoundary, FirstModality};
-use crate::trial::Modality;
 use clap::ValueEnum;
 use flotor_command::options::real;
+use flotor_study::protocol::{AtBoundary, FirstModality};
+use flotor_study::trial::Modality;
 
 /// `--first`
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]

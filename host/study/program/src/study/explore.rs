@@ -2,8 +2,6 @@
 //! use that the thesis names (CMU-RI-TR-07-21, section 7).
 
 use super::front::lines_of;
-use crate::apparatus::watch::Shared;
-use crate::kinematics::{KinematicsMeter, StimulusKinematics};
 use clap::Args;
 use flotor_command::options::{PluginKeyValue, PluginPathOption, StrengthOption};
 use flotor_command::say;
@@ -18,6 +16,8 @@ use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::telemetry::{Watched, publish};
 use flotor_session::{ControlError, Controls, NewValue, RunError, RunOptions, Session};
+use flotor_study::apparatus::watch::Shared;
+use flotor_study::kinematics::{KinematicsMeter, StimulusKinematics};
 use std::io::{BufReader, stdin};
 use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;

@@ -13,9 +13,9 @@ use std::time::Duration;
 const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
 /// A window in front of a person. Dropped, it closes.
-pub(in crate::cli::study) struct Window {
+pub(in crate::study) struct Window {
     /// What is said to it and heard of it.
-    pub(in crate::cli::study) lines: JsonLines<ChildStdin>,
+    pub(in crate::study) lines: JsonLines<ChildStdin>,
     viewer: Running,
 }
 
@@ -24,7 +24,7 @@ impl Window {
     ///
     /// # Errors
     /// There is no viewer, or it cannot open a window and has said why.
-    pub(in crate::cli::study) fn open(stop_key: StopKeyOption) -> Result<Self, CommandError> {
+    pub(in crate::study) fn open(stop_key: StopKeyOption) -> Result<Self, CommandError> {
         let mut command = SeparateProgram::VIEWER.command()?;
         command.arg("--sitting").arg("--run").arg(std::process::id().to_string());
         command.arg("--stop-key").arg(stop_key.word());
@@ -45,7 +45,7 @@ impl Window {
     }
 
     /// Waits until the person closes the window, or somebody stops the study.
-    pub(in crate::cli::study) fn wait_closed(mut self, stop: &StopSwitch) {
+    pub(in crate::study) fn wait_closed(mut self, stop: &StopSwitch) {
         while self.viewer.0.try_wait().is_ok_and(|status| status.is_none()) && !stop.is_stop_asked() {
             std::thread::sleep(LOOK_PERIOD);
         }

@@ -1,21 +1,21 @@
 //! Screens and inputs as lines of JSON, for a window that is another program.
 
 use super::MOMENT;
-use crate::apparatus::attend::{FrontEnd, Heard};
-use crate::conduct::OutsideError;
-use crate::screen::{Said, Screen, Told, Warning};
+use flotor_study::apparatus::attend::{FrontEnd, Heard};
+use flotor_study::conduct::OutsideError;
+use flotor_study::screen::{Said, Screen, Told, Warning};
 use std::io::{ErrorKind, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
 /// The two directions of a window.
-pub(in crate::cli::study) struct JsonLines<W> {
+pub(in crate::study) struct JsonLines<W> {
     lines: Receiver<String>,
     out: W,
 }
 
 impl<W: Write> JsonLines<W> {
     /// A window that is heard and told things here.
-    pub(in crate::cli::study) fn new(lines: Receiver<String>, out: W) -> Self {
+    pub(in crate::study) fn new(lines: Receiver<String>, out: W) -> Self {
         Self { lines, out }
     }
 

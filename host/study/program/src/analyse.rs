@@ -1,15 +1,19 @@
 //! `flotor analyse`: thresholds, effects and tests from the data of a study.
 
-use crate::analysis::{Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectRecord};
-use crate::apparatus::page::html;
-use crate::blinding::Codes;
-use crate::dataset::Dataset;
-use crate::protocol::RatingScale;
 use clap::{Args, ValueEnum};
 use flotor_command::options::JsonOption;
 use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, print_result, style, write_text};
 use flotor_statistics::anova::SumOfSquares;
+use flotor_study::analysis::{
+    Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectQuality, SubjectRecord,
+};
+use flotor_study::analysis::{SCRIPT_PYTHON, SCRIPT_R};
+use flotor_study::apparatus::page::html;
+use flotor_study::blinding::Codes;
+use flotor_study::dataset::{Dataset, trials_csv};
+use flotor_study::log::{Incident, SittingLog};
+use flotor_study::protocol::RatingScale;
 use std::path::PathBuf;
 
 /// Analyse the data of a perception experiment
@@ -33,6 +37,13 @@ pub(crate) struct AnalyseArguments {
     /// Write every subject's response under every condition, for R or Python
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
+    /// Write one row for each trial of the complete sittings, and beside it a script in R and one in Python that repeat
+    /// the tables
+    #[arg(long, value_name = "FILE.csv", conflicts_with = "blind")]
+    trials: Option<PathBuf>,
+    /// Every subject by themselves, also those who have not finished: tracks, psychometric functions, what is suspicious
+    #[arg(long, conflicts_with_all = ["html", "csv", "blind"])]
+    each: bool,
     /// Codes instead of modalities and stimuli, without the values of the thesis
     #[arg(long, conflicts_with = "html")]
     blind: bool,
@@ -60,11 +71,21 @@ enum SumsOption {
 }
 
 pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
-    let logs = Dataset::at(&arguments.data).logs()?;
+    let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
     for log in logs.iter().filter(|log| !log.complete) {
         note(format_args!("{}: incomplete after {} trials, omitted", log.begin.subject, log.trials.len()));
     }
     let Some(first) = logs.first() else { return Ok(()) };
+    // A pilot is analysed before there is anybody to compare it with.
+    if arguments.each || logs.iter().filter(|log| log.complete).count() < 2 {
+        return tell_each(arguments, &logs);
+    }
+    if !first.begin.is_of_a_person() {
+        note(format_args!(
+            "simulated observers, seed {}: one of many draws, and no result about people; another --seed gives another",
+            first.begin.seed
+        ));
+    }
     let complete = logs.iter().filter(|log| log.complete).map(SubjectRecord::of_log);
     let subjects: Vec<SubjectRecord> = complete.collect();
     let options = AnalysisOptions {
@@ -88,7 +109,36 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     };
     print_result(arguments.json.file(), &analysis, text)?;
     write_text(arguments.html.as_deref(), || html(&first.begin, &subjects, &analysis))?;
-    write_text(arguments.csv.as_deref(), || to_csv([], analysis.responses()))
+    write_text(arguments.csv.as_deref(), || to_csv([], analysis.responses()))?;
+    let Some(path) = &arguments.trials else { return Ok(()) };
+    if path.extension().is_none_or(|extension| extension != "csv") {
+        let path = path.display();
+        return Err(CommandError::Usage(format!("--trials {path}: name a file that ends in .csv")));
+    }
+    let complete: Vec<SittingLog> = logs.into_iter().filter(|log| log.complete).collect();
+    write_text(Some(path), || trials_csv(&complete))?;
+    write_text(Some(&path.with_extension("py")), || SCRIPT_PYTHON.to_owned())?;
+    write_text(Some(&path.with_extension("R")), || SCRIPT_R.to_owned())
+}
+
+/// Every subject by themselves.
+fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), CommandError> {
+    let of = |log: &SittingLog| {
+        let incidents: Vec<Incident> = log.incidents.iter().map(|(.., incident)| incident.clone()).collect();
+        SubjectQuality::of(&log.begin.protocol, &SubjectRecord::of_log(log), &incidents)
+    };
+    let each: Vec<SubjectQuality> = logs.iter().map(of).collect();
+    let text = || {
+        let with_incidents = |(quality, log): (&SubjectQuality, &SittingLog)| {
+            let lines = log.incidents.iter().map(|(trials, time, incident)| {
+                let time = time.map_or(String::new(), |time| format!("  {time}"));
+                format!("\n  after {trials} trials{time}: {incident}")
+            });
+            quality.to_text() + &lines.collect::<String>()
+        };
+        each.iter().zip(logs).map(with_incidents).collect::<Vec<_>>().join("\n\n")
+    };
+    print_result(arguments.json.as_deref(), &each, text)
 }
 
 /// Results under codes.

@@ -1,24 +1,24 @@
 //! Text on a terminal, answers by keyboard.
 
 use super::{MOMENT, lines_of};
-use crate::apparatus::attend::{FrontEnd, Heard};
-use crate::conduct::OutsideError;
-use crate::protocol::Quality;
-use crate::screen::{Input, Pause, Question, Screen, TrialView};
-use crate::trial::{Phase, Position, Response};
 use flotor_command::say;
 use flotor_command::style;
+use flotor_study::apparatus::attend::{FrontEnd, Heard};
+use flotor_study::conduct::OutsideError;
+use flotor_study::protocol::Quality;
+use flotor_study::screen::{Input, Pause, Question, Screen, TrialView};
+use flotor_study::trial::{Phase, Position, Response};
 use std::io::{BufReader, IsTerminal};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
 /// A person at this terminal.
-pub(in crate::cli::study) struct Terminal {
+pub(in crate::study) struct Terminal {
     lines: Receiver<String>,
 }
 
 impl Terminal {
     /// Listens to standard input from now on.
-    pub(in crate::cli::study) fn listen() -> std::io::Result<Self> {
+    pub(in crate::study) fn listen() -> std::io::Result<Self> {
         Ok(Self { lines: lines_of(BufReader::new(std::io::stdin()))? })
     }
 }

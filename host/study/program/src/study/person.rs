@@ -2,19 +2,20 @@
 
 use super::front::{JsonLines, ScreenOption, Terminal, Window, lines_of};
 use super::{Common, NoiseOption};
-use crate::apparatus::attend::{FrontEnd, Least, attend};
-use crate::apparatus::noise::WhiteNoise;
-use crate::apparatus::real_time_rig::RealTimeRig;
-use crate::apparatus::rig::TrialFiles;
-use crate::apparatus::{Apparatus, Kinematics};
-use crate::conduct::Ending;
-use crate::dataset::{Dataset, DatasetError, Progress};
-use crate::log::{Begin, Event, FORMAT};
-use crate::protocol::{Protocol, SubjectNumber};
-use crate::screen::Attended;
+use crate::of_dataset;
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note};
+use flotor_study::apparatus::attend::{FrontEnd, Least, attend};
+use flotor_study::apparatus::noise::WhiteNoise;
+use flotor_study::apparatus::real_time_rig::RealTimeRig;
+use flotor_study::apparatus::rig::TrialFiles;
+use flotor_study::apparatus::{Apparatus, Kinematics};
+use flotor_study::conduct::Ending;
+use flotor_study::dataset::{Dataset, DatasetError, Progress};
+use flotor_study::log::{Begin, Event, FORMAT};
+use flotor_study::protocol::{Protocol, SubjectNumber};
+use flotor_study::screen::Attended;
 use serde_json::json;
 use std::io::{BufReader, Stdout, stdin, stdout};
 
@@ -31,11 +32,11 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         observer: json!("human"),
         apparatus: apparatus.description(),
     };
-    let earlier = match dataset.progress(&begin, common.earlier())? {
+    let earlier = match dataset.progress(&begin, common.earlier()).map_err(of_dataset)? {
         Progress::New => None,
         Progress::Partial(log) => Some(log),
         Progress::Complete => {
-            return Err(DatasetError::Duplicate { subject, root: common.out.clone() }.into());
+            return Err(of_dataset(DatasetError::Duplicate { subject, root: common.out.clone() }));
         }
     };
     let files =
@@ -48,8 +49,8 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let mut front = Front::open(common, &rig)?;
 
     let (sitting, mut log) = match earlier {
-        None => dataset.begin(begin)?,
-        Some(log) => log.resume(&begin.version).map_err(DatasetError::from)?,
+        None => dataset.begin(begin).map_err(of_dataset)?,
+        Some(log) => log.resume(&begin.version).map_err(|error| of_dataset(error.into()))?,
     };
     if kinematics == Kinematics::Full {
         let files = TrialFiles::make(files.0, files.1);
@@ -73,7 +74,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         super::outside(error.as_ref(), &error)
     });
     let ending = ended?;
-    tables?;
+    tables.map_err(of_dataset)?;
     if let (Ending::Complete, Front::Window(window)) = (ending, front) {
         window.wait_closed(&stop); // the last screen thanks the person
     }

@@ -1,9 +1,9 @@
 //! `flotor study bias`: bias and error of each threshold estimator.
 
-use crate::bias::{BiasRow, observer_of, rows};
 use clap::Args;
 use flotor_command::options::{JsonOption, count, whole};
 use flotor_command::{CommandError, print_result, progress_bar, style};
+use flotor_study::bias::{BiasRow, observer_of, rows};
 use rayon::prelude::*;
 
 /// Observers: true threshold as a share of the base, and criterion. First the two of the default population, then one

@@ -1,5 +1,5 @@
 //! The program `flotor-study`; everything is in the library.
 
 fn main() -> std::process::ExitCode {
-    flotor_study::cli::main()
+    flotor_study_program::main()
 }

@@ -3,9 +3,9 @@
 mod analyse;
 mod study;
 
-use crate::dataset::DatasetError;
 use clap::{CommandFactory, Parser, Subcommand};
 use flotor_command::{CommandError, exit_code_of, options};
+use flotor_study::dataset::DatasetError;
 use std::process::ExitCode;
 
 /// Run and analyse perception experiments; `flotor COMMAND` starts this program.
@@ -38,11 +38,10 @@ pub fn main() -> ExitCode {
     })
 }
 
-impl From<DatasetError> for CommandError {
-    fn from(error: DatasetError) -> Self {
-        match error {
-            DatasetError::File { .. } => Self::Failed(error.to_string()),
-            other => Self::Usage(other.to_string()),
-        }
+/// What cannot be done with the data of a study, with its exit code.
+fn of_dataset(error: DatasetError) -> CommandError {
+    match error {
+        DatasetError::File { .. } => CommandError::Failed(error.to_string()),
+        other => CommandError::Usage(other.to_string()),
     }
 }

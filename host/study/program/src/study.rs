@@ -5,19 +5,9 @@ mod choices;
 mod explore;
 mod front;
 mod person;
+mod power;
 mod spring;
 
-use crate::apparatus::rig::{Rig, RunEnded, TrialFiles};
-use crate::apparatus::{Apparatus, ApparatusError, Kinematics};
-use crate::cohort::{Cohort, CohortError};
-use crate::conduct::{ConductError, Nothing, OutsideError, Presenter};
-use crate::dataset::{Dataset, Earlier};
-use crate::observer::Population;
-use crate::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
-use crate::protocol::{
-    ComparisonSide, JndDemo, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, Stimulus,
-    SubjectNumber,
-};
 use choices::{
     BoundaryChoice, FirstChoice, ForceWay, NoiseOption, PresentationOption, ProcedureChoice, range,
 };
@@ -31,6 +21,17 @@ use flotor_command::{CommandError, progress_bar, style};
 use flotor_servo::RunEnd;
 use flotor_session::RunError;
 use flotor_session::scene::Scene;
+use flotor_study::apparatus::rig::{Rig, RunEnded, TrialFiles};
+use flotor_study::apparatus::{Apparatus, ApparatusError, Kinematics};
+use flotor_study::cohort::{Cohort, CohortError};
+use flotor_study::conduct::{ConductError, Nothing, OutsideError, Presenter};
+use flotor_study::dataset::{Dataset, Earlier};
+use flotor_study::observer::Population;
+use flotor_study::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
+use flotor_study::protocol::{
+    ComparisonSide, JndDemo, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, Stimulus,
+    SubjectNumber,
+};
 use serde_json::json;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -67,6 +68,8 @@ enum Task {
     Spring(spring::SpringArguments),
     /// Add a note of the experimenter to a subject's log
     Note(NoteArguments),
+    /// How many subjects a difference experiment needs, by simulated studies
+    Power(power::PowerArguments),
     /// Bias and error of each threshold estimator, on observers with a known threshold
     Bias(bias::BiasArguments),
 }
@@ -277,6 +280,7 @@ const FORCE: Subject = Subject { stimulus: "load.force_n", bases: [3.0, 6.0, 9.0
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     match &arguments.task {
         Task::Note(arguments) => note(arguments),
+        Task::Power(arguments) => power::run(arguments),
         Task::Bias(arguments) => bias::run(arguments),
         Task::Explore(arguments) => explore::run(arguments),
         Task::Spring(arguments) => spring::run(arguments),
@@ -455,7 +459,7 @@ fn unfit(error: ApparatusError) -> CommandError {
 }
 
 fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
-    let logs = Dataset::at(&arguments.data).logs()?;
+    let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
     let log = logs.into_iter().find(|log| log.begin.subject.get() == arguments.subject);
     let log = log.ok_or_else(|| {
         let (data, subject) = (arguments.data.display(), arguments.subject);
@@ -465,7 +469,7 @@ fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
 }
 
 fn tell(dataset: &Dataset) -> Result<(), CommandError> {
-    let logs = dataset.logs()?;
+    let logs = dataset.logs().map_err(crate::of_dataset)?;
     let complete = logs.iter().filter(|log| log.complete).count();
     let presentations: usize = logs.iter().map(|log| log.trials.len()).sum();
     let root = dataset.root().display();
@@ -481,7 +485,7 @@ fn tell(dataset: &Dataset) -> Result<(), CommandError> {
 
 fn refused(error: CohortError) -> CommandError {
     match error {
-        CohortError::Dataset(error) => error.into(),
+        CohortError::Dataset(error) => crate::of_dataset(error),
         CohortError::Sitting {
             cause: ConductError::Outside(ref cause) | ConductError::Trial { ref cause, .. },
             ..

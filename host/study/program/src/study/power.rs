@@ -1,0 +1,106 @@
+//! `flotor study power`: how many subjects a difference experiment needs.
+
+use clap::Args;
+use flotor_command::options::{count, real, whole};
+use flotor_command::{CommandError, print_result, progress_bar, style};
+use flotor_study::power::{Power, population, power, study};
+use flotor_study::protocol::{JndProtocol, Protocol, SubjectNumber};
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+#[derive(Args)]
+#[command(
+    after_help = "Each study is one of simulated observers, as `flotor study jnd --apparatus none`, with the paired t-test of \
+    `flotor analyse` at a level of 5 %. --ratio 1 gives the rate of false alarms.\n\n\
+    Examples:\n  \
+    flotor study power --subjects 8..32\n  \
+    flotor study power --subjects 16..16 --ratio 1.1 --replications 6 --runs 400"
+)]
+pub(super) struct PowerArguments {
+    /// Subjects of a study: the fewest and the most; five sizes between them are simulated
+    #[arg(long, default_value = "8..32", value_parser = sizes, value_name = "FEWEST..MOST")]
+    subjects: (u16, u16),
+    /// Simulated studies of each size
+    #[arg(long, default_value_t = 200, value_parser = count(10..=100_000_u32), value_name = "N")]
+    runs: u32,
+    /// Threshold without vision in units of that with vision
+    #[arg(long, default_value_t = 1.21, value_parser = real, value_name = "RATIO")]
+    ratio: f64,
+    /// Share of trials answered without attention
+    #[arg(long, default_value_t = 0.0, value_parser = real, value_name = "SHARE")]
+    lapse: f64,
+    /// Bases, in the unit of the stimulus
+    #[arg(long, value_delimiter = ',', default_value = "17,26,35", value_parser = real, value_name = "LIST")]
+    bases: Vec<f64>,
+    /// Replications, in alternating modality
+    #[arg(long, default_value_t = 4, value_parser = count(2..=1000_u32), value_name = "N")]
+    replications: u32,
+    /// Seed of the answers
+    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
+    seed: u64,
+    /// Write the rows as JSON (- for standard output)
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// `8..32`
+fn sizes(text: &str) -> Result<(u16, u16), String> {
+    let wrong =
+        || format!("`{text}` is no range of subjects; write 8..32, from 3 to {}", SubjectNumber::MOST);
+    let (low, high) = text.split_once("..").ok_or_else(wrong)?;
+    let number = |text: &str| text.trim().parse::<u16>().map_err(|_| wrong());
+    let (low, high) = (number(low)?, number(high)?);
+    if (3..=SubjectNumber::MOST).contains(&low) && (low..=SubjectNumber::MOST).contains(&high) {
+        Ok((low, high))
+    } else {
+        Err(wrong())
+    }
+}
+
+pub(super) fn run(arguments: &PowerArguments) -> Result<(), CommandError> {
+    if !(0.1..=10.0).contains(&arguments.ratio) {
+        return Err(CommandError::Usage(format!("--ratio {}: it must be 0.1 to 10", arguments.ratio)));
+    }
+    if !(0.0..=0.5).contains(&arguments.lapse) {
+        return Err(CommandError::Usage(format!("--lapse {}: it must be 0 to 0.5", arguments.lapse)));
+    }
+    let protocol = JndProtocol {
+        bases: arguments.bases.clone(),
+        replications: arguments.replications,
+        ..JndProtocol::default()
+    };
+    Protocol::Jnd(protocol.clone()).check().map_err(|error| CommandError::Usage(error.to_string()))?;
+    let observers = population(arguments.ratio, arguments.lapse);
+    let (low, high) = arguments.subjects;
+    let mut counts: Vec<u16> = (0..5_u32)
+        .filter_map(|at| u16::try_from(u32::from(low) + u32::from(high - low) * at / 4).ok())
+        .collect();
+    counts.dedup();
+    let progress = progress_bar(counts.len() as u64 * u64::from(arguments.runs), "{percent:>3} %  {elapsed}");
+    let of_size = |subjects: u16| -> Power {
+        let one = |run: u32| {
+            // Seeds of their own: no study is part of another.
+            let seed = arguments.seed.wrapping_mul(1_000_003).wrapping_add(u64::from(run));
+            progress.inc(1);
+            study(&protocol, &observers, subjects, seed).ok()
+        };
+        let results: Vec<_> = (0..arguments.runs).into_par_iter().filter_map(one).collect();
+        power(subjects, &results)
+    };
+    let rows: Vec<Power> = counts.into_iter().map(of_size).collect();
+    progress.finish_and_clear();
+    let title =
+        format!("{} studies of each size, thresholds in the ratio {}", arguments.runs, arguments.ratio);
+    print_result(arguments.json.as_deref(), &rows, || format!("{}\n{}", style::title(&title), to_text(&rows)))
+}
+
+fn to_text(rows: &[Power]) -> String {
+    let head = format!("  {:>8}{:>9}{:>16}{:>14}", "subjects", "power", "standard error", "Weber vh, h");
+    let percent = |share: f64| format!("{:.1} %", share * 100.0);
+    let line = |row: &Power| {
+        let [vh, h] = row.weber.map(percent);
+        let (power, error) = (percent(row.power), percent(row.standard_error));
+        format!("  {:>8}{power:>9}{error:>16}{:>20}", row.subjects, format!("{vh}, {h}"))
+    };
+    [head].into_iter().chain(rows.iter().map(line)).collect::<Vec<_>>().join("\n")
+}

@@ -1,0 +1,183 @@
+//! One subject by themselves, from the first trial on: the tracks as far as they came, psychometric functions, and whether the
+//! answers are those of somebody who felt what was presented.
+
+use super::SubjectRecord;
+use crate::estimate::{Observation, Prior, Psychometric, psychometric};
+use crate::log::Incident;
+use crate::protocol::Protocol;
+use crate::sitting::{TrackResult, Verdict};
+use crate::trial::{Judgement, Modality, Phase, Presented, Response};
+use flotor_statistics::describe::quantile;
+use serde::Serialize;
+
+/// Less time with a stimulus than this is suspicious, s.
+const SHORT_S: f64 = 0.5;
+/// A wrong answer to a difference this many thresholds large is a lapse.
+const LARGE: f64 = 2.5;
+
+/// The psychometric function in one condition.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SubjectCondition {
+    /// Modality.
+    pub modality: Modality,
+    /// Base.
+    pub base: f64,
+    /// Threshold and lapse with intervals.
+    pub function: Psychometric,
+}
+
+/// What can be said of one subject.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SubjectQuality {
+    /// Who: `sub-01`.
+    pub subject: String,
+    /// Answers that count.
+    pub answers: usize,
+    /// Thresholds of the tracks that are over.
+    pub tracks: Vec<TrackResult>,
+    /// Psychometric functions, of a difference experiment.
+    pub conditions: Vec<SubjectCondition>,
+    /// Quartiles of the time from the end of a presentation to the answer, s; none where it is not known.
+    pub response_time_s: Option<[f64; 3]>,
+    /// Share of "I don't know".
+    pub dont_know: Option<f64>,
+    /// Share of "the first" among the answers that name one.
+    pub first: Option<f64>,
+    /// What is suspicious, a sentence each.
+    pub flags: Vec<String>,
+}
+
+impl SubjectQuality {
+    /// Of a subject's data so far.
+    #[must_use]
+    pub fn of(protocol: &Protocol, record: &SubjectRecord, incidents: &[Incident]) -> Self {
+        let counted: Vec<_> = record.counted().collect();
+        let times: Vec<f64> = counted.iter().filter_map(|event| event.exploration.response_time_s).collect();
+        let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&times, share));
+        let named =
+            |response: Response| counted.iter().filter(|event| event.response == response).count() as f64;
+        let [first, second, unsure] = [Response::First, Response::Second, Response::DontKnow].map(named);
+        let is_jnd = matches!(protocol, Protocol::Jnd(_));
+        let share = |part: f64, whole: f64| (is_jnd && whole > 0.0).then(|| part / whole);
+        let conditions = conditions(protocol, record);
+        let mut quality = Self {
+            subject: record.subject.to_string(),
+            answers: counted.len(),
+            tracks: record.tracks.clone(),
+            response_time_s: (!times.is_empty()).then_some(quartiles),
+            dont_know: share(unsure, first + second + unsure),
+            first: share(first, first + second),
+            flags: Vec::new(),
+            conditions,
+        };
+        quality.flags = quality.suspicions(record, first + second, incidents);
+        quality
+    }
+
+    fn suspicions(&self, record: &SubjectRecord, named: f64, incidents: &[Incident]) -> Vec<String> {
+        let mut flags = Vec::new();
+        let felt = |event: &&crate::log::TrialEvent| !event.exploration.kinematics.is_empty();
+        let short = record
+            .counted()
+            .filter(felt)
+            .filter(|event| event.exploration.kinematics.iter().any(|one| one.duration_s < SHORT_S));
+        let still = record
+            .counted()
+            .filter(felt)
+            .filter(|event| event.exploration.kinematics.iter().any(|one| one.cycles == 0));
+        let (short, still) = (short.count(), still.count());
+        let mut say = |count: usize, what: &str| {
+            if count > 0 {
+                flags.push(format!("{count} {what}"));
+            }
+        };
+        say(short, "answers after less than half a second with a stimulus");
+        say(still, "answers without a whole movement down and up");
+        say(self.lapses(record), "wrong answers to a difference of more than 2.5 thresholds");
+        let stuck = self.tracks.iter().filter(|track| track.threshold.is_none()).count();
+        say(stuck, "tracks that did not reach a threshold");
+        say(incidents.len(), "interruptions and disturbances in the log");
+        if let Some(first) = self.first
+            && named >= 20.0
+            // Two deviations of a binomial share of a half.
+            && (first - 0.5).abs() > 1.0 / named.sqrt()
+        {
+            flags.push(format!("a preference: {:.0} % of the answers named the first", first * 100.0));
+        }
+        if self.dont_know.is_some_and(|share| share > 0.5) {
+            flags.push("more than half of the answers are \"I don't know\"".to_owned());
+        }
+        flags
+    }
+
+    fn lapses(&self, record: &SubjectRecord) -> usize {
+        let threshold = |modality, base| {
+            let known =
+                |condition: &&SubjectCondition| condition.modality == modality && condition.base == base;
+            self.conditions.iter().find(known).map(|condition| condition.function.threshold)
+        };
+        let is_lapse = |event: &&crate::log::TrialEvent| match (event.trial.presented, event.verdict) {
+            (Presented::Pair(pair), Verdict::Judged { judgement: Judgement::Wrong, .. }) => {
+                threshold(event.trial.modality, pair.base).is_some_and(|known| pair.delta > LARGE * known)
+            }
+            _ => false,
+        };
+        record.counted().filter(is_lapse).count()
+    }
+
+    /// The page for people.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let percent = |share: f64| format!("{:.1} %", share * 100.0);
+        let mut lines = vec![format!("{}: {} answers that count", self.subject, self.answers)];
+        for track in &self.tracks {
+            let TrackResult { track, replication, modality, base, threshold, trials } = track;
+            let found = threshold.map_or("none".to_owned(), percent);
+            lines.push(format!(
+                "  track {track:<3} replication {replication}  {:<3} base {base:<8} threshold {found:<9} {trials} trials",
+                modality.word(),
+            ));
+        }
+        for SubjectCondition { modality, base, function } in &self.conditions {
+            let [low, high] = function.threshold_interval.map(percent);
+            lines.push(format!(
+                "  {:<3} base {base:<8} {} answers: threshold {} (95 %: {low} to {high}), lapse {} (at most {})",
+                modality.word(),
+                function.answers,
+                percent(function.threshold),
+                percent(function.lapse),
+                percent(function.lapse_most),
+            ));
+        }
+        if let Some([low, middle, high]) = self.response_time_s {
+            lines.push(format!("  answers after {middle:.2} s (quartiles {low:.2} to {high:.2} s)"));
+        }
+        if let (Some(unsure), Some(first)) = (self.dont_know, self.first) {
+            let (unsure, first) = (percent(unsure), percent(first));
+            lines.push(format!("  \"I don't know\" {unsure}; of the others {first} named the first"));
+        }
+        lines.extend(self.flags.iter().map(|flag| format!("  ! {flag}")));
+        lines.join("\n")
+    }
+}
+
+fn conditions(protocol: &Protocol, record: &SubjectRecord) -> Vec<SubjectCondition> {
+    let Protocol::Jnd(jnd) = protocol else { return Vec::new() };
+    let of = |modality: Modality, base: f64| {
+        let here = record.counted().filter(|event| event.trial.modality == modality);
+        let observed = here.filter_map(|event| match (event.trial.presented, event.verdict) {
+            (Presented::Pair(pair), Verdict::Judged { judgement, .. })
+                if pair.base == base && event.trial.phase == Phase::Main =>
+            {
+                Some(Observation { delta: pair.delta, judgement })
+            }
+            _ => None,
+        });
+        let observed: Vec<Observation> = observed.collect();
+        let function = psychometric(&observed, &Prior::default(), jnd.procedure.target())?;
+        Some(SubjectCondition { modality, base, function })
+    };
+    let all =
+        Modality::ALL.into_iter().flat_map(|modality| jnd.bases.iter().map(move |base| (modality, *base)));
+    all.filter_map(|(modality, base)| of(modality, base)).collect()
+}

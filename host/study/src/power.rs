@@ -1,0 +1,84 @@
+//! How many subjects a difference experiment needs: whole studies of simulated observers, without apparatus, and how often the
+//! difference between the modalities is found.
+//!
+//! The test is the paired t-test of `flotor analyse`. With equal observers in both modalities the same share is the rate of
+//! false alarms, which must be the level of the test.
+
+use crate::analysis::{AnalysisError, AnalysisOptions, SubjectRecord, analyse_jnd};
+use crate::log::TrialEvent;
+use crate::observer::{Population, Sensitivity, SimulatedSubject};
+use crate::protocol::{JndProtocol, Protocol, SubjectNumber};
+use crate::sitting::Sitting;
+use crate::trial::Exploration;
+use serde::Serialize;
+
+/// Level of the test.
+pub const LEVEL: f64 = 0.05;
+
+/// The power of a study with so many subjects.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Power {
+    /// Subjects of a study.
+    pub subjects: u16,
+    /// Studies that were simulated.
+    pub studies: u32,
+    /// Share of them that found a difference between the modalities, p below 0.05.
+    pub power: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// Mean Weber fractions over all studies: vision and haptics, haptics alone.
+    pub weber: [f64; 2],
+}
+
+/// Observers whose threshold without vision is this many times that with vision.
+#[must_use]
+pub fn population(ratio: f64, lapse: f64) -> Population {
+    let usual = Population::default();
+    let h = Sensitivity { sigma: usual.vh.sigma * ratio, ..usual.vh };
+    Population { h, lapse, ..usual }
+}
+
+/// p of the paired t-test, and the Weber fractions, of one simulated study.
+///
+/// # Errors
+/// [`AnalysisError`]: a track that came to no threshold, or a study without any spread.
+pub fn study(
+    protocol: &JndProtocol,
+    population: &Population,
+    subjects: u16,
+    seed: u64,
+) -> Result<(f64, [f64; 2]), AnalysisError> {
+    let whole = Protocol::Jnd(protocol.clone());
+    let middle = flotor_statistics::describe::mean(&protocol.bases);
+    let sit = |subject: SubjectNumber| {
+        let simulated = SimulatedSubject::new(population, seed, subject, middle);
+        let mut sitting = Sitting::new(&whole, seed, subject);
+        let mut trials = Vec::new();
+        while let Some(trial) = sitting.next() {
+            let response = simulated.respond(&trial);
+            let exploration = Exploration::default();
+            let Ok(verdict) = sitting.answer(response, &exploration) else { break };
+            trials.push(TrialEvent { trial, response, verdict, exploration });
+        }
+        let first_modality = whole.first_modality().of(subject);
+        SubjectRecord { subject, first_modality, trials, tracks: sitting.results().to_vec() }
+    };
+    let subjects: Vec<SubjectRecord> = (1..=subjects).filter_map(SubjectNumber::new).map(sit).collect();
+    let analysis = analyse_jnd(protocol, &subjects, &AnalysisOptions::default())?;
+    Ok((analysis.t.p, [analysis.weber.vh, analysis.weber.h]))
+}
+
+/// The power from the results of studies with so many subjects.
+#[must_use]
+pub fn power(subjects: u16, results: &[(f64, [f64; 2])]) -> Power {
+    let n = results.len() as f64;
+    let found = results.iter().filter(|(p, _)| *p < LEVEL).count() as f64 / n;
+    let weber = [0, 1].map(|at| results.iter().map(|(_, weber)| weber[at]).sum::<f64>() / n);
+    Power {
+        subjects,
+        studies: u32::try_from(results.len()).unwrap_or(u32::MAX),
+        power: found,
+        standard_error: (found * (1.0 - found) / n).sqrt(),
+        weber,
+    }
+}
