@@ -20,12 +20,14 @@ pub fn bucket_width_s(span_s: f64, buckets: usize) -> f64 {
 pub struct Buckets {
     width_s: f64,
     kept: VecDeque<Bucket>,
+    segment: u32,
 }
 
 /// Smallest and largest point of a bucket, the number of which is its place in time.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
     number: f64,
+    segment: u32,
     low: Point,
     high: Point,
 }
@@ -34,13 +36,18 @@ impl Buckets {
     /// Without any point yet.
     #[must_use]
     pub fn of_width(width_s: f64) -> Self {
-        Self { width_s, kept: VecDeque::new() }
+        Self { width_s, kept: VecDeque::new(), segment: 0 }
     }
 
     /// Width of a bucket, s.
     #[must_use]
     pub fn width_s(&self) -> f64 {
         self.width_s
+    }
+
+    /// What comes is not joined to what was: there is nothing between them.
+    pub fn interrupt(&mut self) {
+        self.segment = self.segment.wrapping_add(1);
     }
 
     /// Adds a point that is not earlier than those before it. One that is not finite is left out.
@@ -50,7 +57,7 @@ impl Buckets {
         }
         let number = (point[0] / self.width_s).floor();
         match self.kept.back_mut() {
-            Some(bucket) if bucket.number == number => {
+            Some(bucket) if bucket.number == number && bucket.segment == self.segment => {
                 if point[1] < bucket.low[1] {
                     bucket.low = point;
                 }
@@ -58,7 +65,7 @@ impl Buckets {
                     bucket.high = point;
                 }
             }
-            _ => self.kept.push_back(Bucket { number, low: point, high: point }),
+            _ => self.kept.push_back(Bucket { number, segment: self.segment, low: point, high: point }),
         }
     }
 
@@ -69,11 +76,12 @@ impl Buckets {
         }
     }
 
-    /// One point or two of each bucket, in order of time.
-    pub fn points(&self) -> impl Iterator<Item = Point> {
-        self.kept.iter().flat_map(|Bucket { low, high, .. }| {
+    /// One point or two of each bucket, in order of time, each with the number of the stretch it belongs to.
+    pub fn points(&self) -> impl Iterator<Item = (u32, Point)> {
+        self.kept.iter().flat_map(|Bucket { low, high, segment, .. }| {
             let [first, second] = if low[0] <= high[0] { [*low, *high] } else { [*high, *low] };
-            [Some(first), (first != second).then_some(second)].into_iter().flatten()
+            let points = [Some(first), (first != second).then_some(second)];
+            points.into_iter().flatten().map(|point| (*segment, point))
         })
     }
 }
@@ -89,7 +97,7 @@ mod tests {
     fn kept(points: &[Point], span_s: f64, buckets: usize) -> Vec<Point> {
         let mut kept = Buckets::of_width(bucket_width_s(span_s, buckets));
         points.iter().for_each(|point| kept.push(*point));
-        kept.points().collect()
+        kept.points().map(|(_, point)| point).collect()
     }
 
     #[test]

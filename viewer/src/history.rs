@@ -194,6 +194,24 @@ impl History {
         self.samples.get(after.saturating_sub(1))
     }
 
+    /// Longest time between two samples of a run that goes on, s; a longer one is a gap.
+    #[must_use]
+    pub fn gap_s(&self) -> f64 {
+        /// A few pictures: what is shorter cannot be seen.
+        const LEAST_S: f64 = 0.05;
+        (20.0 / self.run.rate_hz.max(1.0e-3)).max(LEAST_S)
+    }
+
+    /// The sample that was seen at a time: none before the first one, and none in a gap.
+    #[must_use]
+    pub fn seen_at(&self, time_s: f64) -> Option<&Sample> {
+        let sample = self.at(time_s)?;
+        // The last one stands for what comes after it.
+        let is_last = self.samples.back().is_some_and(|last| last.time_ns == sample.time_ns);
+        let age_s = time_s - sample.time_s();
+        (age_s >= 0.0 && (is_last || age_s <= self.gap_s())).then_some(sample)
+    }
+
     /// Samples between two times, both included.
     pub fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Sample> {
         let start = self.samples.partition_point(|sample| sample.time_s() < from_s);

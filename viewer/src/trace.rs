@@ -12,7 +12,9 @@ use std::ops::Range;
 pub struct Trace {
     quantity: Quantity,
     components: Vec<Buckets>,
-    points: Vec<Vec<PlotPoint>>,
+    points: Vec<Vec<Vec<PlotPoint>>>,
+    /// Time of the last sample looked at, s.
+    last_s: Option<f64>,
     covered: Range<u64>,
     visited: u64,
 }
@@ -26,6 +28,7 @@ impl Trace {
             quantity,
             components: vec![Buckets::default(); count],
             points: vec![Vec::new(); count],
+            last_s: None,
             covered: 0..0,
             visited: 0,
         }
@@ -43,25 +46,31 @@ impl Trace {
         self.visited
     }
 
-    /// Points of each component between two times, at most two for each of so many `buckets`; values times `per_si`.
+    /// Points of each component between two times, at most two for each of so many `buckets`; values times `per_si`. A
+    /// component has a list for each stretch without a gap.
     pub fn points(
         &mut self,
         history: &History,
         span_s: [f64; 2],
         buckets: usize,
         per_si: f64,
-    ) -> &[Vec<PlotPoint>] {
+    ) -> &[Vec<Vec<PlotPoint>>] {
         let width_s = bucket_width_s(span_s[1] - span_s[0], buckets);
         let first = history.number_at(span_s[0]);
         let is_known = self.covered.start <= first && first <= self.covered.end;
         if !is_known || self.components.first().is_none_or(|known| known.width_s() != width_s) {
             self.components.fill(Buckets::of_width(width_s));
             self.covered = first..first;
+            self.last_s = None;
         }
         for sample in history.from_number(self.covered.end).take_while(|sample| sample.time_s() <= span_s[1])
         {
+            let time_s = sample.time_s();
+            if self.last_s.replace(time_s).is_some_and(|last_s| time_s - last_s > history.gap_s()) {
+                self.components.iter_mut().for_each(Buckets::interrupt);
+            }
             for (component, buckets) in self.components.iter_mut().enumerate() {
-                buckets.push([sample.time_s(), self.quantity.value(sample, component)]);
+                buckets.push([time_s, self.quantity.value(sample, component)]);
             }
             self.covered.end += 1;
             self.visited += 1;
@@ -70,8 +79,15 @@ impl Trace {
         for (buckets, points) in self.components.iter_mut().zip(&mut self.points) {
             buckets.forget_before(span_s[0]);
             points.clear();
-            let shown = buckets.points().take_while(|[time_s, _]| *time_s <= span_s[1]);
-            points.extend(shown.map(|[time_s, value]| PlotPoint::new(time_s, value * per_si)));
+            let mut stretch = None;
+            for (segment, [time_s, value]) in buckets.points().take_while(|(_, at)| at[0] <= span_s[1]) {
+                if stretch.replace(segment) != Some(segment) {
+                    points.push(Vec::new());
+                }
+                if let Some(points) = points.last_mut() {
+                    points.push(PlotPoint::new(time_s, value * per_si));
+                }
+            }
         }
         &self.points
     }
@@ -103,14 +119,14 @@ mod tests {
             let samples = history.between(span_s[0], span_s[1]);
             let mut kept = Buckets::of_width(bucket_width_s(span_s[1] - span_s[0], BUCKETS));
             samples.for_each(|s| kept.push([s.time_s(), 2.0 * Quantity::Force.value(s, k)]));
-            kept.points().collect()
+            kept.points().map(|(_, point)| point).collect()
         };
         (0..3).map(component).collect()
     }
 
     fn shown(trace: &mut Trace, history: &History, span_s: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
         let points = trace.points(history, span_s, BUCKETS, 2.0);
-        points.iter().map(|points| points.iter().map(|point| [point.x, point.y]).collect()).collect()
+        points.iter().map(|points| points.concat().iter().map(|point| [point.x, point.y]).collect()).collect()
     }
 
     /// A bucket at the left edge may still know of samples that have left the picture.
@@ -140,6 +156,21 @@ mod tests {
         // Of the first 3000, and of the 4000 at once, only what is in the picture.
         assert_eq!(trace.visited(), 2001 + 16 + 1 + 17 + 900 + 2001 + 333);
         assert_eq!(shown(&mut trace, &history, [7.0, 8.2]), shown(&mut trace, &history, [7.0, 8.2]));
+    }
+
+    /// Nothing was there: no line may say that something was.
+    #[test]
+    fn a_gap_is_a_gap() {
+        let mut history = History::new(unknown_run(), Keep::All);
+        push(&mut history, 0..1000);
+        push(&mut history, 7000..8000);
+        let mut trace = Trace::of(Quantity::Force);
+        let points = trace.points(&history, [0.0, 8.0], BUCKETS, 1.0);
+        assert_eq!(points.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2, 2]);
+        let [before, after] = points[2].as_slice() else { panic!("two stretches") };
+        assert!(before.iter().all(|point| point.x < 1.0) && after.iter().all(|point| point.x >= 7.0));
+        assert!(history.seen_at(0.5).is_some() && history.seen_at(7.5).is_some());
+        assert!(history.seen_at(3.0).is_none() && history.seen_at(-1.6).is_none());
     }
 
     #[test]

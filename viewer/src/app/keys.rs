@@ -54,6 +54,16 @@ impl Viewer {
         if pressed(Key::P) {
             self.switch_panel(ui.ctx());
         }
+        if pressed(Key::F11) {
+            let is_full = ui.input(|input| input.viewport().fullscreen.unwrap_or(false));
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Fullscreen(!is_full));
+        }
+        if pressed(Key::F1) || ui.input(|input| input.events.contains(&egui::Event::Text("?".to_owned()))) {
+            self.shows_keys = !self.shows_keys;
+        }
+        if self.shows_keys && pressed(Key::Escape) {
+            self.shows_keys = false;
+        }
         if pressed(Key::L) {
             self.switch_look(ui.ctx());
         }

@@ -10,6 +10,7 @@ use crate::ui::view3d::Subject;
 use crate::ui::{legend, parameters, readout, standing, style, warnings};
 use egui::{Rect, RichText, ScrollArea, Ui, vec2};
 use flotor_live::{Ask, SetValue};
+use std::time::Instant;
 
 /// Part of the height that the 3D view gets: low windows leave room for two traces first.
 fn view_part(height_pt: f32) -> f32 {
@@ -90,6 +91,9 @@ impl Viewer {
         readout::numbers(ui.painter(), view, &sample, self.plots.units, palette);
         legend::paint(ui.painter(), view, &self.facts, palette);
         warnings::warnings(ui, view, &self.warnings(&sample), palette);
+        if let Some(done) = self.done() {
+            warnings::done(ui, view, done, palette);
+        }
 
         let below = Rect::from_min_max(view.left_bottom() + vec2(12.0, 6.0), area.max - vec2(16.0, 2.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below).id_salt("plots"));
@@ -98,13 +102,13 @@ impl Viewer {
         for request in requests {
             match request {
                 PlotRequest::Seek(now_s) => self.player.seek(now_s, self.history.span_s()),
-                PlotRequest::Export(format) => {
-                    let remark = match export(&self.history, &self.plots, format, self.look) {
-                        Ok(path) => format!("Written: {}", path.display()),
-                        Err(error) => error.to_string(),
-                    };
-                    self.say(remark);
-                }
+                PlotRequest::Export(format) => match export(&self.history, &self.plots, format, self.look) {
+                    Ok(path) => {
+                        let path = std::path::absolute(&path).unwrap_or(path);
+                        self.done = Some((format!("Written: {}", path.display()), Instant::now()));
+                    }
+                    Err(error) => self.say(error.to_string()),
+                },
             }
         }
     }

@@ -25,7 +25,7 @@ use crate::sound::Bell;
 use crate::tally::Tally;
 use crate::ui::plot_stack::{PlotStack, Window};
 use crate::ui::view3d::View3d;
-use crate::ui::{playback, readout, style};
+use crate::ui::{help, playback, readout, style};
 use eframe::egui_wgpu::RenderState;
 use egui::{CentralPanel, Context, Frame, Margin, Panel as Edge, Ui};
 use flotor_live::{Ask, WrenchLimits};
@@ -70,6 +70,9 @@ pub struct Viewer {
     shows_panel: Option<bool>,
     side_pt: f32,
     remark: Option<(String, Instant)>,
+    done: Option<(String, Instant)>,
+    /// Whether the list of keys is in sight.
+    shows_keys: bool,
     bell: Bell,
     last_look: Option<Instant>,
     frame: Duration,
@@ -143,6 +146,8 @@ impl Viewer {
             shows_panel: None,
             side_pt: SIDE_PT,
             remark: None,
+            done: None,
+            shows_keys: false,
             bell: Bell::default(),
             last_look: None,
             frame,
@@ -246,6 +251,9 @@ impl Viewer {
             }
         }
         CentralPanel::default().frame(plain(0, 0)).show(ui, |ui| self.middle(ui, &palette));
+        if self.shows_keys {
+            help::keys(ui.ctx(), &mut self.shows_keys);
+        }
     }
 
     /// Whether the panel is in sight: as was chosen, else where there is room for it beside the run.

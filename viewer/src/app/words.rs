@@ -70,4 +70,10 @@ impl Viewer {
         said.extend(remark.map(|(remark, _)| remark.clone()));
         said
     }
+
+    /// That something was done, which is no warning.
+    pub(super) fn done(&self) -> Option<&str> {
+        let done = self.done.as_ref().filter(|(_, since)| since.elapsed() < REMARK);
+        done.map(|(text, _)| text.as_str())
+    }
 }

@@ -1,6 +1,8 @@
 //! The interface: parts that window, tests and headless pictures put together.
 
+pub mod help;
 pub mod legend;
+pub mod marks;
 pub mod parameters;
 pub mod playback;
 pub mod plot_stack;

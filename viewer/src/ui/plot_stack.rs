@@ -5,6 +5,7 @@ use crate::palette::Palette;
 use crate::player::Motion;
 use crate::quantity::{Quantity, Units};
 use crate::trace::Trace;
+use crate::ui::marks::Marks;
 use crate::ui::plots::{PlotView, plot};
 use crate::ui::style::SMALL_PT;
 use egui::{Color32, ComboBox, RichText, Role, Ui, WidgetInfo};
@@ -59,6 +60,8 @@ pub struct PlotStack {
     pub units: Units,
     /// What has been made of the history, for each quantity shown so far.
     traces: BTreeMap<Quantity, Trace>,
+    /// What happened, beneath the traces.
+    marks: Marks,
     /// End of a window that is shorter than the run, s; the newest while none has been shown.
     end_s: f64,
     /// Where the pointer was in the last picture, s.
@@ -74,6 +77,7 @@ impl PlotStack {
             window,
             units: Units::Handy,
             traces: BTreeMap::new(),
+            marks: Marks::default(),
             end_s: f64::INFINITY,
             hover_s: None,
         }
@@ -82,6 +86,7 @@ impl PlotStack {
     /// Another run is shown from now on.
     pub fn start_over(&mut self) {
         self.traces.clear();
+        self.marks = Marks::default();
         self.end_s = f64::INFINITY;
     }
 
@@ -99,7 +104,9 @@ impl PlotStack {
             Window::Whole => [first_s, last_s.max(first_s + 1.0e-3)],
             Window::Newest(length_s) => {
                 let end_s = self.end_s.min(last_s);
-                [end_s - length_s, end_s]
+                // Before the run there is nothing to show: its beginning stays at the left until it is longer.
+                let from_s = (end_s - length_s).max(first_s.min(end_s));
+                [from_s, from_s + length_s]
             }
         }
     }
@@ -135,6 +142,9 @@ impl PlotStack {
             let view = PlotView { span_s, cursor_s, units: self.units, height, time_axis };
             let trace = self.traces.entry(quantity).or_insert_with(|| Trace::of(quantity));
             let answer = plot(ui, history, trace, view, palette);
+            if time_axis {
+                self.marks.show(ui, history, span_s, answer.frame, palette);
+            }
             self.hover_s = self.hover_s.or(answer.hover_s);
             requests.extend(answer.seek_s.map(PlotRequest::Seek));
         }

@@ -23,12 +23,14 @@ pub struct PlotView {
 }
 
 /// What a person did to a plot.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlotAnswer {
     /// Time the pointer asks for, s.
     pub seek_s: Option<f64>,
     /// Time under the pointer, s.
     pub hover_s: Option<f64>,
+    /// Where the traces are, points.
+    pub frame: egui::Rect,
 }
 
 /// Shows one quantity over time. The components' names and values at the cursor stand above.
@@ -75,11 +77,13 @@ pub fn plot(
         .label_formatter(|_| None)
         .show(ui, |plot| {
             plot.set_plot_bounds_x(span_s[0]..=span_s[1]);
-            for (component, points) in traces.iter().enumerate() {
+            for (component, stretches) in traces.iter().enumerate() {
                 let name = quantity.components()[component];
-                // Two points a bucket are few enough: joined they are as wide everywhere.
-                let line = Line::new(name, PlotPoints::Borrowed(points)).allow_band(false);
-                plot.line(line.color(palette.components[component % 3]).width(1.6));
+                for points in stretches {
+                    // Two points a bucket are few enough: joined they are as wide everywhere.
+                    let line = Line::new(name, PlotPoints::Borrowed(points)).allow_band(false);
+                    plot.line(line.color(palette.components[component % 3]).width(1.6));
+                }
             }
             plot.vline(VLine::new("time", cursor_s).stroke(Stroke::new(1.2, palette.cursor)));
             plot.pointer_coordinate()
@@ -88,7 +92,11 @@ pub fn plot(
     shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &time));
     let hover_s = shown.inner.map(|at| at.x).filter(|_| shown.response.hovered());
     let pressed = shown.response.is_pointer_button_down_on();
-    PlotAnswer { seek_s: shown.inner.map(|at| at.x).filter(|_| pressed), hover_s }
+    PlotAnswer {
+        seek_s: shown.inner.map(|at| at.x).filter(|_| pressed),
+        hover_s,
+        frame: *shown.transform.frame(),
+    }
 }
 
 fn heading(ui: &mut Ui, history: &History, quantity: Quantity, view: &PlotView, palette: &Palette) {
@@ -97,14 +105,25 @@ fn heading(ui: &mut Ui, history: &History, quantity: Quantity, view: &PlotView, 
         ui.add_space(4.0);
         ui.strong(quantity.name());
         ui.weak(unit);
-        let sample = history.at(view.cursor_s);
+        let sample = history.seen_at(view.cursor_s);
         for (component, name) in quantity.components().iter().enumerate() {
             ui.add_space(10.0);
             ui.colored_label(palette.components[component % 3], *name);
             let value = sample.map_or(f64::NAN, |sample| quantity.value(sample, component) * per_si);
-            ui.monospace(fixed(value));
+            ui.monospace(digits(value, view.units));
         }
     });
+}
+
+/// A number as it is read in these units: of metres and joules the digits that matter are behind the third place.
+#[must_use]
+pub fn digits(value: f64, units: Units) -> String {
+    match units {
+        Units::Handy => fixed(value),
+        Units::Si if value.abs() < 10.0 => format!("{value:+9.6}"),
+        Units::Si if value.abs() < 1000.0 => format!("{value:+9.4}"),
+        Units::Si => format!("{:>9}", fixed(value)),
+    }
 }
 
 /// A number in seven columns, whatever its size.
@@ -149,6 +168,11 @@ mod tests {
         for value in [0.0, -1.5, 12.345, -123.45, 99_999.0, f64::NAN, f64::INFINITY, 1.0e9] {
             assert_eq!(fixed(value).chars().count(), 7, "{value}: `{}`", fixed(value));
         }
+        for value in [0.0, 1.0e-6, -0.005_123, 12.5, -999.9, 1.0e6, f64::NAN] {
+            let text = digits(value, Units::Si);
+            assert_eq!(text.chars().count(), 9, "{value}: `{text}`");
+        }
+        assert_eq!(digits(0.001_234, Units::Si), "+0.001234", "a millimetre has its micrometres");
         assert_eq!(short(-1.0e-12), "0");
         assert_eq!(short(0.1 + 0.2), "0.3");
     }

@@ -4,7 +4,7 @@ use crate::history::Sample;
 use crate::palette::Palette;
 use crate::quantity::{Quantity, Units};
 use crate::scene::SceneFacts;
-use crate::ui::plots::fixed;
+use crate::ui::plots::digits;
 use crate::ui::style::{BODY_PT, SMALL_PT, TITLE_PT};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, vec2};
 use flotor_core::Clock;
@@ -60,19 +60,23 @@ pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, pal
     if area.width() < ROOM_FOR_NUMBERS_PT {
         return;
     }
+    let column = match units {
+        Units::Handy => 60.0,
+        Units::Si => 76.0,
+    };
     let shown = [Quantity::Force, Quantity::Torque, Quantity::Position, Quantity::Rotation, Quantity::Energy];
     for quantity in shown {
         let (unit, per_si) = quantity.unit(units);
         painter.text(Pos2::new(right - 34.0, y), Align2::LEFT_TOP, unit, small.clone(), palette.faint);
         let mut x = right - 42.0;
         for component in (0..quantity.components().len()).rev() {
-            let value = fixed(quantity.value(sample, component) * per_si);
+            let value = digits(quantity.value(sample, component) * per_si, units);
             let color =
                 if quantity.components().len() == 3 { palette.components[component] } else { palette.text };
             painter.text(Pos2::new(x, y), Align2::RIGHT_TOP, value, mono.clone(), color);
-            x -= 60.0;
+            x -= column;
         }
-        x = right - 42.0 - 3.0 * 60.0;
+        x = right - 42.0 - 3.0 * column;
         painter.text(Pos2::new(x - 4.0, y), Align2::RIGHT_TOP, quantity.name(), name.clone(), palette.faint);
         y += line;
     }

@@ -200,3 +200,67 @@ fn number_of(window: &Window<'_>, parameter: &str) -> f64 {
         ref other => panic!("{other:?}"),
     }
 }
+
+/// Whatever a hand does to the window with a pointer: no number leaves its soft range, and the stop works in between.
+#[test]
+fn no_pointer_brings_a_parameter_out_of_its_soft_range() {
+    let (mut window, mut host, _folder) = live(&[]);
+    until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
+    let size = window.ctx.content_rect().size();
+    let mut seed = 1_u32;
+    let mut random = |most: f32| {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 8) as f32 / (1 << 24) as f32 * most
+    };
+    let events = if std::env::var("FLOTOR_TEST_SIZE").as_deref() == Ok("full") { 10_000 } else { 300 };
+    let button = |pos, pressed| egui::Event::PointerButton {
+        pos,
+        button: egui::PointerButton::Primary,
+        pressed,
+        modifiers: egui::Modifiers::NONE,
+    };
+    let mut is_down = false;
+    for _ in 0..events {
+        // The right half has the panel; the emergency stop above it and the choices are left out.
+        let at = egui::pos2(size.x * 0.5 + random(size.x * 0.5), 60.0 + random(size.y - 120.0));
+        window.event(egui::Event::PointerMoved(at));
+        if random(1.0) < 0.5 {
+            is_down = !is_down;
+            window.event(button(at, is_down));
+        }
+        if random(1.0) < 0.1 {
+            let delta = egui::vec2(0.0, random(200.0) - 100.0);
+            let unit = egui::MouseWheelUnit::Point;
+            let (phase, modifiers) = (egui::TouchPhase::Move, egui::Modifiers::NONE);
+            window.event(egui::Event::MouseWheel { unit, delta, phase, modifiers });
+        }
+        window.run_steps(1);
+        for knob in window.state().panels().iter().flat_map(|panel| &panel.knobs) {
+            let (Value::Number(number), Some(soft)) = (&knob.value, knob.parameter.soft) else { continue };
+            if knob.standing == Standing::Free {
+                let first: f64 = knob.parameter.first.parse().expect("a number");
+                let legal = soft.min.min(first)..=soft.max.max(first);
+                assert!(legal.contains(number), "{} = {number} beyond {legal:?}", knob.name);
+            }
+        }
+    }
+    window.key_press(Key::Space);
+    window.run_steps(1);
+    let until = std::time::Instant::now() + std::time::Duration::from_secs(20);
+    while host.request(None) != Ask::EmergencyStop {
+        assert!(std::time::Instant::now() < until, "the stop did not arrive");
+    }
+}
+
+#[test]
+fn f1_lists_the_keys() {
+    let (mut window, mut host, _folder) = live(&[]);
+    until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
+    assert!(window.query_by_label("emergency stop; of a recording: play").is_none());
+    window.key_press(Key::F1);
+    window.run_steps(2);
+    window.get_by_label("emergency stop; of a recording: play");
+    window.key_press(Key::Escape);
+    window.run_steps(2);
+    assert!(window.query_by_label("emergency stop; of a recording: play").is_none());
+}

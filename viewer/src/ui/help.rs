@@ -1,0 +1,38 @@
+//! The keys of the window.
+
+use egui::{Context, Grid, RichText, Window};
+
+/// Key and what it does.
+const KEYS: [(&str, &str); 17] = [
+    ("Space", "emergency stop; of a recording: play"),
+    ("Enter", "takes a typed number; Escape leaves it"),
+    ("Ctrl+Z", "the value before the last change"),
+    ("W A S D", "turn the view"),
+    ("+  -", "nearer, farther"),
+    ("R", "the experimenter's view"),
+    ("F", "follow the newest tick"),
+    ("Left  Right", "a second back or on"),
+    ("Shift+Left  Right", "ten seconds"),
+    ("Ctrl+Left  Right", "a tick"),
+    ("Home  End", "beginning and end"),
+    ("U", "millimetres or SI"),
+    ("P", "parameters"),
+    ("L", "light or dark"),
+    ("Ctrl +  Ctrl -", "larger, smaller"),
+    ("F11", "full screen"),
+    ("F1  ?", "these keys"),
+];
+
+/// Shows the list until it is closed.
+pub fn keys(context: &Context, is_open: &mut bool) {
+    let window = Window::new("Keys").open(is_open).collapsible(false).resizable(false);
+    window.anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO).show(context, |ui| {
+        Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).show(ui, |ui| {
+            for (key, does) in KEYS {
+                ui.label(RichText::new(key).strong());
+                ui.label(does);
+                ui.end_row();
+            }
+        });
+    });
+}
