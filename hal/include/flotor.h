@@ -776,6 +776,24 @@ typedef struct FlotorShapeTable {
     uint32_t (*shape)(FlotorInstance instance, const struct FlotorInput *input, struct FlotorShapeView *out);
 } FlotorShapeTable;
 
+// The soft range of one parameter, in its unit. 40 bytes.
+typedef struct FlotorSoftRange {
+    struct FlotorStr id;
+    double min;
+    double max;
+    double step;
+} FlotorSoftRange;
+
+// `flotor.soft-range/1`: see [`SoftRangeModel`].
+typedef struct FlotorSoftRangeTable {
+    // Bytes of this table as the plugin knows it.
+    uint32_t size;
+    // Number of ranges.
+    uint32_t range_count;
+    // The ranges, constant.
+    const struct FlotorSoftRange *ranges;
+} FlotorSoftRangeTable;
+
 // What one instance serves and whether it remembers; the same for its whole life. 8 bytes.
 typedef struct FlotorVariantInfo {
     struct FlotorDemand serves;
@@ -1007,6 +1025,7 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
 #define FLOTOR_INTERFACE_PACING "flotor.pacing/1"
 #define FLOTOR_INTERFACE_SHAPE "flotor.shape/1"
+#define FLOTOR_INTERFACE_SOFT_RANGE "flotor.soft-range/1"
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_WORKSPACE_BOUNDS "flotor.workspace-bounds/1"
 
@@ -1268,6 +1287,15 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(ShapeTable, size),
     FLOTOR_FIELD(ShapeTable, reserved),
     FLOTOR_FIELD(ShapeTable, shape),
+    FLOTOR_STRUCT(SoftRange),
+    FLOTOR_FIELD(SoftRange, id),
+    FLOTOR_FIELD(SoftRange, min),
+    FLOTOR_FIELD(SoftRange, max),
+    FLOTOR_FIELD(SoftRange, step),
+    FLOTOR_STRUCT(SoftRangeTable),
+    FLOTOR_FIELD(SoftRangeTable, size),
+    FLOTOR_FIELD(SoftRangeTable, range_count),
+    FLOTOR_FIELD(SoftRangeTable, ranges),
     FLOTOR_STRUCT(VariantInfo),
     FLOTOR_FIELD(VariantInfo, serves),
     FLOTOR_FIELD(VariantInfo, memory),
