@@ -18,6 +18,39 @@ pub struct Camera {
     pub target_mm: DVec3,
 }
 
+/// From where a picture is to be seen, as a person writes it: `AZIMUTH,INCLINATION` or `AZIMUTH,INCLINATION,ZOOM`, degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    azimuth_rad: f64,
+    inclination_rad: f64,
+    zoom: f64,
+}
+
+impl std::str::FromStr for View {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!(
+                "`{text}` is no view; write AZIMUTH,INCLINATION or AZIMUTH,INCLINATION,ZOOM, such as 30,15 or 30,15,2: degrees to \
+                 the right and, from -2 to 88, above the horizon, and a zoom of 0.2 to 3"
+            )
+        };
+        let numbers = text.split(',').map(|part| part.trim().parse::<f64>().map_err(|_| wrong()));
+        let numbers = numbers.collect::<Result<Vec<f64>, String>>()?;
+        let (azimuth, inclination, zoom) = match numbers.as_slice() {
+            [azimuth, inclination] => (*azimuth, *inclination, 1.0),
+            [azimuth, inclination, zoom] => (*azimuth, *inclination, *zoom),
+            _ => return Err(wrong()),
+        };
+        let is_legal = (-360.0..=360.0).contains(&azimuth)
+            && (-2.0..=88.0).contains(&inclination)
+            && (0.2..=3.0).contains(&zoom);
+        let (azimuth_rad, inclination_rad) = (azimuth.to_radians(), inclination.to_radians());
+        if is_legal { Ok(Self { azimuth_rad, inclination_rad, zoom }) } else { Err(wrong()) }
+    }
+}
+
 /// Vertical angle of view, rad: that of a 70 mm lens on a full frame, which flatters small things.
 const FIELD_OF_VIEW_RAD: f64 = 0.34;
 /// Legal inclinations, rad: a little below the ground to straight above.
@@ -36,6 +69,17 @@ impl Camera {
             distance_mm: 4.6 * height_mm,
             target_mm: DVec3::new(0.0, 0.0, -0.40 * height_mm),
         }
+    }
+
+    /// The view that was requested of a body of this height; without a request the experimenter's.
+    #[must_use]
+    pub fn of(view: Option<View>, height_mm: f64) -> Self {
+        let mut camera = Self::experimenter(height_mm);
+        if let Some(View { azimuth_rad, inclination_rad, zoom }) = view {
+            (camera.azimuth_rad, camera.inclination_rad) = (azimuth_rad, inclination_rad);
+            camera.zoom(zoom, height_mm);
+        }
+        camera
     }
 
     /// Where the eye is, mm.
@@ -115,5 +159,18 @@ mod tests {
         camera.orbit(0.0, -100.0);
         camera.zoom(0.0, 25.0);
         assert_eq!((camera.inclination_rad, camera.distance_mm), (-0.05, 750.0));
+    }
+
+    #[test]
+    fn a_view_is_read_in_degrees_and_what_is_none_is_refused() {
+        let camera = Camera::of(Some("90,30,2".parse().expect("a view")), 25.0);
+        let eye = camera.eye_mm() - camera.target_mm;
+        assert!(eye.x > 0.0 && eye.y.abs() < 1.0e-9 * eye.x, "from the right: {eye}");
+        assert!((eye.z / eye.length() - 0.5).abs() < 1.0e-12, "30 degrees above the horizon");
+        assert!((camera.distance_mm - 0.5 * Camera::experimenter(25.0).distance_mm).abs() < 1.0e-9);
+        assert_eq!(Camera::of(None, 25.0), Camera::experimenter(25.0));
+        for wrong in ["", "30", "30,95", "a,b", "30,15,9", "1,2,1,1", "NaN,0"] {
+            assert!(wrong.parse::<View>().is_err(), "{wrong}");
+        }
     }
 }

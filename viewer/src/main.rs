@@ -4,6 +4,7 @@
 use clap::Parser;
 use flotor_live::Directory;
 use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::camera::View;
 use flotor_viewer::experiment::StopKey;
 use flotor_viewer::experiment::wire::at_standard_streams;
 use flotor_viewer::history::History;
@@ -39,6 +40,15 @@ struct Arguments {
     /// The picture is that of the whole window, with panels
     #[arg(long, requires = "screenshot")]
     window: bool,
+    /// From where the picture is seen, degrees: to the right of the front, above the horizon, and a zoom (default: 31.5,13.8)
+    #[arg(
+        long,
+        value_name = "AZIMUTH,INCLINATION[,ZOOM]",
+        requires = "screenshot",
+        conflicts_with = "window",
+        allow_hyphen_values = true
+    )]
+    view: Option<View>,
     /// The moment to show, s (default: that of the largest force)
     #[arg(long, value_name = "SECONDS")]
     at: Option<f64>,
@@ -125,7 +135,7 @@ fn screenshot(arguments: &Arguments, history: &History, out: &Path) -> Result<()
     for reason in missing {
         eprintln!("note: {reason}");
     }
-    let options = PictureOptions { size_px, scale, look, at_s: arguments.at };
+    let options = PictureOptions { size_px, scale, look, view: arguments.view, at_s: arguments.at };
     let image = picture(history, &mut shapes, &options).map_err(Failure::usage)?;
     write_png(out, &image).map_err(Failure::file)
 }

@@ -1,5 +1,6 @@
 //! A picture of a moment of a run, without a window, a display or a GPU.
 
+use crate::camera::{Camera, View};
 use crate::canvas::Canvas;
 use crate::history::History;
 use crate::palette::{Look, Palette};
@@ -23,6 +24,8 @@ pub struct PictureOptions {
     pub scale: f32,
     /// Light or dark.
     pub look: Look,
+    /// From where; without one, the experimenter's view.
+    pub view: Option<View>,
     /// The moment, s; without one, that of the largest force.
     pub at_s: Option<f64>,
 }
@@ -69,6 +72,7 @@ pub fn picture(
     let sample = *sample.ok_or(PictureError::Empty)?;
     let (scale, height_mm) = (ArrowScale::fitting(history.samples()), SceneBuilder::height_mm(shapes));
     let mut view3d = View3d::new(Canvas::on_processor(SAMPLES), height_mm);
+    view3d.camera = Camera::of(options.view, height_mm);
     Ok(draw_without_window(options.size_px, options.scale, options.look, |ui| {
         let area = ui.max_rect();
         let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * VIEW_PART).round()));

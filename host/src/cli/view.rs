@@ -19,6 +19,7 @@ use std::process::Stdio;
     flotor run --clock virtual --record run.mcap && flotor view run.mcap\n  \
     flotor view --screenshot run.png run.mcap     a picture, without display or GPU\n  \
     flotor view --screenshot run.png --at 2.5 --look light --size 1920x1200 --scale 1.5 run.mcap\n  \
+    flotor view --screenshot run.png --view 80,5,1.5 run.mcap\n  \
     flotor view --measure 10 run.mcap             pictures drawn and processor time in 10 s")]
 pub(crate) struct ViewArguments {
     /// Recording, or zenoh/NAME for a remote session (default: the running host)
@@ -45,6 +46,15 @@ pub(crate) struct ViewArguments {
     /// Size of text and lines, 1 to 3 (default: 1)
     #[arg(long, value_name = "FACTOR")]
     scale: Option<String>,
+    /// With --screenshot: seen from so many degrees to the right, above the horizon, and nearer by ZOOM (default: 31.5,13.8)
+    #[arg(
+        long,
+        value_name = "AZIMUTH,INCLINATION[,ZOOM]",
+        requires = "screenshot",
+        conflicts_with = "window",
+        allow_hyphen_values = true
+    )]
+    view: Option<String>,
     /// Measure the processor time of the window for this time, then close it
     #[arg(long, value_name = "SECONDS", conflicts_with = "screenshot")]
     measure: Option<String>,
@@ -80,6 +90,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         ("--look", &arguments.look),
         ("--size", &arguments.size),
         ("--scale", &arguments.scale),
+        ("--view", &arguments.view),
         ("--measure", &arguments.measure),
     ];
     for (name, value) in options {

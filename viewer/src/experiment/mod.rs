@@ -203,7 +203,7 @@ impl Prompt {
         let question = match screen {
             Screen::Ask { question, .. } => Some(*question),
             Screen::Over => return,
-            Screen::Ready { .. } | Screen::Feel { .. } => None,
+            Screen::Ready { .. } | Screen::Feel { .. } | Screen::Read { .. } => None,
         };
         let input = match (question, key) {
             (None, StudyKey::Enter) => Some(Input::Continue),

@@ -23,6 +23,11 @@ struct Words {
 /// Shows the screen of a moment over an area; the scene, if it may be seen, lies beneath.
 pub fn show(ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
     let Some(screen) = prompt.screen() else { return };
+    if let Screen::Read { text } = screen {
+        read(ui, area, text, palette);
+        below(ui, area, prompt, "Enter to go on", palette);
+        return;
+    }
     let Words { headline, text, keys } = words(screen);
     let over_scene = prompt.shows_scene();
     let centred = Layout::top_down(Align::Center);
@@ -39,6 +44,19 @@ pub fn show(ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
         inner.label(RichText::new(typed).size(TYPED_PT).monospace().color(color));
     }
     below(ui, area, prompt, keys, palette);
+}
+
+/// A text of the experimenter, from the top; a long one is scrolled by the wheel.
+fn read(ui: &mut Ui, area: Rect, text: &str, palette: &Palette) {
+    let (title, rest) = text.split_once('\n').unwrap_or((text, ""));
+    let inside = area.shrink2(egui::vec2(0.12 * area.width(), 20.0));
+    let inside = Rect::from_min_max(inside.min, egui::pos2(inside.right(), area.bottom() - 130.0));
+    let mut inner = ui.new_child(UiBuilder::new().max_rect(inside).id_salt("read"));
+    inner.label(RichText::new(title).size(HEADLINE_PT).color(palette.text));
+    inner.add_space(14.0);
+    egui::ScrollArea::vertical().show(&mut inner, |ui| {
+        ui.label(RichText::new(rest.trim()).size(TEXT_PT).color(palette.text));
+    });
 }
 
 /// The foot of a screen: warnings, which keys mean something, how far it is.
@@ -72,7 +90,7 @@ fn trial(screen: &Screen) -> Option<&TrialView> {
     match screen {
         Screen::Ready { next, .. } => Some(next),
         Screen::Feel { trial, .. } | Screen::Ask { trial, .. } => Some(trial),
-        Screen::Over => None,
+        Screen::Over | Screen::Read { .. } => None,
     }
 }
 
@@ -81,6 +99,8 @@ fn words(screen: &Screen) -> Words {
         Screen::Ready { reason, next } => pause(*reason, next),
         Screen::Feel { trial, position } => feel(trial, *position),
         Screen::Ask { trial, question } => ask(trial, *question),
+        // Shown by itself.
+        Screen::Read { .. } => Words { headline: "", text: String::new(), keys: "" },
         Screen::Over => Words {
             headline: "Thank you",
             text: "That was all. Please let go of the handle.".to_owned(),

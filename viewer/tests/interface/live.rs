@@ -212,7 +212,7 @@ fn no_pointer_brings_a_parameter_out_of_its_soft_range() {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (seed >> 8) as f32 / (1 << 24) as f32 * most
     };
-    let events = if std::env::var("FLOTOR_TEST_SIZE").as_deref() == Ok("full") { 10_000 } else { 300 };
+    let events = if std::env::var("FLOTOR_TEST_SIZE").as_deref() == Ok("full") { 10_000 } else { 60 };
     let button = |pos, pressed| egui::Event::PointerButton {
         pos,
         button: egui::PointerButton::Primary,
@@ -232,7 +232,8 @@ fn no_pointer_brings_a_parameter_out_of_its_soft_range() {
             let delta = egui::vec2(0.0, random(200.0) - 100.0);
             let unit = egui::MouseWheelUnit::Point;
             let (phase, modifiers) = (egui::TouchPhase::Move, egui::Modifiers::NONE);
-            window.event(egui::Event::MouseWheel { unit, delta, phase, modifiers });
+            let source = egui::MouseWheelSource::Unknown;
+            window.event(egui::Event::MouseWheel { unit, delta, phase, modifiers, source });
         }
         window.run_steps(1);
         for knob in window.state().panels().iter().flat_map(|panel| &panel.knobs) {

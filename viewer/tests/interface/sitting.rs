@@ -62,7 +62,7 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
             Screen::Ready { .. } => "A few to get used to it",
             Screen::Feel { .. } => "Feel the spring",
             Screen::Ask { .. } => "How stiff was it?",
-            Screen::Over => unreachable!("it ends the loop"),
+            Screen::Over | Screen::Read { .. } => unreachable!("it ends the loop"),
         };
         window.get_by_label(headline);
         headlines.push(headline);

@@ -13,6 +13,7 @@ pub(crate) mod tools;
 use flotor_core::Clock;
 use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
+use flotor_hal::SoftRange;
 use flotor_live::{
     Answer, Ask, ChangeMessage, Directory, End, EndKind, Frames, Greeting, Kind, Listener, Outcome, PROTOCOL,
     PanelPlugin, RefusalCause, Request, SetValue, Subject, WrenchLimits, frame, ticks_to_payload,
