@@ -76,6 +76,7 @@ impl Cohort {
     fn begin(&self, subject: SubjectNumber) -> Begin {
         Begin {
             format: FORMAT,
+            person: None,
             version: self.version.clone(),
             subject,
             seed: self.seed,

@@ -173,6 +173,10 @@ fn better_estimators_find_the_threshold() {
 #[test]
 fn false_alarms_are_as_often_as_they_should_be_and_power_grows_with_the_subjects() {
     use flotor_study::power::{population, power, study};
+    // Ten seconds of a core.
+    if !matches!(std::env::var("FLOTOR_TEST_SIZE").as_deref(), Ok("daily" | "full")) {
+        return;
+    }
     let protocol = JndProtocol { replications: 2, ..JndProtocol::default() };
     let runs = 5 * studies();
     let of = |ratio: f64, subjects: u16| {

@@ -513,6 +513,41 @@ fn a_misplaced_log_is_refused() {
     assert!(ran.error().contains("sub-02") && ran.error().contains("is a log of sub-01"), "{ran:?}");
 }
 
+/// By keyboard alone, from the consent to the analysis of a pilot: what was read is in the log, what was said of the person in the list
+/// of participants, and nothing else of them.
+#[test]
+fn a_sitting_goes_from_consent_to_analysis_by_keyboard() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let consent =
+        scratch.file("consent.txt", "Einwilligung\nIch nehme freiwillig teil.").display().to_string();
+    let instructions = scratch.file("how.txt", "Ablauf\nFedern vergleichen.").display().to_string();
+    let more = ["--no-demo", "--consent", &consent, "--instructions", &instructions];
+    let who = ["--age", "31", "--sex", "f", "--handedness", "right"];
+    let arguments: Vec<&str> = more.into_iter().chain(who).collect();
+    let ran = person("terminal", "\n\n\n\n\n1\nq\n", &arguments, &out);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let order = ["Einwilligung", "Ich nehme freiwillig teil.", "Ablauf", "Feel the first"];
+    let places = order.map(|text| ran.stdout.find(text).unwrap_or_else(|| panic!("no `{text}` in {ran:?}")));
+    assert!(places.is_sorted(), "{ran:?}");
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    let read = |title: &str| {
+        log.notes.iter().any(|(_, text)| text.starts_with(&format!("read and went on: {title} (SHA")))
+    };
+    assert!(read("Einwilligung") && read("Ablauf") && log.trials.len() == 1, "{:?}", log.notes);
+    assert!(log.trials[0].event.exploration.onset >= log.began, "an onset has a time of day");
+    let list = std::fs::read_to_string(out.join("participants.tsv")).unwrap();
+    assert!(list.contains("\t31\tf\tright\n"), "{list}");
+    let ran = Flotor::with(["analyse", out.to_str().unwrap()]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(
+        ran.stdout.contains("sub-01: 1 answers") && ran.stdout.contains("stopped by the subject"),
+        "{ran:?}"
+    );
+    let refused = person("terminal", "", &["--sex", "two words"], &out);
+    assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
+}
+
 /// What other programs make of the trials is what `analyse` prints, to every digit.
 #[test]
 fn the_script_beside_the_trials_repeats_every_table() {

@@ -26,6 +26,7 @@ use flotor_study::apparatus::{Apparatus, ApparatusError, Kinematics};
 use flotor_study::cohort::{Cohort, CohortError};
 use flotor_study::conduct::{ConductError, Nothing, OutsideError, Presenter};
 use flotor_study::dataset::{Dataset, Earlier};
+use flotor_study::log::Person;
 use flotor_study::observer::Population;
 use flotor_study::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
 use flotor_study::protocol::{
@@ -129,6 +130,21 @@ struct Common {
     /// Screen for questions and answers (human)
     #[arg(long, value_enum, default_value_t)]
     screen: front::ScreenOption,
+    /// Text that a person reads before the first trial, and goes on if they agree (human); its first line is a title
+    #[arg(long, value_name = "FILE")]
+    consent: Option<PathBuf>,
+    /// Text with instructions, in the language of the person, before each sitting (human); its first line is a title
+    #[arg(long, value_name = "FILE")]
+    instructions: Option<PathBuf>,
+    /// Age of the person, for participants.tsv (human)
+    #[arg(long, value_parser = count(1..=130_u16), value_name = "YEARS")]
+    age: Option<u16>,
+    /// Sex of the person, for participants.tsv (human)
+    #[arg(long, value_name = "WORD", value_parser = word)]
+    sex: Option<String>,
+    /// Preferred hand of the person, for participants.tsv (human)
+    #[arg(long, value_parser = ["left", "right", "ambidextrous"], value_name = "HAND")]
+    handedness: Option<String>,
     /// Key that is the emergency stop in the viewer's window (human)
     #[arg(long, value_enum, default_value_t, value_name = "KEY")]
     stop_key: front::StopKeyOption,
@@ -297,12 +313,25 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     }
 }
 
+/// One word of a table.
+fn word(text: &str) -> Result<String, String> {
+    let is_word = !text.is_empty() && text.len() <= 20 && text.chars().all(char::is_alphanumeric);
+    if is_word { Ok(text.to_owned()) } else { Err("it is one word of at most 20 letters".to_owned()) }
+}
+
 /// Seconds, and not none.
 fn feel_s(text: &str) -> Result<f64, String> {
     duration_s(text).and_then(|s| if s > 0.0 { Ok(s) } else { Err("the range is above 0".to_owned()) })
 }
 
 impl Common {
+    /// What was said of the person, if anything was.
+    fn person(&self) -> Option<Person> {
+        let Self { age, sex, handedness, .. } = self;
+        let person = Person { age: *age, sex: sex.clone(), handedness: handedness.clone() };
+        (person != Person::default()).then_some(person)
+    }
+
     fn earlier(&self) -> Earlier {
         if self.resume { Earlier::Resume } else { Earlier::Refuse }
     }

@@ -34,7 +34,11 @@ pub(super) fn compare(pairs: impl IntoIterator<Item = (String, Vec<f64>, Vec<f64
 pub(super) fn modalities(name: &str, levels: &[f64], responses: &[Vec<f64>]) -> Vec<PostHoc> {
     let column = |index: usize| responses.iter().filter_map(|row| row.get(index).copied()).collect();
     compare(levels.iter().enumerate().map(|(index, level)| {
-        (format!("h - vh, {name} {level:.4}"), column(levels.len() + index), column(index))
+        (
+            format!("h - vh, {name} {}", (level * 1.0e4).round() / 1.0e4),
+            column(levels.len() + index),
+            column(index),
+        )
     }))
 }
 

@@ -2,7 +2,7 @@
 
 use super::real_time_rig::RealTimeRig;
 use crate::conduct::{Ending, OutsideError};
-use crate::log::{Event, Incident, LogWriter, TrialEvent};
+use crate::log::{Event, Incident, LogWriter, TrialEvent, digest};
 use crate::screen::{Attended, Input, Screen, Step};
 use crate::time_of_day::TimeOfDay;
 use std::time::Instant;
@@ -152,6 +152,11 @@ fn sit(
                     log.write(&Event::Incident(Incident::NotRecorded { reason: error.to_string() }))?;
                 }
                 watch(&event);
+            }
+            Step::Read(text) => {
+                let title = text.lines().next().unwrap_or_default();
+                let text = format!("read and went on: {title} (SHA-256 {})", digest(&text));
+                log.write(&Event::Note { text })?;
             }
             Step::Stopped => return Ok(Ending::Stopped),
             Step::Shown | Step::Note(_) => {}

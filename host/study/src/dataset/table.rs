@@ -177,7 +177,7 @@ pub(super) fn scans(log: &SittingLog) -> Option<String> {
 
 /// First line of the list of who took part.
 pub(super) const PARTICIPANTS_HEAD: &str =
-    "participant_id\tfirst_modality\tcomplete\tpresentations\tresumed\tincidents\n";
+    "participant_id\tfirst_modality\tcomplete\tpresentations\tresumed\tincidents\tage\tsex\thandedness\n";
 
 /// One who took part: a line.
 pub(super) fn participant(log: &SittingLog) -> String {
@@ -185,7 +185,10 @@ pub(super) fn participant(log: &SittingLog) -> String {
     let first = log.begin.protocol.first_modality().of(subject).word();
     let complete = u8::from(log.complete);
     let counts = [log.trials.len(), log.resumed as usize, log.incidents.len()].map(|count| count.to_string());
-    format!("{subject}\t{first}\t{complete}\t{}\n", counts.join("\t"))
+    let person = log.begin.person.clone().unwrap_or_default();
+    let age = person.age.map(|age| age.to_string());
+    let person = [age, person.sex, person.handedness].map(|known| known.unwrap_or(MISSING.to_owned()));
+    format!("{subject}\t{first}\t{complete}\t{}\t{}\n", counts.join("\t"), person.join("\t"))
 }
 
 /// What the columns of the list of participants mean.
@@ -195,6 +198,9 @@ pub(super) fn participant_columns() -> String {
         "complete": { "Description": "1 if the sitting came to its end" },
         "presentations": { "Description": "Presentations, practice and repeats included" },
         "resumed": { "Description": "How often the sitting was taken up again" },
+        "age": { "Description": "Age, if it was given", "Units": "year" },
+        "sex": { "Description": "Sex, if it was given" },
+        "handedness": { "Description": "Preferred hand, if it was given" },
         "incidents": { "Description": "Interruptions and disturbances in the event log" },
     }))
 }

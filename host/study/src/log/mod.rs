@@ -71,6 +71,9 @@ pub struct Begin {
     pub seed: u64,
     /// The experiment.
     pub protocol: Protocol,
+    /// What is known of the person; nothing is requested.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub person: Option<Person>,
     /// Who answers, with everything that decides how, as JSON.
     pub observer: serde_json::Value,
     /// What presents the stimuli, with everything that decides how, as JSON.
@@ -105,6 +108,20 @@ impl Begin {
     }
 }
 
+/// What BIDS has columns for, as far as somebody has said it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Person {
+    /// Age, years.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub age: Option<u16>,
+    /// Sex, in a word.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub sex: Option<String>,
+    /// The hand that is preferred: left, right or ambidextrous.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub handedness: Option<String>,
+}
+
 /// A trial with what came of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrialEvent {
@@ -127,6 +144,12 @@ fn chain(before: &str, event: &str) -> String {
     digest.update(before.as_bytes());
     digest.update(event.as_bytes());
     hexadecimal(&digest.finalize())
+}
+
+/// SHA-256 of a text, as the log names what was shown.
+#[must_use]
+pub fn digest(text: &str) -> String {
+    hexadecimal(&Sha256::digest(text.as_bytes()))
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {

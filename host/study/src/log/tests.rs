@@ -34,6 +34,7 @@ fn begin() -> Begin {
     jnd.demo.shown = false;
     Begin {
         format: FORMAT,
+        person: None,
         version: "0.0.0".to_owned(),
         subject: SubjectNumber::new(3).unwrap(),
         seed: 11,

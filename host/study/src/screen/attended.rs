@@ -7,6 +7,7 @@ use crate::protocol::{Protocol, Quality};
 use crate::sitting::{AnswerError, Sitting, Verdict};
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Exploration, Modality, Position, Presented, Response, Trial};
+use std::collections::VecDeque;
 
 /// What became of an input.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +16,8 @@ pub enum Step {
     Shown,
     /// A trial was answered: to be logged before the next screen is shown.
     Answered(Box<TrialEvent>),
+    /// A text was read: to be logged before the next screen is shown.
+    Read(String),
     /// To be logged; the screen stays.
     Note(String),
     /// The person stopped.
@@ -61,6 +64,8 @@ enum Stage {
 pub struct Attended {
     sitting: Sitting,
     quality: Quality,
+    /// What is to be read before the first trial, the next one first.
+    texts: VecDeque<String>,
     stage: Stage,
     exploration: Exploration,
     of_about: u64,
@@ -75,6 +80,7 @@ impl Attended {
         Self {
             sitting,
             quality: protocol.stimulus().quality(),
+            texts: VecDeque::new(),
             stage: Stage::Ready(Pause::Welcome),
             exploration: Exploration::default(),
             of_about: protocol.presentations_about(),
@@ -83,10 +89,19 @@ impl Attended {
         }
     }
 
+    /// The same, with texts to be read before it begins: consent, instructions.
+    #[must_use]
+    pub fn after_reading(self, texts: impl IntoIterator<Item = String>) -> Self {
+        Self { texts: texts.into_iter().collect(), ..self }
+    }
+
     /// What is shown now; the same however often it is asked.
     #[must_use]
     pub fn screen(&self) -> Screen {
         let Some(trial) = self.sitting.next() else { return Screen::Over };
+        if let Some(text) = self.texts.front() {
+            return Screen::Read { text: text.clone() };
+        }
         let view = self.view(&trial);
         match self.stage {
             Stage::Ready(reason) => Screen::Ready { reason, next: view },
@@ -128,6 +143,14 @@ impl Attended {
                 _ => Ok(Step::Stopped),
             };
         };
+        if !self.texts.is_empty() {
+            return match input {
+                Input::Note { text } => Ok(Step::Note(text)),
+                Input::Stop => Ok(Step::Stopped),
+                Input::Continue => Ok(Step::Read(self.texts.pop_front().unwrap_or_default())),
+                Input::Again | Input::Answer { .. } => Err(InputError::NotNow("no question is open yet")),
+            };
+        }
         match (self.stage, input) {
             (_, Input::Note { text }) => Ok(Step::Note(text)),
             (_, Input::Stop) => Ok(Step::Stopped),

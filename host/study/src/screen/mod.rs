@@ -25,6 +25,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "screen", rename_all = "kebab-case")]
 pub enum Screen {
+    /// A text of the experimenter, such as a consent or instructions; [`Input::Continue`] says that it was read.
+    Read {
+        /// The text; its first line is a title.
+        text: String,
+    },
     /// Words before the next trial; [`Input::Continue`] goes on.
     Ready {
         /// Why.

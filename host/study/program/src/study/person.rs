@@ -18,6 +18,7 @@ use flotor_study::protocol::{Protocol, SubjectNumber};
 use flotor_study::screen::Attended;
 use serde_json::json;
 use std::io::{BufReader, Stdout, stdin, stdout};
+use std::path::Path;
 
 /// Presents a study to a person: everything is checked, the loop runs and the window is open before the log begins.
 pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -> Result<(), CommandError> {
@@ -25,6 +26,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let subject = subject(common, &dataset, protocol)?;
     let begin = Begin {
         format: FORMAT,
+        person: common.person(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         subject,
         seed: common.seed,
@@ -41,6 +43,10 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     };
     let files =
         (dataset.source_folder(subject).join("motion"), format!("{subject}_task-{}", protocol.task()));
+    // A consent is given once; instructions are read again when the sitting goes on.
+    let consent = common.consent.iter().filter(|_| earlier.is_none());
+    let texts =
+        consent.chain(&common.instructions).map(|path| text_of(path)).collect::<Result<Vec<_>, _>>()?;
     let stop = stop_on_signals();
     let noise = noise(common)?;
     let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
@@ -65,7 +71,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let text = format!("least time {} s, least movement {} mm", least.time_s, common.least_movement_mm);
     log.write(&Event::Note { text }).map_err(failed)?;
 
-    let mut attended = Attended::new(sitting, protocol, common.rest_every);
+    let mut attended = Attended::new(sitting, protocol, common.rest_every).after_reading(texts);
     let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), least, &mut |_| ());
     // What is in the log is in the tables, however the sitting ended.
     let tables = dataset.write_tables();
@@ -87,6 +93,18 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
             Ok(())
         }
     }
+}
+
+/// What is to be read, from a file.
+fn text_of(path: &Path) -> Result<String, CommandError> {
+    let text = std::fs::read_to_string(path).map_err(|cause| {
+        CommandError::Usage(format!("{}: cannot be read as text: {cause}", path.display()))
+    })?;
+    let text = text.trim().to_owned();
+    if text.is_empty() {
+        return Err(CommandError::Usage(format!("{}: the file is empty", path.display())));
+    }
+    Ok(text)
 }
 
 /// How far a sitting came, and how it goes on.

@@ -112,7 +112,7 @@ def comparisons(pairs):
         print(f"{name}: t({len(table) - 1}) = {test.statistic:.2f}, {p_text(p)}, d = {size:.2f}")
 
 
-comparisons([(f"h - vh, {LEVEL} {level:.4f}", table["h"][level], table["vh"][level]) for level in levels])
+comparisons([(f"h - vh, {LEVEL} {round(level, 4):.10g}", table["h"][level], table["vh"][level]) for level in levels])
 if is_jnd:
     both = {level: (fractions["vh"][level] + fractions["h"][level]) / 2 for level in levels}
     comparisons(

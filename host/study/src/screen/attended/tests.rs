@@ -19,6 +19,7 @@ fn screens_lead_through_every_trial_of_the_sitting() {
         assert_eq!(screen, person.screen(), "looking changes nothing");
         let input = match screen {
             Screen::Over => break,
+            Screen::Read { .. } => unreachable!("no text was given"),
             Screen::Ready { reason, .. } => {
                 pauses.push(reason);
                 Input::Continue
@@ -126,4 +127,20 @@ fn practice_asks_the_question_and_a_rating_is_above_0() {
     let answer = Input::Answer { response: Response::Rating(0.5) };
     let Ok(Step::Answered(event)) = person.input(answer, 0.0) else { panic!("not taken") };
     assert_eq!(event.verdict, Verdict::Taken);
+}
+
+/// A consent comes first, then the instructions; who does not go on has felt nothing.
+#[test]
+fn texts_are_read_before_the_first_trial() {
+    let texts = || ["Consent\nI agree.".to_owned(), "How it goes".to_owned()];
+    let start = || attended(&Protocol::Jnd(JndProtocol::default()), 0).after_reading(texts());
+    let mut person = start();
+    for text in texts() {
+        assert_eq!(person.screen(), Screen::Read { text: text.clone() });
+        assert!(person.input(Input::Again, 0.0).is_err() && person.stimulus().is_none());
+        assert_eq!(person.input(Input::Continue, 0.0), Ok(Step::Read(text)));
+    }
+    assert!(matches!(person.screen(), Screen::Ready { reason: Pause::Welcome, .. }));
+    let mut person = start();
+    assert_eq!((person.input(Input::Stop, 0.0), person.presented()), (Ok(Step::Stopped), 0));
 }

@@ -64,6 +64,11 @@ impl FrontEnd for Terminal {
 /// A screen as text.
 fn words(screen: &Screen) -> String {
     match screen {
+        Screen::Read { text } => {
+            let (title, rest) = text.split_once('\n').unwrap_or((text, ""));
+            let rest: String = rest.trim().lines().map(|line| format!("  {line}\n")).collect();
+            format!("\n{}\n{rest}  Enter continues, q stops", style::title(title))
+        }
         Screen::Ready { reason, next } => {
             format!(
                 "\n{}\n{}\n  Enter continues, n TEXT adds a note, q stops",
