@@ -66,7 +66,7 @@ impl Marks {
         #[allow(clippy::cast_possible_truncation)] // points
         let x = |time_s: f64| frame.left() + ((time_s - span_s[0]) * per_s) as f32;
         let strip = Rect::from_min_max(egui::pos2(frame.left(), frame.bottom() - 7.0), frame.max);
-        let response = ui.interact(strip, ui.id().with("marks"), Sense::hover());
+        let response = ui.interact(strip, ui.scope_id().with("marks"), Sense::hover());
         let pointed = response.hover_pos().map(|at| at.x);
         let (mut said, mut all) = (Vec::new(), Events::NONE);
         for (number, events) in &self.kept {

@@ -204,6 +204,12 @@ fn number_of(window: &Window<'_>, parameter: &str) -> f64 {
 /// Whatever a hand does to the window with a pointer: no number leaves its soft range, and the stop works in between.
 #[test]
 fn no_pointer_brings_a_parameter_out_of_its_soft_range() {
+    // Each event is a picture drawn on the processor.
+    let events = match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
+        Ok("full") => 10_000,
+        Ok("daily") => 60,
+        _ => return,
+    };
     let (mut window, mut host, _folder) = live(&[]);
     until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
     let size = window.ctx.content_rect().size();
@@ -212,7 +218,6 @@ fn no_pointer_brings_a_parameter_out_of_its_soft_range() {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (seed >> 8) as f32 / (1 << 24) as f32 * most
     };
-    let events = if std::env::var("FLOTOR_TEST_SIZE").as_deref() == Ok("full") { 10_000 } else { 60 };
     let button = |pos, pressed| egui::Event::PointerButton {
         pos,
         button: egui::PointerButton::Primary,

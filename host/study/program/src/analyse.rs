@@ -72,13 +72,13 @@ enum SumsOption {
 
 pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
-    for log in logs.iter().filter(|log| !log.complete) {
-        note(format_args!("{}: incomplete after {} trials, omitted", log.begin.subject, log.trials.len()));
-    }
     let Some(first) = logs.first() else { return Ok(()) };
     // A pilot is analysed before there is anybody to compare it with.
     if arguments.each || logs.iter().filter(|log| log.complete).count() < 2 {
         return tell_each(arguments, &logs);
+    }
+    for log in logs.iter().filter(|log| !log.complete) {
+        note(format_args!("{}: incomplete after {} trials, omitted", log.begin.subject, log.trials.len()));
     }
     if !first.begin.is_of_a_person() {
         note(format_args!(
