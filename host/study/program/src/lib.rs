@@ -18,7 +18,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Study(study::StudyArguments),
+    Study(Box<study::StudyArguments>),
     Analyse(analyse::AnalyseArguments),
 }
 
