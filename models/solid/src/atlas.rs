@@ -241,7 +241,7 @@ fn ease(x: Jet, knee: f64, width: f64) -> Jet {
 }
 
 /// The same, staying at `end`, bent over `width` before it and as much behind.
-fn ease_at(x: Jet, end: f64, width: f64) -> Jet {
+pub(crate) fn ease_at(x: Jet, end: f64, width: f64) -> Jet {
     let eased = ease(x, end - width, width);
     // Rounding must not leave the table.
     if eased.value > end { Jet::constant(end) } else { eased }

@@ -11,11 +11,13 @@ use crate::body;
 use crate::dense::NotPositive;
 use crate::grid::{Grid, Lame};
 use crate::half_space::HalfSpace;
+use crate::jet::Jet;
 use crate::law::{Body, Description, Tool};
 use crate::mesh::Mesh;
 use crate::plate::plate;
 use crate::punch::{Bond, Loads, Outline, punch_loads};
 use crate::rigid::{MODES, RigidPatch};
+use crate::several::{self, Spheres};
 use crate::skin::{Face, Focus, Skin};
 use flotor_hal::{DMat3, DQuat, DVec3, Form, Part, Pose, Primitive, ScalarField, Shape, SurfaceVertex, math};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -85,7 +87,9 @@ impl Drawing {
         };
         let mesh = mesh.or(round.as_ref());
         let look = match description.tool {
-            Tool::Sphere { .. } => Look::Sphere(mesh.map(|mesh| Skin::of_mesh(mesh).0)),
+            Tool::Sphere { .. } | Tool::Spheres { .. } => {
+                Look::Sphere(mesh.map(|mesh| Skin::of_mesh(mesh).0))
+            }
             Tool::Plate => Look::Bonded(Box::new(plate_modes(description, mesh)?)),
             Tool::Punch { outline, bond } => {
                 Look::Bonded(Box::new(punch_modes(description, mesh, outline, bond)?))
@@ -107,11 +111,36 @@ impl Drawing {
     pub fn sphere(&mut self, atlas: &Atlas, centre_m: DVec3, answer: &Answer, modulus_pa: f64) -> &Shape {
         let contact = Contact::new(self.height_m, atlas, centre_m, answer, modulus_pa);
         let focus = Focus { at_m: contact.at_m, width_m: 0.6 * contact.radius_m.max(0.15 * atlas.radius_m) };
+        self.under(&[contact], focus, atlas.radius_m)
+    }
+
+    /// Under several spheres, where the law's answer is `answer`: the surface is as deep as under all of them together.
+    pub fn spheres(&mut self, spheres: &Spheres, answer: &several::Answer, modulus_pa: f64) -> &Shape {
+        let atlas = &spheres.atlas;
+        let contacts: Vec<Contact> = (0..spheres.count())
+            .map(|i| {
+                let slope = (-answer.forces_n[i]).to_array();
+                let energy = Jet { value: 0.0, slope };
+                let alone = Answer { energy, depth_m: answer.depths_m[i], is_beyond: false };
+                // Seen from the surface as the others have pushed it down.
+                let lifted_m = answer.centres_m[i] + DVec3::Z * answer.sunk_m[i];
+                let contact = Contact::new(self.height_m, atlas, lifted_m, &alone, modulus_pa);
+                Contact { centre_m: answer.centres_m[i], ..contact }
+            })
+            .collect();
+        let middle_m = contacts.iter().map(|contact| contact.at_m).sum::<DVec3>() / contacts.len() as f64;
+        let away_m = contacts.iter().map(|contact| contact.at_m.distance(middle_m)).fold(0.0, f64::max);
+        self.under(&contacts, Focus { at_m: middle_m, width_m: away_m }, away_m + atlas.radius_m)
+    }
+
+    /// Under contacts, on a skin that is fine at a place; `tool_m`: how far the tool reaches from it.
+    fn under(&mut self, contacts: &[Contact], focus: Focus, tool_m: f64) -> &Shape {
         let own;
         let skin = match (&self.look, self.body) {
             (Look::Sphere(Some(skin)), _) => skin,
             (_, Body::Block(size)) => {
-                let steps = if contact.normal.z > 0.7 { STEPS } else { SIDE_STEPS };
+                let is_above = contacts.iter().any(|contact| contact.normal.z > 0.7);
+                let steps = if is_above { STEPS } else { SIDE_STEPS };
                 own = Skin::block([size.half_x_m, size.half_y_m], size.height_m, focus, steps);
                 &own
             }
@@ -120,20 +149,30 @@ impl Drawing {
                 &own
             }
             _ => {
-                own = Skin::disc(HALF_SPACE_RADII * atlas.radius_m, focus);
+                own = Skin::disc(HALF_SPACE_RADII * tool_m, focus);
                 &own
             }
         };
         let Shape { primitives, surface } = &mut self.shape;
         surface.vertices.clear();
-        surface.vertices.extend(skin.places_m.iter().map(|place_m| contact.vertex(*place_m)));
+        surface.vertices.extend(skin.places_m.iter().map(|place_m| vertex(contacts, *place_m)));
         surface.triangles.clone_from(&skin.triangles);
         surface.field = PRESSURE;
         surface.set_normals();
         primitives.clear();
-        primitives.push(Primitive::sphere(Part::Tool, Pose::new(centre_m, DQuat::IDENTITY), atlas.radius_m));
+        primitives.extend(contacts.iter().map(|Contact { centre_m, sphere_m, .. }| {
+            Primitive::sphere(Part::Tool, Pose::new(*centre_m, DQuat::IDENTITY), *sphere_m)
+        }));
         &self.shape
     }
+}
+
+/// A place of the surface under contacts, deformed, and the pressure there.
+fn vertex(contacts: &[Contact], place_m: DVec3) -> SurfaceVertex {
+    let moved_m: DVec3 = contacts.iter().map(|contact| contact.moved_m(place_m)).sum();
+    let outside_m = contacts.iter().fold(place_m + moved_m, |at_m, contact| contact.outside_m(place_m, at_m));
+    let value = contacts.iter().map(|contact| contact.pressure_kpa(place_m)).sum();
+    SurfaceVertex { position_m: outside_m.to_array(), normal: [0.0; 3], value }
 }
 
 /// Share of a half-space's displacement that is drawn at a height: none at the fixed face.
@@ -188,24 +227,33 @@ impl Contact {
         Self { at_m, normal, radius_m, rim_m, peak_kpa, centre_m, sphere_m, height_m }
     }
 
-    /// A place of the surface, deformed.
-    fn vertex(&self, place_m: DVec3) -> SurfaceVertex {
-        let from_middle_m = place_m - self.at_m;
-        let along_m = from_middle_m.dot(self.normal);
-        let beside_m = from_middle_m - self.normal * along_m;
-        let distance_m = from_middle_m.length();
+    /// How far a place of the surface moves, m.
+    fn moved_m(&self, place_m: DVec3) -> DVec3 {
         let share = free_share(self.height_m, place_m.z);
-        let mut position_m = place_m - self.normal * (share * self.sunk_m(distance_m));
-        let within = self.sphere_m * self.sphere_m - beside_m.length_squared();
-        // Nothing is inside the sphere.
-        if self.radius_m > 0.0 && position_m.distance_squared(self.centre_m) < self.sphere_m * self.sphere_m {
-            let below_m = (self.centre_m - self.at_m).dot(self.normal) - within.max(0.0).sqrt();
-            position_m = self.at_m + beside_m + self.normal * below_m;
+        self.normal * -(share * self.sunk_m(place_m.distance(self.at_m)))
+    }
+
+    /// A place of the surface that has moved to `at_m`, or where it is on the sphere: nothing is inside.
+    fn outside_m(&self, place_m: DVec3, at_m: DVec3) -> DVec3 {
+        if self.radius_m == 0.0 || at_m.distance_squared(self.centre_m) >= self.sphere_m * self.sphere_m {
+            return at_m;
         }
-        let part = 1.0 - beside_m.length_squared() / (self.radius_m * self.radius_m);
-        let is_on_face = along_m.abs() < 0.1 * self.sphere_m;
-        let value = if part > 0.0 && is_on_face { self.peak_kpa * part.sqrt() } else { 0.0 };
-        SurfaceVertex { position_m: position_m.to_array(), normal: [0.0; 3], value }
+        let beside_m = self.beside_m(place_m);
+        let within = self.sphere_m * self.sphere_m - beside_m.length_squared();
+        let below_m = (self.centre_m - self.at_m).dot(self.normal) - within.max(0.0).sqrt();
+        self.at_m + beside_m + self.normal * below_m
+    }
+
+    /// From the middle of the contact, along the surface, m.
+    fn beside_m(&self, place_m: DVec3) -> DVec3 {
+        let from_middle_m = place_m - self.at_m;
+        from_middle_m - self.normal * from_middle_m.dot(self.normal)
+    }
+
+    fn pressure_kpa(&self, place_m: DVec3) -> f64 {
+        let part = 1.0 - self.beside_m(place_m).length_squared() / (self.radius_m * self.radius_m);
+        let is_on_face = (place_m - self.at_m).dot(self.normal).abs() < 0.1 * self.sphere_m;
+        if part > 0.0 && is_on_face { self.peak_kpa * part.sqrt() } else { 0.0 }
     }
 
     /// Depression of the surface at a distance from the middle: inside the contact that of the sphere, outside that of Hertz.

@@ -8,10 +8,13 @@ use crate::grid::{Grid, Lame, graded};
 use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
 use crate::plate::plate;
-use crate::prepare::{Footing, Prepared, Resolution, sphere_on_block, sphere_on_half_space, sphere_on_mesh};
+use crate::prepare::{
+    Footing, Prepared, Resolution, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
+};
 use crate::punch::{Bond, Outline, extrapolated};
 use crate::remainder::{Face, Fineness, Remainder, Size};
 use crate::rigid::{MODES, RigidPatch};
+use crate::several::{Beyond, Spheres};
 use crate::table::Table;
 use flotor_hal::{Refusal, Settings};
 
@@ -49,6 +52,15 @@ pub enum Tool {
         /// Its radius, m.
         radius_m: f64,
     },
+    /// Equal ones on one handle, without bond, in contact at once.
+    Spheres {
+        /// Radius of each, m.
+        radius_m: f64,
+        /// Two to four.
+        count: usize,
+        /// Between the centres of neighbours, m.
+        spacing_m: f64,
+    },
     /// Bonded to the whole of a face.
     Plate,
     /// On part of the top face.
@@ -80,6 +92,8 @@ pub enum Law {
     Bonded(Box<RigidPatch>),
     /// A sphere.
     Sphere(Box<Atlas>),
+    /// Several.
+    Spheres(Box<Spheres>),
 }
 
 /// Elements of the remainder and cells of a contact, by resolution.
@@ -130,7 +144,10 @@ impl Description {
         };
         let punch = |outline| Tool::Punch { outline, bond };
         let tool = match settings.choice_or_default("tool") {
-            0 => Tool::Sphere { radius_m },
+            0 => match settings.choice_or_default("tool_count") {
+                0 => Tool::Sphere { radius_m },
+                more => Tool::Spheres { radius_m, count: 1 + more, spacing_m: metres("tool_spacing_mm") },
+            },
             1 => Tool::Plate,
             2 => punch(Outline::Round { radius_m }),
             _ => punch(Outline::Square { half_m: 0.5 * metres("tool_side_mm") }),
@@ -141,7 +158,13 @@ impl Description {
             poisson_ratio: value("poisson_ratio"),
             resolution: settings.choice_or_default("resolution"),
         };
-        if settings.number("bond") == Some(0.0) && matches!(tool, Tool::Sphere { .. }) {
+        if settings.choice_or_default("tool_count") > 0 && matches!(tool, Tool::Plate | Tool::Punch { .. }) {
+            return Err(Refusal::parameter(
+                "`tool_count` is of spheres: leave it out, or set tool = \"sphere\"",
+            ));
+        }
+        if settings.number("bond") == Some(0.0) && matches!(tool, Tool::Sphere { .. } | Tool::Spheres { .. })
+        {
             return Err(Refusal::parameter(
                 "a sphere is not bonded: leave `bond` out, and set `friction` if it shall not slide freely",
             ));
@@ -155,15 +178,18 @@ impl Description {
 
     fn check(&self) -> Result<(), Refusal> {
         let (extent_m, what) = match self.tool {
-            Tool::Sphere { radius_m } => (radius_m, "`tool_radius_mm`"),
+            Tool::Sphere { radius_m } | Tool::Spheres { radius_m, .. } => (radius_m, "`tool_radius_mm`"),
             Tool::Punch { outline: Outline::Round { radius_m }, .. } => (radius_m, "`tool_radius_mm`"),
             Tool::Punch { outline: Outline::Square { half_m }, .. } => (half_m, "half of `tool_side_mm`"),
             Tool::Plate => (0.0, ""),
         };
+        if let Tool::Spheres { radius_m, spacing_m, .. } = self.tool {
+            self.check_spheres(radius_m, spacing_m)?;
+        }
         match (self.body, self.tool) {
             (Body::Beam { .. }, Tool::Plate)
             | (Body::File { .. }, _)
-            | (Body::HalfSpace, Tool::Sphere { .. } | Tool::Punch { .. }) => Ok(()),
+            | (Body::HalfSpace, Tool::Sphere { .. } | Tool::Spheres { .. } | Tool::Punch { .. }) => Ok(()),
             (Body::Beam { .. }, _) => {
                 Err(Refusal::unsupported("a beam is held by its end: set tool = \"plate\""))
             }
@@ -189,6 +215,36 @@ impl Description {
         }
     }
 
+    fn check_spheres(&self, radius_m: f64, spacing_m: f64) -> Result<(), Refusal> {
+        let mm = |m: f64| m * 1.0e3;
+        if spacing_m < 2.0 * radius_m {
+            return Err(Refusal::parameter(format!(
+                "`tool_spacing_mm` is {:.4} mm, but spheres of {:.4} mm are at least {:.4} mm apart: make them smaller or the spacing larger",
+                mm(spacing_m),
+                mm(radius_m),
+                mm(2.0 * radius_m)
+            )));
+        }
+        match self.body {
+            Body::HalfSpace | Body::Beam { .. } => Ok(()),
+            Body::Block(Size { half_x_m, half_y_m, .. }) => {
+                let least_m = half_x_m.min(half_y_m);
+                // Of four, the farthest centre is that far along an axis; of three, a little farther.
+                if 0.6 * spacing_m <= least_m {
+                    return Ok(());
+                }
+                Err(Refusal::parameter(format!(
+                    "`tool_spacing_mm` is {:.4} mm, too much for this face (at most {:.4} mm): make it smaller or the body larger",
+                    mm(spacing_m),
+                    mm(least_m / 0.6)
+                )))
+            }
+            Body::Cylinder { .. } | Body::File { .. } => Err(Refusal::unsupported(
+                "several spheres touch a block or a half-space: leave `tool_count` out, or choose another `body`",
+            )),
+        }
+    }
+
     /// What the law depends on, in words, for the cache: the exact bits of every number.
     fn words(&self) -> String {
         // Debug prints the shortest decimal that reads back as the same number.
@@ -201,6 +257,15 @@ impl Description {
     /// # Errors
     /// A [`Refusal`] if no solution exists for these numbers.
     pub fn prepare(&self, mesh: Option<&Mesh>) -> Result<(Law, f64), Refusal> {
+        if let Tool::Spheres { .. } = self.tool {
+            return self.spheres(
+                &mut |one| one.prepare(None),
+                &mut |words, solve| match cache::load(words) {
+                    Some(found) => Ok(found),
+                    None => solve().inspect(|numbers| cache::store(words, numbers)),
+                },
+            );
+        }
         let words = self.words();
         if let Some(found) = cache::load(&words).and_then(|numbers| self.read(&numbers)) {
             return Ok(found);
@@ -211,6 +276,34 @@ impl Description {
         };
         cache::store(&words, &to_numbers(&law, mesh_error));
         Ok((law, mesh_error))
+    }
+
+    /// The law of several spheres: of one, and how contacts influence each other, by what solves or remembers these.
+    fn spheres(
+        &self,
+        one: &mut dyn FnMut(&Self) -> Result<(Law, f64), Refusal>,
+        remember: &mut dyn FnMut(&str, &dyn Fn() -> Result<Vec<f64>, Refusal>) -> Result<Vec<f64>, Refusal>,
+    ) -> Result<(Law, f64), Refusal> {
+        let Tool::Spheres { radius_m, count, spacing_m } = self.tool else { return one(self) };
+        let single = Self { tool: Tool::Sphere { radius_m }, ..*self };
+        let (Law::Sphere(atlas), mesh_error) = one(&single)? else {
+            return Err(Refusal::unsupported("this body has no law for spheres"));
+        };
+        let beyond = match self.body {
+            Body::Block(size) => {
+                let words = format!("beyond {size:?} {:?} {}", self.poisson_ratio, self.resolution);
+                let fineness = RESOLUTIONS[self.resolution.min(2)].fineness;
+                let solve = || beyond_half_space(self.poisson_ratio, size, fineness).map_err(not_positive);
+                let numbers = remember(&words, &solve)?;
+                match Beyond::from_numbers(&numbers) {
+                    Some(beyond) => Some(beyond),
+                    None => Beyond::from_numbers(&solve()?),
+                }
+            }
+            _ => None,
+        };
+        let spheres = Spheres::new(*atlas, self.poisson_ratio, count, spacing_m, beyond);
+        Ok((Law::Spheres(Box::new(spheres)), mesh_error))
     }
 
     /// What carries a sphere.
@@ -244,6 +337,9 @@ impl Description {
     /// # Errors
     /// A [`Refusal`] if no solution exists for these numbers, or a mesh is needed: see [`Self::solve_on`].
     pub fn solve(&self) -> Result<(Law, f64), Refusal> {
+        if let Tool::Spheres { .. } = self.tool {
+            return self.spheres(&mut Self::solve, &mut |_, solve| solve());
+        }
         match self.body {
             Body::Cylinder { radius_m, height_m } => {
                 let mesh = Mesh::cylinder(radius_m, height_m, CYLINDER_BRICKS[self.resolution.min(2)])
@@ -303,7 +399,7 @@ impl Description {
             (Body::Block(size), Tool::Sphere { radius_m }) => {
                 return Ok(sphere(sphere_on_block(self.poisson_ratio, radius_m, size, resolution)?));
             }
-            (_, Tool::Sphere { radius_m }) => {
+            (_, Tool::Sphere { radius_m } | Tool::Spheres { radius_m, .. }) => {
                 return Ok(sphere(sphere_on_half_space(self.poisson_ratio, radius_m)));
             }
             (Body::Block(size), Tool::Punch { outline, bond }) => {
@@ -365,6 +461,8 @@ fn sphere(prepared: Prepared) -> (Law, f64) {
 fn to_numbers(law: &Law, mesh_error: f64) -> Vec<f64> {
     match law {
         Law::Sphere(atlas) => Prepared { atlas: (**atlas).clone(), mesh_error }.to_numbers(),
+        // Kept as the law of one.
+        Law::Spheres(spheres) => Prepared { atlas: spheres.atlas.clone(), mesh_error }.to_numbers(),
         Law::Bonded(patch) => {
             let mut numbers = vec![mesh_error];
             patch.stiffness.iter().for_each(|row| numbers.extend(row));

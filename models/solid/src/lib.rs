@@ -11,7 +11,7 @@
 //!   body does that a half-space would not; [`recovery`]: how good its mesh is.
 //! - [`sphere`]: contact of a sphere in contact space. [`punch`], [`plate`]: rigid patches bonded to a surface.
 //! - [`prepare`], [`law`], [`cache`]: from a description to a law.
-//! - [`atlas`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.
+//! - [`atlas`], [`several`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.
 //! - [`drawing`], [`skin`]: what it looks like, for people.
 //! - `plugin`: parameters and the contract.
 
@@ -42,6 +42,7 @@ pub mod punch;
 pub mod recovery;
 pub mod remainder;
 pub mod rigid;
+pub mod several;
 pub mod skin;
 pub mod sphere;
 pub mod spline;

@@ -4,6 +4,7 @@ use crate::drawing::Drawing;
 use crate::friction::Friction;
 use crate::law::{Description, Law, Tool};
 use crate::mesh::Mesh;
+use crate::several::{self, MOST};
 use crate::{cache, gmsh};
 use flotor_hal::{
     Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output,
@@ -16,6 +17,7 @@ const REACH_M: f64 = 10.0;
 
 const BODIES: Choices = choices!["block", "beam", "cylinder", "half-space", "file"];
 const TOOLS: Choices = choices!["sphere", "plate", "punch-round", "punch-square"];
+const COUNTS: Choices = choices!["1", "2", "3", "4"];
 const BONDS: Choices = choices!["bonded", "frictionless"];
 const RESOLUTIONS: Choices = choices!["quick", "standard", "fine"];
 
@@ -61,6 +63,20 @@ const SCHEMA: &[Parameter] = &[
     Parameter::choice("tool", TOOLS, 0, "What touches: a sphere, or what is bonded to a face"),
     Parameter::real("tool_radius_mm", "mm", 0.1, 500.0, 12.7, "Radius of the sphere or of the round punch"),
     Parameter::real("tool_side_mm", "mm", 0.1, 1000.0, 20.0, "Side of the square punch"),
+    Parameter::choice(
+        "tool_count",
+        COUNTS,
+        0,
+        "Number of spheres on the handle: two along x, or the corners of a triangle or square",
+    ),
+    Parameter::real(
+        "tool_spacing_mm",
+        "mm",
+        0.2,
+        1000.0,
+        30.0,
+        "Between the centres of neighbouring spheres, if there are several",
+    ),
     Parameter::choice("bond", BONDS, 0, "How a punch holds the surface"),
     Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction of the sphere"),
     Parameter::choice(
@@ -80,6 +96,7 @@ const SCHEMA: &[Parameter] = &[
 
 const DETAILS: &[Detail] = &[
     Detail::number("depth_m", "m", "How far the face is inside the sphere"),
+    Detail::number("contacts", "1", "How many spheres are in contact"),
     Detail::number("mesh_error", "1", "Estimated relative error of the stiffness that comes from the mesh"),
 ];
 
@@ -88,8 +105,10 @@ pub struct Solid {
     law: Law,
     mesh_error: f64,
     youngs_modulus_pa: f64,
-    friction: Friction,
+    /// One for each sphere.
+    friction: [Friction; MOST],
     depth_m: f64,
+    contacts: f64,
     parameters: [f64; SCHEMA.len()],
     description: Description,
     mesh: Option<Mesh>,
@@ -143,6 +162,27 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     Ok(Some((mesh, cache::digest(&named))))
 }
 
+/// The status of several spheres: that they are too deep goes before that they did not settle, and that before a place nearby.
+fn worse(status: StepStatus, answer: &several::Answer, is_too_deep: bool) -> StepStatus {
+    if status != StepStatus::Ok {
+        status
+    } else if is_too_deep {
+        StepStatus::Clamped
+    } else if !answer.is_settled {
+        StepStatus::NotConverged
+    } else if answer.is_beyond {
+        StepStatus::OutOfDomain
+    } else {
+        status
+    }
+}
+
+impl Solid {
+    fn forget_details(&mut self) {
+        (self.depth_m, self.contacts) = (f64::NAN, f64::NAN);
+    }
+}
+
 impl ForceModel for Solid {
     const INFO: ModelInfo =
         ModelInfo::new("solid", "Solid", "An elastic solid, touched with a sphere, a punch or a plate")
@@ -159,7 +199,7 @@ impl ForceModel for Solid {
         let mesh = mesh.map(|(mesh, _)| mesh);
         let (law, mesh_error) = description.prepare(mesh.as_ref())?;
         let reach_m = match description.tool {
-            Tool::Sphere { radius_m } => radius_m,
+            Tool::Sphere { radius_m } | Tool::Spheres { radius_m, .. } => radius_m,
             _ => 0.0,
         };
         let friction =
@@ -169,8 +209,9 @@ impl ForceModel for Solid {
             law,
             mesh_error,
             youngs_modulus_pa,
-            friction,
+            friction: [friction; MOST],
             depth_m: f64::NAN,
+            contacts: f64::NAN,
             parameters,
             description,
             mesh,
@@ -183,7 +224,7 @@ impl ForceModel for Solid {
         let norm_error = input.pose.orientation().length_squared() - 1.0;
         // NaN is no length either.
         if !(input.pose.is_finite() && norm_error.abs() < UNIT_NORM_TOLERANCE) {
-            self.depth_m = f64::NAN;
+            self.forget_details();
             return Output::new(Wrench::ZERO, f64::NAN, StepStatus::InvalidInput);
         }
         let position_m = input.pose.position();
@@ -199,14 +240,35 @@ impl ForceModel for Solid {
                 let centre_m = reached_m + DVec3::Z * atlas.radius_m;
                 let answer = atlas.answer(centre_m.to_array());
                 self.depth_m = answer.depth_m;
+                self.contacts = f64::from(u8::from(answer.depth_m > 0.0));
                 if answer.depth_m > atlas.deepest_m {
                     status = StepStatus::Clamped;
                 } else if answer.is_beyond && status == StepStatus::Ok {
                     status = StepStatus::OutOfDomain;
                 }
                 let normal_n = DVec3::from_array(answer.energy.slope) * -modulus;
-                let rubbing = self.friction.follow(reached_m, normal_n, modulus);
+                let rubbing = self.friction[0].follow(reached_m, normal_n, modulus);
                 (Wrench::from_force(normal_n + rubbing.0), answer.energy.value * modulus + rubbing.1)
+            }
+            Law::Spheres(spheres) => {
+                let answer = spheres.answer(reached_m, input.pose.orientation());
+                let depths_m = &answer.depths_m[..spheres.count()];
+                self.depth_m = depths_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                self.contacts = depths_m.iter().map(|&depth_m| f64::from(u8::from(depth_m > 0.0))).sum();
+                status = worse(status, &answer, self.depth_m > spheres.atlas.deepest_m);
+                let home_m = reached_m + DVec3::Z * spheres.atlas.radius_m;
+                let (mut rubbing_n, mut rubbing_nm, mut rubbing_j) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+                for (i, friction) in self.friction.iter_mut().enumerate().take(spheres.count()) {
+                    let centre_m = answer.centres_m[i];
+                    let (force_n, energy_j) =
+                        friction.follow(centre_m, answer.forces_n[i] * modulus, modulus);
+                    rubbing_n += force_n;
+                    rubbing_nm += (centre_m - home_m).cross(force_n);
+                    rubbing_j += energy_j;
+                }
+                let force_n = answer.wrench.force() * modulus + rubbing_n;
+                let torque_nm = answer.wrench.torque() * modulus + rubbing_nm;
+                (Wrench::new(force_n, torque_nm), answer.energy_j * modulus + rubbing_j)
             }
         };
         Output::new(wrench, energy_j, status)
@@ -226,8 +288,8 @@ impl ForceModel for Solid {
     }
 
     fn reset(&mut self) {
-        self.friction.release();
-        self.depth_m = f64::NAN;
+        self.friction.iter_mut().for_each(Friction::release);
+        self.forget_details();
     }
 }
 
@@ -255,6 +317,10 @@ impl ShapeModel for Solid {
                 let answer = atlas.answer(centre_m.to_array());
                 drawing.sphere(atlas, centre_m, &answer, self.youngs_modulus_pa)
             }
+            Law::Spheres(spheres) => {
+                let answer = spheres.answer(reached_m, pose.orientation());
+                drawing.spheres(spheres, &answer, self.youngs_modulus_pa)
+            }
         }
     }
 }
@@ -262,7 +328,7 @@ impl ShapeModel for Solid {
 impl VariantModel for Solid {
     /// Only friction remembers.
     fn variant_info(&self) -> VariantInfo {
-        let memory = if self.friction.is_smooth() { Memory::Stateless } else { Memory::PathDependent };
+        let memory = if self.friction[0].is_smooth() { Memory::Stateless } else { Memory::PathDependent };
         VariantInfo::new(Demand::ALL, memory)
     }
 }
@@ -271,7 +337,7 @@ impl DetailsModel for Solid {
     const DETAILS: &'static [Detail] = DETAILS;
 
     fn details(&self, values: &mut [f64]) {
-        for (value, number) in values.iter_mut().zip([self.depth_m, self.mesh_error]) {
+        for (value, number) in values.iter_mut().zip([self.depth_m, self.contacts, self.mesh_error]) {
             *value = number;
         }
     }

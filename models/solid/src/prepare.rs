@@ -181,6 +181,34 @@ pub fn sphere_on_block(
     Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), ground), mesh_error })
 }
 
+/// Where contacts on a block are compared, in halves of a side from the middle.
+const BEYOND_PLACES: [f64; 4] = [0.0, 0.4, 0.75, 0.97];
+
+/// How a vertical force on the top of a block moves the top elsewhere, up, beyond what a half-space does: the numbers of
+/// [`crate::several::Beyond`], for a modulus of 1 Pa. Not real-time: up to some seconds.
+///
+/// # Errors
+/// [`NotPositive`] if the numbers do not describe a solid.
+pub fn beyond_half_space(
+    poisson_ratio: f64,
+    size: Size,
+    fineness: Fineness,
+) -> Result<Vec<f64>, NotPositive> {
+    let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
+    let remainder = Remainder::new(size, solid, fineness)?;
+    let [x, y] = [size.half_x_m, size.half_y_m].map(|half_m| BEYOND_PLACES.map(|share| share * half_m));
+    let table = Table::new(&remainder, Face::Top, [&x, &y]);
+    let both = |half: &[f64]| -> Vec<f64> {
+        half.iter().skip(1).rev().map(|x| -x).chain(half.iter().copied()).collect()
+    };
+    let (x, y) = (both(&x), both(&y));
+    let points: Vec<[f64; 2]> = y.iter().flat_map(|&y| x.iter().map(move |&x| [x, y])).collect();
+    let mut numbers = vec![x.len() as f64, y.len() as f64, size.half_x_m, size.half_y_m];
+    numbers.extend(x.iter().chain(&y));
+    numbers.extend(table.among(&points).iter().map(|block| block[2][2]));
+    Ok(numbers)
+}
+
 /// Radius of a block's edges for a sphere, m.
 fn rounding_m(size: Size, radius_m: f64) -> f64 {
     let least_m = (2.0 * size.half_x_m).min(2.0 * size.half_y_m).min(size.height_m);

@@ -104,7 +104,7 @@ impl Curve {
 }
 
 /// The first of some numbers, which are taken off.
-fn take<'a>(numbers: &mut &'a [f64], count: usize) -> Option<&'a [f64]> {
+pub(crate) fn take<'a>(numbers: &mut &'a [f64], count: usize) -> Option<&'a [f64]> {
     let (front, rest) = numbers.split_at_checked(count)?;
     *numbers = rest;
     Some(front)
@@ -112,7 +112,7 @@ fn take<'a>(numbers: &mut &'a [f64], count: usize) -> Option<&'a [f64]> {
 
 /// A number of nodes of a spline.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 3 to 1000
-fn whole(number: f64) -> Option<usize> {
+pub(crate) fn whole(number: f64) -> Option<usize> {
     (number.fract() == 0.0 && (3.0..=1000.0).contains(&number)).then_some(number as usize)
 }
 

@@ -20,13 +20,13 @@ fn atlas() -> &'static Atlas {
         };
         match description.solve().expect("a solid").0 {
             Law::Sphere(atlas) => atlas,
-            Law::Bonded(_) => panic!("a sphere"),
+            Law::Bonded(_) | Law::Spheres(_) => panic!("a sphere"),
         }
     })
 }
 
 /// A generator of numbers from 0 to 1, the same every time (Knuth's multiplier).
-struct Numbers(u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
     fn next(&mut self) -> f64 {
@@ -34,7 +34,7 @@ impl Numbers {
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.next()
     }
 
@@ -162,7 +162,7 @@ fn the_force_does_not_jump() {
     println!("largest step: {largest:.3} of stiffness times travel");
 }
 
-fn model(settings: &[(&str, &str)]) -> Model {
+pub(crate) fn model(settings: &[(&str, &str)]) -> Model {
     let plugin = Plugin::in_process(&flotor_solid::FLOTOR_ENTRY).expect("the solid is a plugin");
     let settings: Vec<Setting> = settings
         .iter()
@@ -171,7 +171,7 @@ fn model(settings: &[(&str, &str)]) -> Model {
     plugin.create_model(&settings).expect("a solid")
 }
 
-fn step(model: &mut Model, pose: Pose) -> Output {
+pub(crate) fn step(model: &mut Model, pose: Pose) -> Output {
     let mut output = Output::from(Wrench::ZERO);
     let _ = model.step(&Input::at_rest(pose), &mut output);
     output

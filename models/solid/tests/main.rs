@@ -3,6 +3,7 @@
 mod contact;
 mod mesh;
 mod rows;
+mod several;
 mod solver;
 mod table;
 

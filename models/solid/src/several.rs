@@ -1,0 +1,339 @@
+//! Several equal spheres on one handle, each in contact with the same solid.
+//!
+//! Every sphere alone has the energy `E` of [`crate::atlas`]. A contact also pushes the surface down under the others: by
+//! `C F` for a vertical force `F`, with the compliance `C` of a half-space between two points of its surface, `(1 - nu^2) /
+//! (pi E r)`, and what the body adds to it. With the depressions `w` of the surface under each sphere by all others,
+//!
+//! ```text
+//! F_i = -dE_i/dz (c_i + w_i z),   w_i = sum_j C_ij F_j,   W = sum_i E_i(c_i + w_i z) + 1/2 sum_ij C_ij F_i F_j
+//! ```
+//!
+//! `W` is stationary in the forces, so its gradient at the centres is that of `E` at the lowered places and that of `C`: the
+//! force has a potential, whatever spheres come into contact. The forces are one active set over all contacts: without contact
+//! `E` and its force are zero. A few steps of Newton's method solve for them, from the same start in every tick, so that no
+//! path has a memory.
+//!
+//! `C` counts each contact as a point: for contacts of radius `a` at a distance of `r` that is an error of `0.2 (a / r)^2` of
+//! the interaction, at most 5 % of it for spheres that nearly touch each other.
+
+use crate::atlas::{Atlas, ease_at};
+use crate::jet::Jet;
+use crate::spline::{Curve, End, take, whole};
+use flotor_hal::{DQuat, DVec3, Wrench};
+use std::f64::consts::PI;
+
+/// Most spheres on a handle.
+pub const MOST: usize = 4;
+/// Steps until a solve gives up.
+const STEPS: usize = 40;
+/// A solve ends when no force changes by more of the largest one.
+const TOLERANCE: f64 = 1.0e-12;
+/// Depressions nearer to each other have no secant between them, m.
+const SECANT_M: f64 = 1.0e-12;
+
+/// Compliance between places of the top face, beyond that of a half-space, for a modulus of 1 Pa: cubic splines through values
+/// between the nodes of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beyond {
+    /// For each node of an axis, the spline that is one there and zero at the other nodes.
+    shapes: [Vec<Curve>; 2],
+    /// First and last node of each axis, m.
+    ends_m: [[f64; 2]; 2],
+    /// Where the face ends, along x and y, m.
+    edges_m: [f64; 2],
+    /// Between each two nodes of the grid (x first), m/N.
+    values: Vec<f64>,
+}
+
+/// Nodes of the grid along an axis, at most.
+const MOST_NODES: usize = 7;
+
+/// Weights of a place, and their derivatives along x and y.
+type Weights = [[f64; 3]; MOST_NODES * MOST_NODES];
+
+impl Beyond {
+    /// From values between each two nodes of a grid (x first) on a face that ends at `edges_m` to both sides. At most seven nodes along an axis, at least three. Not
+    /// real-time.
+    #[must_use]
+    pub fn new(edges_m: [f64; 2], nodes_m: [&[f64]; 2], values: Vec<f64>) -> Option<Self> {
+        let count = nodes_m[0].len() * nodes_m[1].len();
+        if nodes_m.iter().any(|nodes| !(3..=MOST_NODES).contains(&nodes.len()))
+            || values.len() != count * count
+        {
+            return None;
+        }
+        let shapes = nodes_m.map(|nodes| {
+            let unit = |node: usize| (0..nodes.len()).map(|i| f64::from(u8::from(i == node))).collect();
+            (0..nodes.len()).map(|node| Curve::new(nodes.to_vec(), unit(node), [End::Parabola; 2])).collect()
+        });
+        let ends_m = nodes_m.map(|nodes| [nodes[0], nodes[nodes.len() - 1]]);
+        Some(Self { shapes, ends_m, edges_m, values })
+    }
+
+    /// From what [`crate::prepare::beyond_half_space`] found; `None` if the numbers are not those of such a grid. Not real-time.
+    #[must_use]
+    pub fn from_numbers(mut numbers: &[f64]) -> Option<Self> {
+        let counts = [whole(take(&mut numbers, 1)?[0])?, whole(take(&mut numbers, 1)?[0])?];
+        let edges_m = take(&mut numbers, 2)?;
+        let (x, y) = (take(&mut numbers, counts[0])?, take(&mut numbers, counts[1])?);
+        Self::new([edges_m[0], edges_m[1]], [x, y], numbers.to_vec())
+    }
+
+    /// Weights of the nodes for a place; beyond the grid it counts as one at its edge.
+    fn weights(&self, place_m: DVec3) -> Weights {
+        let along = [0, 1].map(|axis| {
+            let [low, high] = self.ends_m[axis];
+            let width = 0.05 * (high - low);
+            let at = ease_at(Jet::variable(place_m[axis], axis), high, width);
+            let at = -ease_at(-at, -low, width);
+            let mut weights = [(0.0, 0.0); MOST_NODES];
+            for (weight, shape) in weights.iter_mut().zip(&self.shapes[axis]) {
+                let (value, slope) = shape.at(at.value);
+                *weight = (value, slope * at.slope[axis]);
+            }
+            weights
+        });
+        let mut all = [[0.0; 3]; MOST_NODES * MOST_NODES];
+        let count = self.shapes[0].len();
+        for (j, (v, dv)) in along[1].iter().enumerate().take(self.shapes[1].len()) {
+            for (i, (u, du)) in along[0].iter().enumerate().take(count) {
+                all[j * count + i] = [u * v, du * v, u * dv];
+            }
+        }
+        all
+    }
+
+    /// How much of a contact with a sphere is one of the top face: one inside, zero from the edge on, falling over half a radius
+    /// before it, and earlier with the centre below the face, where another face is near; and the derivatives of that. A
+    /// compliance of the top does not describe a contact of two faces.
+    fn over_face(&self, centre_m: DVec3, radius_m: f64) -> (f64, DVec3) {
+        let up = Jet::variable(centre_m.z, 2);
+        let below = if up.value < 0.0 { up * up * (4.0 / radius_m) } else { Jet::default() };
+        let width_m = 0.5 * radius_m;
+        let mut all = Jet::constant(1.0);
+        for axis in 0..2 {
+            let inside = -Jet::variable(centre_m[axis], axis).abs() - below + self.edges_m[axis];
+            let s = (inside.value / width_m).clamp(0.0, 1.0);
+            all = all * inside.chain(s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / width_m);
+        }
+        (all.value, DVec3::from_array(all.slope))
+    }
+
+    /// Displacement of each node for a unit force at a place of these weights.
+    fn spread(&self, weights: &Weights) -> [f64; MOST_NODES * MOST_NODES] {
+        let count = self.shapes[0].len() * self.shapes[1].len();
+        let mut moved = [0.0; MOST_NODES * MOST_NODES];
+        for (row, weight) in self.values.chunks_exact(count).zip(weights) {
+            moved.iter_mut().zip(row).for_each(|(m, value)| *m += value * weight[0]);
+        }
+        moved
+    }
+}
+
+/// The law of several spheres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spheres {
+    /// That of one.
+    pub atlas: Atlas,
+    poisson_ratio: f64,
+    /// Centres from the handle, in its frame, m.
+    offsets_m: Vec<DVec3>,
+    beyond: Option<Beyond>,
+}
+
+/// What several spheres feel, for a modulus of 1 Pa.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// On the hand.
+    pub wrench: Wrench,
+    /// Stored energy, J.
+    pub energy_j: f64,
+    /// Where the centres are, m; as many as [`Spheres::count`].
+    pub centres_m: [DVec3; MOST],
+    /// Force on each sphere, N.
+    pub forces_n: [DVec3; MOST],
+    /// How far the face is inside each sphere, with what the others push it down; not positive without contact.
+    pub depths_m: [f64; MOST],
+    /// How far the others push the surface down under each sphere, m.
+    pub sunk_m: [f64; MOST],
+    /// True where the law of some sphere is that of a place nearby.
+    pub is_beyond: bool,
+    /// False if the forces did not settle.
+    pub is_settled: bool,
+}
+
+impl Spheres {
+    /// Two to four spheres at the corners of a regular polygon about the handle, across z: two along x. Not real-time.
+    #[must_use]
+    pub fn new(
+        atlas: Atlas,
+        poisson_ratio: f64,
+        count: usize,
+        spacing_m: f64,
+        beyond: Option<Beyond>,
+    ) -> Self {
+        let half = 0.5 * spacing_m;
+        let corners: &[[f64; 2]] = match count {
+            0..=2 => &[[-1.0, 0.0], [1.0, 0.0]],
+            3 => &[
+                [-1.0, -0.577_350_269_189_625_8],
+                [1.0, -0.577_350_269_189_625_8],
+                [0.0, 1.154_700_538_379_251_5],
+            ],
+            _ => &[[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]],
+        };
+        let offsets_m = corners.iter().map(|[x, y]| DVec3::new(x * half, y * half, 0.0)).collect();
+        Self { atlas, poisson_ratio, offsets_m, beyond }
+    }
+
+    /// Number of spheres.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.offsets_m.len()
+    }
+
+    /// What the hand feels with the handle at a pose (finite), the home of which has all spheres touching. Real-time: bounded,
+    /// no allocation.
+    #[must_use]
+    pub fn answer(&self, position_m: DVec3, orientation: DQuat) -> Answer {
+        let count = self.count();
+        let home = DVec3::Z * self.atlas.radius_m;
+        let mut arms_m = [DVec3::ZERO; MOST];
+        arms_m.iter_mut().zip(&self.offsets_m).for_each(|(arm, offset)| *arm = orientation * *offset);
+        let centres_m = arms_m.map(|arm| position_m + home + arm);
+        let (compliance, slopes) = self.compliance(&centres_m);
+        let (settled, is_settled) = self.settle(&centres_m, &compliance);
+        let mut answer = Answer {
+            wrench: Wrench::ZERO,
+            energy_j: 0.0,
+            centres_m,
+            forces_n: [DVec3::ZERO; MOST],
+            depths_m: [-1.0; MOST],
+            sunk_m: [0.0; MOST],
+            is_beyond: false,
+            is_settled,
+        };
+        let (mut force_n, mut torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+        for i in 0..count {
+            let (alone, sunk_m) = (settled[i].0, settled[i].1);
+            let up_n = -alone.energy.slope[2];
+            let mut own_n = -DVec3::from_array(alone.energy.slope);
+            answer.energy_j += alone.energy.value;
+            for j in (0..count).filter(|&j| j != i) {
+                let both_n2 = up_n * -settled[j].0.energy.slope[2];
+                answer.energy_j += 0.5 * compliance[i][j] * both_n2;
+                own_n += slopes[i][j] * both_n2;
+            }
+            answer.forces_n[i] = own_n;
+            answer.depths_m[i] = alone.depth_m;
+            answer.sunk_m[i] = sunk_m;
+            answer.is_beyond |= alone.is_beyond;
+            force_n += own_n;
+            torque_nm += arms_m[i].cross(own_n);
+        }
+        answer.wrench = Wrench::new(force_n, torque_nm);
+        answer
+    }
+
+    /// Compliance between each two spheres, m/N, and its derivatives along the place of the first.
+    fn compliance(&self, centres_m: &[DVec3; MOST]) -> ([[f64; MOST]; MOST], [[DVec3; MOST]; MOST]) {
+        let count = self.count();
+        let (mut values, mut slopes) = ([[0.0; MOST]; MOST], [[DVec3::ZERO; MOST]; MOST]);
+        for i in 0..count {
+            for j in (0..count).filter(|&j| j != i) {
+                // The tool is rigid: this distance is the same at every pose, and the derivative acts inside of it alone.
+                let distance_m = (self.offsets_m[i] - self.offsets_m[j]).length();
+                values[i][j] = (1.0 - self.poisson_ratio * self.poisson_ratio) / (PI * distance_m);
+            }
+        }
+        let Some(beyond) = &self.beyond else { return (values, slopes) };
+        let weights = centres_m.map(|centre| beyond.weights(centre));
+        let over = centres_m.map(|centre| beyond.over_face(centre, self.atlas.radius_m));
+        for j in 0..count {
+            let moved = beyond.spread(&weights[j]);
+            for i in (0..count).filter(|&i| i != j) {
+                let mut sums = [0.0; 3];
+                for (weight, moved) in weights[i].iter().zip(&moved) {
+                    sums.iter_mut().zip(weight).for_each(|(sum, w)| *sum += w * moved);
+                }
+                let sum = values[i][j] + sums[0];
+                let ((share, slope), (other, _)) = (over[i], over[j]);
+                values[i][j] = sum * share * other;
+                slopes[i][j] = (DVec3::new(sums[1], sums[2], 0.0) * share + slope * sum) * other;
+            }
+        }
+        // The table is symmetric up to rounding; the energy needs it to be so.
+        for i in 0..count {
+            for j in 0..i {
+                values[i][j] = values[j][i];
+            }
+        }
+        (values, slopes)
+    }
+
+    /// The answers of single spheres over the surface that the others have pushed down, and how far; whether they settled.
+    fn settle(
+        &self,
+        centres_m: &[DVec3; MOST],
+        compliance: &[[f64; MOST]; MOST],
+    ) -> ([(crate::atlas::Answer, f64); MOST], bool) {
+        let count = self.count();
+        let alone =
+            |centre: DVec3, sunk_m: f64| (self.atlas.answer((centre + DVec3::Z * sunk_m).to_array()), sunk_m);
+        let mut now = centres_m.map(|centre| alone(centre, 0.0));
+        let (mut up_n, mut stiffness) = ([0.0; MOST], [0.0; MOST]);
+        for i in 0..count {
+            let (answer, _) = now[i];
+            up_n[i] = -answer.energy.slope[2];
+            // That of Hertz's law, to start with.
+            stiffness[i] = if answer.depth_m > 0.0 { (1.5 * up_n[i] / answer.depth_m).max(0.0) } else { 0.0 };
+        }
+        for _ in 0..STEPS {
+            let (mut largest_n, mut miss_n) = (0.0_f64, 0.0_f64);
+            let (mut matrix, mut right) = ([[0.0; MOST]; MOST], [0.0; MOST]);
+            for i in 0..count {
+                let (before, before_m) = now[i];
+                let sunk_m: f64 = (0..count).map(|j| compliance[i][j] * up_n[j]).sum();
+                now[i] = alone(centres_m[i], sunk_m);
+                let found_n = -now[i].0.energy.slope[2];
+                right[i] = found_n - up_n[i];
+                largest_n = largest_n.max(found_n.abs());
+                miss_n = miss_n.max(right[i].abs());
+                // A force depends on one depression alone: the secant through the last two.
+                let moved_m = sunk_m - before_m;
+                if moved_m.abs() > SECANT_M {
+                    stiffness[i] = (-before.energy.slope[2] - found_n) / moved_m;
+                }
+                for j in 0..count {
+                    matrix[i][j] = stiffness[i] * compliance[i][j] + f64::from(u8::from(i == j));
+                }
+            }
+            if miss_n <= TOLERANCE * largest_n {
+                return (now, true);
+            }
+            let change = eliminate(matrix, right, count);
+            if !change.iter().all(|c| c.is_finite()) {
+                break;
+            }
+            (0..count).for_each(|i| up_n[i] += change[i]);
+        }
+        (now, false)
+    }
+}
+
+/// Solves a small system with a dominant diagonal.
+fn eliminate(mut matrix: [[f64; MOST]; MOST], mut right: [f64; MOST], count: usize) -> [f64; MOST] {
+    for column in 0..count {
+        let pivot = matrix[column];
+        for row in column + 1..count {
+            let share = matrix[row][column] / pivot[column];
+            matrix[row].iter_mut().zip(pivot).for_each(|(value, p)| *value -= share * p);
+            right[row] -= share * right[column];
+        }
+    }
+    for row in (0..count).rev() {
+        let known: f64 = (row + 1..count).map(|k| matrix[row][k] * right[k]).sum();
+        right[row] = (right[row] - known) / matrix[row][row];
+    }
+    right
+}
