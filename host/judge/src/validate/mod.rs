@@ -24,6 +24,7 @@ pub use rule::Check;
 
 use flotor_hal::abi::loader::read_metadata;
 use flotor_hal::conformance::Rule;
+use patience::Ended;
 use rustix::fs::{MemfdFlags, memfd_create};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -139,6 +140,7 @@ pub fn validate(
     let Ok(kind) = read.map(|known| known.kind) else { return findings };
     let is_wanted = |check: &Check| only.is_empty() || only.contains(check);
     let checks = Check::all().filter(|check| *check != metadata && check.applies_to(kind));
+    let mut patience = patience;
     for check in checks.filter(is_wanted) {
         let mut command = program(check);
         match check {
@@ -146,7 +148,13 @@ pub fn validate(
             Check::Contract(Rule::InsideMemory) => guarded::with_guard(&mut command),
             _ => {}
         }
-        let outcome = in_own_process(check, command, patience);
+        let is_first_instance = check == Check::Contract(Rule::Defaults);
+        let own_patience = if is_first_instance { patience * PREPARATION } else { patience };
+        let outcome = in_own_process(check, command, own_patience);
+        if let (true, Ok(Some((_, ran)))) = (is_first_instance, &outcome) {
+            patience += *ran * INSTANCES;
+        }
+        let outcome = outcome.map(|ended| ended.map(|(verdict, _)| verdict));
         let is_fatal = matches!(check, Check::Contract(Rule::Loads | Rule::Defaults));
         let stops = is_fatal || matches!(outcome, Ok(None));
         let verdict = match outcome {
@@ -158,7 +166,7 @@ pub fn validate(
                 Verdict { seen: Some(Seen::Missing(late)), figures: None }
             }
             Ok(None) => Verdict::violated(format!(
-                "it did not return within {patience:?}; the rules after it were not checked"
+                "it did not return within {own_patience:?}; the rules after it were not checked (`--timeout` allows more)"
             )),
             Err(error) => Verdict::violated(format!("cannot be checked: {error}")),
         };
@@ -184,17 +192,27 @@ fn died(check: Check, end: ExitStatus) -> String {
     format!("the process died by signal {signal}{hint}")
 }
 
-/// Runs the check of one rule in its own process; `None` if it took too long.
-fn in_own_process(check: Check, mut command: Command, patience: Duration) -> io::Result<Option<Verdict>> {
+/// So many times longer than the other rules may the first instance take: models prepare once, and keep what they found.
+const PREPARATION: u32 = 6;
+/// Most instances that a rule creates one after the other: where nothing can be kept, each takes as long as the first.
+const INSTANCES: u32 = 4;
+
+/// Runs the check of one rule in its own process, and tells how long that ran; `None` if it took too long.
+fn in_own_process(
+    check: Check,
+    mut command: Command,
+    patience: Duration,
+) -> io::Result<Option<(Verdict, Duration)>> {
     // A file, not a pipe: nobody has to empty it. What a plugin prints is its own business.
     let mut told = File::from(memfd_create("flotor-verdict", MemfdFlags::CLOEXEC)?);
     let mut child = command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
-    let Some(end) = patience::wait(&mut child, patience)? else { return Ok(None) };
+    let Some(Ended { status: end, ran }) = patience::wait(&mut child, patience)? else { return Ok(None) };
     let mut text = Vec::new();
     told.rewind()?;
     told.read_to_end(&mut text)?;
-    Ok(Some(match serde_json::from_slice(&text) {
+    let verdict = match serde_json::from_slice(&text) {
         Ok(verdict) if end.success() => verdict,
         _ => Verdict::violated(died(check, end)),
-    }))
+    };
+    Ok(Some((verdict, ran)))
 }

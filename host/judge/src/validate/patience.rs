@@ -13,14 +13,23 @@ const LONGEST_LOOK: Duration = Duration::from_millis(20);
 /// Unit of processor times under /proc: `USER_HZ` is 100 on every Linux.
 const CLOCK_TICK: Duration = Duration::from_millis(10);
 
+/// How a process has ended.
+pub(super) struct Ended {
+    pub(super) status: ExitStatus,
+    /// Time of a processor that it took, as far as was seen.
+    pub(super) ran: Duration,
+}
+
 /// Waits for the end of a process; `None` if it took too long and was ended.
-pub(super) fn wait(child: &mut Child, patience: Duration) -> io::Result<Option<ExitStatus>> {
+pub(super) fn wait(child: &mut Child, patience: Duration) -> io::Result<Option<Ended>> {
     let (mut idle, mut looked) = (Duration::ZERO, Instant::now());
+    let mut ran = Duration::ZERO;
     loop {
-        if let Some(end) = child.try_wait()? {
-            return Ok(Some(end));
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(Ended { status, ran }));
         }
         let used = used(child.id());
+        ran = ran.max(used.ran);
         if used.ran > patience || idle > patience {
             child.kill()?;
             child.wait()?;
@@ -79,6 +88,14 @@ mod tests {
     #[test]
     fn one_that_ends_is_waited_for() {
         let outcome = wait(&mut shell("exit 7"), Duration::from_secs(60)).expect("it can be waited for");
-        assert_eq!(outcome.and_then(|end| end.code()), Some(7));
+        assert_eq!(outcome.and_then(|end| end.status.code()), Some(7));
+    }
+
+    #[test]
+    fn the_time_of_the_processor_is_told() {
+        let script = "i=0; while [ $i -lt 300000 ]; do i=$((i+1)); done";
+        let outcome = wait(&mut shell(script), Duration::from_secs(60)).expect("it can be waited for");
+        let ran = outcome.expect("it ends").ran;
+        assert!(ran > Duration::ZERO && ran < Duration::from_secs(60), "{ran:?}");
     }
 }

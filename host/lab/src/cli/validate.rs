@@ -26,7 +26,7 @@ pub(crate) struct ValidateArguments {
     /// Check only this rule of the contract (repeatable)
     #[arg(long, value_parser = rule, value_name = "RULE")]
     only: Vec<Check>,
-    /// Limit of the processor time and of the waiting time of each rule: 10s, 500ms
+    /// Limit of the processor time and of the waiting time of each rule, six times as long for the first instance: 10s, 500ms
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME", default_value = "10s")]
     timeout: f64,
     /// Check one rule in this process, and print the verdict as JSON
