@@ -1,11 +1,13 @@
 //! Prepared laws on disk, so that a description is solved once.
 //!
 //! A file holds its description in full, its numbers and a sum over both; one that differs anywhere is ignored and made
-//! anew. Without a folder to write to, every start prepares. Not real-time.
+//! anew. The last few are kept in memory too, so that without a folder to write to every start prepares, but not every instance.
+//! Not real-time.
 
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 
 /// First bytes of a file. The version changes when the same description would give other numbers.
 const MAGIC: &[u8; 16] = b"flotor-solid 01\n";
@@ -50,14 +52,37 @@ fn decode(description: &str, bytes: &[u8]) -> Option<Vec<f64>> {
     left.is_empty().then(|| chunks.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect())
 }
 
+/// Descriptions with their numbers, the latest last.
+static LATEST: Mutex<Vec<(String, Vec<f64>)>> = Mutex::new(Vec::new());
+/// How many are kept in memory.
+const KEPT: usize = 4;
+
+fn keep(description: &str, numbers: &[f64]) {
+    let mut latest = LATEST.lock().unwrap_or_else(PoisonError::into_inner);
+    latest.retain(|(other, _)| other != description);
+    if latest.len() >= KEPT {
+        latest.remove(0);
+    }
+    latest.push((description.to_owned(), numbers.to_vec()));
+}
+
+fn kept(description: &str) -> Option<Vec<f64>> {
+    let latest = LATEST.lock().unwrap_or_else(PoisonError::into_inner);
+    latest.iter().find(|(other, _)| other == description).map(|(_, numbers)| numbers.clone())
+}
+
 /// The numbers of a description, if they are there and whole.
 #[must_use]
 pub fn load(description: &str) -> Option<Vec<f64>> {
+    if let Some(numbers) = kept(description) {
+        return Some(numbers);
+    }
     decode(description, &fs::read(file(description)?).ok()?)
 }
 
 /// Keeps numbers. Says nothing if that fails: the next start prepares again.
 pub fn store(description: &str, numbers: &[f64]) {
+    keep(description, numbers);
     let Some(path) = file(description) else { return };
     let Some(folder) = path.parent() else { return };
     if fs::create_dir_all(folder).is_err() {
@@ -73,6 +98,15 @@ pub fn store(description: &str, numbers: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_last_few_are_kept_in_memory() {
+        for number in 0..=KEPT {
+            keep(&format!("kept {number}"), &[number as f64]);
+        }
+        assert_eq!(kept("kept 0"), None);
+        assert_eq!(kept("kept 2"), Some(vec![2.0]));
+    }
 
     #[test]
     fn a_file_that_differs_anywhere_is_no_file() {

@@ -7,7 +7,7 @@ use crate::dense::NotPositive;
 use crate::grid::{Grid, Lame, graded};
 use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
-use crate::plate::plate;
+use crate::plate::{Hold, plate, plate_on};
 use crate::prepare::{
     Footing, Prepared, Resolution, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
 };
@@ -16,6 +16,7 @@ use crate::remainder::{Face, Fineness, Remainder, Size};
 use crate::rigid::{MODES, RigidPatch};
 use crate::several::{Beyond, Spheres};
 use crate::table::Table;
+use crate::tetrahedra::Tetrahedra;
 use flotor_hal::{Refusal, Settings};
 
 /// What is touched.
@@ -102,6 +103,8 @@ pub const RESOLUTIONS: [Resolution; 3] = [
     Resolution { fineness: Fineness { across: 4, high: 5, order: 3 }, rings: 6 },
     Resolution { fineness: Fineness { across: 4, high: 5, order: 4 }, rings: 8 },
 ];
+/// Not one of [`RESOLUTIONS`]: a plate on linear tetrahedra.
+pub const LINEAR_TETRAHEDRA: usize = 3;
 /// Bricks along a side of the square in the middle of a cylinder, by resolution.
 const CYLINDER_BRICKS: [usize; 3] = [4, 6, 8];
 /// Order of the elements under a plate, by resolution.
@@ -177,6 +180,13 @@ impl Description {
     }
 
     fn check(&self) -> Result<(), Refusal> {
+        let has_tetrahedra =
+            matches!((self.body, self.tool), (Body::Block(_) | Body::Beam { .. }, Tool::Plate));
+        if self.resolution == LINEAR_TETRAHEDRA && !has_tetrahedra {
+            return Err(Refusal::unsupported(
+                "resolution = \"linear-tetrahedra\" is a comparison for plates on a block or a beam: set tool = \"plate\"",
+            ));
+        }
         let (extent_m, what) = match self.tool {
             Tool::Sphere { radius_m } | Tool::Spheres { radius_m, .. } => (radius_m, "`tool_radius_mm`"),
             Tool::Punch { outline: Outline::Round { radius_m }, .. } => (radius_m, "`tool_radius_mm`"),
@@ -438,9 +448,49 @@ impl Description {
         }
     }
 
+    /// Ten by two by two cells of a beam, six tetrahedra each: 99 corners. The error is against cells of half the side.
+    fn linear_plate(body: Body, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> {
+        let even = |from: f64, to: f64, count: usize| -> Vec<f64> {
+            (0..=count).map(|i| from + (to - from) * i as f64 / count as f64).collect()
+        };
+        let (ranges, counts, axis) = match body {
+            Body::Beam { size_m: [x, y, z] } => {
+                ([(-x, 0.0), (-0.5 * y, 0.5 * y), (-0.5 * z, 0.5 * z)], [10, 2, 2], 0)
+            }
+            Body::Block(Size { half_x_m: x, half_y_m: y, height_m: z }) => {
+                ([(-x, x), (-y, y), (-z, 0.0)], [4, 4, 4], 2)
+            }
+            // Refused before.
+            _ => ([(-1.0, 0.0); 3], [1, 1, 1], 2),
+        };
+        let solve = |finer: usize| {
+            let borders = [0, 1, 2].map(|k| even(ranges[k].0, ranges[k].1, finer * counts[k]));
+            let grid = Grid::new(borders, 1);
+            let centre = [0, 1, 2].map(|k| if k == axis { 0.0 } else { 0.5 * (ranges[k].0 + ranges[k].1) });
+            let hold = |node: usize| {
+                let at = grid.position_m(node);
+                match grid.index(node)[axis] {
+                    0 => Hold::Fixed,
+                    last if last == finer * counts[axis] => Hold::Plate([0, 1, 2].map(|k| at[k] - centre[k])),
+                    _ => Hold::Free,
+                }
+            };
+            plate_on(&Tetrahedra::new(&grid, lame), hold).map(|(patch, _)| patch)
+        };
+        let (own, finer) = (solve(1)?, solve(2)?);
+        let error = (0..MODES)
+            .filter(|&i| finer.stiffness[i][i] > 0.0)
+            .map(|i| (own.stiffness[i][i] / finer.stiffness[i][i] - 1.0).abs())
+            .fold(0.0, f64::max);
+        Ok((own, error))
+    }
+
     /// Two orders of elements on one grid: the better one, and the largest relative difference of a stiffness.
     fn plate(&self, body: Body) -> Result<(RigidPatch, f64), NotPositive> {
         let lame = Lame::new(1.0, self.poisson_ratio);
+        if self.resolution == LINEAR_TETRAHEDRA {
+            return Self::linear_plate(body, lame);
+        }
         let (borders, axis) = Self::plate_borders(body);
         let order = PLATE_ORDERS[self.resolution.min(2)];
         let solve = |order| plate(&Grid::new(borders.clone(), order), lame, axis);

@@ -13,6 +13,7 @@
 //! - [`prepare`], [`law`], [`cache`]: from a description to a law.
 //! - [`atlas`], [`several`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.
 //! - [`drawing`], [`skin`]: what it looks like, for people.
+//! - [`tetrahedra`]: linear elements, to compare with.
 //! - `plugin`: parameters and the contract.
 
 // Indices name the components of vectors and tensors, in several at once.
@@ -47,5 +48,6 @@ pub mod skin;
 pub mod sphere;
 pub mod spline;
 pub mod table;
+pub mod tetrahedra;
 
 pub use plugin::{FLOTOR_ENTRY, Solid};

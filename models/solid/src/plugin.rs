@@ -19,7 +19,7 @@ const BODIES: Choices = choices!["block", "beam", "cylinder", "half-space", "fil
 const TOOLS: Choices = choices!["sphere", "plate", "punch-round", "punch-square"];
 const COUNTS: Choices = choices!["1", "2", "3", "4"];
 const BONDS: Choices = choices!["bonded", "frictionless"];
-const RESOLUTIONS: Choices = choices!["quick", "standard", "fine"];
+const RESOLUTIONS: Choices = choices!["quick", "standard", "fine", "linear-tetrahedra"];
 
 /// By how much the squared length of an orientation may differ from one: as in the spring.
 const UNIT_NORM_TOLERANCE: f64 = 1.0e-6;
@@ -83,7 +83,7 @@ const SCHEMA: &[Parameter] = &[
         "resolution",
         RESOLUTIONS,
         1,
-        "Elements and contact cells of the preparation; a tick costs the same",
+        "Elements and contact cells of the preparation; a tick costs the same; linear-tetrahedra: what others use, under a plate",
     ),
     Parameter::file(
         "file",
