@@ -3,7 +3,7 @@
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, PluginPathOption, settings};
 use flotor_command::say;
-use flotor_command::{CommandError, style, write_json};
+use flotor_command::{CommandError, style, while_preparing, write_json};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Metadata, Plugin};
 use flotor_hal::{Input, Mutability, Output, Parameter, ParameterKind, Pose, Wrench};
@@ -142,7 +142,8 @@ const TIMED_TICKS: usize = 1000;
 fn print_certificate(plugin: &Plugin, sets: &[KeyValue]) -> Result<(), CommandError> {
     let settings = settings(plugin, sets)?;
     let started = Instant::now();
-    let mut model = match plugin.create_model(&settings) {
+    let id = &plugin.metadata().id;
+    let mut model = match while_preparing(id, || plugin.create_model(&settings)) {
         Ok(model) => model,
         Err(_) if sets.is_empty() => return Ok(()), // not without settings
         Err(error) => return Err(error.into()),

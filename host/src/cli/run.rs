@@ -8,7 +8,8 @@ use flotor_command::options::{
 };
 use flotor_command::stopping::{Keys, stop_on_signals, stop_run_on_signals};
 use flotor_command::{
-    CommandError, first_error, keep_results_apart, note, print_result, progress_bar, style, write_json,
+    CommandError, first_error, keep_results_apart, note, print_result, progress_bar, style, while_preparing,
+    write_json,
 };
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
@@ -104,7 +105,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     }
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
-    let session = Session::prepare(&scene, &registry, &options)?;
+    let session = while_preparing(&scene.title, || Session::prepare(&scene, &registry, &options))?;
     let mut session = session.with_strength(arguments.strength.strength()).on_core(arguments.core);
     if arguments.ml_api.is_none() {
         session.notices().into_iter().for_each(note);

@@ -5,7 +5,7 @@ use crate::poses::Poses;
 use clap::Args;
 use flotor_command::options::{KeyValue, PluginPathOption, new_file, settings};
 use flotor_command::tables::to_csv;
-use flotor_command::{CommandError, note, progress_bar, write_text};
+use flotor_command::{CommandError, note, progress_bar, while_preparing, write_text};
 use flotor_hal::Detail;
 use flotor_hal::abi::PluginKind;
 use flotor_session::registry::is_same_file;
@@ -58,7 +58,8 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
     let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
     let settings = settings(&plugin, &arguments.sets)?;
     // A refused setting is told before a long file is read.
-    let details = if arguments.details { plugin.create_model(&settings)?.details() } else { &[] };
+    let first = while_preparing(&plugin.metadata().id, || plugin.create_model(&settings))?;
+    let details = if arguments.details { first.details() } else { &[] };
     let Poses { ids, handles } = read_poses(&arguments.poses)?;
     let evaluation = Evaluation {
         plugin: &plugin,
