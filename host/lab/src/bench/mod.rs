@@ -39,12 +39,14 @@ use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_judge::subject::prepared;
 
 /// One setting of the model.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Case {
     /// What the table calls it.
     pub name: String,
     /// Its settings.
     pub settings: Vec<Setting>,
+    /// Another model that is measured beside, along the same path; none: that of all cases.
+    pub other: Option<Plugin>,
 }
 
 /// Length of the path, ticks, and how often it is walked: enough for a median, or for p99.9.
@@ -56,7 +58,7 @@ const fn extent(size: Size) -> (usize, usize) {
 }
 
 /// What is measured.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Plan {
     /// The cases.
     pub cases: Vec<Case>,
@@ -73,7 +75,7 @@ pub struct Plan {
 }
 
 /// Calls to split by a detail of the answer.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Split {
     /// Id of the detail: above zero, or not.
     pub detail: String,
@@ -143,5 +145,5 @@ pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<
 }
 
 fn create(plugin: &Plugin, case: &Case) -> Result<Model, LoadError> {
-    prepared(plugin, &case.settings, 0)
+    prepared(case.other.as_ref().unwrap_or(plugin), &case.settings, 0)
 }

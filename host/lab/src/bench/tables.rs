@@ -201,14 +201,23 @@ impl BenchReport {
             );
             cases.series(Series::points(name("in a batch"), in_batches))
         };
-        Figure::new(title, Axis::log("Time of a tick with force and torque, or of a pose in a batch", "ns"))
-            .subtitle(format!(
-                "{} ticks of a smooth path of 1 to 3 Hz at 1 kHz; {against}; a tick has 1 000 000 ns",
-                self.ticks
-            ))
-            .panel_height_px(220.0)
-            .panel(drawn(force, true, |distance| distance.force_rms_n))
-            .panel(drawn(torque, false, |distance| distance.torque_rms_nm))
-            .to_svg()
+        let has_torque = with_errors.iter().any(|(_, distance)| distance.torque_rms_nm > 0.0);
+        let figure = Figure::new(
+            title,
+            Axis::log("Time of a tick with force and torque, or of a pose in a batch", "ns"),
+        )
+        .subtitle(format!(
+            "{} ticks of a smooth path of 1 to 3 Hz at 1 kHz; {against}; a tick has 1 000 000 ns",
+            self.ticks
+        ))
+        .panel_height_px(220.0)
+        .panel(drawn(force, true, |distance| distance.force_rms_n));
+        // A sphere has no torque about its centre.
+        let figure = if has_torque || with_errors.is_empty() {
+            figure.panel(drawn(torque, false, |distance| distance.torque_rms_nm))
+        } else {
+            figure
+        };
+        figure.to_svg()
     }
 }

@@ -16,12 +16,13 @@ use std::path::PathBuf;
 /// Measure cost and error of an evaluation, for many settings of a force model.
 #[derive(Args)]
 #[command(
-    after_help = "Without --case, the command compares the variants and settings of the spring with its exact variant, `rod`. It measures \
-    any other model with default settings. With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace. \
+    after_help = "Without --case, the command compares the variants and settings of the spring with its exact variant, `rod`, and the \
+    resolutions of the solid with the membrane, or under a plate with linear tetrahedra. It measures any other model with default settings. With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace. \
     Times are wall clock: compare them within one run only.\n\n\
     Examples:\n  \
     flotor bench --csv bench.csv --plot bench.svg\n  \
     flotor bench --case variant=energy --case variant=rod,accuracy=servo --size full\n  \
+    flotor bench --model solid --set body=beam --set tool=plate --plot beam.svg\n  \
     flotor bench --model ./libmy_model.so --case steps=8 --case steps=64 --reference steps=1024\n  \
     flotor bench --set preset=slender --case variant=energy --depth-mm 20 --apart rod_share\n  \
     flotor bench --tick"
@@ -30,7 +31,7 @@ pub(crate) struct BenchArguments {
     /// Id of the model, or path to its plugin file
     #[arg(long, value_name = "ID", default_value = "spring")]
     model: String,
-    /// Settings of a case (repeatable)
+    /// Settings of a case; `model=ID` before them measures another model beside (repeatable)
     #[arg(long = "case", value_name = "KEY=VALUE,...")]
     cases: Vec<String>,
     /// Settings common to all cases (repeatable)
@@ -81,6 +82,15 @@ const SPRING_CASES: [&str; 9] = [
 ];
 /// Their reference.
 const SPRING_REFERENCE: &str = "variant=rod,accuracy=tight";
+/// Cases of the solid: its resolutions under a sphere, with the membrane beside; under a plate, with linear tetrahedra beside.
+const SPHERE_CASES: [&str; 3] = [
+    "resolution=standard",
+    "resolution=quick",
+    "model=membrane,ball_radius_mm=12.7,side_mm=80,nodes_per_side=17",
+];
+const PLATE_CASES: [&str; 3] = ["resolution=standard", "resolution=quick", "resolution=linear-tetrahedra"];
+/// Their reference.
+const SOLID_REFERENCE: &str = "resolution=fine";
 /// The detail that splits its calls, and the depths (mm): that of the cases, and about half the free length, where springs
 /// that can buckle have both laws.
 const SPRING_SPLIT: &str = "rod_share";
@@ -166,12 +176,19 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
 fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
     let is_spring = plugin.metadata().id == "spring" && arguments.cases.is_empty();
-    let cases: Vec<&str> = match (arguments.cases.is_empty(), is_spring) {
-        (false, _) => arguments.cases.iter().map(String::as_str).collect(),
-        (true, true) => SPRING_CASES.to_vec(),
-        (true, false) => vec![""],
+    let is_under_plate = arguments.sets.iter().any(|set| set.parameter().value == "plate");
+    let (own_cases, own_reference): (&[&str], _) = match &*plugin.metadata().id {
+        "spring" => (&SPRING_CASES, Some(SPRING_REFERENCE)),
+        "solid" if is_under_plate => (&PLATE_CASES, Some(SOLID_REFERENCE)),
+        "solid" => (&SPHERE_CASES, Some(SOLID_REFERENCE)),
+        _ => (&[""], None),
     };
-    let reference = arguments.reference.as_deref().or(is_spring.then_some(SPRING_REFERENCE));
+    let cases: Vec<&str> = match arguments.cases.is_empty() {
+        true => own_cases.to_vec(),
+        false => arguments.cases.iter().map(String::as_str).collect(),
+    };
+    let own_reference = own_reference.filter(|_| arguments.cases.is_empty());
+    let reference = arguments.reference.as_deref().or(own_reference);
     let case = |text: &str| case(&plugin, &arguments.sets, text);
     let hand = Hand { depth_m: arguments.depth_mm / 1e3 };
     let cases = cases.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;
@@ -217,15 +234,31 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     write_text(arguments.plot.as_deref(), || report.to_svg())
 }
 
+/// Before the settings of a case, the id of another model.
+const OTHER_MODEL: &str = "model";
+
 /// A case from `KEY=VALUE,KEY=VALUE`, on top of the common settings.
 fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandError> {
     let usage = |problem: String| CommandError::Usage(format!("case `{text}`: {problem}"));
     let own = text.split(',').filter(|part| !part.trim().is_empty()).map(str::parse::<KeyValue>);
-    let own = own.collect::<Result<Vec<_>, _>>().map_err(usage)?;
-    let settings = sets.iter().chain(&own).map(|set| {
+    let mut own = own.collect::<Result<Vec<_>, _>>().map_err(usage)?;
+    let names_model = own.first().is_some_and(|set| set.parameter().key == OTHER_MODEL);
+    let other = match own.first() {
+        Some(first) if names_model => {
+            Some(Registry::search(&[]).load(&first.parameter().value, PluginKind::Model)?)
+        }
+        _ => None,
+    };
+    let shown = own.clone();
+    if names_model {
+        own.remove(0);
+    }
+    let parameters = other.as_ref().unwrap_or(plugin).parameters();
+    // The common settings are of the common model.
+    let common = if names_model { &[] } else { sets };
+    let settings = common.iter().chain(&own).map(|set| {
         let parameter = set.parameter();
-        Setting::parse(plugin.parameters(), &parameter.key, &parameter.value)
-            .map_err(|error| usage(error.to_string()))
+        Setting::parse(parameters, &parameter.key, &parameter.value).map_err(|error| usage(error.to_string()))
     });
     // A value says what it is of, but for a switch.
     let word = |set: &KeyValue| {
@@ -235,7 +268,10 @@ fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandE
             _ => parameter.value,
         }
     };
-    let values: Vec<String> = own.iter().map(word).collect();
+    let mut values: Vec<String> = shown.iter().map(word).collect();
+    if let (Some(other), Some(first)) = (&other, values.first_mut()) {
+        first.clone_from(&other.metadata().id);
+    }
     let name = if values.is_empty() { "defaults".to_owned() } else { values.join(" ") };
-    Ok(Case { name, settings: settings.collect::<Result<_, _>>()? })
+    Ok(Case { name, settings: settings.collect::<Result<_, _>>()?, other })
 }
