@@ -31,7 +31,7 @@ pub(crate) struct BenchArguments {
     /// Id of the model, or path to its plugin file
     #[arg(long, value_name = "ID", default_value = "spring")]
     model: String,
-    /// Settings of a case; `model=ID` before them measures another model beside (repeatable)
+    /// Settings of a case; `model=ID` among them measures another model beside (repeatable)
     #[arg(long = "case", value_name = "KEY=VALUE,...")]
     cases: Vec<String>,
     /// Settings common to all cases (repeatable)
@@ -234,7 +234,7 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     write_text(arguments.plot.as_deref(), || report.to_svg())
 }
 
-/// Before the settings of a case, the id of another model.
+/// Among the settings of a case, the id of another model.
 const OTHER_MODEL: &str = "model";
 
 /// A case from `KEY=VALUE,KEY=VALUE`, on top of the common settings.
@@ -242,20 +242,12 @@ fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandE
     let usage = |problem: String| CommandError::Usage(format!("case `{text}`: {problem}"));
     let own = text.split(',').filter(|part| !part.trim().is_empty()).map(str::parse::<KeyValue>);
     let mut own = own.collect::<Result<Vec<_>, _>>().map_err(usage)?;
-    let names_model = own.first().is_some_and(|set| set.parameter().key == OTHER_MODEL);
-    let other = match own.first() {
-        Some(first) if names_model => {
-            Some(Registry::search(&[]).load(&first.parameter().value, PluginKind::Model)?)
-        }
-        _ => None,
-    };
-    let shown = own.clone();
-    if names_model {
-        own.remove(0);
-    }
+    let at = own.iter().position(|set| set.parameter().key == OTHER_MODEL);
+    let named = at.map(|at| own.remove(at).parameter().value);
+    let other = named.map(|id| Registry::search(&[]).load(&id, PluginKind::Model)).transpose()?;
     let parameters = other.as_ref().unwrap_or(plugin).parameters();
     // The common settings are of the common model.
-    let common = if names_model { &[] } else { sets };
+    let common = if other.is_some() { &[] } else { sets };
     let settings = common.iter().chain(&own).map(|set| {
         let parameter = set.parameter();
         Setting::parse(parameters, &parameter.key, &parameter.value).map_err(|error| usage(error.to_string()))
@@ -268,10 +260,8 @@ fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandE
             _ => parameter.value,
         }
     };
-    let mut values: Vec<String> = shown.iter().map(word).collect();
-    if let (Some(other), Some(first)) = (&other, values.first_mut()) {
-        first.clone_from(&other.metadata().id);
-    }
+    let id = other.as_ref().map(|other| other.metadata().id.clone());
+    let values: Vec<String> = id.into_iter().chain(own.iter().map(word)).collect();
     let name = if values.is_empty() { "defaults".to_owned() } else { values.join(" ") };
     Ok(Case { name, settings: settings.collect::<Result<_, _>>()?, other })
 }
