@@ -25,7 +25,7 @@ use std::f64::consts::PI;
 /// Most spheres on a handle.
 pub const MOST: usize = 4;
 /// Steps until a solve gives up.
-const STEPS: usize = 40;
+const STEPS: usize = 60;
 /// A solve ends when no force changes by more of the largest one.
 const TOLERANCE: f64 = 1.0e-12;
 /// Depressions nearer to each other have no secant between them, m.
@@ -288,7 +288,7 @@ impl Spheres {
             // That of Hertz's law, to start with.
             stiffness[i] = if answer.depth_m > 0.0 { (1.5 * up_n[i] / answer.depth_m).max(0.0) } else { 0.0 };
         }
-        for _ in 0..STEPS {
+        for step in 0..STEPS {
             let (mut largest_n, mut miss_n) = (0.0_f64, 0.0_f64);
             let (mut matrix, mut right) = ([[0.0; MOST]; MOST], [0.0; MOST]);
             for i in 0..count {
@@ -301,8 +301,14 @@ impl Spheres {
                 miss_n = miss_n.max(right[i].abs());
                 // A force depends on one depression alone: the secant through the last two.
                 let moved_m = sunk_m - before_m;
-                if moved_m.abs() > SECANT_M {
-                    stiffness[i] = (-before.energy.slope[2] - found_n) / moved_m;
+                let hertz =
+                    if now[i].0.depth_m > 0.0 { (1.5 * found_n / now[i].0.depth_m).abs() } else { 0.0 };
+                if step >= STEPS / 2 {
+                    // At a bend of the law secants may go round in circles; half of Hertz's stiffness comes closer at every step.
+                    stiffness[i] = 0.5 * hertz;
+                } else if moved_m.abs() > SECANT_M {
+                    let secant = (-before.energy.slope[2] - found_n) / moved_m;
+                    stiffness[i] = secant.clamp(-2.0 * hertz, 2.0 * hertz);
                 }
                 for j in 0..count {
                     matrix[i][j] = stiffness[i] * compliance[i][j] + f64::from(u8::from(i == j));
