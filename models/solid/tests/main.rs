@@ -1,6 +1,7 @@
 //! The solid against tables made elsewhere, and against the laws no solid may break.
 
 mod contact;
+mod finer;
 mod mesh;
 mod rows;
 mod several;
