@@ -110,6 +110,11 @@ const CYLINDER_BRICKS: [usize; 3] = [4, 6, 8];
 /// Order of the elements under a plate, by resolution.
 const PLATE_ORDERS: [usize; 3] = [2, 3, 4];
 
+/// A law and the estimated error of its mesh, or why there is none.
+type Prepares = Result<(Law, f64), Refusal>;
+/// What the cache keeps.
+type Numbers = Result<Vec<f64>, Refusal>;
+
 impl Description {
     /// Reads parameters (`value`: those in force, by id; `mesh_digest`: that of the mesh's text and names). Not real-time.
     ///
@@ -268,13 +273,10 @@ impl Description {
     /// A [`Refusal`] if no solution exists for these numbers.
     pub fn prepare(&self, mesh: Option<&Mesh>) -> Result<(Law, f64), Refusal> {
         if let Tool::Spheres { .. } = self.tool {
-            return self.spheres(
-                &mut |one| one.prepare(None),
-                &mut |words, solve| match cache::load(words) {
-                    Some(found) => Ok(found),
-                    None => solve().inspect(|numbers| cache::store(words, numbers)),
-                },
-            );
+            return self.spheres(&|one| one.prepare(None), &|words, solve| match cache::load(words) {
+                Some(found) => Ok(found),
+                None => solve().inspect(|numbers| cache::store(words, numbers)),
+            });
         }
         let words = self.words();
         if let Some(found) = cache::load(&words).and_then(|numbers| self.read(&numbers)) {
@@ -291,8 +293,8 @@ impl Description {
     /// The law of several spheres: of one, and how contacts influence each other, by what solves or remembers these.
     fn spheres(
         &self,
-        one: &mut dyn FnMut(&Self) -> Result<(Law, f64), Refusal>,
-        remember: &mut dyn FnMut(&str, &dyn Fn() -> Result<Vec<f64>, Refusal>) -> Result<Vec<f64>, Refusal>,
+        one: &dyn Fn(&Self) -> Prepares,
+        remember: &dyn Fn(&str, &dyn Fn() -> Numbers) -> Numbers,
     ) -> Result<(Law, f64), Refusal> {
         let Tool::Spheres { radius_m, count, spacing_m } = self.tool else { return one(self) };
         let single = Self { tool: Tool::Sphere { radius_m }, ..*self };
@@ -348,7 +350,7 @@ impl Description {
     /// A [`Refusal`] if no solution exists for these numbers, or a mesh is needed: see [`Self::solve_on`].
     pub fn solve(&self) -> Result<(Law, f64), Refusal> {
         if let Tool::Spheres { .. } = self.tool {
-            return self.spheres(&mut Self::solve, &mut |_, solve| solve());
+            return self.spheres(&Self::solve, &|_, solve| solve());
         }
         match self.body {
             Body::Cylinder { radius_m, height_m } => {
