@@ -14,6 +14,7 @@ const LONGEST_LOOK: Duration = Duration::from_millis(20);
 const CLOCK_TICK: Duration = Duration::from_millis(10);
 
 /// How a process has ended.
+#[derive(Debug)]
 pub(super) struct Ended {
     pub(super) status: ExitStatus,
     /// Time of a processor that it took, as far as was seen.
