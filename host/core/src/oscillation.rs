@@ -129,10 +129,12 @@ mod tests {
     /// Reverses a force at its limit so often a second, for so long; when it was damped and given up, s.
     fn swing(oscillation: &mut Oscillation, per_s: f64, from_s: f64, length_s: f64) -> [Option<f64>; 2] {
         let (mut damped, mut given_up) = (None, None);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // seconds of a test
         let ticks = (length_s * 1000.0) as u64;
         for tick in 0..ticks {
             let now_s = from_s + tick as f64 * 1.0e-3;
             let sign = if (now_s * per_s).floor() % 2.0 == 0.0 { 1.0 } else { -1.0 };
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // seconds of a test
             let now_ns = (now_s * 1.0e9) as u64;
             let wrench = Wrench::new(DVec3::new(0.0, 0.0, 100.0 * sign), DVec3::ZERO);
             oscillation.note(&wrench, true, false, now_ns);

@@ -10,6 +10,7 @@ use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::Detail;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -17,7 +18,8 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "Without --case, the command compares the variants and settings of the spring with its exact variant, `rod`, and the \
-    resolutions of the solid with the membrane, or under a plate with linear tetrahedra. It measures any other model with default settings. With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace. \
+    resolutions of the solid with the membrane, or under a plate with linear tetrahedra. It measures any other model with default settings. \
+    With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace. \
     Times are wall clock: compare them within one run only.\n\n\
     Examples:\n  \
     flotor bench --csv bench.csv --plot bench.svg\n  \
@@ -174,7 +176,8 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
 }
 
 fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
-    let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
+    let registry = arguments.plugin_path.registry();
+    let plugin = registry.load(&arguments.model, PluginKind::Model)?;
     let is_spring = plugin.metadata().id == "spring" && arguments.cases.is_empty();
     let is_under_plate = arguments.sets.iter().any(|set| set.parameter().value == "plate");
     let (own_cases, own_reference): (&[&str], _) = match &*plugin.metadata().id {
@@ -189,7 +192,7 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     };
     let own_reference = own_reference.filter(|_| arguments.cases.is_empty());
     let reference = arguments.reference.as_deref().or(own_reference);
-    let case = |text: &str| case(&plugin, &arguments.sets, text);
+    let case = |text: &str| case(&registry, &plugin, &arguments.sets, text);
     let hand = Hand { depth_m: arguments.depth_mm / 1e3 };
     let cases = cases.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;
     if let (Some(detail), Some(case)) = (&arguments.apart, cases.first()) {
@@ -237,14 +240,14 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
 /// Among the settings of a case, the id of another model.
 const OTHER_MODEL: &str = "model";
 
-/// A case from `KEY=VALUE,KEY=VALUE`, on top of the common settings.
-fn case(plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandError> {
+/// A case from `KEY=VALUE,KEY=VALUE`, on top of the common settings; another model of it is searched for in the registry.
+fn case(registry: &Registry, plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandError> {
     let usage = |problem: String| CommandError::Usage(format!("case `{text}`: {problem}"));
     let own = text.split(',').filter(|part| !part.trim().is_empty()).map(str::parse::<KeyValue>);
     let mut own = own.collect::<Result<Vec<_>, _>>().map_err(usage)?;
     let at = own.iter().position(|set| set.parameter().key == OTHER_MODEL);
     let named = at.map(|at| own.remove(at).parameter().value);
-    let other = named.map(|id| Registry::search(&[]).load(&id, PluginKind::Model)).transpose()?;
+    let other = named.map(|id| registry.load(&id, PluginKind::Model)).transpose()?;
     let parameters = other.as_ref().unwrap_or(plugin).parameters();
     // The common settings are of the common model.
     let common = if other.is_some() { &[] } else { sets };

@@ -138,7 +138,7 @@ fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), Co
         };
         each.iter().zip(logs).map(with_incidents).collect::<Vec<_>>().join("\n\n")
     };
-    print_result(arguments.json.as_deref(), &each, text)
+    print_result(arguments.json.file(), &each, text)
 }
 
 /// Results under codes.
