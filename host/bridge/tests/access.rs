@@ -100,7 +100,11 @@ fn members_cannot_pretend_to_be_the_bridge() {
         ..LinkOptions::default()
     };
     let session = open(&link, End::Visiting).unwrap();
-    let lie = serde_json::to_vec(&flotor_live::End { words: "a lie".to_owned(), kind: flotor_live::EndKind::InOrder }).unwrap();
+    let lie = serde_json::to_vec(&flotor_live::End {
+        words: "a lie".to_owned(),
+        kind: flotor_live::EndKind::InOrder,
+    })
+    .unwrap();
     for _ in 0..20 {
         session.put(bridge.name.key("end"), lie.clone()).wait().unwrap();
     }

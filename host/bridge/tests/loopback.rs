@@ -311,7 +311,11 @@ fn without_keys_only_the_bridge_tells_what_becomes_of_a_run() {
     let listener = listening(&bridge, &host);
     let link = LinkOptions { connect: vec![bridge.endpoint.clone()], ..LinkOptions::default() };
     let forger = open(&link, End::Visiting).unwrap();
-    let lie = serde_json::to_vec(&flotor_live::End { words: "a lie".to_owned(), kind: flotor_live::EndKind::InOrder }).unwrap();
+    let lie = serde_json::to_vec(&flotor_live::End {
+        words: "a lie".to_owned(),
+        kind: flotor_live::EndKind::InOrder,
+    })
+    .unwrap();
     for what in ["end", "tick", "tf", "change", "status", "news/pair"] {
         for _ in 0..20 {
             forger.put(bridge.name.key(what), lie.clone()).wait().unwrap();

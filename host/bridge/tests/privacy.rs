@@ -183,6 +183,10 @@ fn a_stranger_forges() {
         assert!(started.elapsed() < Duration::from_secs(3), "it reaches nobody");
         std::thread::sleep(Duration::from_millis(10));
     }
-    let forged = serde_json::to_vec(&flotor_live::End { words: "FORGED".to_owned(), kind: flotor_live::EndKind::InOrder }).unwrap();
+    let forged = serde_json::to_vec(&flotor_live::End {
+        words: "FORGED".to_owned(),
+        kind: flotor_live::EndKind::InOrder,
+    })
+    .unwrap();
     session.put(Name::new("lab").unwrap().key("end"), forged).wait().unwrap();
 }

@@ -143,7 +143,10 @@ impl Relay<'_> {
                     break;
                 }
                 Err(error) => {
-                    station.end(&flotor_live::End { words: error.to_string(), kind: flotor_live::EndKind::Failed }, handler.due())?;
+                    station.end(
+                        &flotor_live::End { words: error.to_string(), kind: flotor_live::EndKind::Failed },
+                        handler.due(),
+                    )?;
                     break;
                 }
             }
