@@ -2,12 +2,13 @@
 
 use crate::in_process::InProcess;
 use flotor_falcon::remote::{REQUEST, WRITE};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
 
-/// How long is waited for the host before a look whether a packet is due.
-const LOOK: Duration = Duration::from_micros(500);
+/// How long is waited for the host before a look whether a packet is due, ns. `poll` waits so short a time; the timeout of a
+/// socket is rounded to the system's ticks of some milliseconds.
+const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000 };
 
 /// Serves a host until it is gone, or the device is.
 ///
@@ -15,14 +16,13 @@ const LOOK: Duration = Duration::from_micros(500);
 /// What the system says of the connection.
 pub fn serve(mut stream: TcpStream, device: &InProcess) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    stream.set_read_timeout(Some(LOOK))?;
     let (mut heard, mut chunk) = (Vec::new(), [0; 1024]);
     loop {
-        match stream.read(&mut chunk) {
-            Ok(0) => return Ok(()),
-            Ok(length) => heard.extend_from_slice(chunk.get(..length).unwrap_or_default()),
-            Err(error) if [ErrorKind::WouldBlock, ErrorKind::TimedOut].contains(&error.kind()) => {}
-            Err(error) => return Err(error),
+        if poll(&mut [PollFd::new(&stream, PollFlags::IN)], Some(&LOOK))? > 0 {
+            match stream.read(&mut chunk)? {
+                0 => return Ok(()),
+                length => heard.extend_from_slice(chunk.get(..length).unwrap_or_default()),
+            }
         }
         while let Some(length) = obey(&heard, device)? {
             heard.drain(..length);

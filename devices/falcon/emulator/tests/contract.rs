@@ -62,6 +62,30 @@ fn pushed(device: &mut ActiveDevice, index: &mut u64, force_n: DVec3, samples: u
     state
 }
 
+/// The system waits for a socket in steps of milliseconds; a report is due a millisecond after the one before.
+#[test]
+fn a_report_comes_in_most_ticks() {
+    const TICKS: u32 = 60;
+    let (_device, address) = serve(Power::On, CENTRE_M);
+    let mut device = activated(open(&address, &[]).expect("it is there"));
+    let (mut state, started, mut index) = (DeviceState::HOME, Instant::now(), 0);
+    // In a stretch in which nothing else delays the two.
+    loop {
+        let mut fresh = 0;
+        for _ in 0..TICKS {
+            let tick = Tick { index, time_ns: index * 1_000_000, dt_ns: 1_000_000 };
+            index += 1;
+            fresh += u32::from(device.read(&tick, &mut state) == Cycle::Fresh);
+            let _ = device.write(&tick, &Wrench::ZERO);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        if fresh > TICKS / 2 {
+            return;
+        }
+        assert!(started.elapsed() < PATIENCE, "{fresh} of {TICKS}");
+    }
+}
+
 #[test]
 fn the_handle_is_where_the_hand_holds_it_and_a_force_pushes_along_its_axis() {
     // 10 mm to the right, 5 mm up, 20 mm away from the user: the maker's z is towards the user.
