@@ -21,8 +21,8 @@ enum Role {
     OfDevices,
     /// The other end of a device's link, without hardware.
     Emulator,
-    /// What emulators plug devices into a kernel with.
-    Cable,
+    /// What several emulators share.
+    OfEmulators,
     Sync,
     /// Plain data and maths of a run.
     Core,
@@ -64,7 +64,7 @@ enum Role {
 
 use Role::{
     Cable, Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab,
-    Live, OfDevices, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
+    Live, OfDevices, OfEmulators, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
     StudyProgram, Sync, Tests, Viewer,
 };
 
@@ -73,7 +73,8 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("hal", Contract, &[]),
     ("devices/force-switch", OfDevices, &[Contract]),
     ("devices/vendor-sdk", OfDevices, &[Contract]),
-    ("devices/usbip", Cable, &[]),
+    ("devices/usbip", OfEmulators, &[]),
+    ("devices/emulation", OfEmulators, &[]),
     ("host/sync", Sync, &[]),
     ("host/core", Core, &[Contract, Sync]),
     ("host/servo", Servo, &[Contract, Sync, Core]),
@@ -151,7 +152,7 @@ impl Role {
         match self {
             Plugin => &[Contract, OfDevices],
             Fixture => &[Contract],
-            Emulator => &[Contract, Plugin, Cable],
+            Emulator => &[Contract, Plugin, OfEmulators],
             _ => CRATES.iter().find(|(_, role, _)| *role == self).map_or(&[], |(.., used)| used),
         }
     }

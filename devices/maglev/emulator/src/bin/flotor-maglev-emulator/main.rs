@@ -10,6 +10,8 @@ mod stator;
 mod usb;
 
 use clap::{Parser, ValueEnum};
+use flotor_emulation::command_line::{self, link_to, say};
+use flotor_emulation::rig::{RigArguments, serve};
 use flotor_hal::Refusal;
 use flotor_hal::abi::loader::{LoadError, Setting};
 use flotor_maglev::transport::stream::StreamLink;
@@ -19,7 +21,6 @@ use flotor_maglev_emulator::gadget::Personality;
 use flotor_maglev_emulator::{Emulator, Event, Pace, controller_config};
 use plant::LoadedPlant;
 use std::error::Error;
-use std::io::Write;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -54,16 +55,8 @@ struct Arguments {
     /// Set a parameter of the simulated flotor (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
-    /// Hold the handle in a calibration rig instead of a hand: a stand that comes down step by step, and a force sensor
-    /// as a serial port by this name
-    #[arg(long, value_name = "PATH")]
-    calibration_rig: Option<PathBuf>,
-    /// Calibration rig: step of the stand, in mm
-    #[arg(long, default_value_t = 1.0, value_name = "MM", requires = "calibration_rig", value_parser = step_mm)]
-    rig_step_mm: f64,
-    /// Calibration rig: time at each step, in s
-    #[arg(long, default_value_t = 1.0, value_name = "S", requires = "calibration_rig", value_parser = stop_s)]
-    rig_stop_s: f64,
+    #[command(flatten)]
+    rig: RigArguments,
     /// Seed of all random numbers
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
@@ -142,7 +135,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     };
     let mut settings = Vec::new();
     let defaults = match arguments.protocol {
-        ProtocolOption::MlApi if arguments.calibration_rig.is_none() => arguments.ml_api.plant_defaults(),
+        ProtocolOption::MlApi if arguments.rig.rig().is_none() => arguments.ml_api.plant_defaults(),
         ProtocolOption::MlApi | ProtocolOption::Flotor => &[],
     };
     let is_set =
@@ -150,8 +143,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     for (key, value) in defaults.iter().filter(|(key, _)| !is_set(key)) {
         settings.push(parse(key, value)?);
     }
-    if let Some(link) = &arguments.calibration_rig {
-        for (key, value) in rig::settings(link, arguments.rig_step_mm, arguments.rig_stop_s)? {
+    if let Some((link, stand)) = arguments.rig.rig() {
+        for (key, value) in rig::settings(link, stand)? {
             settings.push(parse(key, &value)?);
         }
     }
@@ -162,9 +155,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         settings.push(parse(key.trim(), value.trim())?);
     }
     let (mut plant, capabilities) = LoadedPlant::open(plugin, settings, arguments.seed)?;
-    if let Some(link) = &arguments.calibration_rig {
+    if let Some((link, _)) = arguments.rig.rig() {
         let force = rig::SensedForce::default();
-        let port = rig::serve(link, force.clone())?;
+        let sensed = force.clone();
+        let port = serve(link, move || sensed.value_n())?;
         plant.sense(force)?;
         say(&format!("force-sensor {}", port.display()));
     }
@@ -187,37 +181,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
 }
 
-fn step_mm(text: &str) -> Result<f64, String> {
-    within(text, 0.1, 7.0, "mm")
-}
-
-fn stop_s(text: &str) -> Result<f64, String> {
-    within(text, 0.1, 600.0, "s")
-}
-
-fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
-    let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
-    if (least..=most).contains(&number) {
-        Ok(number)
-    } else {
-        Err(format!("must be {least} to {most} {unit}"))
-    }
-}
-
-/// A symbolic link by this name. Only a link is replaced, never somebody's file.
-fn link_to(target: &Path, link: &Path) -> Result<(), Box<dyn Error>> {
-    if link.is_symlink() {
-        std::fs::remove_file(link)?;
-    }
-    std::os::unix::fs::symlink(target, link).map_err(|error| format!("{}: {error}", link.display()).into())
-}
-
 /// Listens where it is said, or at this port of this machine, and says where.
 fn listen(arguments: &Arguments, port: u16) -> Result<TcpListener, Box<dyn Error>> {
     let at = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{port}"));
-    let listener = TcpListener::bind(&at).map_err(|error| {
-        format!("cannot listen at {at}: {error}; --listen 127.0.0.1:0 takes any free port")
-    })?;
+    let listener = command_line::listen(&at)?;
     say(&format!("listening tcp {}", listener.local_addr()?));
     Ok(listener)
 }
@@ -275,10 +242,4 @@ fn tell(event: Event) {
             say(&format!("closed rejected={} {rejections:?}", rejections.total()))
         }
     }
-}
-
-fn say(line: &str) {
-    let mut out = std::io::stdout().lock();
-    // Nobody reads: nothing to do about it, the controller goes on.
-    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
 }

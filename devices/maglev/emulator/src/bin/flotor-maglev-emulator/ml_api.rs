@@ -1,9 +1,10 @@
 //! The ML API: a flotor on its stator or in a hand, and the server its clients connect to.
 
-use super::{Arguments, TransportOption, listen, say};
+use super::{Arguments, TransportOption, listen};
 use crate::plant::LoadedPlant;
 use crate::stator::{OnStator, Press, Pressed};
 use clap::{Args, ValueEnum};
+use flotor_emulation::command_line::{say, within};
 use flotor_hal::Refusal;
 use flotor_maglev::ml_api::PORT;
 use flotor_maglev_emulator::ml_api::server::Hub;
@@ -88,7 +89,7 @@ enum SilenceOption {
 }
 
 fn watchdog_ms(text: &str) -> Result<f64, String> {
-    super::within(text, 1.0, 60_000.0, "ms")
+    within(text, 1.0, 60_000.0, "ms")
 }
 
 impl MlApiArguments {
@@ -139,7 +140,7 @@ pub(crate) fn serve(plant: LoadedPlant, pace: Pace, arguments: &Arguments) -> Re
         let reason = "the ML API serves any number of clients over TCP; remove --once and --transport";
         return Err(Refusal::parameter(reason).into());
     }
-    if options.hand == HandOption::None && arguments.calibration_rig.is_none() {
+    if options.hand == HandOption::None && arguments.rig.rig().is_none() {
         return run(Pressed::new(OnStator::new(plant), &options.presses), pace, false, arguments);
     }
     run(Pressed::new(plant, &options.presses), pace, pace == Pace::Lockstep, arguments)

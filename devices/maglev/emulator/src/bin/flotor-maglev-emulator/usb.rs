@@ -1,7 +1,8 @@
 //! The controller as a device on this machine's own USB.
 
-use super::{Arguments, say, tell};
+use super::{Arguments, tell};
 use crate::plant::LoadedPlant;
+use flotor_emulation::command_line::say;
 use flotor_maglev_emulator::Emulator;
 use flotor_maglev_emulator::gadget::{Gadget, Personality};
 use std::error::Error;

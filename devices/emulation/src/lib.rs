@@ -1,0 +1,9 @@
+//! What the emulators of devices share.
+//!
+//! - [`command_line`]: numbers with limits, lines of output, a socket, a name for a terminal.
+//! - [`rig`]: the rig of the vertical calibration: a stand that comes down step by step, and a force sensor.
+//!
+//! Not real-time.
+
+pub mod command_line;
+pub mod rig;
