@@ -7,6 +7,7 @@
 //! ```
 //!
 //! - [`machine`]: what the device does; pure, with a clock that is passed in.
+//! - [`rig`]: a device in the rig of the vertical calibration, whose motors deliver less or more than they are told.
 //! - [`in_process`], [`server`], [`gadget`]: the three ways.
 //!
 //! It has no firmware of the maker's: any bytes are loaded and run the one that is written here. Not real-time.
@@ -15,4 +16,5 @@
 pub mod gadget;
 pub mod in_process;
 pub mod machine;
+pub mod rig;
 pub mod server;

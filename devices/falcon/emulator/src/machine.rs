@@ -1,10 +1,11 @@
 //! The device behind its USB endpoints: what it answers to requests and bytes, and when a packet is due.
 
+use flotor_emulation::rig::Stand;
 use flotor_falcon::boot::{AGREED, LOAD_DIVISOR, PROMPT, PROMPT_ANSWER, PROMPT_DIVISOR, RUN_DIVISOR};
 use flotor_falcon::chip::{PAYLOAD_BYTES, Request};
 use flotor_falcon::kinematics::{CENTRE_M, angles_rad, counts, inverse, posture};
 use flotor_falcon::protocol::{ALL_HOMED, Command, Frames, Heard, Homing, Report};
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, VerticalCalibration};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -69,29 +70,40 @@ enum Stage {
     Running,
 }
 
-/// Where the hand moves the handle: to and fro about a place, in the maker's frame.
+/// Where hand or stand have the handle, in the maker's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
-    /// The middle, m.
-    pub centre_m: DVec3,
-    /// From there to the ends, m.
-    pub amplitude_m: DVec3,
-    /// How often, Hz.
-    pub frequency_hz: f64,
+pub enum Motion {
+    /// A hand moves it to and fro.
+    ToAndFro {
+        /// The middle, m.
+        centre_m: DVec3,
+        /// From there to the ends, m.
+        amplitude_m: DVec3,
+        /// How often, Hz.
+        frequency_hz: f64,
+    },
+    /// The stand of a calibration rig holds it, above and below the centre of the range. Its time goes on by a millisecond
+    /// a command, so that a delayed host misses no stop.
+    OnStand(Stand),
 }
 
 impl Motion {
     /// A handle that is held at a place, m.
     #[must_use]
     pub fn held(place_m: DVec3) -> Self {
-        Self { centre_m: place_m, amplitude_m: DVec3::ZERO, frequency_hz: 0.0 }
+        Self::ToAndFro { centre_m: place_m, amplitude_m: DVec3::ZERO, frequency_hz: 0.0 }
     }
 
-    /// Where the handle is, m.
-    #[must_use]
-    pub fn place_m(&self, at: Duration) -> DVec3 {
-        let phase = std::f64::consts::TAU * self.frequency_hz * at.as_secs_f64();
-        self.centre_m + self.amplitude_m * flotor_hal::math::sin(phase)
+    /// Where the handle is at a time, and after so many commands, m.
+    fn place_m(&self, at: Duration, commands: u64) -> DVec3 {
+        match self {
+            Self::ToAndFro { centre_m, amplitude_m, frequency_hz } => {
+                let phase = std::f64::consts::TAU * frequency_hz * at.as_secs_f64();
+                *centre_m + *amplitude_m * flotor_hal::math::sin(phase)
+            }
+            // Up is y.
+            Self::OnStand(stand) => CENTRE_M + DVec3::Y * stand.height_m(Duration::from_millis(commands)),
+        }
     }
 }
 
@@ -99,6 +111,8 @@ impl Motion {
 #[derive(Clone, Debug)]
 pub struct Machine {
     motion: Motion,
+    /// Share of a vertical force that arrives, by the height above the centre of the range.
+    share: VerticalCalibration,
     /// Buttons that the hand presses.
     buttons: u32,
     fault: Option<Fault>,
@@ -127,6 +141,7 @@ impl Machine {
         };
         Self {
             motion,
+            share: VerticalCalibration::NONE,
             buttons: 0,
             fault: None,
             stage,
@@ -154,6 +169,11 @@ impl Machine {
         (self.motion, self.buttons) = (motion, buttons);
     }
 
+    /// Of a vertical force arrives this share from now on, by the height above the centre of the range.
+    pub fn delivers(&mut self, share: VerticalCalibration) {
+        self.share = share;
+    }
+
     /// The newest command.
     #[must_use]
     pub fn command(&self) -> Command {
@@ -175,9 +195,11 @@ impl Machine {
     /// Force of the motors on the hand, N, in the maker's frame; `None` where the linkage has no posture.
     #[must_use]
     pub fn force_n(&self, at: Duration) -> Option<DVec3> {
-        let angles = inverse(self.motion.place_m(at))?;
+        let place_m = self.motion.place_m(at, self.commands);
         let torques_nm = DVec3::from_array(self.command.motors.map(f64::from)) / -WORDS_PER_NM;
-        Some(posture(angles, CENTRE_M)?.force_n(torques_nm))
+        let force_n = posture(inverse(place_m)?, CENTRE_M)?.force_n(torques_nm);
+        // Up is y.
+        Some(force_n.with_y(force_n.y * self.share.share(place_m.y - CENTRE_M.y)))
     }
 
     /// A request of the host to the chip; what it answers, or nothing to what is no request of its.
@@ -292,7 +314,7 @@ impl Machine {
         }
         let (mut homed, mut encoders) = (self.homed, [0; 3]);
         if homed == ALL_HOMED {
-            encoders = inverse(self.motion.place_m(at)).map_or([0; 3], counts);
+            encoders = inverse(self.motion.place_m(at, self.commands)).map_or([0; 3], counts);
         }
         match self.fault {
             Some(Fault::HubReset(first)) if since(first) => {

@@ -1,22 +1,23 @@
 //! A Novint Falcon without hardware: `flotor emulate falcon` starts it.
 
 use clap::{Parser, ValueEnum};
+use flotor_emulation::command_line::{listen, say, within};
+use flotor_emulation::rig::RigArguments;
 use flotor_falcon::kinematics::CENTRE_M;
 use flotor_falcon_emulator::in_process::InProcess;
 use flotor_falcon_emulator::machine::{Machine, Motion, Power};
-use flotor_falcon_emulator::server;
+use flotor_falcon_emulator::{rig, server};
 use flotor_hal::DVec3;
 use std::error::Error;
-use std::io::Write;
-use std::net::TcpListener;
 use std::process::ExitCode;
 
 /// Emulate a Novint Falcon: a hand moves its handle up and down.
 #[derive(Parser)]
 #[command(name = "flotor emulate falcon", version, max_term_width = 110)]
-#[command(after_help = "The first line on standard output says where it is.\n\nExamples:\n  \
+#[command(after_help = "A line on standard output says where it is.\n\nExamples:\n  \
     flotor emulate falcon\n  \
-    sudo modprobe vhci_hcd && sudo flotor emulate falcon --transport usb --power off")]
+    sudo modprobe vhci_hcd && sudo flotor emulate falcon --transport usb --power off\n  \
+    flotor emulate falcon --calibration-rig /tmp/flotor-force")]
 struct Arguments {
     /// What the host connects by
     #[arg(long, value_enum, default_value = "tcp")]
@@ -33,9 +34,23 @@ struct Arguments {
     /// How often the handle goes up and down, in Hz
     #[arg(long, default_value_t = 0.5, value_name = "HZ", value_parser = frequency_hz)]
     frequency_hz: f64,
+    #[command(flatten)]
+    rig: RigArguments,
     /// End when the first host is gone
     #[arg(long)]
     once: bool,
+}
+
+impl Arguments {
+    /// What the hand does.
+    fn motion(&self) -> Motion {
+        // Up is y in the maker's frame.
+        Motion::ToAndFro {
+            centre_m: CENTRE_M,
+            amplitude_m: DVec3::Y * (self.amplitude_mm * 1.0e-3),
+            frequency_hz: self.frequency_hz,
+        }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -63,15 +78,6 @@ fn frequency_hz(text: &str) -> Result<f64, String> {
     within(text, 0.0, 10.0, "Hz")
 }
 
-fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
-    let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
-    if (least..=most).contains(&number) {
-        Ok(number)
-    } else {
-        Err(format!("must be {least} to {most} {unit}"))
-    }
-}
-
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -87,21 +93,17 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         PowerOption::Off => Power::Off,
         PowerOption::On => Power::On,
     };
-    // Up is y in the maker's frame.
-    let motion = Motion {
-        centre_m: CENTRE_M,
-        amplitude_m: DVec3::Y * (arguments.amplitude_mm * 1.0e-3),
-        frequency_hz: arguments.frequency_hz,
+    let device = match arguments.rig.rig() {
+        Some((link, stand)) => {
+            let (device, sensor) = rig::device_on(stand, link, power)?;
+            say(&format!("force-sensor {}", sensor.display()));
+            device
+        }
+        None => InProcess::new(Machine::new(power, arguments.motion())),
     };
-    let device = InProcess::new(Machine::new(power, motion));
     match arguments.transport {
         TransportOption::Tcp => {
-            let listener = TcpListener::bind(&arguments.listen).map_err(|error| {
-                format!(
-                    "cannot listen at {}: {error}; --listen 127.0.0.1:0 takes any free port",
-                    arguments.listen
-                )
-            })?;
+            let listener = listen(&arguments.listen)?;
             say(&format!("listening tcp:{}", listener.local_addr()?));
             loop {
                 let (stream, _) = listener.accept()?;
@@ -122,10 +124,4 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             Ok(())
         }
     }
-}
-
-fn say(line: &str) {
-    let mut out = std::io::stdout().lock();
-    // Nobody reads: nothing to do about it, the device goes on.
-    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
 }

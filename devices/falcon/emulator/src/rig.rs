@@ -1,0 +1,49 @@
+//! A device in the rig of the vertical calibration: the stand holds its handle, its motors deliver more or less than they
+//! are told, and a force sensor feels the difference to the weight.
+
+use crate::in_process::InProcess;
+use crate::machine::{Machine, Motion, Power};
+use flotor_emulation::rig::{Stand, serve};
+use flotor_hal::VerticalCalibration;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+/// Delivered over commanded force: `1.04 - 0.004 z - 0.0006 z²`, z in mm, as made up for this rig.
+const SHARE_PER_M: [f64; 3] = [1.04, -4.0, -600.0];
+/// Where that holds, m: what the stand goes through. Beyond, the share is that at the end.
+const RANGE_M: [f64; 2] = [-7.0e-3, 7.0e-3];
+/// Weight of handle, plate and screws on the arms, N, likewise made up.
+pub const WEIGHT_N: f64 = 1.5;
+
+/// Difference of the largest and the smallest share over the range, percent: `1.04 + 0.004²/(4 0.0006)` at -3.33 mm, less
+/// 0.9826 at 7 mm.
+pub const ERROR_PERCENT: f64 = 6.406_666_7;
+
+/// A device in the rig, with a force sensor of this name; and the name of its terminal.
+///
+/// # Errors
+/// What the system says of a pseudo terminal.
+pub fn device_on(stand: Stand, link: &Path, power: Power) -> Result<(InProcess, PathBuf), Box<dyn Error>> {
+    let mut machine = Machine::new(power, Motion::OnStand(stand));
+    machine.delivers(VerticalCalibration::new(RANGE_M, &SHARE_PER_M)?);
+    let device = InProcess::new(machine);
+    let felt = device.clone();
+    // Arms without a posture exert nothing that is known.
+    let force_n = move || felt.machine().force_n(felt.now()).map_or(0.0, |force_n| force_n.y) - WEIGHT_N;
+    let name = serve(link, force_n)?;
+    Ok((device, name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_is_the_one_that_is_told() {
+        let share = VerticalCalibration::new(RANGE_M, &SHARE_PER_M).expect("it is a calibration");
+        let shares = || (-7000..=7000).map(|um| share.share(f64::from(um) * 1.0e-6));
+        let (least, most) = (shares().fold(f64::INFINITY, f64::min), shares().fold(0.0, f64::max));
+        // A micrometre beside the largest is 6e-10 less.
+        assert!(((most - least) * 100.0 - ERROR_PERCENT).abs() < 1.0e-6, "{least} {most}");
+    }
+}
