@@ -66,13 +66,24 @@ pub enum CalibrationError {
     },
     /// The plan asks for more than the device gives: what is cut off would be fitted as a loss.
     #[error(
-        "the plan needs {command_n} N; device and host exert at most {most_n} N in a calibration: plan smaller forces"
+        "the plan needs {command_n} N; device and host exert at most {most_n} N in a calibration: plan smaller forces (--force)"
     )]
     TooStrong {
         /// What the plan asks for, N.
         command_n: f64,
         /// The less of what the device declares and the host's ceiling, N.
         most_n: f64,
+    },
+    /// The device cut off what was commanded.
+    #[error(
+        "the device exerts less than the {command_n} N of the plan at {height_mm:.1} mm (it is saturated): plan smaller forces \
+         (--force)"
+    )]
+    Saturated {
+        /// What was commanded, N.
+        command_n: f64,
+        /// Where, mm.
+        height_mm: f64,
     },
     /// Somebody stopped it.
     #[error("calibration aborted; handle lowered, no file written")]

@@ -63,7 +63,7 @@ enum Role {
 }
 
 use Role::{
-    Cable, Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab,
+    Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab,
     Live, OfDevices, OfEmulators, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
     StudyProgram, Sync, Tests, Viewer,
 };

@@ -85,9 +85,9 @@ fn refused(error: CalibrationError) -> CommandError {
         CalibrationError::Setting(_) | CalibrationError::Refused(_) => {
             CommandError::PluginRefused(error.to_string())
         }
-        CalibrationError::TooFew { .. } | CalibrationError::TooStrong { .. } => {
-            CommandError::Usage(error.to_string())
-        }
+        CalibrationError::TooFew { .. }
+        | CalibrationError::TooStrong { .. }
+        | CalibrationError::Saturated { .. } => CommandError::Usage(error.to_string()),
         other => CommandError::Failed(other.to_string()),
     }
 }

@@ -1,11 +1,11 @@
 //! `flotor calibrate verify`: the error of the vertical force without and with a file.
 
-use super::refused;
 use super::rig::RigArguments;
+use super::{FORCES_N, refused};
 use crate::procedure::{Plan, measure};
 use crate::verify::{ErrorCurve, PROBE_N};
 use clap::Args;
-use flotor_command::options::JsonOption;
+use flotor_command::options::{JsonOption, number};
 use flotor_command::{CommandError, print_result, progress_bar, style};
 use flotor_hal::VerticalCalibration;
 use flotor_session::calibration_file::{CalibrationFile, CalibrationFileError};
@@ -21,6 +21,9 @@ pub(super) struct VerifyArguments {
     file: PathBuf,
     #[command(flatten)]
     rig: RigArguments,
+    /// Commanded vertical force in N
+    #[arg(long, value_name = "N", default_value_t = PROBE_N, conflicts_with = "simulated", value_parser = number("N", "force", FORCES_N), allow_hyphen_values = true)]
+    force: f64,
     #[command(flatten)]
     json: JsonOption,
 }
@@ -78,9 +81,10 @@ fn device(
     file: &CalibrationFile,
     calibration: &VerticalCalibration,
 ) -> Result<[f64; 2], CommandError> {
-    let plan = Plan { forces_n: vec![PROBE_N], runs: 1, ..Plan::thesis() };
+    let plan = Plan { forces_n: vec![arguments.force], runs: 1, ..Plan::thesis() };
     let (mut rig, progress) = arguments.rig.device_rig(2 * plan.stops())?;
     check(arguments, file, rig.serial())?;
+    rig.check(&plan).map_err(refused)?;
     let mut errors = [0.0; 2];
     for (error, calibration) in errors.iter_mut().zip([&VerticalCalibration::NONE, calibration]) {
         rig.calibrate(calibration).map_err(refused)?;

@@ -1,6 +1,6 @@
 //! A real device with a force sensor on a serial port. Somebody, or something, lowers the sensor.
 
-use super::holder::{Guard, Holder, Holding, REST_M};
+use super::holder::{Guard, Holder, Holding, REST_M, STEADY_N};
 use super::{PERIOD_NS, Rest, Rig};
 use crate::CalibrationError;
 use crate::procedure::Plan;
@@ -158,6 +158,11 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
             let report = self.holder()?.look()?;
             let is_close = (report.height_m - target_m).abs() <= close_m;
             if report.state == Holding::Steady(command_n) && is_close && report.moved_m <= REST_M {
+                // Saturated alone may be in another axis: a coil that holds the locked ones, for a tick.
+                if report.saturated > 0 && report.delivered_n < command_n - STEADY_N {
+                    let height_mm = report.height_m * 1.0e3;
+                    return Err(CalibrationError::Saturated { command_n, height_mm });
+                }
                 self.tell(None)?;
                 self.restless = report.restless;
                 return Ok(Rest { height_m: report.height_m, delivered_n: report.delivered_n });

@@ -8,7 +8,7 @@ use super::{AVERAGED_TICKS, Mean, PERIOD_NS, locked};
 use crate::CalibrationError;
 use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
-use flotor_hal::{Cycle, DeviceState, Fault, Tick};
+use flotor_hal::{Conditions, Cycle, DeviceState, Fault, Tick};
 use flotor_servo::{
     EmergencySource, Envelope, Gate, Heartbeat, LastStop, Place, PlausibilityCheck, StopSwitch, Trust,
     enter_real_time, start_watchdog,
@@ -26,7 +26,7 @@ const RUNAWAY_M_PER_S: f64 = 0.1;
 pub(super) const REST_M: f64 = 10.0e-6;
 /// Delivered force of two means after each other that is the same force, N: the noise of the sensor. A single tick without
 /// the force, as a delayed host causes it, is five times that.
-const STEADY_N: f64 = 0.02;
+pub(super) const STEADY_N: f64 = 0.02;
 /// Damping that stops it, N·s/m (the locked axes').
 const BRAKE_NS_PER_M: f64 = 15.0;
 /// Ticks without a new sample after which there is no force: nobody knows where the handle is (10 ms, as in a run).
@@ -75,9 +75,11 @@ pub(super) struct Report {
     pub(super) means: u64,
     /// How many of them were of another height or force than the one before.
     pub(super) restless: u64,
+    /// In how many of the ticks of the last two means the device said it exerts less than it was told.
+    pub(super) saturated: u64,
 }
 
-const REPORT_WORDS: usize = 7;
+const REPORT_WORDS: usize = 8;
 
 impl Words<REPORT_WORDS> for Report {
     fn to_words(&self) -> [u64; REPORT_WORDS] {
@@ -88,10 +90,11 @@ impl Words<REPORT_WORDS> for Report {
             Holding::Faulted(fault) => (3, u64::from(fault as u32)),
         };
         let [height, moved, delivered] = [self.height_m, self.moved_m, self.delivered_n].map(f64::to_bits);
-        [kind, detail, height, moved, delivered, self.means, self.restless]
+        [kind, detail, height, moved, delivered, self.means, self.restless, self.saturated]
     }
 
-    fn from_words(&[kind, detail, height, moved, delivered, means, restless]: &[u64; REPORT_WORDS]) -> Self {
+    fn from_words(words: &[u64; REPORT_WORDS]) -> Self {
+        let &[kind, detail, height, moved, delivered, means, restless, saturated] = words;
         let state = match kind {
             0 => Holding::Changing,
             1 => Holding::Steady(f64::from_bits(detail)),
@@ -102,7 +105,7 @@ impl Words<REPORT_WORDS> for Report {
             }
         };
         let [height_m, moved_m, delivered_n] = [height, moved, delivered].map(f64::from_bits);
-        Self { state, height_m, moved_m, delivered_n, means, restless }
+        Self { state, height_m, moved_m, delivered_n, means, restless, saturated }
     }
 }
 
@@ -265,7 +268,7 @@ fn hold(
             averages.begin_anew();
         }
         if read == Cycle::Fresh {
-            averages.add(state.pose.position().z, state.delivered.force().z);
+            averages.add(&state);
         }
         let speed_m_per_s = state.twist.linear().z;
         ran_away |= speed_m_per_s.abs() > RUNAWAY_M_PER_S;
@@ -317,6 +320,8 @@ struct Averages {
     samples: u64,
     means: u64,
     restless: u64,
+    /// Saturated ticks of the mean that grows, and of the last two.
+    saturated: [u64; 3],
 }
 
 impl Averages {
@@ -329,9 +334,10 @@ impl Averages {
         self.full.is_some()
     }
 
-    fn add(&mut self, height_m: f64, delivered_n: f64) {
-        self.height_m.add(height_m);
-        self.delivered_n.add(delivered_n);
+    fn add(&mut self, state: &DeviceState) {
+        self.height_m.add(state.pose.position().z);
+        self.delivered_n.add(state.delivered.force().z);
+        self.saturated[0] += u64::from(state.conditions.contains(Conditions::SATURATED));
         self.samples += 1;
         if self.samples == AVERAGED_TICKS {
             let mean = (self.height_m.value(), self.delivered_n.value());
@@ -339,6 +345,8 @@ impl Averages {
             self.last = Some(mean);
             (self.height_m, self.delivered_n, self.samples) = (Mean::default(), Mean::default(), 0);
             self.means += 1;
+            let [now, last, _] = self.saturated;
+            self.saturated = [0, now, last];
             let is_at_rest = self.full.is_some_and(|[(height_m, delivered_n), (before_m, before_n)]| {
                 (height_m - before_m).abs() <= REST_M && (delivered_n - before_n).abs() <= STEADY_N
             });
@@ -348,14 +356,16 @@ impl Averages {
 
     fn report(&self, state: Holding) -> Report {
         let (means, restless) = (self.means, self.restless);
+        let [_, last, before] = self.saturated;
+        let saturated = last + before;
         match self.full {
             Some([(height_m, delivered_n), (before_m, _)]) => {
                 let moved_m = (height_m - before_m).abs();
-                Report { state, height_m, moved_m, delivered_n, means, restless }
+                Report { state, height_m, moved_m, delivered_n, means, restless, saturated }
             }
             None => {
                 let (height_m, moved_m) = (self.height_m.value(), f64::INFINITY);
-                Report { state, height_m, moved_m, delivered_n: 0.0, means, restless }
+                Report { state, height_m, moved_m, delivered_n: 0.0, means, restless, saturated }
             }
         }
     }
