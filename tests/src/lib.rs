@@ -8,6 +8,7 @@ pub mod process;
 pub mod program;
 pub mod scratch;
 pub mod side_by_side;
+pub mod stand_in;
 pub mod tables;
 pub mod tools;
 pub mod watched;

@@ -10,8 +10,7 @@ use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
 use flotor_session::{Observer, RunError, RunOptions, Session};
-use flotor_tests::library::{plugin_file, rules_of_a_device};
-use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::stand_in::assert_every_rule_holds;
 use flotor_tests::workspace_root;
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
@@ -115,11 +114,5 @@ fn a_scene_that_wants_more_than_the_plane_is_told_before_anything_moves() {
 #[test]
 fn with_a_board_every_rule_is_checked_and_holds() {
     let board = Board::start();
-    let library = plugin_file("flotor-haply").display().to_string();
-    let port = format!("port={}", board.path);
-    let ran =
-        Flotor::with(["validate", &library, "--timeout", "60s", "--set", &port, "--set", "timeout_ms=9000"]);
-    let ran = ran.run();
-    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
-    assert_eq!(ran.stdout.matches("  ok ").count(), rules_of_a_device(), "{}", ran.stdout);
+    assert_every_rule_holds("flotor-haply", &[&format!("port={}", board.path), "timeout_ms=9000"]);
 }

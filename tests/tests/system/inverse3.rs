@@ -4,9 +4,9 @@
 use super::services::Service;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, Tick, Wrench};
-use flotor_tests::library::{plugin_file, rules_of_a_device};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::stand_in::{assert_every_rule_holds, assert_runs_with_force, demo_on};
 use flotor_tests::workspace_root;
 use rustix::process::Signal;
 use std::time::{Duration, Instant};
@@ -78,31 +78,10 @@ fn a_push_along_each_axis_is_felt_and_moves_the_flotor_along_it() {
 /// The demo with the two lines of the device changed.
 #[test]
 fn the_demo_runs_on_it_with_two_changed_lines() {
-    let text = std::fs::read_to_string(workspace_root().join("host/scenes/demo.toml")).expect("it is there");
-    let service = Service::start(&[]);
-    let changed = text
-        .replace("plugin = \"simulated\"", "plugin = \"inverse3\"")
-        .replace("preset = \"plain\"", &format!("address = \"{}\"", service.simulation));
-    let differing = text.lines().zip(changed.lines()).filter(|(before, after)| before != after).count();
-    assert_eq!(differing, 2);
-    let scratch = Scratch::default();
-    let (scene, json) = (scratch.file("demo.toml", changed), scratch.path().join("run.json"));
-    let json_path = json.display().to_string();
-    let ran = Flotor::with([
-        "run",
-        &scene.display().to_string(),
-        "--duration",
-        "2s",
-        "--set",
-        "device.timeout_ms=9000",
-        "--json",
-        &json_path,
-    ])
-    .run();
-    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
-    let summary = std::fs::read_to_string(&json).expect("it was requested");
-    let summary: serde_json::Value = serde_json::from_str(&summary).expect("it is JSON");
-    assert!(summary["peak_force_n"].as_f64().is_some_and(|peak_n| peak_n > 0.1), "{summary}");
+    let (service, scratch) = (Service::start(&[]), Scratch::default());
+    let scene = demo_on(&scratch, "inverse3", &format!("address = \"{}\"", service.simulation));
+    let long = ["--duration", "2s", "--set", "device.timeout_ms=9000"];
+    assert_runs_with_force(&scratch, &[&[&*scene], &long[..]].concat(), &[]);
     let said = service.end();
     assert!(said.contains("asked for"), "{said}");
 }
@@ -110,21 +89,8 @@ fn the_demo_runs_on_it_with_two_changed_lines() {
 #[test]
 fn with_the_service_every_rule_is_checked_and_holds() {
     let service = Service::start(&[]);
-    let library = plugin_file("flotor-inverse3").display().to_string();
     let address = format!("address={}", service.simulation);
-    let ran = Flotor::with([
-        "validate",
-        &library,
-        "--timeout",
-        "60s",
-        "--set",
-        &address,
-        "--set",
-        "timeout_ms=9000",
-    ]);
-    let ran = ran.run();
-    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
-    assert_eq!(ran.stdout.matches("  ok ").count(), rules_of_a_device(), "{}", ran.stdout);
+    assert_every_rule_holds("flotor-inverse3", &[&address, "timeout_ms=9000"]);
 }
 
 #[test]

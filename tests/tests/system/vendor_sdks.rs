@@ -7,6 +7,7 @@ use flotor_record::Recording;
 use flotor_tests::library::{build_folder, compile_c_file, plugin_file, rules_of_a_device};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::stand_in::{assert_runs_with_force, demo_on};
 use flotor_tests::tools::{self, Tool};
 use flotor_tests::{TestSize, workspace_root};
 use std::path::{Path, PathBuf};
@@ -180,26 +181,11 @@ fn a_press_along_each_axis_moves_the_simulated_flotor_along_it_and_comes_back() 
 
 #[test]
 fn the_demo_runs_on_each_with_two_changed_lines() {
+    let folder = build_folder().join("deps").display().to_string();
     for api in APIS {
         let scratch = Scratch::default();
-        let demo = workspace_root().join("host/scenes/demo.toml");
-        let demo = std::fs::read_to_string(demo).expect("the scene is there");
-        let changed = demo
-            .replace("plugin = \"simulated\"", &format!("plugin = \"{}\"", api.id))
-            .replace("preset = \"plain\"", "stand_in = true");
-        let differ = demo.lines().zip(changed.lines()).filter(|(before, after)| before != after).count();
-        assert_eq!(differ, 2, "{changed}");
-        let scene = scratch.file("demo.toml", changed).display().to_string();
-        let folder = build_folder().join("deps").display().to_string();
-        let json = scratch.path().join("run.json");
-        let ran = Flotor::with(["run", &scene, "--duration", "1s", "--json", &json.display().to_string()])
-            .env("LD_LIBRARY_PATH", &folder)
-            .run();
-        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-        let json = std::fs::read_to_string(json).expect("a summary was requested");
-        let json: serde_json::Value = serde_json::from_str(&json).expect("it is JSON");
-        assert_eq!(json["end"], "finished", "{json}");
-        assert!(json["peak_force_n"].as_f64().is_some_and(|peak_n| peak_n > 0.1), "{json}");
+        let scene = demo_on(&scratch, api.id, "stand_in = true");
+        assert_runs_with_force(&scratch, &[&scene, "--duration", "1s"], &[("LD_LIBRARY_PATH", &folder)]);
     }
 }
 
