@@ -55,7 +55,7 @@ mod friction;
 mod tilt;
 
 /// What the evaluations of a tick may cost, in evaluations of an energy, before the last begins.
-const MOST_COST: u32 = 50;
+const MOST_COST: u32 = 180;
 /// Evaluations of the law per tick at most.
 const MOST_EVALUATIONS: u32 = 24;
 /// Change of the tilt that counts as none (rad), of a law that leaves nothing open.

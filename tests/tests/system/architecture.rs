@@ -63,8 +63,8 @@ enum Role {
 }
 
 use Role::{
-    Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab,
-    Live, OfDevices, OfEmulators, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
+    Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab, Live,
+    OfDevices, OfEmulators, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
     StudyProgram, Sync, Tests, Viewer,
 };
 
