@@ -1,15 +1,19 @@
-//! A force that swings between its limits: a loop that is unstable, such as a stiffness the device cannot render. It is damped
-//! first; if it goes on, the run has to end, whether anybody watches or not.
+//! Detects a force that alternates between its limits: the sign of an unstable loop, for example of a stiffness that the device
+//! cannot render. It is damped first; if it goes on, the run has to end, whether anybody watches or not.
 //!
-//! What counts is a reversal at the limits: what is requested is cut, and points against what was cut before. A hand between two
-//! stiff walls makes a few in a second; an unstable loop makes tens.
+//! What counts is a reversal at the limits: what is requested is cut, and points against what was cut before, at a place the
+//! handle has moved to since. A hand between two stiff walls makes a few in a second; an unstable loop makes tens. Noise of a model
+//! reverses the force in every tick and moves the handle by micrometres: the limits alone meet it.
 
-use flotor_hal::{DVec3, Wrench};
+use flotor_hal::{DQuat, DVec3, Pose, Wrench};
 
 /// Reversals in a row that are an oscillation.
 const REVERSALS: usize = 10;
 /// The time in which they come, ns: 10 Hz and more, which no hand makes against the full force of a device.
 const WINDOW_NS: u64 = 500_000_000;
+/// Way of the handle, m, or its turn, rad, between two reversals that count.
+const LEAST_WAY_M: f64 = 0.1e-3;
+const LEAST_TURN_RAD: f64 = 1.0e-3;
 /// What is left of the force while it is damped.
 const DAMPED: f64 = 0.25;
 /// Time without a reversal after which the force comes back, and the time it takes to, ns.
@@ -20,18 +24,22 @@ const RETURN_NS: u64 = 1_000_000_000;
 #[derive(Clone, Copy, Debug)]
 struct Swing {
     last: DVec3,
+    /// Where the handle was at the last reversal that counted.
+    last_pose: Pose,
     times_ns: [u64; REVERSALS],
     count: usize,
 }
 
 impl Swing {
-    const NONE: Swing = Swing { last: DVec3::ZERO, times_ns: [0; REVERSALS], count: 0 };
+    const NONE: Swing =
+        Swing { last: DVec3::ZERO, last_pose: Pose::HOME, times_ns: [0; REVERSALS], count: 0 };
 
-    /// Takes in what was cut; true if that was a reversal.
-    fn note(&mut self, cut: DVec3, now_ns: u64) -> bool {
-        let is_reversal = cut.dot(self.last) < 0.0;
+    /// Takes in what was cut, and where; true if that was a reversal that counts.
+    fn note(&mut self, cut: DVec3, pose: &Pose, now_ns: u64) -> bool {
+        let is_reversal = cut.dot(self.last) < 0.0 && has_moved(&self.last_pose, pose);
         self.last = cut;
         if is_reversal {
+            self.last_pose = *pose;
             if let Some(time_ns) = self.times_ns.get_mut(self.count % REVERSALS) {
                 *time_ns = now_ns;
             }
@@ -49,6 +57,15 @@ impl Swing {
         }
         is_one
     }
+}
+
+/// Whether a handle has moved or turned far enough for a reversal to be one of the loop.
+fn has_moved(from: &Pose, to: &Pose) -> bool {
+    let way_m = (to.position() - from.position()).length();
+    let turn: DQuat = from.orientation().conjugate() * to.orientation();
+    // Of a small turn the vector part of the quaternion is half the angle.
+    let turn_rad = 2.0 * turn.xyz().length();
+    way_m >= LEAST_WAY_M || turn_rad >= LEAST_TURN_RAD
 }
 
 /// How the force is let through.
@@ -74,17 +91,22 @@ impl Oscillation {
     pub const NONE: Oscillation =
         Oscillation { force: Swing::NONE, torque: Swing::NONE, stage: Stage::Whole };
 
-    /// Takes in a wrench whose force or torque, by these, had to be cut. Real-time: bounded, no allocation.
+    /// Takes in a wrench whose force or torque, by these, had to be cut, and where the handle was. Real-time: bounded, no allocation.
     #[inline(never)] // seldom called
-    pub fn note(&mut self, wrench: &Wrench, cuts_force: bool, cuts_torque: bool, now_ns: u64) {
-        let force = cuts_force && self.force.note(wrench.force(), now_ns);
-        let torque = cuts_torque && self.torque.note(wrench.torque(), now_ns);
+    pub fn note(&mut self, wrench: &Wrench, cut: [bool; 2], pose: &Pose, now_ns: u64) {
+        let [cuts_force, cuts_torque] = cut;
+        let force = cuts_force && self.force.note(wrench.force(), pose, now_ns);
+        let torque = cuts_torque && self.torque.note(wrench.torque(), pose, now_ns);
         if !(force || torque) {
             return;
         }
         let is_one = self.force.is_oscillation(now_ns) | self.torque.is_oscillation(now_ns);
         self.stage = match self.stage {
-            Stage::Whole if is_one => Stage::Damped { since_ns: now_ns },
+            Stage::Whole if is_one => {
+                // What goes on in spite of the damping has to show itself anew.
+                (self.force.count, self.torque.count) = (0, 0);
+                Stage::Damped { since_ns: now_ns }
+            }
             Stage::Damped { .. } if is_one => Stage::GivenUp,
             Stage::Damped { .. } => Stage::Damped { since_ns: now_ns },
             stage => stage,
@@ -137,7 +159,8 @@ mod tests {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // seconds of a test
             let now_ns = (now_s * 1.0e9) as u64;
             let wrench = Wrench::new(DVec3::new(0.0, 0.0, 100.0 * sign), DVec3::ZERO);
-            oscillation.note(&wrench, true, false, now_ns);
+            let pose = Pose::new(DVec3::new(0.0, 0.0, 1.0e-3 * sign), DQuat::IDENTITY);
+            oscillation.note(&wrench, [true, false], &pose, now_ns);
             if oscillation.gain(now_ns).is_some() && damped.is_none() {
                 damped = Some(now_s);
             }
@@ -155,6 +178,37 @@ mod tests {
             assert!(damped.is_some_and(|at_s| at_s <= 0.5), "{per_s}: {damped:?}");
             assert!(given_up.is_some_and(|at_s| at_s <= 1.0), "{per_s}: {given_up:?}");
         }
+    }
+
+    /// Where the handle stays, a force that reverses is noise, however often: the limits meet it.
+    /// A torque that reverses one tick after the force is no second sign of the same swing.
+    #[test]
+    fn the_damping_is_tried_where_force_and_torque_swing_together() {
+        let mut oscillation = calm();
+        let (mut damped, mut given_up) = (None, None);
+        for tick in 0..1000_u64 {
+            let sign = |tick: u64| if tick / 10 % 2 == 0 { 1.0 } else { -1.0 };
+            let wrench = Wrench::new(DVec3::Z * sign(tick), DVec3::Z * sign(tick + 9));
+            let pose =
+                Pose::new(DVec3::Z * (1.0e-3 * sign(tick)), DQuat::from_rotation_z(0.01 * sign(tick + 9)));
+            oscillation.note(&wrench, [true, true], &pose, tick * 1_000_000);
+            damped = damped.or(oscillation.gain(tick * 1_000_000).map(|_| tick));
+            given_up = given_up.or(oscillation.is_given_up().then_some(tick));
+        }
+        let between = given_up.expect("it goes on") - damped.expect("it swings");
+        assert!(between >= 50, "{between} ms");
+    }
+
+    #[test]
+    fn a_force_that_does_not_move_the_handle_is_no_oscillation() {
+        let mut oscillation = calm();
+        for tick in 0..2000 {
+            let sign = if tick % 2 == 0 { 1.0 } else { -1.0 };
+            let wrench = Wrench::new(DVec3::Z * sign, DVec3::Z * sign);
+            let pose = Pose::new(DVec3::Z * (0.04e-3 * sign), DQuat::from_rotation_z(0.4e-3 * sign));
+            oscillation.note(&wrench, [true, true], &pose, tick * 1_000_000);
+        }
+        assert_eq!(oscillation.gain(2_000_000_000), None);
     }
 
     #[test]

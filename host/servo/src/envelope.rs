@@ -94,7 +94,7 @@ impl Envelope {
         let walled = self.add_boundary(driven, gate, state, events);
         // Before passivity: what cannot be sent anyway may be too large to be squared.
         let bounded = self.limit_wrench(walled, events);
-        let calmed = self.limit_oscillation(&walled, bounded, tick, events);
+        let calmed = self.limit_oscillation(bounded, state, tick, events);
         let passive = self.limit_energy(calmed, state, events);
         let sent = self.limit_slew(passive, tick, events);
         self.last = sent;
@@ -160,15 +160,14 @@ impl Envelope {
     #[inline]
     fn limit_oscillation(
         &mut self,
-        wanted: &Wrench,
         bounded: Wrench,
+        state: &DeviceState,
         tick: &Tick,
         events: &mut Events,
     ) -> Wrench {
-        let [force, torque] =
-            [Events::FORCE_LIMITED, Events::TORQUE_LIMITED].map(|cut| events.intersects(cut));
-        if force || torque {
-            self.oscillation.note(wanted, force, torque, tick.time_ns);
+        let cut = [Events::FORCE_LIMITED, Events::TORQUE_LIMITED].map(|cut| events.intersects(cut));
+        if cut != [false; 2] {
+            self.oscillation.note(&bounded, cut, &state.pose, tick.time_ns);
         }
         let Some(gain) = self.oscillation.gain(tick.time_ns) else { return bounded };
         events.insert(Events::OSCILLATION_DAMPED);

@@ -77,6 +77,7 @@ fn an_option_of_many_commands_is_the_same_in_each() {
                 "bench",
                 "stress",
                 "study spring",
+                "study power",
                 "study bias",
                 "analyse",
                 "calibrate vertical",

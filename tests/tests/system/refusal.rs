@@ -316,7 +316,10 @@ fn a_device_is_no_model_and_a_model_no_device() {
 fn a_path_without_a_plugin_file_is_a_mistake_in_the_scene_or_command() {
     let scratch = Scratch::default();
     let missing = scratch.path().join("missing.so");
-    for (path, cause) in [(missing, "No such file"), (scratch.folder("folder.so"), "s a directory")] {
+    for (path, cause, verdict) in [
+        (missing, "No such file", "does not exist"),
+        (scratch.folder("folder.so"), "s a directory", "is not a plugin file"),
+    ] {
         let ran = run_scene(&model_scene(&path));
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
         let told = format!("scene.toml:5: {}: cannot read the plugin: ", path.display());
@@ -324,7 +327,7 @@ fn a_path_without_a_plugin_file_is_a_mistake_in_the_scene_or_command() {
         let ran = Flotor::with(["validate".as_ref(), path.as_os_str()]).run();
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
         assert!(
-            ran.error().ends_with("is not a plugin file; `flotor plugins` lists the file of each id"),
+            ran.error().ends_with(&format!("{verdict}; `flotor plugins` lists the file of each id")),
             "{ran:#?}"
         );
     }

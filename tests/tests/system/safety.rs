@@ -306,12 +306,13 @@ fn a_run_that_is_to_outlive_its_terminal_does() {
 #[test]
 fn an_emergency_stop_has_its_exit_code_also_where_the_summary_cannot_be_written() {
     let scratch = Scratch::default();
-    let json = scratch.path().join("missing").join("run.json");
+    let json = scratch.path().join("run.json");
+    std::os::unix::fs::symlink("/dev/full", &json).expect("a link to a disk that is full");
     let flotor = in_real_time(&scratch, &scene("", "", PATIENT), json.as_ref());
     let ran = run_meanwhile(&scratch, flotor, |running| running.signal(Signal::USR1));
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
-    let missing = format!("error: {}: cannot write the JSON: ", json.display());
-    assert!(ran.stderr.lines().any(|line| line.starts_with(&missing)), "{ran:?}");
+    let full = format!("error: {}: cannot write the JSON: ", json.display());
+    assert!(ran.stderr.lines().any(|line| line.starts_with(&full)), "{ran:?}");
     assert!(last_line(&ran).starts_with("error: emergency stop (signal)"), "{ran:?}");
     // Whoever opens the recording learns of it, too.
     let mut recording = Recording::open(&recording_in(&scratch)).expect("a recording");

@@ -7,7 +7,7 @@ use egui::{Color32, CornerRadius, Rect, Sense, Ui, WidgetInfo};
 use flotor_core::trace::Events;
 use std::collections::VecDeque;
 
-/// Stretches of time, at most, that events are told apart in.
+/// Into how many stretches of time, at most, events are sorted.
 const STRETCHES: usize = 400;
 
 /// How bad what happened is, from the worst; each has its colour.

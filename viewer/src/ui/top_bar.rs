@@ -31,7 +31,7 @@ pub enum Mood {
     Well,
     /// It runs, and not as it should.
     Careful,
-    /// It ended by a fault or an emergency stop, or is out of reach.
+    /// It ended by a fault or an emergency stop, or cannot be reached.
     Bad,
 }
 

@@ -74,7 +74,16 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
     let Some(first) = logs.first() else { return Ok(()) };
     // A pilot is analysed before there is anybody to compare it with.
-    if arguments.each || logs.iter().filter(|log| log.complete).count() < 2 {
+    let is_pilot = logs.iter().filter(|log| log.complete).count() < 2;
+    if arguments.each || is_pilot {
+        let needs_all = [&arguments.html, &arguments.csv, &arguments.trials].into_iter().any(Option::is_some);
+        if arguments.blind || needs_all {
+            return Err(CommandError::Usage(
+                "what is told of each subject is not blind and goes into no file but --json; with --blind, --html, --csv or \
+                 --trials, at least two complete sittings are needed, without --each"
+                    .to_owned(),
+            ));
+        }
         return tell_each(arguments, &logs);
     }
     for log in logs.iter().filter(|log| !log.complete) {

@@ -72,8 +72,13 @@ impl LogWriter {
         let next = chain(&self.chain, &text);
         let mut bytes = line(&next, &text).into_bytes();
         bytes.push(b'\n');
+        let before = self.file.metadata().map(|file| file.len());
         let written = self.file.write_all(&bytes).and_then(|()| self.file.sync_data());
-        written.map_err(|cause| LogError::file(&self.path, "cannot write the log", cause))?;
+        if let Err(cause) = written {
+            // A part of a line in the middle would make the whole log unreadable.
+            let _ = before.and_then(|length| self.file.set_len(length));
+            return Err(LogError::file(&self.path, "cannot write the log", cause));
+        }
         self.chain = next;
         Ok(())
     }

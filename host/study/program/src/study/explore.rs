@@ -10,6 +10,7 @@ use flotor_command::{CommandError, note, style};
 use flotor_core::Change;
 use flotor_hal::{Parameter, ParameterKind};
 use flotor_live::Directory;
+use flotor_live::EndKind;
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
@@ -77,7 +78,11 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let (switch, mut observers) = (stop.clone(), Watched { observer: watch, publication: publication.ok() });
     let run = std::thread::spawn(move || {
         let outcome = session.run(&mut observers, &switch);
-        observers.end("the exploration ended", flotor_live::EndKind::InOrder);
+        let is_in_order = outcome.as_ref().is_ok_and(|outcome| {
+            matches!(outcome.end, flotor_servo::RunEnd::Finished | flotor_servo::RunEnd::Stopped)
+        });
+        let kind = if is_in_order { EndKind::InOrder } else { EndKind::Failed };
+        observers.end("the exploration ended", kind);
         outcome
     });
     say!("{}", style::title(&scene.title));

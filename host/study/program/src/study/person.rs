@@ -43,8 +43,9 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     };
     let files =
         (dataset.source_folder(subject).join("motion"), format!("{subject}_task-{}", protocol.task()));
-    // A consent is given once; instructions are read again when the sitting goes on.
-    let consent = common.consent.iter().filter(|_| earlier.is_none());
+    // A consent is given once, before the first trial; instructions are read again when the sitting goes on.
+    let has_begun = earlier.as_ref().is_some_and(|log| !log.trials.is_empty());
+    let consent = common.consent.iter().filter(|_| !has_begun);
     let texts =
         consent.chain(&common.instructions).map(|path| text_of(path)).collect::<Result<Vec<_>, _>>()?;
     let stop = stop_on_signals();

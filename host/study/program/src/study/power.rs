@@ -1,12 +1,11 @@
 //! `flotor study power`: how many subjects a difference experiment needs.
 
 use clap::Args;
-use flotor_command::options::{count, real, whole};
+use flotor_command::options::{JsonOption, count, real, whole};
 use flotor_command::{CommandError, print_result, progress_bar, style};
 use flotor_study::power::{Power, population, power, study};
 use flotor_study::protocol::{JndProtocol, Protocol, SubjectNumber};
 use rayon::prelude::*;
-use std::path::PathBuf;
 
 #[derive(Args)]
 #[command(
@@ -38,9 +37,8 @@ pub(super) struct PowerArguments {
     /// Seed of the answers
     #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
     seed: u64,
-    /// Write the rows as JSON (- for standard output)
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonOption,
 }
 
 /// `8..32`
@@ -91,7 +89,7 @@ pub(super) fn run(arguments: &PowerArguments) -> Result<(), CommandError> {
     progress.finish_and_clear();
     let title =
         format!("{} studies of each size, thresholds in the ratio {}", arguments.runs, arguments.ratio);
-    print_result(arguments.json.as_deref(), &rows, || format!("{}\n{}", style::title(&title), to_text(&rows)))
+    print_result(arguments.json.file(), &rows, || format!("{}\n{}", style::title(&title), to_text(&rows)))
 }
 
 fn to_text(rows: &[Power]) -> String {
