@@ -16,6 +16,8 @@ const LEAST_WAY_M: f64 = 0.1e-3;
 const LEAST_TURN_RAD: f64 = 1.0e-3;
 /// What is left of the force while it is damped.
 const DAMPED: f64 = 0.25;
+/// Time that damping has to act before the run is given up, ns.
+const TRIED_NS: u64 = 250_000_000;
 /// Time without a reversal after which the force comes back, and the time it takes to, ns.
 const CALM_NS: u64 = 2_000_000_000;
 const RETURN_NS: u64 = 1_000_000_000;
@@ -72,8 +74,9 @@ fn has_moved(from: &Pose, to: &Pose) -> bool {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Whole,
-    /// With the time of the last reversal.
+    /// With the times of the first and of the last reversal.
     Damped {
+        began_ns: u64,
         since_ns: u64,
     },
     GivenUp,
@@ -105,10 +108,12 @@ impl Oscillation {
             Stage::Whole if is_one => {
                 // What goes on in spite of the damping has to show itself anew.
                 (self.force.count, self.torque.count) = (0, 0);
-                Stage::Damped { since_ns: now_ns }
+                Stage::Damped { began_ns: now_ns, since_ns: now_ns }
             }
-            Stage::Damped { .. } if is_one => Stage::GivenUp,
-            Stage::Damped { .. } => Stage::Damped { since_ns: now_ns },
+            Stage::Damped { began_ns, .. } if is_one && now_ns.saturating_sub(began_ns) >= TRIED_NS => {
+                Stage::GivenUp
+            }
+            Stage::Damped { began_ns, .. } => Stage::Damped { began_ns, since_ns: now_ns },
             stage => stage,
         };
     }
@@ -120,7 +125,7 @@ impl Oscillation {
         match self.stage {
             Stage::Whole => None,
             Stage::GivenUp => Some(0.0),
-            Stage::Damped { since_ns } => {
+            Stage::Damped { since_ns, .. } => {
                 let calm_ns = now_ns.saturating_sub(since_ns);
                 if calm_ns >= CALM_NS + RETURN_NS {
                     self.stage = Stage::Whole;

@@ -318,7 +318,7 @@ fn a_path_without_a_plugin_file_is_a_mistake_in_the_scene_or_command() {
     let missing = scratch.path().join("missing.so");
     for (path, cause, verdict) in [
         (missing, "No such file", "does not exist"),
-        (scratch.folder("folder.so"), "s a directory", "is not a plugin file"),
+        (scratch.folder("folder.so"), "s a directory", "is not a file"),
     ] {
         let ran = run_scene(&model_scene(&path));
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
