@@ -192,7 +192,7 @@ mod tests {
         let mut oscillation = calm();
         let (mut damped, mut given_up) = (None, None);
         for tick in 0..1000_u64 {
-            let sign = |tick: u64| if tick / 10 % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = |tick: u64| if (tick / 10).is_multiple_of(2) { 1.0 } else { -1.0 };
             let wrench = Wrench::new(DVec3::Z * sign(tick), DVec3::Z * sign(tick + 9));
             let pose =
                 Pose::new(DVec3::Z * (1.0e-3 * sign(tick)), DQuat::from_rotation_z(0.01 * sign(tick + 9)));
@@ -208,7 +208,7 @@ mod tests {
     fn a_force_that_does_not_move_the_handle_is_no_oscillation() {
         let mut oscillation = calm();
         for tick in 0..2000 {
-            let sign = if tick % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if tick & 1 == 0 { 1.0 } else { -1.0 };
             let wrench = Wrench::new(DVec3::Z * sign, DVec3::Z * sign);
             let pose = Pose::new(DVec3::Z * (0.04e-3 * sign), DQuat::from_rotation_z(0.4e-3 * sign));
             oscillation.note(&wrench, [true, true], &pose, tick * 1_000_000);

@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         let needs_all = [&arguments.html, &arguments.csv, &arguments.trials].into_iter().any(Option::is_some);
         if arguments.blind || needs_all {
             return Err(CommandError::Usage(
-                "the report on each subject is not blind and goes into no file but --json; with --blind, --html, --csv or \
+                "the tables of each subject are not blind and go into no file but --json; with --blind, --html, --csv or \
                  --trials, at least two complete sittings are needed, without --each"
                     .to_owned(),
             ));
