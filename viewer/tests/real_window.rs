@@ -114,8 +114,9 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
                 changes.push(change);
             }
         }
-        // One where the button went down, one where the mouse was moved to; before them perhaps those of an earlier pull.
-        let is_stiffer = changes.last_chunk().is_some_and(|[at, to]| to.number > 1.2 * at.number);
+        // The number moves at its rate to where the button went down, and from there to where the mouse was moved to.
+        let least = changes.iter().map(|change| change.number).fold(f64::INFINITY, f64::min);
+        let is_stiffer = changes.last().is_some_and(|last| last.number > 1.2 * least);
         is_stiffer.then_some(changes)
     });
     for change in &changes {
