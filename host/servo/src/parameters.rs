@@ -131,9 +131,9 @@ impl ParameterQueue {
     }
 
     /// Applies what is due at this tick, oldest first, and at most `waiting` of those that were sent, and moves numbers on
-    /// that are on their way; reports it; true if there was anything.
+    /// that have a rate; reports it; true if there was anything.
     ///
-    /// Real-time: bounded by the schedule, `waiting`, the numbers on their way, and `apply`; no allocation.
+    /// Real-time: bounded by the schedule, `waiting`, the numbers that move, and `apply`; no allocation.
     #[inline]
     pub fn apply_due(
         &mut self,
@@ -155,7 +155,7 @@ impl ParameterQueue {
             movements.note(&due.change, outcome);
             *next += 1;
         }
-        // The queue of reports must have room for what was sent; else that waits, and so does what is on its way.
+        // The queue of reports must have room for what was sent; else that waits, and so do the numbers that move.
         let left = schedule.len() - *next;
         if waiting > 0 && reports.slots() >= left + sent.buffer().capacity() {
             for change in (0..waiting).map_while(|_| sent.pop().ok()) {
@@ -171,7 +171,12 @@ impl ParameterQueue {
             }
         }
         if reports.slots() >= left + movements.moving() {
-            movements.advance(tick, |change| take(reports, change));
+            let report = |change, outcome| {
+                any = true;
+                let _ =
+                    reports.push(ChangeReport { tick: tick.index, time_ns: tick.time_ns, change, outcome });
+            };
+            movements.advance(tick, |change| outcome(apply(change)), report);
         }
         any
     }

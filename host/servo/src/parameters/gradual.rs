@@ -1,4 +1,4 @@
-//! Numbers on their way to a new value: a person at a slider must not make the force jump.
+//! Numbers that move to a new value at a rate: a person at a slider must not make the force jump.
 
 use super::ParameterChange;
 use flotor_core::ChangeOutcome;
@@ -6,6 +6,9 @@ use flotor_hal::Tick;
 
 /// The longest step in time that a number is moved by at a tick, ns: a tick after missed ones does not make up for them.
 const LONGEST_STEP_NS: u64 = 10_000_000;
+/// How long a plugin may refuse the next value before the number stays where it is, ns: the orders of a slow asynchronous
+/// model are full for a while, and two numbers may have to move together.
+const PATIENCE_NS: u64 = 1_000_000_000;
 
 /// How fast a number gets to a new value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +33,8 @@ struct Known {
     value: f64,
     /// Where it is to be, and how fast it gets there, per second.
     goal: Option<(f64, f64)>,
+    /// For how long its next value has been refused, ns.
+    refused_ns: u64,
 }
 
 impl Known {
@@ -46,7 +51,7 @@ impl Known {
     }
 }
 
-/// The numbers that were changed, with those that are on their way.
+/// The numbers that were changed, with those that move.
 pub(super) struct Movements {
     known: Vec<Known>,
     moving: usize,
@@ -58,13 +63,13 @@ impl Movements {
         Self { known: Vec::with_capacity(parameters), moving: 0 }
     }
 
-    /// How many numbers are on their way. Real-time: bounded, no allocation.
+    /// How many numbers move. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn moving(&self) -> usize {
         self.moving
     }
 
-    /// A change that came at once: a number that was on its way there stays. Real-time: bounded, no allocation.
+    /// A change without a rate: a movement of this number ends. Real-time: bounded, no allocation.
     pub(super) fn note(&mut self, change: &ParameterChange, outcome: ChangeOutcome) {
         if outcome == ChangeOutcome::Applied {
             self.keep(change, change.value, None);
@@ -79,13 +84,13 @@ impl Movements {
     fn keep(&mut self, change: &ParameterChange, value: f64, goal: Option<(f64, f64)>) -> bool {
         let has_room = self.known.len() < self.known.capacity();
         if let Some(known) = self.known.iter_mut().find(|known| known.is_of(change)) {
-            known.goal = goal;
+            (known.goal, known.refused_ns) = (goal, 0);
             if goal.is_none() {
                 known.value = value;
             }
         } else if has_room {
             let ParameterChange { plugin, generation, parameter, .. } = *change;
-            self.known.push(Known { plugin, generation, parameter, value, goal });
+            self.known.push(Known { plugin, generation, parameter, value, goal, refused_ns: 0 });
         } else {
             return false;
         }
@@ -93,9 +98,14 @@ impl Movements {
         true
     }
 
-    /// Moves every number that is on its way by a tick; `apply` makes the change. Real-time: bounded by the numbers and
-    /// `apply`, no allocation.
-    pub(super) fn advance(&mut self, tick: &Tick, mut apply: impl FnMut(ParameterChange) -> ChangeOutcome) {
+    /// Moves every number that has a goal by a tick: `apply` makes the change, `report` hears of every one that was made and
+    /// of a movement that ended short of its goal. Real-time: bounded by the numbers and `apply`, no allocation.
+    pub(super) fn advance(
+        &mut self,
+        tick: &Tick,
+        mut apply: impl FnMut(&ParameterChange) -> ChangeOutcome,
+        mut report: impl FnMut(ParameterChange, ChangeOutcome),
+    ) {
         let dt_s = tick.dt_ns.min(LONGEST_STEP_NS) as f64 * 1.0e-9;
         if self.moving == 0 || dt_s == 0.0 {
             return;
@@ -104,11 +114,16 @@ impl Movements {
             let Some(value) = known.after(dt_s) else { continue };
             let Known { plugin, generation, parameter, .. } = *known;
             let change = ParameterChange { plugin, generation, parameter, value, pace: Pace::AtOnce };
-            match apply(change) {
-                ChangeOutcome::Applied => known.value = value,
-                // It stays where it is: the plugin takes no more of it.
+            let outcome = apply(&change);
+            match outcome {
+                ChangeOutcome::Applied => (known.value, known.refused_ns) = (value, 0),
+                ChangeOutcome::Refused if known.refused_ns + tick.dt_ns < PATIENCE_NS => {
+                    known.refused_ns += tick.dt_ns;
+                    continue;
+                }
                 ChangeOutcome::Refused | ChangeOutcome::Broke => known.goal = None,
             }
+            report(change, outcome);
             known.goal = known.goal.filter(|(goal, _)| *goal != known.value);
         }
         self.count();

@@ -104,6 +104,36 @@ fn a_refusal_ends_the_way_and_a_late_tick_takes_no_longer_step() {
     assert_eq!(steps, [21.0, 22.0, 23.0], "10 ms of a second, and nothing after the refusal");
 }
 
+/// Of a slow asynchronous model, whose orders are full for a while, and of two numbers whose values in between do not go
+/// together until the other has moved on.
+#[test]
+fn a_number_that_is_refused_for_a_while_moves_on_and_nobody_hears_of_it() {
+    let (mut queue, mut sender, mut reports) = ParameterQueue::new(Vec::new(), 0);
+    sender.push(gradual(20.35)).unwrap();
+    for index in 1..600 {
+        let waiting = queue.waiting();
+        queue.apply_due(&at(index), waiting, |_| {
+            if (2..500).contains(&index) { CallStatus::Unsupported } else { CallStatus::Ok }
+        });
+    }
+    let told: Vec<_> = std::iter::from_fn(|| reports.pop().ok()).collect();
+    assert!(told.iter().all(|report| report.outcome == ChangeOutcome::Applied), "{told:?}");
+    assert_eq!(told.last().map(|report| report.change.value), Some(20.35));
+}
+
+#[test]
+fn a_number_that_is_refused_for_a_second_stays_and_its_sender_hears_of_it_once() {
+    let (mut queue, mut sender, mut reports) = ParameterQueue::new(Vec::new(), 0);
+    sender.push(gradual(40.0)).unwrap();
+    for index in 1..3000 {
+        let waiting = queue.waiting();
+        queue.apply_due(&at(index), waiting, |_| CallStatus::OutOfRange);
+    }
+    let told: Vec<_> = std::iter::from_fn(|| reports.pop().ok()).map(|report| report.outcome).collect();
+    assert_eq!(told, [ChangeOutcome::Refused]);
+    assert!(!queue.is_due(&at(3001)));
+}
+
 #[test]
 fn a_replaced_plugin_is_not_moved_any_more() {
     let (mut queue, mut sender, _reports) = ParameterQueue::new(Vec::new(), 0);
