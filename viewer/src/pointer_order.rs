@@ -1,11 +1,16 @@
-//! The order of what a pointer does, kept when a picture comes late.
+//! The order of clicks and keys, kept when a picture comes late.
 //!
 //! A window that was busy gets all that happened meanwhile with one picture, and a widget is then told the last position of the
 //! pointer only: a slider that was let go, and a pointer that moved on after that, would leave the slider where the pointer is.
-//! Here a picture gets what happened up to the next press or release, and the pictures after it get the rest.
+//! Here a picture gets the events up to the next press or release, and the pictures after it get the rest: what was typed after a
+//! click goes to the field that was clicked. Only the keys of an emergency stop do not wait.
 
-use egui::{Event, RawInput};
+use crate::experiment::StopKey;
+use egui::{Event, Key, RawInput};
 use std::collections::VecDeque;
+
+/// Every key that may be the emergency stop.
+const STOP_KEYS: [Key; 3] = [StopKey::Escape.key(), StopKey::Space.key(), StopKey::F12.key()];
 
 /// Splits the input of a late picture at presses and releases.
 #[derive(Debug, Default)]
@@ -15,12 +20,12 @@ pub struct PointerOrder {
 }
 
 impl PointerOrder {
-    /// Leaves in the input of a picture what happened up to the next press or release; true if there is more, for which
-    /// another picture should be made at once. Keys never wait: one of them is the emergency stop.
+    /// Keeps in the input of a picture the events up to the next press or release; true if more wait, for which another picture
+    /// should be made at once.
     pub fn split(&mut self, input: &mut RawInput) -> bool {
         let arrived = std::mem::take(&mut input.events);
-        let (pointer, others): (Vec<_>, Vec<_>) = arrived.into_iter().partition(is_of_pointer);
-        self.waiting.extend(pointer);
+        let (ordered, others): (Vec<_>, Vec<_>) = arrived.into_iter().partition(is_in_order);
+        self.waiting.extend(ordered);
         while let Some(event) = self.waiting.pop_front() {
             let is_boundary = matches!(event, Event::PointerButton { .. });
             input.events.push(event);
@@ -33,23 +38,26 @@ impl PointerOrder {
     }
 }
 
-fn is_of_pointer(event: &Event) -> bool {
-    matches!(
-        event,
-        Event::PointerMoved(_)
-            | Event::MouseMoved(_)
-            | Event::PointerButton { .. }
-            | Event::PointerGone
-            | Event::Touch { .. }
-            | Event::MouseWheel { .. }
-            | Event::Zoom(_)
-    )
+/// Whether an event keeps its place among the clicks.
+fn is_in_order(event: &Event) -> bool {
+    match event {
+        Event::Key { key, .. } => !STOP_KEYS.contains(key),
+        Event::Text(_)
+        | Event::PointerMoved(_)
+        | Event::MouseMoved(_)
+        | Event::PointerButton { .. }
+        | Event::PointerGone
+        | Event::Touch { .. }
+        | Event::MouseWheel { .. }
+        | Event::Zoom(_) => true,
+        _ => false,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use egui::{Key, Modifiers, PointerButton, Pos2, pos2};
+    use egui::{Modifiers, PointerButton, Pos2, pos2};
 
     fn button(at: Pos2, pressed: bool) -> Event {
         Event::PointerButton { pos: at, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE }
@@ -84,7 +92,15 @@ mod tests {
     }
 
     #[test]
-    fn keys_come_with_the_first_picture_however_much_the_pointer_did() {
+    fn what_was_typed_after_a_click_comes_after_it() {
+        let at = pos2(10.0, 5.0);
+        let (five, enter) = (Event::Text("5".to_owned()), key(Key::Enter));
+        let told = pictures(vec![button(at, true), button(at, false), five.clone(), enter.clone()]);
+        assert_eq!(told, [vec![button(at, true)], vec![button(at, false)], vec![five, enter]]);
+    }
+
+    #[test]
+    fn a_stop_key_comes_with_the_first_picture_however_much_the_pointer_did() {
         let at = pos2(10.0, 5.0);
         let told = pictures(vec![button(at, true), button(at, false), key(Key::Space)]);
         assert!(told[0].contains(&key(Key::Space)), "{told:?}");

@@ -53,6 +53,12 @@ pub enum CalibrationError {
         /// Where, mm.
         height_mm: f64,
     },
+    /// The force of a locked axis alternated between its limits, and the envelope took it away.
+    #[error(
+        "the force of a locked axis alternated between its limits, so it was taken away; check that the handle moves freely and that \
+         the device is the one of the calibration"
+    )]
+    Oscillated,
     /// The sensor was not brought where it should be.
     #[error(
         "the handle rests at {height_mm:.2} mm instead of {target_mm:.2} mm; move the sensor, or raise the time limit \

@@ -30,6 +30,12 @@ pub enum RunEnd {
 }
 
 impl RunEnd {
+    /// Whether the run ended as it should: its time was over, or somebody stopped it. Real-time: bounded, no allocation.
+    #[must_use]
+    pub const fn is_in_order(self) -> bool {
+        matches!(self, Self::Finished | Self::Stopped)
+    }
+
     /// What it means that a device does not set the pace it should.
     fn without_pace(lost: PaceLost) -> Self {
         match lost {

@@ -220,7 +220,7 @@ fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
     }
     let ill = summary.plugins.iter().filter(|plugin| plugin.health != "ok");
     notes.extend(ill.map(|plugin| note(Severity::Error, &plugin.name, plugin.health.clone())));
-    if !matches!(outcome.end, RunEnd::Finished | RunEnd::Stopped) {
+    if !outcome.end.is_in_order() {
         notes.push(note(Severity::Error, "flotor", end_words(outcome, summary.rate_hz)));
     }
     notes
@@ -315,7 +315,7 @@ fn peer_links(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLi
 
 /// Whether a run ended as it should, for its clients.
 fn end_kind(end: RunEnd) -> EndKind {
-    if matches!(end, RunEnd::Finished | RunEnd::Stopped) { EndKind::InOrder } else { EndKind::Failed }
+    if end.is_in_order() { EndKind::InOrder } else { EndKind::Failed }
 }
 
 /// How a run ended, for its clients.

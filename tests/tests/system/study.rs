@@ -541,7 +541,7 @@ fn a_sitting_goes_from_consent_to_analysis_by_keyboard() {
     let ran = Flotor::with(["analyse", out.to_str().unwrap()]).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     assert!(
-        ran.stdout.contains("sub-01: 1 answers") && ran.stdout.contains("stopped by the subject"),
+        ran.stdout.contains("sub-01: 1 answers") && ran.stdout.contains("stopped at the keyboard"),
         "{ran:?}"
     );
     let refused = person("terminal", "", &["--sex", "two words"], &out);

@@ -19,7 +19,7 @@ fn view_part(height_pt: f32) -> f32 {
 
 impl Viewer {
     pub(super) fn top(&mut self, ui: &mut Ui, palette: &Palette) {
-        let (standing, mood) = self.standing();
+        let (standing, status) = self.standing();
         let (title, subtitle) = match &self.source {
             Source::Waiting(_) => ("Flotor", ""),
             // Names of parameters are nothing for a subject's eyes.
@@ -30,7 +30,7 @@ impl Viewer {
             title,
             subtitle,
             standing: &standing,
-            mood,
+            status,
             can_stop: self.source.is_running(),
             has_panel: self.audience == Audience::Experimenter,
             look: self.look,

@@ -5,7 +5,7 @@ use crate::feed::FeedState;
 use crate::history::Sample;
 use crate::player::Motion;
 use crate::ui::readout;
-use crate::ui::top_bar::Mood;
+use crate::ui::top_bar::RunStatus;
 use flotor_core::trace::Events;
 use flotor_live::EndKind;
 use flotor_record::Severity;
@@ -20,27 +20,29 @@ const REMARK: Duration = Duration::from_secs(6);
 
 impl Viewer {
     /// How the run stands, and how well that is.
-    pub(super) fn standing(&self) -> (String, Mood) {
+    pub(super) fn standing(&self) -> (String, RunStatus) {
         let newest = self.history.at(f64::INFINITY);
         let events = newest.map_or(Events::NONE, |sample| sample.events);
         match &self.source {
-            Source::Waiting(_) => ("no run".to_owned(), Mood::Idle),
-            Source::Recording => ("recording".to_owned(), Mood::Idle),
+            Source::Waiting(_) => ("no run".to_owned(), RunStatus::Idle),
+            Source::Recording => ("recording".to_owned(), RunStatus::Idle),
             Source::Live { feed, .. } => match feed.state() {
-                FeedState::Ended(words, EndKind::InOrder) if !events.intersects(FATAL) => (words, Mood::Idle),
-                FeedState::Ended(words, _) => (words, Mood::Bad),
-                FeedState::Lost(_) => ("connection lost".to_owned(), Mood::Bad),
-                FeedState::Running if feed.is_stale() => ("no ticks come".to_owned(), Mood::Bad),
+                FeedState::Ended(words, EndKind::InOrder) if !events.intersects(FATAL) => {
+                    (words, RunStatus::Idle)
+                }
+                FeedState::Ended(words, _) => (words, RunStatus::Failed),
+                FeedState::Lost(_) => ("connection lost".to_owned(), RunStatus::Failed),
+                FeedState::Running if feed.is_stale() => ("no ticks come".to_owned(), RunStatus::Failed),
                 FeedState::Running if events.intersects(Events::HOLDING) => {
-                    ("holding".to_owned(), Mood::Careful)
+                    ("holding".to_owned(), RunStatus::Warning)
                 }
                 FeedState::Running if events.intersects(Events::RELEASING) => {
-                    ("fading out".to_owned(), Mood::Well)
+                    ("fading out".to_owned(), RunStatus::InOrder)
                 }
                 FeedState::Running if events.intersects(Events::RAMPING) => {
-                    ("fading in".to_owned(), Mood::Well)
+                    ("fading in".to_owned(), RunStatus::InOrder)
                 }
-                FeedState::Running => ("running".to_owned(), Mood::Well),
+                FeedState::Running => ("running".to_owned(), RunStatus::InOrder),
             },
         }
     }

@@ -50,7 +50,7 @@ pub enum StopKey {
 impl StopKey {
     /// The same for the window.
     #[must_use]
-    pub fn key(self) -> egui::Key {
+    pub const fn key(self) -> egui::Key {
         match self {
             Self::Escape => egui::Key::Escape,
             Self::Space => egui::Key::Space,

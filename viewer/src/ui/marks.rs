@@ -7,8 +7,8 @@ use egui::{Color32, CornerRadius, Rect, Sense, Ui, WidgetInfo};
 use flotor_core::trace::Events;
 use std::collections::VecDeque;
 
-/// Into how many stretches of time, at most, events are sorted.
-const STRETCHES: usize = 400;
+/// Number of intervals, at most, into which the time shown is divided.
+const INTERVALS: usize = 400;
 
 /// How bad what happened is, from the worst; each has its colour.
 const RANKS: [&[Events]; 3] = [
@@ -32,14 +32,14 @@ const RANKS: [&[Events]; 3] = [
 #[derive(Clone, Debug, Default)]
 pub struct Marks {
     width_s: f64,
-    /// Number of a stretch, and what happened in it.
+    /// Number of an interval, and what happened in it.
     kept: VecDeque<(f64, Events)>,
     next: u64,
 }
 
 impl Marks {
     fn look(&mut self, history: &History, span_s: [f64; 2]) {
-        let width_s = bucket_width_s(span_s[1] - span_s[0], STRETCHES);
+        let width_s = bucket_width_s(span_s[1] - span_s[0], INTERVALS);
         let first = history.number_at(span_s[0]);
         let is_earlier =
             self.kept.front().is_some_and(|(number, _)| number * self.width_s > span_s[0] + width_s);

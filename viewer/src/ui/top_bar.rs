@@ -12,8 +12,8 @@ pub struct TopBar<'a> {
     pub subtitle: &'a str,
     /// How the run stands, in a word or two.
     pub standing: &'a str,
-    /// How well that is.
-    pub mood: Mood,
+    /// Whether that is in order.
+    pub status: RunStatus,
     /// Whether there is a run to stop.
     pub can_stop: bool,
     /// Whether there is a panel to put away.
@@ -22,26 +22,26 @@ pub struct TopBar<'a> {
     pub look: Look,
 }
 
-/// How well a run stands.
+/// Whether a run is in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mood {
+pub enum RunStatus {
     /// Nothing runs, and nothing is wrong.
     Idle,
     /// It runs.
-    Well,
+    InOrder,
     /// It runs, and not as it should.
-    Careful,
+    Warning,
     /// It ended by a fault or an emergency stop, or cannot be reached.
-    Bad,
+    Failed,
 }
 
-impl Mood {
+impl RunStatus {
     fn color(self, palette: &Palette) -> Color32 {
         match self {
             Self::Idle => palette.faint,
-            Self::Well => palette.well,
-            Self::Careful => palette.warning,
-            Self::Bad => palette.fault,
+            Self::InOrder => palette.well,
+            Self::Warning => palette.warning,
+            Self::Failed => palette.fault,
         }
     }
 }
@@ -80,8 +80,12 @@ impl TopBar<'_> {
                     request = Some(TopBarRequest::SwitchLook);
                 }
                 ui.add_space(6.0);
-                let dot = self.mood.color(palette);
-                let color = if matches!(self.mood, Mood::Idle | Mood::Well) { palette.text } else { dot };
+                let dot = self.status.color(palette);
+                let color = if matches!(self.status, RunStatus::Idle | RunStatus::InOrder) {
+                    palette.text
+                } else {
+                    dot
+                };
                 // A long reason leaves room for the title; all of it is below the pointer.
                 let most = (ui.available_width() * 0.6).max(80.0);
                 let standing = egui::Label::new(RichText::new(self.standing).color(color)).truncate();

@@ -87,6 +87,7 @@ impl Words<REPORT_WORDS> for Report {
             Holding::Changing => (0, 0),
             Holding::Steady(force_n) => (1, force_n.to_bits()),
             Holding::RanAway => (2, 0),
+            Holding::Oscillated => (4, 0),
             Holding::Faulted(fault) => (3, u64::from(fault as u32)),
         };
         let [height, moved, delivered] = [self.height_m, self.moved_m, self.delivered_n].map(f64::to_bits);
@@ -99,6 +100,7 @@ impl Words<REPORT_WORDS> for Report {
             0 => Holding::Changing,
             1 => Holding::Steady(f64::from_bits(detail)),
             2 => Holding::RanAway,
+            4 => Holding::Oscillated,
             _ => {
                 let code = u32::try_from(detail).unwrap_or(u32::MAX);
                 Holding::Faulted(Fault::from_code(code).unwrap_or(Fault::Broken))
@@ -118,6 +120,8 @@ pub(super) enum Holding {
     Steady(f64),
     /// The handle flew off and is braked, without force.
     RanAway,
+    /// The force of an axis alternated between its limits, and there is none any more.
+    Oscillated,
     /// The device faulted.
     Faulted(Fault),
 }
@@ -182,6 +186,7 @@ impl Holder {
         }
         match report.state {
             Holding::Faulted(fault) => Err(CalibrationError::Fault(fault)),
+            Holding::Oscillated => Err(CalibrationError::Oscillated),
             Holding::RanAway => Err(CalibrationError::RanAway { height_mm: report.height_m * 1.0e3 }),
             Holding::Changing | Holding::Steady(_) => Ok(report),
         }
@@ -293,6 +298,7 @@ fn hold(
         }
         let doing = match fault {
             Some(fault) => Holding::Faulted(fault),
+            None if envelope.is_unstable() => Holding::Oscillated,
             None if ran_away => Holding::RanAway,
             None if averages.are_full() => Holding::Steady(pushed_n),
             None => Holding::Changing,

@@ -83,7 +83,7 @@ impl<'a> RealTimeRig<'a> {
         let thread = std::thread::Builder::new().name("flotor-study".to_owned());
         let run = thread.spawn(move || {
             let outcome = session.run(&mut observers, &switch);
-            let is_in_order = outcome.as_ref().is_ok_and(|outcome| outcome.end == RunEnd::Stopped);
+            let is_in_order = outcome.as_ref().is_ok_and(|outcome| outcome.end.is_in_order());
             let kind = if is_in_order { EndKind::InOrder } else { EndKind::Failed };
             observers.end("the sitting has ended", kind);
             outcome
@@ -223,8 +223,8 @@ impl<'a> RealTimeRig<'a> {
             self.ended = Some(outcome?.end);
         }
         match self.ended {
-            None | Some(RunEnd::Finished | RunEnd::Stopped) => Ok(ending),
-            Some(end) => Err(RunEnded(end).into()),
+            Some(end) if !end.is_in_order() => Err(RunEnded(end).into()),
+            None | Some(_) => Ok(ending),
         }
     }
 

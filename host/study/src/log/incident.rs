@@ -19,9 +19,9 @@ pub enum Incident {
     },
     /// The window in front of the person was closed, or standard input was.
     WindowClosed,
-    /// The person, or somebody at the keyboard, had enough.
+    /// Somebody pressed the key that stops the sitting.
     Stopped,
-    /// The program was asked to end.
+    /// The program was asked to end: by a signal, or by a program that watches.
     Signal,
     /// The handle was pushed back at the edge of its range.
     OutOfRange,
@@ -43,8 +43,8 @@ impl fmt::Display for Incident {
             Self::EmergencyStop { source } => write!(f, "emergency stop ({source})"),
             Self::RunEnded { reason } => write!(f, "the run ended: {reason}"),
             Self::WindowClosed => f.write_str("the window was closed"),
-            Self::Stopped => f.write_str("stopped by the subject"),
-            Self::Signal => f.write_str("stopped by a signal"),
+            Self::Stopped => f.write_str("stopped at the keyboard"),
+            Self::Signal => f.write_str("asked to end, by a signal or a client"),
             Self::OutOfRange => f.write_str("the handle left its range"),
             Self::MissedTicks { ticks } => write!(f, "{ticks} ticks were missed"),
             Self::NotRecorded { reason } => write!(f, "the movement was not recorded: {reason}"),

@@ -78,9 +78,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let (switch, mut observers) = (stop.clone(), Watched { observer: watch, publication: publication.ok() });
     let run = std::thread::spawn(move || {
         let outcome = session.run(&mut observers, &switch);
-        let is_in_order = outcome.as_ref().is_ok_and(|outcome| {
-            matches!(outcome.end, flotor_servo::RunEnd::Finished | flotor_servo::RunEnd::Stopped)
-        });
+        let is_in_order = outcome.as_ref().is_ok_and(|outcome| outcome.end.is_in_order());
         let kind = if is_in_order { EndKind::InOrder } else { EndKind::Failed };
         observers.end("the exploration ended", kind);
         outcome
@@ -96,12 +94,13 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
             Err(RecvTimeoutError::Disconnected) => break,
         }
     }
-    end(&stop, run)
+    end(&stop, run, scene.rate_hz)
 }
 
 fn end(
     stop: &StopSwitch,
     run: std::thread::JoinHandle<Result<flotor_session::Outcome, RunError>>,
+    rate_hz: f64,
 ) -> Result<(), CommandError> {
     stop.stop();
     let outcome = run.join().map_err(|_| RunError::Thread("panicked"))??;
@@ -111,7 +110,9 @@ fn end(
         flotor_servo::RunEnd::NotPaced => Err(CommandError::NotPaced),
         flotor_servo::RunEnd::Oscillation => Err(CommandError::Oscillation),
         flotor_servo::RunEnd::Unguarded => Err(CommandError::Unguarded),
-        _ => Ok(()),
+        flotor_servo::RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
+        flotor_servo::RunEnd::TooFast(samples_per_s) => Err(CommandError::TooFast { samples_per_s, rate_hz }),
+        flotor_servo::RunEnd::Finished | flotor_servo::RunEnd::Stopped => Ok(()),
     }
 }
 

@@ -77,8 +77,9 @@ pub(super) fn run(arguments: &PowerArguments) -> Result<(), CommandError> {
     let progress = progress_bar(counts.len() as u64 * u64::from(arguments.runs), "{percent:>3} %  {elapsed}");
     let of_size = |subjects: u16| -> Power {
         let one = |run: u32| {
-            // Seeds of their own: no study is part of another.
-            let seed = arguments.seed.wrapping_mul(1_000_003).wrapping_add(u64::from(run));
+            // Each size has seeds of its own: no study is part of another, and the rows are independent.
+            let number = u64::from(subjects) << 32 | u64::from(run);
+            let seed = arguments.seed.wrapping_mul(1_000_003).wrapping_add(number);
             progress.inc(1);
             study(&protocol, &observers, subjects, seed).ok()
         };
