@@ -149,7 +149,7 @@ impl Panel {
         self.knobs.iter_mut().filter(|knob| knob.wanted.is_some()).for_each(Knob::give_up);
     }
 
-    /// A person begins to change a parameter that had this value: it can be undone.
+    /// A user starts to change a parameter: the value before the change can be restored.
     pub fn begin(&mut self, index: usize, before: Value) {
         const MOST: usize = 100;
         if self.earlier.len() == MOST {

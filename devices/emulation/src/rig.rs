@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Highest place of the stand, and as far below the middle its lowest, mm: what the thesis measured (Varadharajan 2007,
 /// section 3.4).
 const TOP_MM: f64 = 7.0;
-/// Time of one step down, s: a twentieth of a millimetre's worth of hurry.
+/// Time of one step down, s.
 const MOVE_S: f64 = 0.15;
 /// Time back up to the top, s.
 const RETURN_S: f64 = 1.0;

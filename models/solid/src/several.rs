@@ -10,8 +10,8 @@
 //!
 //! `W` is stationary in the forces, so its gradient at the centres is that of `E` at the lowered places and that of `C`: the
 //! force has a potential, whatever spheres come into contact. The forces are one active set over all contacts: without contact
-//! `E` and its force are zero. A few steps of Newton's method solve for them, from the same start in every tick, so that no
-//! path has a memory.
+//! `E` and its force are zero. The secant method in at most sixty steps solves for them, from the same start in every tick, so
+//! that the answer has no memory of the path.
 //!
 //! `C` counts each contact as a point: for contacts of radius `a` at a distance of `r` that is an error of `0.2 (a / r)^2` of
 //! the interaction, at most 5 % of it for spheres that nearly touch each other.

@@ -120,10 +120,16 @@ fn heading(ui: &mut Ui, history: &History, quantity: Quantity, view: &PlotView, 
 pub fn digits(value: f64, units: Units) -> String {
     match units {
         Units::Handy => fixed(value),
-        Units::Si if value.abs() < 10.0 => format!("{value:+9.6}"),
+        Units::Si if value.abs() < 10.0 => without_minus_of_zero(format!("{value:+9.6}")),
         Units::Si if value.abs() < 1000.0 => format!("{value:+9.4}"),
         Units::Si => format!("{:>9}", fixed(value)),
     }
+}
+
+/// A number that is zero in the digits shown has no minus.
+fn without_minus_of_zero(text: String) -> String {
+    let is_zero = !text.contains(|digit: char| ('1'..='9').contains(&digit));
+    if is_zero { text.replace('-', "+") } else { text }
 }
 
 /// A number in seven columns, whatever its size.
@@ -131,7 +137,7 @@ pub fn digits(value: f64, units: Units) -> String {
 pub fn fixed(value: f64) -> String {
     match value.abs() {
         size if !size.is_finite() => "      –".to_owned(),
-        size if size < 10.0 => format!("{value:+7.3}"),
+        size if size < 10.0 => without_minus_of_zero(format!("{value:+7.3}")),
         size if size < 100.0 => format!("{value:+7.2}"),
         size if size < 9_999.9 => format!("{value:+7.1}"),
         size if size < 999_999.0 => format!("{value:+7.0}"),
@@ -172,6 +178,8 @@ mod tests {
             let text = digits(value, Units::Si);
             assert_eq!(text.chars().count(), 9, "{value}: `{text}`");
         }
+        assert_eq!([fixed(-0.000_4), fixed(-0.0), fixed(-0.000_6)], [" +0.000", " +0.000", " -0.001"]);
+        assert_eq!(digits(-4e-7, Units::Si), "+0.000000");
         assert_eq!(digits(0.001_234, Units::Si), "+0.001234", "a millimetre has its micrometres");
         assert_eq!(short(-1.0e-12), "0");
         assert_eq!(short(0.1 + 0.2), "0.3");

@@ -201,7 +201,7 @@ fn number_of(window: &Window<'_>, parameter: &str) -> f64 {
     }
 }
 
-/// Whatever a hand does to the window with a pointer: no number leaves its soft range, and the stop works in between.
+/// Random pointer events: no number leaves its soft range, and the emergency stop works throughout.
 #[test]
 fn no_pointer_brings_a_parameter_out_of_its_soft_range() {
     // Each event is a picture drawn on the processor.

@@ -82,8 +82,8 @@ pub enum Motion {
         /// How often, Hz.
         frequency_hz: f64,
     },
-    /// The stand of a calibration rig holds it, above and below the centre of the range. Its time goes on by a millisecond
-    /// a command, so that a delayed host misses no stop.
+    /// The stand of a calibration rig holds it, above and below the centre of the range. Its clock advances by a
+    /// millisecond with each command, so that a delayed host misses no stop.
     OnStand(Stand),
 }
 

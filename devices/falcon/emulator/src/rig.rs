@@ -8,7 +8,7 @@ use flotor_hal::VerticalCalibration;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Delivered over commanded force: `1.04 - 0.004 z - 0.0006 z²`, z in mm, as made up for this rig.
+/// Delivered over commanded force: `1.04 - 0.004 z - 0.0006 z²`, z in mm; an arbitrary curve of this rig.
 const SHARE_PER_M: [f64; 3] = [1.04, -4.0, -600.0];
 /// Where that holds, m: what the stand goes through. Beyond, the share is that at the end.
 const RANGE_M: [f64; 2] = [-7.0e-3, 7.0e-3];

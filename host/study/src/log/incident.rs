@@ -1,4 +1,4 @@
-//! What an ethics board asks about: whatever interrupted or disturbed a sitting.
+//! Interruptions and disturbances of a sitting, as an ethics board asks for them.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
