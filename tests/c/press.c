@@ -1,5 +1,8 @@
 /* A model that presses along one axis after the other: x, y, z, then about them. It begins after 400 steps; each axis is pressed
  * for 300 and free for 300. */
+#ifndef PRESS_N
+#define PRESS_N 1.0
+#endif
 #include "flotor.h"
 #include <stdlib.h>
 #include <string.h>
@@ -25,9 +28,9 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
     if (at >= BEGIN && (at - BEGIN) / ROUND < 6 && (at - BEGIN) % ROUND < PRESSED) {
         const uint64_t axis = (at - BEGIN) / ROUND;
         if (axis < 3) {
-            output->wrench.force_n[axis] = 1.0;
+            output->wrench.force_n[axis] = PRESS_N;
         } else {
-            output->wrench.torque_nm[axis - 3] = 0.02;
+            output->wrench.torque_nm[axis - 3] = 0.02 * PRESS_N;
         }
     }
     return FlotorCallStatus_Ok;

@@ -47,3 +47,33 @@ pub fn assert_runs_with_force(scratch: &Scratch, arguments: &[&str], environment
     assert_eq!(summary["end"], "finished", "{summary}");
     assert!(summary["peak_force_n"].as_f64().is_some_and(|peak_n| peak_n > 0.1), "{summary}");
 }
+
+/// That a run says, when it pairs a device without torque with a model that has some, that the hand cannot feel it; and no longer
+/// where a scene sets that limit itself. `stderr_with` runs the device with a spring and such a table, and returns what it said.
+///
+/// # Panics
+/// If that is not so.
+pub fn assert_missing_torque_is_told(stderr_with: impl Fn(&str) -> String) {
+    let words = "`device` gives no torque, and the hand cannot feel that of a model";
+    let said = stderr_with("");
+    assert!(said.contains(words), "{said}");
+    let said = stderr_with("[limits]\ntorque_nm = [0, 0, 0]");
+    assert!(!said.contains(words), "{said}");
+}
+
+/// What `flotor run` says of a spring on a device that an emulator or a service stands in for, with this table in the scene.
+///
+/// # Panics
+/// If the run fails.
+#[must_use]
+pub fn said_of_a_spring_on(plugin: &str, address: &str, table: &str) -> String {
+    let scratch = Scratch::default();
+    let scene = format!(
+        "duration_s = 0.1\n[device]\nplugin = \"{plugin}\"\n[device.parameters]\naddress = \"{address}\"\ntimeout_ms = 9000\n\
+         [[model]]\nplugin = \"spring\"\n[model.parameters]\nvariant = \"energy\"\n{table}\n"
+    );
+    let scene = scratch.file("spring.toml", scene).display().to_string();
+    let ran = Flotor::with(["run", &scene]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    ran.stderr
+}

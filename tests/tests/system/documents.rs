@@ -32,6 +32,18 @@ fn prose(markdown: &str) -> String {
     markdown.lines().filter(outside).flat_map(|line| [line, "\n"]).collect()
 }
 
+/// A device whose maker has an SDK, firmware or a service: its chapter says what of it may be used, and that none is here.
+#[test]
+fn a_chapter_about_a_makers_device_has_a_note_on_licences() {
+    for device in ["falcon", "force-dimension", "inverse3", "openhaptics"] {
+        let chapter = read(format!("{BOOK}/devices/{device}.md"));
+        let (_, note) =
+            chapter.split_once("\n## Licence\n").unwrap_or_else(|| panic!("{device}: no licence note"));
+        let words: Vec<&str> = note.split_whitespace().collect();
+        assert!(words.join(" ").contains("is in this repository"), "{device}: {note}");
+    }
+}
+
 // ---------------------------------------------------------------- commands
 
 /// Files and folders that a command of the book writes: the value of such an option, or a new plugin.

@@ -7,7 +7,10 @@ use flotor_tests::library::build_folder;
 use flotor_tests::process::Owned;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::stand_in::{assert_every_rule_holds, assert_runs_with_force, demo_on};
+use flotor_tests::stand_in::said_of_a_spring_on;
+use flotor_tests::stand_in::{
+    assert_every_rule_holds, assert_missing_torque_is_told, assert_runs_with_force, demo_on,
+};
 use rustix::process::Signal;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -46,6 +49,12 @@ fn with_an_emulator_every_rule_is_checked_and_holds() {
     let emulator = Emulator::start(&[]);
     let address = format!("address={}", emulator.address);
     assert_every_rule_holds("flotor-falcon", &[&address, "timeout_ms=9000"]);
+}
+
+#[test]
+fn a_torque_that_it_cannot_give_is_told_when_it_is_paired() {
+    let emulator = Emulator::start(&[]);
+    assert_missing_torque_is_told(|table| said_of_a_spring_on("falcon", &emulator.address, table));
 }
 
 /// The demo with the two lines of the device changed; then the cable is pulled.

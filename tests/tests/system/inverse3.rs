@@ -6,7 +6,10 @@ use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, Tick, Wrench};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
-use flotor_tests::stand_in::{assert_every_rule_holds, assert_runs_with_force, demo_on};
+use flotor_tests::stand_in::said_of_a_spring_on;
+use flotor_tests::stand_in::{
+    assert_every_rule_holds, assert_missing_torque_is_told, assert_runs_with_force, demo_on,
+};
 use flotor_tests::workspace_root;
 use rustix::process::Signal;
 use std::time::{Duration, Instant};
@@ -73,6 +76,12 @@ fn a_push_along_each_axis_is_felt_and_moves_the_flotor_along_it() {
     drop(device);
     let summary = service.end();
     assert!(summary.contains("asked for 1.500 N"), "{summary}");
+}
+
+#[test]
+fn a_torque_that_it_cannot_give_is_told_when_it_is_paired() {
+    let service = Service::start(&[]);
+    assert_missing_torque_is_told(|table| said_of_a_spring_on("inverse3", &service.simulation, table));
 }
 
 /// The demo with the two lines of the device changed.
