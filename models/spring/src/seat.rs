@@ -54,8 +54,8 @@ mod base;
 mod friction;
 mod tilt;
 
-/// What the evaluations of a tick may cost, in evaluations of an energy, before the last begins.
-const MOST_COST: u32 = 180;
+/// What the evaluations of a tick may cost, in evaluations of an energy, if each costs no more than the one before.
+const MOST_COST: u32 = 60;
 /// Evaluations of the law per tick at most.
 const MOST_EVALUATIONS: u32 = 24;
 /// Change of the tilt that counts as none (rad), of a law that leaves nothing open.
@@ -118,6 +118,25 @@ struct Lost {
     stored_j: f64,
     missing_n: [f64; 2],
     trial: Trial,
+}
+
+/// What the evaluations of a tick cost so far, in evaluations of an energy.
+#[derive(Default)]
+struct Cost {
+    whole: u32,
+    last: u32,
+}
+
+impl Cost {
+    fn add(&mut self, last: u32) {
+        self.whole += last;
+        self.last = last;
+    }
+
+    /// Whether one more evaluation like the last would cost too much.
+    fn is_spent(&self) -> bool {
+        self.whole + self.last > MOST_COST
+    }
 }
 
 /// The place that is tried next for a base that lost the ground.
@@ -224,16 +243,17 @@ impl Seat {
         let mut slid_from: Option<(Standing, f64)> = None;
         let mut tip_nm = None;
         let mut lost: Option<Lost> = None;
-        let (mut failures, mut has_rolled, mut cost) = (0, false, 0);
+        let (mut failures, mut has_rolled) = (0, false);
+        let mut cost = Cost::default();
         for _ in 0..MOST_EVALUATIONS {
-            if cost > MOST_COST && last.is_some() {
+            if cost.is_spent() && last.is_some() {
                 let shorter = (0..failures).fold(self.stride_rad, |stride_rad, _| stride_rad * SHORTER);
                 self.stride_rad = shorter.max(LEAST_STRIDE_RAD);
                 break;
             }
             let base = self.base();
             let response = base.respond(spring, pose, Demand::WrenchAndEnergy);
-            cost += spring.cost();
+            cost.add(spring.cost());
             let has_settled = matches!(response.validity, Validity::Ok | Validity::Clamped);
             if !has_settled && last.is_none() && lost.is_none() {
                 // It snaps between its plates: the base waits for it.
@@ -274,7 +294,7 @@ impl Seat {
                     }
                     // It merely touches the ground.
                     Trial::Hanging if !may_stand => return without_load(demand),
-                    Trial::Hanging if cost <= MOST_COST => {
+                    Trial::Hanging if !cost.is_spent() => {
                         let there_n = self.missing_n(&base, pose, &response, height_m);
                         self.at = at.toward(&hanging, part_of_the_way(*missing_n, there_n));
                         *trial = Trial::OnTheWay;

@@ -31,6 +31,8 @@ const LONGEST_WAY: f64 = 0.097;
 const LONGEST_UNFELT_STEP: f64 = 0.4;
 /// How often a search that is not felt may begin anew.
 const MOST_SEARCHES: u32 = 3;
+/// What these searches may cost together, in evaluations of the energy, if each costs no more than the one before.
+const MOST_COST: u32 = 200;
 /// Curvature that counts as none. Bending has 4; the softest stable directions have 1e-5; rounding makes
 /// 1e-14.
 const NEUTRAL: f64 = 1.0e-9;
@@ -302,7 +304,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             self.work = Work::default();
             outcome = self.search(plate, demand);
             work = work.and(&self.work);
-            if !matches!(outcome, Outcome::Moving(_)) {
+            if !matches!(outcome, Outcome::Moving(_)) || work.and(&self.work).cost() > MOST_COST {
                 break;
             }
         }
