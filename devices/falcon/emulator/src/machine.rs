@@ -126,6 +126,8 @@ pub struct Machine {
     frames: Frames,
     homed: u8,
     homing_commands: u32,
+    /// What the arms would count where the firmware began: until they have met their ends, they count from there.
+    began: Option<[i16; 3]>,
     commands: u64,
     command: Command,
     is_gone: bool,
@@ -153,6 +155,7 @@ impl Machine {
             frames: Frames::default(),
             homed,
             homing_commands: 0,
+            began: None,
             commands: 0,
             command: Command::REST,
             is_gone: false,
@@ -225,6 +228,7 @@ impl Machine {
                     && self.fault != Some(Fault::NoReport)
                 {
                     (self.stage, self.homed, self.homing_commands) = (Stage::Running, 0, 0);
+                    self.began = None;
                 }
                 Some(Vec::new())
             }
@@ -312,9 +316,11 @@ impl Machine {
                 self.homed = ALL_HOMED;
             }
         }
-        let (mut homed, mut encoders) = (self.homed, [0; 3]);
-        if homed == ALL_HOMED {
-            encoders = inverse(self.motion.place_m(at, self.commands)).map_or([0; 3], counts);
+        let mut homed = self.homed;
+        let mut encoders = inverse(self.motion.place_m(at, self.commands)).map_or([0; 3], counts);
+        if homed != ALL_HOMED {
+            let began = self.began.get_or_insert(encoders);
+            encoders = std::array::from_fn(|arm| encoders[arm].wrapping_sub(began[arm]));
         }
         match self.fault {
             Some(Fault::HubReset(first)) if since(first) => {

@@ -5,6 +5,8 @@ use flotor_falcon::kinematics::CENTRE_M;
 use flotor_falcon::protocol::ALL_HOMED;
 use flotor_falcon_emulator::in_process::InProcess;
 use flotor_falcon_emulator::machine::{Fault, Machine, Motion, Power, place_of};
+use flotor_hal::DVec3;
+use std::time::Duration;
 
 /// No firmware of anybody's: bytes without a pattern.
 fn dummy(length: u32) -> Vec<u8> {
@@ -24,6 +26,26 @@ fn a_firmware_is_loaded_once_and_stays() {
     let report = start(&device, Some(&dummy(8492))).expect("it is loaded");
     assert_eq!((report.homed, report.encoders), (0, [0; 3]), "no arm has met its end");
     assert_eq!(start(&device, None), Ok(report), "it runs already");
+}
+
+/// As incremental encoders do: a program that never homes the device sees them move.
+#[test]
+fn arms_that_have_not_met_their_ends_count_from_where_the_firmware_began() {
+    let motion = Motion::ToAndFro { centre_m: CENTRE_M, amplitude_m: DVec3::Y * 0.02, frequency_hz: 2.0 };
+    let device = InProcess::new(Machine::new(Power::Off, motion));
+    let first = start(&device, Some(&dummy(500))).expect("it is loaded");
+    assert_eq!((first.homed, first.encoders), (0, [0; 3]));
+    let mut most = 0;
+    for _ in 0..100 {
+        let report = start(&device, None).expect("it runs already");
+        assert_eq!(report.homed, 0);
+        most = report.encoders.map(i16::abs).into_iter().fold(most, i16::max);
+        if most > 100 {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    panic!("no arm moved by more than {most} counts");
 }
 
 #[test]
