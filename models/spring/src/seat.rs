@@ -180,7 +180,7 @@ impl Seat {
     /// Seated again, where it was at first. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.stand(Standing::SEATED);
-        (self.lifted, self.hold) = (false, 1.0);
+        (self.lifted, self.hold, self.stride_rad) = (false, 1.0, LONGEST_STEP_RAD);
     }
 
     /// Stands at a place, with nothing known of the spring there.

@@ -428,6 +428,34 @@ fn every_pose_gets_a_finite_answer() {
     }
 }
 
+/// Whatever was tried in vain before leaves nothing behind.
+#[test]
+fn a_reset_seat_answers_as_a_new_one() {
+    let wild = Workspace { shear: 0.5, height: 0.6, tilt_rad: 0.5, yaw_rad: 0.5 };
+    for preset in Preset::ALL {
+        let spring = preset.spring();
+        let new = || (Rod::to_rounding(&spring, Coils::Pass), Seat::new(&spring, Friction::STICKING));
+        let (mut law, mut seat) = new();
+        let mut sampler = Sampler::new(14);
+        for _ in 0..of(2000, 400) {
+            for _ in 0..3 {
+                let pose = wild.pose(&mut sampler, spring.geometry().free_length_m);
+                seat.step(&mut law, &pose, Demand::WrenchAndEnergy);
+            }
+            law.reset();
+            seat.reset();
+            assert_eq!(seat, new().1, "{preset:?}");
+        }
+        let (mut other_law, mut other_seat) = new();
+        for _ in 0..of(2000, 400) {
+            let pose = wild.pose(&mut sampler, spring.geometry().free_length_m);
+            let [one, other] = [(&mut law, &mut seat), (&mut other_law, &mut other_seat)]
+                .map(|(law, seat)| seat.step(law, &pose, Demand::WrenchAndEnergy));
+            assert_eq!(one, other, "{preset:?} {pose:?}");
+        }
+    }
+}
+
 /// Half as far again as the workspace a base may tip over, where no tilt is of least energy; how many poses stay without one is
 /// printed, not hidden.
 #[test]
