@@ -109,6 +109,8 @@ macro_rules! export_plugin {
             #[used]
             #[cfg_attr(not(target_vendor = "apple"), unsafe(link_section = ".flotor"))]
             #[cfg_attr(target_vendor = "apple", unsafe(link_section = "__DATA,__flotor"))]
+            // The linker of a DLL keeps what is exported, and drops what is merely used.
+            #[cfg_attr(windows, unsafe(export_name = concat!("flotor_metadata_", env!("CARGO_CRATE_NAME"))))]
             static METADATA: [u8; $crate::abi::metadata::length(&FACTS)] =
                 $crate::abi::metadata::render(&FACTS);
         };

@@ -136,12 +136,7 @@ table!(IndependentStopTable: "flotor.independent-stop/1", D: [IndependentStopDev
 pub mod means {
     use super::{BY_ITSELF, IndependentStop, STOP_MESSAGE_BYTES, StoppedState};
     use crate::Refusal;
-    use rustix::fs::{OFlags, fcntl_getfl};
-    use rustix::io::fcntl_dupfd_cloexec;
-    use std::os::fd::{BorrowedFd, OwnedFd};
-
-    /// Lowest number of a duplicate: not one of the three that every process has.
-    const LOWEST_DESCRIPTOR: i32 = 3;
+    use crate::abi::loader::platform::{Handle, writable_duplicate};
 
     /// What stops a device without its host.
     #[derive(Debug)]
@@ -149,7 +144,7 @@ pub mod means {
         /// A message on a handle of its own.
         Message {
             /// Where to.
-            handle: OwnedFd,
+            handle: Handle,
             /// What.
             message: Vec<u8>,
             /// What the device is then.
@@ -184,21 +179,8 @@ pub mod means {
             let Some(message) = message.map(<[u8]>::to_vec) else {
                 return Err(wrong(format!("has {length} bytes; it must have 1 to {STOP_MESSAGE_BYTES}")));
             };
-            if told.descriptor < 0 {
-                return Err(wrong(format!("names the descriptor {}", told.descriptor)));
-            }
-            // SAFETY: the plugin keeps it open until the device is closed (contract), and the device is open; a number that
-            // is none is told by the system.
-            let theirs = unsafe { BorrowedFd::borrow_raw(told.descriptor) };
-            let no_use = |error| wrong(format!("names the descriptor {}: {error}", told.descriptor));
-            let mode = fcntl_getfl(theirs).map_err(no_use)?;
-            if !mode.intersects(OFlags::WRONLY | OFlags::RDWR) {
-                return Err(wrong(format!(
-                    "names the descriptor {}, which cannot be written",
-                    told.descriptor
-                )));
-            }
-            let handle = fcntl_dupfd_cloexec(theirs, LOWEST_DESCRIPTOR).map_err(no_use)?;
+            // SAFETY: the plugin keeps it open until the device is closed (contract), and the device is open.
+            let handle = unsafe { writable_duplicate(told.descriptor) }.map_err(wrong)?;
             Ok(Self::Message { handle, message, state })
         }
     }
@@ -224,7 +206,8 @@ impl OpenedDevice {
     }
 }
 
-#[cfg(all(test, feature = "loader"))]
+/// Descriptors are those of Unix.
+#[cfg(all(test, feature = "loader", unix))]
 mod tests {
     use super::*;
     use std::io::Read;

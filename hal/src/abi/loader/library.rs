@@ -3,6 +3,7 @@
 use super::declaration;
 use super::interfaces::Interface;
 use super::model::{Model, ModelTables};
+use super::platform::PrivateCopy;
 use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file, schema};
 use crate::abi::{
     ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, Entry, HOST_QUIET_PANICS, Host, MAGIC, PluginKind,
@@ -10,10 +11,6 @@ use crate::abi::{
 use crate::extension::{DeviceExtensions, ModelExtensions};
 use crate::{DeviceInfo, ModelInfo, Parameter};
 use object::ReadCache;
-use std::ffi::CString;
-use std::fs::File;
-use std::os::fd::AsRawFd;
-use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 /// Whose Rust runtime a plugin's panics happen in.
@@ -53,12 +50,13 @@ impl Plugin {
     pub unsafe fn load(path: &Path) -> Result<Self, LoadError> {
         let (mut original, _) = metadata_file::open_regular(path)?;
         let copy_error = |cause: std::io::Error| LoadError::Copy { path: path.into(), cause };
-        let mut copy = file_in_memory(path).map_err(copy_error)?;
-        let length = std::io::copy(&mut original, &mut copy).map_err(copy_error)?;
-        let metadata = metadata_file::parse(path, &ReadCache::new(&copy), length)?;
+        let copy = PrivateCopy::of(path, &mut original).map_err(copy_error)?;
+        let length = copy.file().metadata().map_err(copy_error)?.len();
+        let metadata = metadata_file::parse(path, &ReadCache::new(copy.file()), length)?;
         metadata.check_contract()?;
         // SAFETY: the caller trusts the file.
-        let entry = unsafe { open_private_copy(&metadata, copy) }?;
+        let entry = unsafe { copy.open(&metadata.entry) };
+        let entry = entry.map_err(|cause| LoadError::Link { path: path.into(), cause })?.cast::<Entry>();
         // SAFETY: null, or what the metadata call the entry, in a library that is never unloaded; that it keeps the
         // contract is the caller's trust in the file.
         let plugin = unsafe { Self::from_entry(metadata, entry, Runtime::Own) }?;
@@ -238,41 +236,6 @@ impl Plugin {
     }
 }
 
-/// An empty file nobody else can reach, called like `path` for debuggers.
-fn file_in_memory(path: &Path) -> std::io::Result<File> {
-    let name = path.file_name().map(OsStrExt::as_bytes).unwrap_or_default();
-    let name = CString::new(name).unwrap_or_default();
-    Ok(rustix::fs::memfd_create(&name, rustix::fs::MemfdFlags::CLOEXEC)?.into())
-}
-
-/// Opens a copy in memory, the very bytes that were checked, so that nobody can change the file under a running loop
-/// (an overwritten mapped library raises SIGBUS at the next call) and a rebuilt plugin at the same path is new code.
-///
-/// Gives what the metadata call the entry, to be checked; null if there is no such symbol.
-///
-/// # Safety
-/// As for [`Plugin::load`].
-unsafe fn open_private_copy(metadata: &Metadata, file: File) -> Result<*const Entry, LoadError> {
-    let path = &metadata.path;
-    let copy = format!("/proc/self/fd/{}", file.as_raw_fd());
-
-    use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
-    // RTLD_NOW: with lazy binding a missing symbol would kill the process in the middle of a tick.
-    // SAFETY: opening runs the library's initialisers, which the caller trusts.
-    let library = unsafe { Library::open(Some(&copy), RTLD_NOW | RTLD_LOCAL) }.map_err(|cause| {
-        LoadError::Link { path: path.clone(), cause: whole_cause(&cause).replace(&copy, "it") }
-    })?;
-    let symbol = metadata.entry.as_str();
-    // SAFETY: the symbol is only used as an address here; it is checked to be an `Entry` before it is one to
-    // anybody.
-    let found = unsafe { library.get::<*const Entry>(symbol.as_bytes()) }.map(|entry| entry.as_raw_ptr());
-    let address = found.unwrap_or(std::ptr::null_mut()).cast::<Entry>().cast_const();
-    // Thread-local destructors make unloading unsound: a library stays for the life of the process. Its file
-    // stays open too: the linker knows a library by its path, and a reused descriptor would be the same path.
-    std::mem::forget((library, file));
-    Ok(address)
-}
-
 /// The entry at an address, if there is one and none of it is missing.
 ///
 /// # Safety
@@ -294,14 +257,4 @@ unsafe fn whole_entry(address: *const Entry) -> Option<&'static Entry> {
     }
     // SAFETY: not null, aligned and, by its own word, whole; it stays for ever, and any bits are an `Entry`.
     Some(unsafe { &*address })
-}
-
-fn whole_cause(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text = format!("{text}: {cause}");
-        source = cause.source();
-    }
-    text
 }

@@ -1,10 +1,8 @@
 //! Reads what a file says about itself without running any of it.
 
-use super::LoadError;
-use crate::abi::{CONTRACT, PluginKind, metadata};
-use object::elf::FileHeader64;
-use object::read::elf::{FileHeader, ProgramHeader, SectionHeader};
-use object::{Endianness, ReadCache, ReadRef};
+use super::{LoadError, platform};
+use crate::abi::{CONTRACT, PluginKind};
+use object::{ReadCache, ReadRef};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -69,28 +67,7 @@ impl Metadata {
 
 /// Finds and reads the metadata section of the bytes of a library.
 pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Result<Metadata, LoadError> {
-    let not_a_library = |cause| LoadError::NotALibrary { path: path.into(), cause };
-    // The header first: the table it points at is at the end of the file, the first thing a cut takes away.
-    let header = FileHeader64::<Endianness>::parse(data).map_err(not_a_library)?;
-    let truncated = |need| LoadError::Truncated { path: path.into(), have: length, need };
-    let need = end_of_section_headers(header).map_err(not_a_library)?;
-    if need > length {
-        return Err(truncated(need));
-    }
-    let endian = header.endian().map_err(not_a_library)?;
-    let segments = header.program_headers(endian, data).map_err(not_a_library)?;
-    let sections = header.sections(endian, data).map_err(not_a_library)?;
-    // `dlopen` maps them all and dies of SIGBUS in a file that is shorter.
-    let ends =
-        segments.iter().map(|segment| segment.p_offset(endian).saturating_add(segment.p_filesz(endian)));
-    let ranges = sections.iter().filter_map(|section| section.file_range(endian));
-    let need = ends.chain(ranges.map(|(offset, size)| offset.saturating_add(size))).max().unwrap_or(0);
-    if need > length {
-        return Err(truncated(need));
-    }
-    let section = sections.section_by_name(endian, metadata::SECTION.as_bytes());
-    let (_, section) = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
-    let text = section.data(endian, data).map_err(not_a_library)?;
+    let text = platform::metadata_section(path, data, length)?;
     let bad = |cause: String| LoadError::BadMetadata { path: path.into(), cause };
     let text = std::str::from_utf8(text).map_err(|cause| bad(cause.to_string()))?;
     let pairs = text.trim_end_matches('\0').lines().map(str::trim).filter(|line| !line.is_empty());
@@ -124,11 +101,4 @@ fn key_and_value(line: &str) -> Option<(&str, &str)> {
     // A control character would go to a terminal.
     let is_plain = |sign: char| !matches!(sign, '"' | '\\') && !sign.is_control();
     value.chars().all(is_plain).then_some((key.trim(), value))
-}
-
-/// Bytes a file needs to hold its section headers.
-fn end_of_section_headers(header: &FileHeader64<Endianness>) -> object::Result<u64> {
-    let endian = header.endian()?;
-    let size = u64::from(header.e_shnum(endian)) * u64::from(header.e_shentsize(endian));
-    Ok(header.e_shoff(endian).saturating_add(size))
 }

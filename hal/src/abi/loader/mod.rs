@@ -16,6 +16,7 @@ mod interfaces;
 mod library;
 mod metadata_file;
 mod model;
+pub(crate) mod platform;
 mod schema;
 mod setting;
 

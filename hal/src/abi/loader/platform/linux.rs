@@ -1,0 +1,128 @@
+//! Linux: ELF, a copy in memory without a name, `dlopen`.
+
+use crate::abi::loader::LoadError;
+use crate::abi::metadata;
+use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+use object::elf::FileHeader64;
+use object::read::elf::{FileHeader, ProgramHeader, SectionHeader};
+use object::{Endianness, ReadRef};
+use rustix::fs::{OFlags, fcntl_getfl};
+use rustix::io::fcntl_dupfd_cloexec;
+use std::ffi::{CString, c_void};
+use std::fs::File;
+use std::io;
+use std::os::fd::{AsRawFd, BorrowedFd, OwnedFd};
+use std::os::unix::ffi::OsStrExt;
+use std::path::Path;
+
+/// Lowest number of a duplicate: not one of the three that every process has.
+const LOWEST_DESCRIPTOR: i32 = 3;
+
+/// What is kept of a plugin's descriptor.
+pub(crate) type Handle = OwnedFd;
+
+/// A duplicate of a descriptor that can be written; it stays when the plugin closes its own.
+///
+/// # Errors
+/// What is wrong with the descriptor.
+///
+/// # Safety
+/// Whoever owns the descriptor keeps it open during the call. A number that is none is told by the system.
+pub(crate) unsafe fn writable_duplicate(descriptor: i32) -> Result<Handle, String> {
+    if descriptor < 0 {
+        return Err(format!("names the descriptor {descriptor}"));
+    }
+    // SAFETY: open for the call, as this function demands.
+    let theirs = unsafe { BorrowedFd::borrow_raw(descriptor) };
+    let no_use = |error| format!("names the descriptor {descriptor}: {error}");
+    let mode = fcntl_getfl(theirs).map_err(no_use)?;
+    if !mode.intersects(OFlags::WRONLY | OFlags::RDWR) {
+        return Err(format!("names the descriptor {descriptor}, which cannot be written"));
+    }
+    fcntl_dupfd_cloexec(theirs, LOWEST_DESCRIPTOR).map_err(no_use)
+}
+
+/// A copy in memory that nobody else can reach: nobody can change the file under a running loop (an overwritten mapped
+/// library raises SIGBUS at the next call), and a rebuilt plugin at the same path is new code.
+pub(crate) struct PrivateCopy(File);
+
+impl PrivateCopy {
+    /// Copies a file, called like `path` for debuggers.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(crate) fn of(path: &Path, original: &mut File) -> io::Result<Self> {
+        let name = path.file_name().map(OsStrExt::as_bytes).unwrap_or_default();
+        let name = CString::new(name).unwrap_or_default();
+        let mut copy: File = rustix::fs::memfd_create(&name, rustix::fs::MemfdFlags::CLOEXEC)?.into();
+        io::copy(original, &mut copy)?;
+        Ok(Self(copy))
+    }
+
+    /// The copy, to be read.
+    pub(crate) fn file(&self) -> &File {
+        &self.0
+    }
+
+    /// Opens it as a library, for ever: the address of a symbol, null if it has none.
+    ///
+    /// # Errors
+    /// All that the linker said.
+    ///
+    /// # Safety
+    /// The caller trusts the library: opening it runs its initialisers.
+    pub(crate) unsafe fn open(self, symbol: &str) -> Result<*const c_void, String> {
+        let copy = format!("/proc/self/fd/{}", self.0.as_raw_fd());
+        // RTLD_NOW: with lazy binding a missing symbol would kill the process in the middle of a tick.
+        // SAFETY: opening runs the library's initialisers, which the caller trusts.
+        let library = unsafe { Library::open(Some(&copy), RTLD_NOW | RTLD_LOCAL) }
+            .map_err(|cause| super::whole_cause(&cause).replace(&copy, "it"))?;
+        // SAFETY: the symbol is only used as an address.
+        let found =
+            unsafe { library.get::<*const c_void>(symbol.as_bytes()) }.map(|entry| entry.as_raw_ptr());
+        // Thread-local destructors make unloading unsound: a library stays for the life of the process. Its file
+        // stays open too: the linker knows a library by its path, and a reused descriptor would be the same path.
+        std::mem::forget((library, self.0));
+        Ok(found.unwrap_or(std::ptr::null_mut()).cast_const())
+    }
+}
+
+/// The bytes of the metadata section.
+///
+/// # Errors
+/// [`LoadError`], if this is no whole ELF library or has no such section.
+pub(crate) fn metadata_section<'d>(
+    path: &Path,
+    data: impl ReadRef<'d>,
+    length: u64,
+) -> Result<&'d [u8], LoadError> {
+    let not_a_library = |cause| LoadError::NotALibrary { path: path.into(), cause };
+    // The header first: the table it points at is at the end of the file, the first thing a cut takes away.
+    let header = FileHeader64::<Endianness>::parse(data).map_err(not_a_library)?;
+    let truncated = |need| LoadError::Truncated { path: path.into(), have: length, need };
+    let need = end_of_section_headers(header).map_err(not_a_library)?;
+    if need > length {
+        return Err(truncated(need));
+    }
+    let endian = header.endian().map_err(not_a_library)?;
+    let segments = header.program_headers(endian, data).map_err(not_a_library)?;
+    let sections = header.sections(endian, data).map_err(not_a_library)?;
+    // `dlopen` maps them all and dies of SIGBUS in a file that is shorter.
+    let ends =
+        segments.iter().map(|segment| segment.p_offset(endian).saturating_add(segment.p_filesz(endian)));
+    let ranges = sections.iter().filter_map(|section| section.file_range(endian));
+    let need = ends.chain(ranges.map(|(offset, size)| offset.saturating_add(size))).max().unwrap_or(0);
+    if need > length {
+        return Err(truncated(need));
+    }
+    let section = sections.section_by_name(endian, metadata::SECTION.as_bytes());
+    let (_, section) = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
+    section.data(endian, data).map_err(not_a_library)
+}
+
+/// Bytes a file needs to hold its section headers.
+fn end_of_section_headers(header: &FileHeader64<Endianness>) -> object::Result<u64> {
+    let endian = header.endian()?;
+    let size = u64::from(header.e_shnum(endian)) * u64::from(header.e_shentsize(endian));
+    Ok(header.e_shoff(endian).saturating_add(size))
+}

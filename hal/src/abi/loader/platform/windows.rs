@@ -1,0 +1,127 @@
+//! Windows: PE, a copy in the folder for temporary files, `LoadLibrary`.
+
+use crate::abi::loader::LoadError;
+use crate::abi::metadata;
+use libloading::os::windows::Library;
+use object::ReadRef;
+use object::pe::{ImageDosHeader, ImageNtHeaders64};
+use object::read::pe::ImageNtHeaders;
+use std::ffi::{OsStr, c_void};
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::os::windows::fs::OpenOptionsExt;
+use std::os::windows::io::OwnedHandle;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+/// Others may read the copy, and neither write nor remove it (`FILE_SHARE_READ`).
+const SHARE_READ: u32 = 1;
+/// Folder of the copies, in the one for temporary files.
+const FOLDER: &str = "flotor-plugins";
+/// A copy that is younger may be one that another process has not opened yet.
+const OPENED_WITHIN: Duration = Duration::from_secs(60);
+
+/// What is kept of a plugin's descriptor.
+pub(crate) type Handle = OwnedHandle;
+
+/// A descriptor is a number of the plugin's own C library here, which means nothing to its host.
+///
+/// # Errors
+/// Always: a device that needs a message to stop has to stop by itself on this system.
+///
+/// # Safety
+/// None is needed; as on other systems.
+pub(crate) unsafe fn writable_duplicate(descriptor: i32) -> Result<Handle, String> {
+    Err(format!("names the descriptor {descriptor}, which no other program of this system can use"))
+}
+
+/// A copy in a file of its own, which nobody can write or remove while this process lives: the file of the plugin stays free to
+/// be built again. A loaded library cannot be removed; a later start of any program does it.
+pub(crate) struct PrivateCopy {
+    path: PathBuf,
+    file: File,
+}
+
+impl PrivateCopy {
+    /// Copies a file.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(crate) fn of(path: &Path, original: &mut File) -> io::Result<Self> {
+        static COPIES: AtomicU32 = AtomicU32::new(0);
+        let folder = std::env::temp_dir().join(FOLDER);
+        std::fs::create_dir_all(&folder)?;
+        remove_those_nobody_has(&folder);
+        let name = path.file_name().unwrap_or(OsStr::new("plugin.dll")).to_string_lossy();
+        let number = COPIES.fetch_add(1, Ordering::Relaxed);
+        let path = folder.join(format!("{}-{number}-{name}", std::process::id()));
+        io::copy(original, &mut File::create(&path)?)?;
+        let file = OpenOptions::new().read(true).share_mode(SHARE_READ).open(&path)?;
+        Ok(Self { path, file })
+    }
+
+    /// The copy, to be read.
+    pub(crate) fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Opens it as a library, for ever: the address of a symbol, null if it has none.
+    ///
+    /// # Errors
+    /// All that the system said.
+    ///
+    /// # Safety
+    /// The caller trusts the library: opening it runs its initialisers.
+    pub(crate) unsafe fn open(self, symbol: &str) -> Result<*const c_void, String> {
+        // SAFETY: opening runs the library's initialisers, which the caller trusts.
+        let library = unsafe { Library::new(&self.path) }.map_err(|cause| super::whole_cause(&cause))?;
+        // SAFETY: the symbol is only used as an address.
+        let found = unsafe { library.get::<*const c_void>(symbol.as_bytes()) };
+        let address = found.map(|entry| entry.as_raw_ptr()).unwrap_or(std::ptr::null_mut());
+        // Thread-local destructors make unloading unsound: a library stays for the life of the process. Its file stays open: so
+        // nobody can change it.
+        std::mem::forget((library, self.file));
+        Ok(address.cast_const())
+    }
+}
+
+/// Copies that earlier processes left: one that is in use cannot be removed, and stays.
+fn remove_those_nobody_has(folder: &Path) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let age =
+            entry.metadata().and_then(|about| about.modified()).map(|at| at.elapsed().unwrap_or_default());
+        if age.is_ok_and(|age| age > OPENED_WITHIN) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// The bytes of the metadata section.
+///
+/// # Errors
+/// [`LoadError`], if this is no whole PE library of 64 bits or has no such section.
+pub(crate) fn metadata_section<'d>(
+    path: &Path,
+    data: impl ReadRef<'d>,
+    length: u64,
+) -> Result<&'d [u8], LoadError> {
+    let not_a_library = |cause| LoadError::NotALibrary { path: path.into(), cause };
+    let dos = ImageDosHeader::parse(data).map_err(not_a_library)?;
+    let mut offset = u64::from(dos.nt_headers_offset());
+    let (headers, _) = ImageNtHeaders64::parse(data, &mut offset).map_err(not_a_library)?;
+    let sections = headers.sections(data, offset).map_err(not_a_library)?;
+    let need = sections.iter().map(|section| {
+        let (at, size) = section.pe_file_range();
+        u64::from(at) + u64::from(size)
+    });
+    let need = need.max().unwrap_or(0);
+    if need > length {
+        return Err(LoadError::Truncated { path: path.into(), have: length, need });
+    }
+    let named = |name: &[u8]| name.strip_suffix(b"\0").unwrap_or(name) == metadata::SECTION.as_bytes();
+    let section = sections.iter().find(|section| named(&section.name));
+    let section = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
+    section.pe_data(data).map_err(not_a_library)
+}
