@@ -99,7 +99,7 @@ missing_named() {
 }
 
 # Workspaces of their own beside the core.
-satellites="host/python host/bridge host/sweep devices/maglev/fuzz"
+satellites="host/python host/bridge host/sweep tests/fuzz"
 
 format() {
     local satellite
@@ -166,15 +166,19 @@ bits() {
     done
 }
 
-# Coverage-guided fuzzing of the maglev's decoders, a minute each. The instrumentation is LLVM's, as `cargo fuzz` asks for it;
-# without its address sanitizer no nightly compiler is needed, and the decoder has no `unsafe`.
+# Coverage-guided fuzzing of what reads bytes that others wrote, a minute each. The instrumentation is LLVM's, as `cargo fuzz` asks
+# for it; without its address sanitizer no nightly compiler is needed, and the decoders have no `unsafe`.
 fuzz() {
-    local coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
+    local reader coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
         -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
         -Cllvm-args=-sanitizer-coverage-trace-compares"
-    for decoder in decode ml_api; do
-        RUSTFLAGS="$(echo $coverage)" cargo run --release --manifest-path devices/maglev/fuzz/Cargo.toml \
-            --target "$(target)" --target-dir target/fuzz --bin "$decoder" -- -max_total_time=60 -print_final_stats=1
+    for reader in decode ml_api gmsh; do
+        # What it starts from, and what it finds on the way.
+        mkdir -p "target/fuzz/found/$reader"
+        find "tests/fuzz/seeds/$reader" -type f -exec cp {} "target/fuzz/found/$reader" \; 2>/dev/null || true
+        RUSTFLAGS="$(echo $coverage)" cargo run --release --manifest-path tests/fuzz/Cargo.toml \
+            --target "$(target)" --target-dir target/fuzz --bin "$reader" -- \
+            "target/fuzz/found/$reader" -max_total_time=60 -print_final_stats=1
     done
 }
 

@@ -1,5 +1,5 @@
 //! Any bytes give frames or reasons, never a panic: frames that were right, wounded in every way a link and a bad host
-//! know, as packets and on a stream. `FLOTOR_TEST_SIZE=full` makes it 1e8 of them; `fuzz/` has the same for libFuzzer.
+//! know, as packets and on a stream. `FLOTOR_TEST_SIZE=full` makes it 1e8 of them; `tests/fuzz` has the same for libFuzzer.
 #![allow(clippy::cast_possible_truncation)] // random bytes
 
 use flotor_maglev::protocol::stream::{CODED_BYTES, Received, StreamDecoder, coded};

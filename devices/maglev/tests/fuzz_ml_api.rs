@@ -1,5 +1,5 @@
 //! Any bytes give requests, replies and events of the ML API or nothing, never a panic: frames that were right, wounded in every
-//! way a link and a bad program know, whole and on a stream. `FLOTOR_TEST_SIZE=full` makes it 1e8 of each; `fuzz/` has the same
+//! way a link and a bad program know, whole and on a stream. `FLOTOR_TEST_SIZE=full` makes it 1e8 of each; `tests/fuzz` has the same
 //! for libFuzzer.
 #![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // random bytes
 
