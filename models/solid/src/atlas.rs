@@ -59,7 +59,7 @@ pub struct Atlas {
     pub hertz: f64,
     /// `h` over `sqrt(d / R)`.
     pub profile: Curve,
-    /// Depth from which on the force stays as it is, m.
+    /// Depth from which on the stiffness falls to zero, over a tenth of the radius, m.
     pub deepest_m: f64,
     /// What is touched.
     pub ground: Ground,
@@ -68,8 +68,11 @@ pub struct Atlas {
 /// Over how much of the root of depth over radius the ratio comes to its end, behind the deepest that is answered.
 const RATIO_END: f64 = 0.022;
 
-/// Distances below this are none, m: their reciprocals would not be finite.
-const NOTHING_M: f64 = 1.0e-15;
+/// Over how many radii the stiffness falls to zero, behind the deepest that is answered.
+const DEEPEST_FADE: f64 = 0.1;
+
+/// Distances whose square is below this are none, m2: their reciprocals would not be finite.
+const NOTHING_M2: f64 = 1.0e-30;
 
 /// Depth, and what the ratio is there.
 struct Touch {
@@ -121,6 +124,31 @@ impl Atlas {
         Answer { energy: self.unbounded(touch.depth_m) * touch.ratio, depth_m, is_beyond }
     }
 
+    /// The same of the top face of a block alone, as if it had no other: zero beyond its edges, and growing over half a radius before
+    /// them. Its force grows with the depth, which that of [`Self::answer`] does not where the nearest face is another. Real-time:
+    /// bounded, no allocation.
+    #[must_use]
+    pub fn top(&self, centre_m: [f64; 3]) -> Answer {
+        let Ground::Block { size, ratios, rounding_m } = &self.ground else { return self.answer(centre_m) };
+        let centre = [0, 1, 2].map(|axis| Jet::variable(centre_m[axis], axis));
+        let depth_m = -centre[2] + self.radius_m;
+        let width_m = 0.5 * self.radius_m;
+        let half_m = [size.half_x_m, size.half_y_m];
+        let inside = [0, 1].map(|k| (-centre[k].abs() + half_m[k]) * (1.0 / width_m));
+        if depth_m.value <= 0.0 || inside.iter().any(|s| s.value <= 0.0) {
+            return Answer { energy: Jet::default(), depth_m: depth_m.value, is_beyond: false };
+        }
+        let ratio = ratios[0].at(self.place_on_top(centre, depth_m, &ratios[0], *rounding_m));
+        let energy = self.unbounded(depth_m) * ratio * step(inside[0]) * step(inside[1]);
+        Answer { energy, depth_m: depth_m.value, is_beyond: false }
+    }
+
+    /// Coordinates of the ratio of a block's top.
+    fn place_on_top(&self, centre: [Jet; 3], depth_m: Jet, ratio: &Volume, rounding_m: f64) -> [Jet; 3] {
+        let across = |k: usize| ease_at(centre[k].abs(), ratio.range(k).1, rounding_m);
+        [across(0), across(1), self.root(depth_m, ratio)]
+    }
+
     /// Root of depth over radius, up to where the ratio ends.
     fn root(&self, depth_m: Jet, ratio: &Volume) -> Jet {
         let value = (depth_m.value / self.radius_m).sqrt();
@@ -158,7 +186,7 @@ impl Atlas {
             Jet::constant(f64::NEG_INFINITY),
             up - (0.5 * height_m - rounding_m),
         ];
-        let (distance_m, shares) = distance(beyond);
+        let (distance_m, shares) = distance(beyond, rounding_m);
         let depth_m = -distance_m + (self.radius_m + rounding_m);
         if depth_m.value <= 0.0 {
             return None;
@@ -168,7 +196,7 @@ impl Atlas {
         Some(Touch { depth_m, ratio, is_beyond: shares[0].value > 0.5 })
     }
 
-    /// `P(d)`: beyond the deepest, a straight line.
+    /// `P(d)`: beyond the deepest, its second derivative falls to zero; from there on it is a straight line.
     fn unbounded(&self, depth_m: Jet) -> Jet {
         let within = depth_m.value.min(self.deepest_m);
         let root = (within / self.radius_m).sqrt();
@@ -176,7 +204,23 @@ impl Atlas {
         let hertz = self.hertz * within * within * within.sqrt();
         let value = hertz * h;
         let derivative = 2.5 * value / within + hertz * slope * 0.5 * root / within;
-        depth_m.chain(value + derivative * (depth_m.value - within), derivative)
+        let over_m = depth_m.value - within;
+        if over_m == 0.0 {
+            return depth_m.chain(value, derivative);
+        }
+        let bend = self.profile.curvature(root);
+        let second = hertz / (within * within) * (3.75 * h + 2.25 * slope * root + 0.25 * bend * root * root);
+        let width_m = DEEPEST_FADE * self.radius_m;
+        let s = (over_m / width_m).min(1.0);
+        // The integrals of 1 - s^2 (3 - 2 s), once and twice.
+        let once = width_m * s * (1.0 - s * s * (1.0 - 0.5 * s));
+        let twice = width_m * width_m * s * s * (0.5 - s * s * (0.25 - 0.1 * s));
+        let straight_m = (over_m - width_m).max(0.0);
+        let steepest = derivative + second * once;
+        depth_m.chain(
+            value + derivative * (over_m - straight_m) + second * twice + steepest * straight_m,
+            steepest,
+        )
     }
 
     /// Depth and ratio at a block; `None` far from it.
@@ -192,14 +236,14 @@ impl Atlas {
         let blunt_m = 0.25 * half_m[0].min(half_m[1]).min(half_m[2]);
         // Distance beyond each pair of faces of the block less its rounding.
         let beyond = [0, 1, 2].map(|axis| smooth_size(middle[axis], blunt_m) - (half_m[axis] - rounding_m));
-        let (distance_m, shares) = distance(beyond);
+        let (distance_m, shares) = distance(beyond, rounding_m);
         let depth_m = -distance_m + (self.radius_m + rounding_m);
         if depth_m.value <= 0.0 {
             return None;
         }
         let root = self.root(depth_m, &ratios[0]);
         let across = |axis: usize, volume: &Volume, k: usize| {
-            ease_at(smooth_size(middle[axis], 0.0), volume.range(k).1, rounding_m)
+            ease_at(middle[axis].abs(), volume.range(k).1, rounding_m)
         };
         let up = |volume: &Volume| {
             let (low, high) = volume.range(1);
@@ -212,7 +256,7 @@ impl Atlas {
                 0 => ratios[1].at([across(1, &ratios[1], 0), up(&ratios[1]), root]),
                 1 => ratios[2].at([across(0, &ratios[2], 0), up(&ratios[2]), root]),
                 // Of the clamped face too, where nothing is to be touched: in the middle of the block the law stays one.
-                _ => ratios[0].at([across(0, &ratios[0], 0), across(1, &ratios[0], 1), root]),
+                _ => ratios[0].at(self.place_on_top(centre, depth_m, &ratios[0], rounding_m)),
             };
             ratio = ratio + share * part;
         }
@@ -222,7 +266,11 @@ impl Atlas {
 
 /// Size of a number; round at zero, if `blunt` is positive, but for a constant.
 fn smooth_size(x: Jet, blunt: f64) -> Jet {
-    if x.value.abs() >= blunt { x.abs() } else { (x * x * (1.0 / blunt) + blunt) * 0.5 }
+    if x.value.abs() >= blunt {
+        return x.abs();
+    }
+    let square = x * x * (1.0 / (blunt * blunt));
+    (square * (square * -0.125 + 0.75) + 0.375) * blunt
 }
 
 /// The number itself up to `knee`, then bent until it stays at `knee + width`, which it reaches at `knee + 2 width`.
@@ -247,37 +295,57 @@ pub(crate) fn ease_at(x: Jet, end: f64, width: f64) -> Jet {
     if eased.value > end { Jet::constant(end) } else { eased }
 }
 
-/// Distance to a box (negative inside) of the distances beyond its pairs of faces, and the share of each pair in it.
-fn distance(beyond: [Jet; 3]) -> (Jet, [Jet; 3]) {
-    if beyond.iter().any(|b| b.value >= -NOTHING_M) {
-        let outside = beyond.map(|b| b.at_least(0.0));
-        let square = outside[0] * outside[0] + outside[1] * outside[1] + outside[2] * outside[2];
-        if square.value > NOTHING_M * NOTHING_M {
-            let inverse = square.recip();
-            return (square.sqrt(), outside.map(|b| b * b * inverse));
-        }
-        // On the box: the distance along the first such face.
-        let first = beyond.iter().position(|b| b.value >= -NOTHING_M).unwrap_or_default();
-        let mut shares = [Jet::constant(0.0); 3];
-        shares[first] = Jet::constant(1.0);
-        return (beyond[first], shares);
+/// What a number is above zero, bent over `width` on both sides of it. It less that of the opposite number is the number.
+fn above(x: Jet, width: f64) -> Jet {
+    if x.value <= -width { Jet::default() } else { x - ease(x, -width, width) }
+}
+
+/// Length of a vector.
+fn length(of: [Jet; 3]) -> Jet {
+    let square = of[0] * of[0] + of[1] * of[1] + of[2] * of[2];
+    if square.value > NOTHING_M2 { square.sqrt() } else { Jet::default() }
+}
+
+/// Smooth substitute for the least of three numbers, none of them negative: `(a^-8 + b^-8 + c^-8)^(-1/8)`.
+fn least(of: [Jet; 3]) -> Jet {
+    let least = of.iter().copied().fold(of[0], |least, d| if d.value < least.value { d } else { least });
+    if least.value * least.value <= NOTHING_M2 {
+        return Jet::default();
     }
-    let depths = beyond.map(|b| -b);
-    let least =
-        depths.iter().copied().fold(depths[0], |least, d| if d.value < least.value { d } else { least });
-    let powers = depths.map(|d| {
+    let mut sum = Jet::constant(0.0);
+    for d in of {
         let mut power = least / d;
         for _ in 0..SHARPNESS_ROOTS {
             power = power * power;
         }
-        power
-    });
-    let inverse = (powers[0] + powers[1] + powers[2]).recip();
-    let mut root = inverse;
+        sum = sum + power;
+    }
+    let mut root = sum.recip();
     for _ in 0..SHARPNESS_ROOTS {
         root = root.sqrt();
     }
-    (-(least * root), powers.map(|power| power * inverse))
+    least * root
+}
+
+/// Distance to a box (negative inside) of the distances beyond its pairs of faces, and the share of each pair in it. Where
+/// several pairs are as near, both are bent over `width` on both sides: second derivatives are continuous everywhere.
+fn distance(beyond: [Jet; 3], width: f64) -> (Jet, [Jet; 3]) {
+    let outside = beyond.map(|b| above(b, width));
+    let distance = length(outside) - least(beyond.map(|b| above(-b, width)));
+    // Outside, the distance beyond one of three pairs is at least 0.58 of that to their corner; inside, at most 1.15 of it.
+    let over = (above(distance, width) * 0.6 + above(-distance, width) * 0.3 + width).recip();
+    let weights = beyond.map(|b| {
+        let s = (b - distance) * over + 1.0;
+        if s.value > 0.0 { step(s) } else { Jet::default() }
+    });
+    let sum = (weights[0] + weights[1] + weights[2]).recip();
+    (distance, weights.map(|weight| weight * sum))
+}
+
+/// From zero at zero to one at one, with two continuous derivatives; one beyond.
+pub(crate) fn step(x: Jet) -> Jet {
+    let s = x.value.clamp(0.0, 1.0);
+    x.chain(s * s * s * (10.0 - s * (15.0 - 6.0 * s)), 30.0 * s * s * (1.0 - s) * (1.0 - s))
 }
 
 #[cfg(test)]
@@ -287,13 +355,21 @@ mod tests {
 
     /// A law whose ratio is one everywhere: only distance and depth are left.
     fn even() -> Atlas {
+        with([1.0; 3])
+    }
+
+    /// A law whose ratio is one number on each pair of faces: top, across x, across y.
+    fn with(ratios: [f64; 3]) -> Atlas {
         let size = Size { half_x_m: 0.02, half_y_m: 0.03, height_m: 0.05 };
-        let even = |a: f64, low: f64, high: f64| {
+        let even = |ratio: f64, a: f64, low: f64, high: f64| {
             let nodes = [vec![0.0, 0.5 * a, a], vec![low, 0.5 * (low + high), high], vec![0.0, 0.5, 1.0]];
-            Volume::new(nodes, &[1.0; 27], [[End::Parabola; 2]; 3])
+            Volume::new(nodes, &[ratio; 27], [[End::Parabola; 2]; 3])
         };
-        let ratios =
-            Box::new([even(0.018, 0.0, 0.028), even(0.028, -0.048, -0.002), even(0.018, -0.048, -0.002)]);
+        let ratios = Box::new([
+            even(ratios[0], 0.018, 0.0, 0.028),
+            even(ratios[1], 0.028, -0.048, -0.002),
+            even(ratios[2], 0.018, -0.048, -0.002),
+        ]);
         Atlas {
             radius_m: 0.005,
             hertz: 1.0,
@@ -319,6 +395,37 @@ mod tests {
             assert!((answer.depth_m - depth_m).abs() < 1.0e-12, "{centre_m:?} {}", answer.depth_m);
         }
         assert_eq!(atlas.answer([0.0, 0.0, 0.0051]).energy, Jet::default());
+    }
+
+    /// On the axis of a rounded edge, and where two faces are as near, directions meet: neither the energy nor the force depends on the side one comes from, and
+    /// faces of different stiffness do not make a force of their difference.
+    #[test]
+    fn the_axis_of_an_edge_is_a_place_like_others() {
+        let atlas = with([1.0, 1.3, 0.8]);
+        let near = atlas.answer([0.0, 0.0, -0.001]).energy.slope[2].abs();
+        for axis_m in [
+            [0.019, 0.0, -0.001],
+            [0.0, 0.029, -0.001],
+            [0.019, 0.029, -0.02],
+            [0.019, 0.029, -0.001],
+            [0.009, 0.0, -0.011],
+            [0.009, 0.019, -0.011],
+        ] {
+            let at = |i: usize, j: usize, k: usize| {
+                let side = |k: usize| (k as f64 - 1.0) * 1.0e-9;
+                atlas.answer([axis_m[0] + side(i), axis_m[1] + side(j), axis_m[2] + side(k)]).energy
+            };
+            let middle = at(1, 1, 1);
+            for place in 0..27 {
+                let beside = at(place % 3, place / 3 % 3, place / 9);
+                let turned = (0..3).map(|k| (beside.slope[k] - middle.slope[k]).abs()).fold(0.0, f64::max);
+                let step_j = (beside.value - middle.value).abs();
+                // A nanometre is a millionth of the rounding: so much of the force of the face, and of its work.
+                assert!(turned < 1.0e-4 * near, "{axis_m:?} {place}: {turned} {near}");
+                assert!(step_j < 1.0e-8 * near, "{axis_m:?} {place}: {step_j}");
+                assert!(beside.slope.iter().all(|s| s.abs() < 1.5 * near), "{axis_m:?} {:?}", beside.slope);
+            }
+        }
     }
 
     #[test]

@@ -303,7 +303,8 @@ impl Description {
         };
         let beyond = match self.body {
             Body::Block(size) => {
-                let words = format!("beyond {size:?} {:?} {}", self.poisson_ratio, self.resolution);
+                let words =
+                    format!("beyond a half-space {size:?} {:?} {}", self.poisson_ratio, self.resolution);
                 let fineness = RESOLUTIONS[self.resolution.min(2)].fineness;
                 let solve = || beyond_half_space(self.poisson_ratio, size, fineness).map_err(not_positive);
                 let numbers = remember(&words, &solve)?;

@@ -203,7 +203,7 @@ pub fn beyond_half_space(
     };
     let (x, y) = (both(&x), both(&y));
     let points: Vec<[f64; 2]> = y.iter().flat_map(|&y| x.iter().map(move |&x| [x, y])).collect();
-    let mut numbers = vec![x.len() as f64, y.len() as f64, size.half_x_m, size.half_y_m];
+    let mut numbers = vec![x.len() as f64, y.len() as f64];
     numbers.extend(x.iter().chain(&y));
     numbers.extend(table.among(&points).iter().map(|block| block[2][2]));
     Ok(numbers)

@@ -13,10 +13,14 @@
 //! `E` and its force are zero. The secant method in at most sixty steps solves for them, from the same start in every tick, so
 //! that the answer has no memory of the path.
 //!
+//! At an edge, and deeper than a solid of small strains answers, the vertical force of `E` falls as a sphere goes down, and several
+//! answers would exist. The law that is lowered is therefore that of the top face alone, `T` ([`Atlas::top`]), whose force grows with
+//! the depth: `W = sum_i (E_i - T_i)(c_i) + T_i(c_i + w_i z) + 1/2 sum_ij C_ij F_i F_j` with `F_i = -dT_i/dz`. On the top, `E` is `T`.
+//!
 //! `C` counts each contact as a point: for contacts of radius `a` at a distance of `r` that is an error of `0.2 (a / r)^2` of
 //! the interaction, at most 5 % of it for spheres that nearly touch each other.
 
-use crate::atlas::{Atlas, ease_at};
+use crate::atlas::{self, Atlas, ease_at};
 use crate::jet::Jet;
 use crate::spline::{Curve, End, take, whole};
 use flotor_hal::{DQuat, DVec3, Wrench};
@@ -30,6 +34,8 @@ const STEPS: usize = 60;
 const TOLERANCE: f64 = 1.0e-12;
 /// Depressions nearer to each other have no secant between them, m.
 const SECANT_M: f64 = 1.0e-12;
+/// Two energies that differ by less of them are the same.
+const ROUNDING: f64 = 1.0e-12;
 
 /// Compliance between places of the top face, beyond that of a half-space, for a modulus of 1 Pa: cubic splines through values
 /// between the nodes of a grid.
@@ -39,8 +45,6 @@ pub struct Beyond {
     shapes: [Vec<Curve>; 2],
     /// First and last node of each axis, m.
     ends_m: [[f64; 2]; 2],
-    /// Where the face ends, along x and y, m.
-    edges_m: [f64; 2],
     /// Between each two nodes of the grid (x first), m/N.
     values: Vec<f64>,
 }
@@ -52,10 +56,9 @@ const MOST_NODES: usize = 7;
 type Weights = [[f64; 3]; MOST_NODES * MOST_NODES];
 
 impl Beyond {
-    /// From values between each two nodes of a grid (x first) on a face that ends at `edges_m` to both sides. At most seven nodes along an axis, at least three. Not
-    /// real-time.
+    /// From values between each two nodes of a grid (x first). At most seven nodes along an axis, at least three. Not real-time.
     #[must_use]
-    pub fn new(edges_m: [f64; 2], nodes_m: [&[f64]; 2], values: Vec<f64>) -> Option<Self> {
+    pub fn new(nodes_m: [&[f64]; 2], values: Vec<f64>) -> Option<Self> {
         let count = nodes_m[0].len() * nodes_m[1].len();
         if nodes_m.iter().any(|nodes| !(3..=MOST_NODES).contains(&nodes.len()))
             || values.len() != count * count
@@ -67,16 +70,15 @@ impl Beyond {
             (0..nodes.len()).map(|node| Curve::new(nodes.to_vec(), unit(node), [End::Parabola; 2])).collect()
         });
         let ends_m = nodes_m.map(|nodes| [nodes[0], nodes[nodes.len() - 1]]);
-        Some(Self { shapes, ends_m, edges_m, values })
+        Some(Self { shapes, ends_m, values })
     }
 
     /// From what [`crate::prepare::beyond_half_space`] found; `None` if the numbers are not those of such a grid. Not real-time.
     #[must_use]
     pub fn from_numbers(mut numbers: &[f64]) -> Option<Self> {
         let counts = [whole(take(&mut numbers, 1)?[0])?, whole(take(&mut numbers, 1)?[0])?];
-        let edges_m = take(&mut numbers, 2)?;
         let (x, y) = (take(&mut numbers, counts[0])?, take(&mut numbers, counts[1])?);
-        Self::new([edges_m[0], edges_m[1]], [x, y], numbers.to_vec())
+        Self::new([x, y], numbers.to_vec())
     }
 
     /// Weights of the nodes for a place; beyond the grid it counts as one at its edge.
@@ -101,22 +103,6 @@ impl Beyond {
             }
         }
         all
-    }
-
-    /// How much of a contact with a sphere is one of the top face: one inside, zero from the edge on, falling over half a radius
-    /// before it, and earlier with the centre below the face, where another face is near; and the derivatives of that. A
-    /// compliance of the top does not describe a contact of two faces.
-    fn over_face(&self, centre_m: DVec3, radius_m: f64) -> (f64, DVec3) {
-        let up = Jet::variable(centre_m.z, 2);
-        let below = if up.value < 0.0 { up * up * (4.0 / radius_m) } else { Jet::default() };
-        let width_m = 0.5 * radius_m;
-        let mut all = Jet::constant(1.0);
-        for axis in 0..2 {
-            let inside = -Jet::variable(centre_m[axis], axis).abs() - below + self.edges_m[axis];
-            let s = (inside.value / width_m).clamp(0.0, 1.0);
-            all = all * inside.chain(s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / width_m);
-        }
-        (all.value, DVec3::from_array(all.slope))
     }
 
     /// Displacement of each node for a unit force at a place of these weights.
@@ -215,17 +201,24 @@ impl Spheres {
         };
         let (mut force_n, mut torque_nm) = (DVec3::ZERO, DVec3::ZERO);
         for i in 0..count {
-            let (alone, sunk_m) = (settled[i].0, settled[i].1);
-            let up_n = -alone.energy.slope[2];
-            let mut own_n = -DVec3::from_array(alone.energy.slope);
-            answer.energy_j += alone.energy.value;
+            let (pressed, sunk_m) = settled[i];
+            let centre_m = centres_m[i].to_array();
+            let (alone, top) = (self.atlas.answer(centre_m), self.atlas.top(centre_m));
+            // What another face has of it.
+            let mut edge = alone.energy - top.energy;
+            if edge.value.abs() <= ROUNDING * alone.energy.value {
+                edge = Jet::default();
+            }
+            let own = edge + pressed.energy;
+            let mut own_n = -DVec3::from_array(own.slope);
+            answer.energy_j += own.value;
             for j in (0..count).filter(|&j| j != i) {
-                let both_n2 = up_n * -settled[j].0.energy.slope[2];
+                let both_n2 = pressed.energy.slope[2] * settled[j].0.energy.slope[2];
                 answer.energy_j += 0.5 * compliance[i][j] * both_n2;
                 own_n += slopes[i][j] * both_n2;
             }
             answer.forces_n[i] = own_n;
-            answer.depths_m[i] = alone.depth_m;
+            answer.depths_m[i] = if top.energy.value > 0.0 { alone.depth_m - sunk_m } else { alone.depth_m };
             answer.sunk_m[i] = sunk_m;
             answer.is_beyond |= alone.is_beyond;
             force_n += own_n;
@@ -248,7 +241,6 @@ impl Spheres {
         }
         let Some(beyond) = &self.beyond else { return (values, slopes) };
         let weights = centres_m.map(|centre| beyond.weights(centre));
-        let over = centres_m.map(|centre| beyond.over_face(centre, self.atlas.radius_m));
         for j in 0..count {
             let moved = beyond.spread(&weights[j]);
             for i in (0..count).filter(|&i| i != j) {
@@ -256,10 +248,8 @@ impl Spheres {
                 for (weight, moved) in weights[i].iter().zip(&moved) {
                     sums.iter_mut().zip(weight).for_each(|(sum, w)| *sum += w * moved);
                 }
-                let sum = values[i][j] + sums[0];
-                let ((share, slope), (other, _)) = (over[i], over[j]);
-                values[i][j] = sum * share * other;
-                slopes[i][j] = (DVec3::new(sums[1], sums[2], 0.0) * share + slope * sum) * other;
+                values[i][j] += sums[0];
+                slopes[i][j] = DVec3::new(sums[1], sums[2], 0.0);
             }
         }
         // The table is symmetric up to rounding; the energy needs it to be so.
@@ -271,15 +261,15 @@ impl Spheres {
         (values, slopes)
     }
 
-    /// The answers of single spheres over the surface that the others have pushed down, and how far; whether they settled.
+    /// The answers of single spheres on the top alone, over the surface that the others have pushed down, and how far; whether they settled.
     fn settle(
         &self,
         centres_m: &[DVec3; MOST],
         compliance: &[[f64; MOST]; MOST],
-    ) -> ([(crate::atlas::Answer, f64); MOST], bool) {
+    ) -> ([(atlas::Answer, f64); MOST], bool) {
         let count = self.count();
         let alone =
-            |centre: DVec3, sunk_m: f64| (self.atlas.answer((centre + DVec3::Z * sunk_m).to_array()), sunk_m);
+            |centre: DVec3, sunk_m: f64| (self.atlas.top((centre + DVec3::Z * sunk_m).to_array()), sunk_m);
         let mut now = centres_m.map(|centre| alone(centre, 0.0));
         let (mut up_n, mut stiffness) = ([0.0; MOST], [0.0; MOST]);
         for i in 0..count {

@@ -101,6 +101,17 @@ impl Curve {
         let sum = |shares: [f64; 4]| shares.iter().zip(&data).map(|(s, v)| s * v).sum();
         (sum(h), sum(d))
     }
+
+    /// Second derivative at a coordinate between the first and last node. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn curvature(&self, coordinate: f64) -> f64 {
+        let i = cell(&self.nodes, coordinate);
+        let width = self.nodes[i + 1] - self.nodes[i];
+        let s = (coordinate - self.nodes[i]) / width;
+        let bend = (self.values[i + 1] - self.values[i]) * (6.0 - 12.0 * s) / width;
+        let turn = self.slopes[i] * (6.0 * s - 4.0) + self.slopes[i + 1] * (6.0 * s - 2.0);
+        (bend + turn) / width
+    }
 }
 
 /// The first of some numbers, which are taken off.
