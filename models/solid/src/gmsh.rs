@@ -71,10 +71,16 @@ impl Words<'_> {
     }
 
     fn count(&mut self) -> Result<usize, FormatError> {
-        let count = self.number()?;
-        if count > MOST {
-            let problem =
-                format!("{count} entries are too many, at most {MOST} are solved: use a coarser mesh");
+        self.count_after(0)
+    }
+
+    /// The number of entries that follow so many others.
+    fn count_after(&mut self, others: usize) -> Result<usize, FormatError> {
+        let count: usize = self.number()?;
+        if others.saturating_add(count) > MOST {
+            let problem = format!(
+                "{count} entries are too many, at most {MOST} of a kind are solved: use a coarser mesh"
+            );
             return Err(FormatError { line: self.line, problem });
         }
         Ok(count)
@@ -194,7 +200,7 @@ impl Reader {
         for _ in 0..blocks {
             let mut words = lines.words()?;
             words.skip(3)?;
-            let count = words.count()?;
+            let count = words.count_after(self.parts.nodes_m.len())?;
             let tags =
                 (0..count).map(|_| lines.words()?.number()).collect::<Result<Vec<usize>, FormatError>>()?;
             for tag in tags {
@@ -217,7 +223,7 @@ impl Reader {
             let mut words = lines.words()?;
             words.skip(1)?;
             let (entity, kind): (i64, u32) = (words.number()?, words.number()?);
-            let count = words.count()?;
+            let count = words.count_after(self.parts.elements.len() + self.parts.faces.len())?;
             let nodes = match kind {
                 9 => 6,
                 11 => 10,
@@ -275,7 +281,8 @@ impl Reader {
         nodes.truncate(if kind == 9 { 3 } else { 4 });
         for group in self.groups.get(&entity).into_iter().flatten() {
             // The sign tells the orientation; a group without a name goes by its number.
-            let name = self.names.get(&group.abs()).cloned().unwrap_or_else(|| group.abs().to_string());
+            let name = i64::try_from(group.unsigned_abs()).ok().and_then(|tag| self.names.get(&tag)).cloned();
+            let name = name.unwrap_or_else(|| group.unsigned_abs().to_string());
             self.parts.surfaces.entry(name).or_default().push(nodes.clone());
         }
         self.parts.faces.push(nodes);

@@ -350,6 +350,18 @@ fn files_that_are_no_body_are_refused() {
         good[..block].replace("\n3 10 1 10\n", "\n2 4 1 4\n") + "$EndElements\n"
     };
     let apart = cube(Kind::Brick, 1);
+    // Two blocks of a size that is allowed.
+    let in_blocks = {
+        let block = |from: usize| {
+            let tags: String = (from..from + 30_000).map(|tag| format!("{tag}\n")).collect();
+            format!("3 1 0 30000\n{tags}{}", "0 0 0\n".repeat(30_000))
+        };
+        format!(
+            "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n2 40000 1 40000\n{}{}",
+            block(1),
+            block(30_001)
+        )
+    };
     for (text, wanted) in [
         (String::new(), "MeshFormat"),
         ("solid cube\nfacet normal 0 0 1\n".to_owned(), "not a Gmsh mesh"),
@@ -368,6 +380,12 @@ fn files_that_are_no_body_are_refused() {
         (Boxes { to_m: [90.0; 3], ..apart }.text(), "metres"),
         (good.replace("3 1 0 27", "3 1 0 99999999999"), "too many"),
         (good.lines().take(59).collect::<Vec<_>>().join("\n"), "ends here"),
+        (in_blocks, "too many"),
+        // The number with no opposite: a physical group by its number, not a crash.
+        (
+            good.replace("1 0 0 0 0 0 0 1 1 0\n2", "1 0 0 0 0 0 0 1 -9223372036854775808 0\n2"),
+            "9223372036854775808",
+        ),
     ] {
         let refusal = match gmsh::read(&text) {
             Ok(parts) => Mesh::new(parts, "fixed", "touched").map(|_| ()).map_err(|error| error.to_string()),
