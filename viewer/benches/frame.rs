@@ -124,7 +124,7 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
                 moment_s = (moment_s + 0.016) % 10.0;
                 let sample = history.at(moment_s).expect("ten seconds");
                 let (mesh, facts) =
-                    builder.build(&mut shapes, sample, &palette, &camera, HEIGHT_PX, scale, true);
+                    builder.build(&mut shapes, &[*sample], &palette, &camera, HEIGHT_PX, scale, true);
                 black_box((mesh.indices.len(), facts))
             });
         });
@@ -148,7 +148,7 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
 /// The whole picture but its rasterising: interface, six traces of ten seconds, 3D scene, and egui's triangles of it all.
 fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let context = egui::Context::default();
-    let start = Start::Recording(Box::new(history()), Some(0.0), vec![library("spring")]);
+    let start = Start::Recording(vec![history()], Some(0.0), vec![library("spring")]);
     // Drawn by an adapter, whose threads are not this one; without any, by this one.
     let state =
         std::panic::catch_unwind(|| create_render_state(default_wgpu_setup(), Default::default())).ok();
@@ -163,7 +163,8 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let (palette, scale) = (Palette::of(Look::Dark), ArrowScale::fitting(run.samples()));
     let sample = run.at(0.2).expect("ten seconds");
     let mut builder = SceneBuilder::default();
-    let (mesh, _) = builder.build(&mut shapes, sample, &palette, &camera, SCENE_PX[1] as f64, scale, true);
+    let (mesh, _) =
+        builder.build(&mut shapes, &[*sample], &palette, &camera, SCENE_PX[1] as f64, scale, true);
     let mut canvas = Canvas::new(None);
     criterion.bench_function("3D scene drawn on the processor", |bench| {
         bench.iter(|| black_box(canvas.draw(&context, mesh, &camera, palette.backdrop, SCENE_PX)));

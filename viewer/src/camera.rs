@@ -1,9 +1,9 @@
 //! Where the picture is seen from: an orbit around a point, z up.
 
 use flotor_hal::DVec3;
-use flotor_hal::glam::DMat4;
 use flotor_hal::glam::dcamera::rh::proj::directx::perspective;
 use flotor_hal::glam::dcamera::rh::view::look_at_mat4;
+use flotor_hal::glam::{DMat4, DVec4};
 
 /// An eye on a sphere around a point it looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,6 +111,21 @@ impl Camera {
             * look_at_mat4(self.eye_mm(), self.target_mm, DVec3::Z)
     }
 
+    /// Where a point (mm) appears, as parts of width and height from the upper left; `None` behind the eye.
+    #[must_use]
+    pub fn on_screen(&self, point_mm: DVec3, aspect: f64) -> Option<[f64; 2]> {
+        let DVec4 { x, y, w, .. } = self.projection(aspect) * point_mm.extend(1.0);
+        (w > 0.0).then(|| [0.5 + 0.5 * x / w, 0.5 - 0.5 * y / w])
+    }
+
+    /// Directions to the right of the picture and upwards in it.
+    #[must_use]
+    pub fn right_and_up(&self) -> (DVec3, DVec3) {
+        let ahead = (self.target_mm - self.eye_mm()).normalize();
+        let right = ahead.cross(DVec3::Z).normalize();
+        (right, right.cross(ahead))
+    }
+
     /// Pixels a millimetre at the point looked at covers in a picture so many pixels high.
     #[must_use]
     pub fn pixels_per_mm(&self, height_px: f64) -> f64 {
@@ -121,15 +136,6 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_hal::glam::DVec4;
-
-    impl Camera {
-        /// Where a point (mm) appears, as parts of width and height from the upper left; `None` behind the eye.
-        fn on_screen(&self, point_mm: DVec3, aspect: f64) -> Option<[f64; 2]> {
-            let DVec4 { x, y, w, .. } = self.projection(aspect) * point_mm.extend(1.0);
-            (w > 0.0).then(|| [0.5 + 0.5 * x / w, 0.5 - 0.5 * y / w])
-        }
-    }
 
     #[test]
     fn the_point_looked_at_is_in_the_middle_and_up_is_up() {

@@ -6,7 +6,7 @@ use crate::picture::{draw_without_window, write_png};
 use crate::quantity::Quantity;
 use crate::trace::Trace;
 use crate::ui::plot_stack::{ExportFormat, PlotStack};
-use crate::ui::plots::{PlotView, plot};
+use crate::ui::plots::{Maximise, PlotView, plot};
 use crate::ui::view3d::pixels;
 use egui::vec2;
 use flotor_plot::{Axis, Figure, Panel, Series};
@@ -73,9 +73,9 @@ pub fn write(
 pub fn csv(history: &History, plots: &PlotStack) -> String {
     let [from_s, to_s] = plots.span_s(history);
     let mut text = "time_s".to_owned();
-    let columns = || {
-        plots.shown.iter().flat_map(|quantity| (0..quantity.components().len()).map(move |k| (*quantity, k)))
-    };
+    let shown = plots.in_sight();
+    let columns =
+        || shown.iter().flat_map(|quantity| (0..quantity.components().len()).map(move |k| (*quantity, k)));
     for (quantity, component) in columns() {
         let (unit, _) = quantity.unit(plots.units);
         let _ = write!(text, ",{} {} ({unit})", quantity.name(), quantity.components()[component]);
@@ -106,20 +106,31 @@ pub fn svg(history: &History, plots: &PlotStack) -> String {
         lines.fold(Panel::new(Axis::linear(quantity.name(), unit)), Panel::series)
     };
     let figure = Figure::new("Traces", Axis::linear("Time", "s").range(from_s, to_s));
-    plots.shown.iter().map(panel).fold(figure, Figure::panel).to_svg()
+    plots.in_sight().iter().map(panel).fold(figure, Figure::panel).to_svg()
 }
 
 fn png(history: &History, plots: &PlotStack, look: Look) -> egui::ColorImage {
     let palette = Palette::of(look);
     let span_s = plots.span_s(history);
-    let size = vec2(WIDTH, HEIGHT_OF_ONE * plots.shown.len() as f32 + 20.0);
+    let size = vec2(WIDTH, HEIGHT_OF_ONE * plots.in_sight().len() as f32 + 20.0);
     draw_without_window(pixels(size * SCALE), SCALE, look, |ui| {
         let inside = ui.max_rect().shrink2(vec2(12.0, 4.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(inside));
-        for (index, quantity) in plots.shown.iter().enumerate() {
-            let time_axis = index + 1 == plots.shown.len();
+        for (index, quantity) in plots.in_sight().iter().enumerate() {
+            let time_axis = index + 1 == plots.in_sight().len();
             let height = HEIGHT_OF_ONE - 30.0 + if time_axis { 14.0 } else { 0.0 };
-            let view = PlotView { span_s, cursor_s: span_s[1], units: plots.units, height, time_axis };
+            let (_, per_si) = quantity.unit(plots.units);
+            let values = plots.values_of(*quantity).map(|values| values.map(|value| value * per_si));
+            let view = PlotView {
+                device: None,
+                span_s,
+                cursor_s: span_s[1],
+                units: plots.units,
+                height,
+                time_axis,
+                values,
+                maximise: Maximise::No,
+            };
             plot(&mut ui, history, &mut Trace::of(*quantity), view, &palette);
         }
     })

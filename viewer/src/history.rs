@@ -108,44 +108,69 @@ pub struct History {
     forgotten: u64,
     keep: Keep,
     notes: Vec<Note>,
+    device: u16,
+}
+
+impl Default for History {
+    /// Of nothing.
+    fn default() -> Self {
+        Self::new(unknown_run(), Keep::Newest(1))
+    }
 }
 
 impl History {
-    /// Of a run of which nothing has been seen.
+    /// Of the first device of a run of which nothing has been seen.
     #[must_use]
     pub fn new(run: RunDescription, keep: Keep) -> Self {
         let capacity = if let Keep::Newest(count) = keep { count } else { 0 };
         let samples = VecDeque::with_capacity(capacity);
-        Self { run, samples, forgotten: 0, keep, notes: Vec::new() }
+        Self { run, samples, forgotten: 0, keep, notes: Vec::new(), device: 0 }
     }
 
-    /// All of a recording. Damage after the first tick costs only what follows it and becomes a note.
+    /// Of each device of a run of which nothing has been seen.
+    #[must_use]
+    pub fn of_each_device(run: &RunDescription, keep: Keep) -> Vec<Self> {
+        let count = u16::try_from(run.devices().count()).unwrap_or(u16::MAX).max(1);
+        (0..count).map(|device| Self { device, ..Self::new(run.clone(), keep) }).collect()
+    }
+
+    /// All of a recording, of each device. Damage after the first tick costs only what follows it and becomes a note.
     ///
     /// # Errors
     /// [`ReadError`]: nothing of the file can be used.
-    pub fn read(path: &Path) -> Result<Self, ReadError> {
+    pub fn read(path: &Path) -> Result<Vec<Self>, ReadError> {
         let mut recording = Recording::open(path)?;
-        let mut history = Self::new(recording.run().clone(), Keep::All);
-        let mut damage = None;
+        let mut histories = Self::of_each_device(recording.run(), Keep::All);
+        let (mut damage, mut last_ns) = (None, None);
         for tick in recording.by_ref() {
             match tick {
-                Ok(record) => history.push(&record),
-                Err(error) if history.samples.is_empty() => return Err(error),
+                Ok(record) => {
+                    last_ns = Some(record.time_ns);
+                    histories.iter_mut().for_each(|history| history.push(&record));
+                }
+                Err(error) if last_ns.is_none() => return Err(error),
                 Err(error) => damage = Some(error.to_string()),
             }
         }
-        history.notes = recording.notes().to_vec();
+        let mut notes = recording.notes().to_vec();
         if let Some(text) = damage {
-            let time_ns = history.samples.back().map_or(0, |sample| sample.time_ns);
             let severity = flotor_record::Severity::Error;
-            history.notes.push(Note { time_ns, severity, source: "recording".to_owned(), text });
+            let time_ns = last_ns.unwrap_or_default();
+            notes.push(Note { time_ns, severity, source: "recording".to_owned(), text });
         }
-        Ok(history)
+        histories.iter_mut().for_each(|history| history.notes.clone_from(&notes));
+        Ok(histories)
     }
 
-    /// Adds a tick of the first device, of several; the oldest makes room where only so many are kept.
+    /// Number of the device it is of.
+    #[must_use]
+    pub fn device(&self) -> u16 {
+        self.device
+    }
+
+    /// Adds a tick of its device, and of no other; the oldest makes room where only so many are kept.
     pub fn push(&mut self, record: &TickRecord) {
-        if record.device != 0 {
+        if record.device != self.device {
             return;
         }
         if let Keep::Newest(count) = self.keep {

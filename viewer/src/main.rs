@@ -49,6 +49,9 @@ struct Arguments {
         allow_hyphen_values = true
     )]
     view: Option<View>,
+    /// Name of the device that numbers and traces are of, where there are several (default: the first)
+    #[arg(long, value_name = "NAME", requires = "screenshot")]
+    device: Option<String>,
     /// The moment to show, s (default: that of the largest force)
     #[arg(long, value_name = "SECONDS")]
     at: Option<f64>,
@@ -91,10 +94,10 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let history = arguments.recording.as_ref().map(read).transpose()?;
     match (history, &arguments.screenshot) {
         (Some(history), Some(out)) if arguments.window => whole_window(arguments, history, out),
-        (Some(history), Some(out)) => screenshot(arguments, &history, out),
+        (Some(history), Some(out)) => screenshot(arguments, history, out),
         (history, _) => {
             let start = match history {
-                Some(history) => Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone()),
+                Some(history) => Start::Recording(history, arguments.at, arguments.plugins.clone()),
                 None => live(arguments)?,
             };
             let cost = open(start, arguments.request)?;
@@ -116,10 +119,13 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
 }
 
 /// The window as it would open on the recording, drawn on the processor.
-fn whole_window(arguments: &Arguments, history: History, out: &Path) -> Result<(), Failure> {
+fn whole_window(arguments: &Arguments, history: Vec<History>, out: &Path) -> Result<(), Failure> {
     let (look, size, scale) = of_picture(arguments.request);
-    let start = Start::Recording(Box::new(history), arguments.at, arguments.plugins.clone());
+    let start = Start::Recording(history, arguments.at, arguments.plugins.clone());
     let mut viewer = Viewer::new(&egui::Context::default(), None, start, look);
+    if let Some(name) = &arguments.device {
+        viewer.look_at_named(name).map_err(Failure::usage)?;
+    }
     let image = draw_without_window(size, scale, look, |ui| viewer.show(ui));
     write_png(out, &image).map_err(Failure::file)
 }
@@ -129,13 +135,21 @@ fn of_picture(request: WindowOptions) -> (Look, [usize; 2], f32) {
     (request.look.unwrap_or_default(), request.size.unwrap_or([1280, 800]), request.scale.unwrap_or(1.0))
 }
 
-fn screenshot(arguments: &Arguments, history: &History, out: &Path) -> Result<(), Failure> {
+fn screenshot(arguments: &Arguments, history: Vec<History>, out: &Path) -> Result<(), Failure> {
     let (look, size_px, scale) = of_picture(arguments.request);
-    let (mut shapes, missing) = shapes_of(history.run(), &arguments.plugins);
+    let (mut shapes, missing) =
+        history.first().map(|first| shapes_of(first.run(), &arguments.plugins)).unwrap_or_default();
     for reason in missing {
         eprintln!("note: {reason}");
     }
-    let options = PictureOptions { size_px, scale, look, view: arguments.view, at_s: arguments.at };
+    let options = PictureOptions {
+        size_px,
+        scale,
+        look,
+        view: arguments.view,
+        device: arguments.device.clone(),
+        at_s: arguments.at,
+    };
     let image = picture(history, &mut shapes, &options).map_err(Failure::usage)?;
     write_png(out, &image).map_err(Failure::file)
 }

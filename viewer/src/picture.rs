@@ -2,14 +2,15 @@
 
 use crate::camera::{Camera, View};
 use crate::canvas::Canvas;
+use crate::devices::Devices;
 use crate::history::History;
 use crate::palette::{Look, Palette};
 use crate::quantity::{Quantity, Units};
 use crate::raster::flat::FlatRasterizer;
-use crate::scene::{ArrowScale, SceneBuilder};
+use crate::scene::SceneBuilder;
 use crate::shape::Shape;
 use crate::trace::Trace;
-use crate::ui::plots::{PlotView, plot};
+use crate::ui::plots::{Maximise, PlotView, plot};
 use crate::ui::view3d::{Subject, View3d};
 use crate::ui::{legend, readout, style};
 use egui::{ColorImage, Context, RawInput, Rect, Ui, pos2, vec2};
@@ -26,6 +27,8 @@ pub struct PictureOptions {
     pub look: Look,
     /// From where; without one, the experimenter's view.
     pub view: Option<View>,
+    /// Name of the device that numbers and traces are of; without one, the first.
+    pub device: Option<String>,
     /// The moment, s; without one, that of the largest force.
     pub at_s: Option<f64>,
 }
@@ -37,6 +40,14 @@ pub enum PictureError {
     /// There is nothing to show.
     #[error("the recording holds no ticks, there is nothing to show; record a longer run")]
     Empty,
+    /// There is no such device.
+    #[error("no device is called `{name}`; this run has {}", known.join(", "))]
+    Device {
+        /// What was requested.
+        name: String,
+        /// Names of those there are.
+        known: Vec<String>,
+    },
     /// The file could not be written.
     #[error("cannot write the picture `{}`: {cause}; name a file in a folder you may write to", path.display())]
     Write {
@@ -55,39 +66,61 @@ const SAMPLES: usize = 3;
 /// What stands beneath the 3D view.
 const PLOTS: [Quantity; 2] = [Quantity::Force, Quantity::Position];
 
+/// Number of the device of this name.
+///
+/// # Errors
+/// [`PictureError::Device`].
+pub fn number_of(devices: &Devices, name: &str) -> Result<usize, PictureError> {
+    let known = || devices.names().map(str::to_owned).collect::<Vec<_>>();
+    let number = devices.names().position(|known| known == name);
+    number.ok_or_else(|| PictureError::Device { name: name.to_owned(), known: known() })
+}
+
 /// Draws a moment of a run: 3D view, numbers, traces.
 ///
 /// # Errors
 /// [`PictureError::Empty`].
 pub fn picture(
-    history: &History,
+    histories: Vec<History>,
     shapes: &mut [Shape],
     options: &PictureOptions,
 ) -> Result<ColorImage, PictureError> {
     let palette = Palette::of(options.look);
+    let mut devices = Devices::new(histories);
+    if let Some(name) = &options.device {
+        devices.choose(number_of(&devices, name)?);
+    }
+    let history = devices.history();
     let sample = match options.at_s {
         Some(at_s) => history.at(at_s),
         None => history.strongest(),
     };
     let sample = *sample.ok_or(PictureError::Empty)?;
-    let (scale, height_mm) = (ArrowScale::fitting(history.samples()), SceneBuilder::height_mm(shapes));
+    let samples = devices.at(sample.time_s()).ok_or(PictureError::Empty)?;
+    let (scale, height_mm) = (devices.scale(), SceneBuilder::framing_mm(shapes, devices.count()));
     let mut view3d = View3d::new(Canvas::on_processor(SAMPLES), height_mm);
     view3d.camera = Camera::of(options.view, height_mm);
     Ok(draw_without_window(options.size_px, options.scale, options.look, |ui| {
         let area = ui.max_rect();
         let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * VIEW_PART).round()));
-        let subject = Subject { shapes, version: 0, sample: &sample, scale };
+        let subject = Subject { shapes, version: 0, samples: &samples, scale };
         let facts = view3d.show(ui, view, options.look, subject);
         readout::title(ui.painter(), view, history.run(), &palette);
         readout::numbers(ui.painter(), view, &sample, Units::default(), &palette);
         readout::paint_warnings(ui.painter(), view, &readout::warnings(&sample, &facts), &palette);
-        legend::paint(ui.painter(), view, &facts, &palette);
+        legend::paint(ui.painter(), view, &facts, &view3d.camera, &palette);
+        legend::axes(ui.painter(), view, &facts, &view3d.camera, &palette);
+        let names = (devices.names(), devices.chosen());
+        legend::names(ui.painter(), view, &facts, &view3d.camera, names, &palette);
         let below = Rect::from_min_max(view.left_bottom() + vec2(14.0, 8.0), area.max - vec2(20.0, 4.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below));
         let height = (below.height() - 2.0 * 26.0 - 12.0) / 2.0;
         for (index, quantity) in PLOTS.into_iter().enumerate() {
             let time_axis = index + 1 == PLOTS.len();
             let view = PlotView {
+                device: devices.name(),
+                values: None,
+                maximise: Maximise::No,
                 span_s: history.span_s(),
                 cursor_s: sample.time_s(),
                 units: Units::default(),

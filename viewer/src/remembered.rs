@@ -24,6 +24,8 @@ pub struct Remembered {
     pub shows_panel: Option<bool>,
     /// Its width, points.
     pub side_pt: f32,
+    /// Part of the height that the 3D view gets; not chosen: as the window is high.
+    pub view_part: Option<f32>,
     /// Width and height of the window, points.
     pub size_pt: [f32; 2],
     /// Size of text and lines: pixels per point over those of the display.
@@ -38,6 +40,7 @@ impl Default for Remembered {
             traces: FIRST_TRACES.to_vec(),
             shows_panel: None,
             side_pt: 300.0,
+            view_part: None,
             size_pt: [1280.0, 800.0],
             zoom: 1.0,
         }
@@ -62,6 +65,7 @@ impl Remembered {
         // No window smaller than it can be used, none that is all text.
         found.size_pt =
             found.size_pt.map(|length| if length.is_finite() { length.clamp(480.0, 8192.0) } else { 800.0 });
+        found.view_part = found.view_part.filter(|part| part.is_finite());
         found.zoom = if found.zoom.is_finite() { found.zoom.clamp(0.5, 3.0) } else { 1.0 };
         found
     }
@@ -95,6 +99,7 @@ mod tests {
             traces: vec![Quantity::Energy, Quantity::AngularVelocity],
             shows_panel: Some(false),
             side_pt: 360.0,
+            view_part: Some(0.5),
             size_pt: [1600.0, 900.0],
             zoom: 1.5,
         };

@@ -8,6 +8,7 @@ use crate::geometry::{
 use crate::history::Sample;
 use crate::light;
 use crate::palette::{Palette, strain_color};
+use crate::placing::{Placing, round_below};
 use crate::shape::{Posed, Rest, Shape};
 use flotor_hal::{DVec3, Part, Pose, ScalarField, Wrench};
 
@@ -36,6 +37,12 @@ impl ArrowScale {
             force_n: self.force_n.max(FULL_FORCE * sample.force_n().length()),
             torque_nm: self.torque_nm.max(sample.torque_nm().length()),
         }
+    }
+
+    /// So that both fit.
+    #[must_use]
+    pub fn larger(self, other: Self) -> Self {
+        Self { force_n: self.force_n.max(other.force_n), torque_nm: self.torque_nm.max(other.torque_nm) }
     }
 }
 
@@ -66,6 +73,27 @@ pub struct SceneFacts {
     pub touching: bool,
     /// True if a model had no shape at this pose.
     pub no_shape: bool,
+    /// Where the devices stand.
+    pub placing: Placing,
+    /// Distance of the lines of the ground, m, and its height.
+    pub grid_m: f64,
+    /// Height of the ground, m.
+    pub ground_m: f64,
+    /// Axes of the device frame in the frame of the picture.
+    pub axes: [DVec3; 3],
+    /// How long arrows are; none where none are drawn.
+    pub arrows: Option<ArrowKey>,
+}
+
+/// How long arrows are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArrowKey {
+    /// Length of the arrow of a newton, mm.
+    pub mm_per_n: f64,
+    /// The largest force so far, N.
+    pub full_force_n: f64,
+    /// Torque whose arrow goes three quarters around, N·m.
+    pub torque_nm: f64,
 }
 
 /// What the colours of a body mean.
@@ -100,34 +128,86 @@ impl SceneBuilder {
         self.corners_made
     }
 
-    /// Puts together the scene at a sample, seen at a height of so many pixels.
+    /// The height with which a camera has all devices in sight, mm.
+    #[must_use]
+    pub fn framing_mm(shapes: &[Shape], devices: usize) -> f64 {
+        let height_m = Self::height_mm(shapes) / MM_PER_M;
+        let placing = Placing::of(devices, height_m, plates_m(shapes, height_m));
+        MM_PER_M * height_m * placing.framing(height_m)
+    }
+
+    /// Puts together the scene at a sample of each device, seen at a height of so many pixels.
     #[allow(clippy::too_many_arguments)] // one call site for each, and no two belong together
     pub fn build(
         &mut self,
         shapes: &mut [Shape],
-        sample: &Sample,
+        samples: &[Sample],
         palette: &Palette,
         camera: &Camera,
         height_px: f64,
         scale: ArrowScale,
         shows_arrows: bool,
     ) -> (&Mesh, SceneFacts) {
-        let mut facts = SceneFacts::default();
         let height_m = Self::height_mm(shapes) / MM_PER_M;
-        let posed: Vec<Option<Posed>> = shapes.iter_mut().map(|shape| shape.at(&sample.pose)).collect();
-        facts.no_shape = posed.iter().any(Option::is_none);
-        let drawn = || shapes.iter().zip(&posed).filter_map(|(shape, posed)| Some((shape, posed.as_ref()?)));
-
-        let plate_radius_m =
-            drawn().map(|(shape, _)| footprint_m(shape.rest())).fold(0.25 * height_m, f64::max);
-        let (handle, wrench) = in_scene_frame(shapes.first(), sample);
+        let plate_radius_m = plates_m(shapes, height_m);
         let depth_m = shapes.iter().map(Shape::ground_m).fold(0.0, f64::max);
         let depth_m = if depth_m > 0.0 { depth_m } else { height_m };
         let ground = ground(palette, height_m, depth_m + PLATE_THICKNESS * plate_radius_m);
+        let placing = Placing::of(samples.len(), height_m, plate_radius_m);
+        let mut facts = SceneFacts {
+            placing,
+            grid_m: ground.spacing_m,
+            ground_m: ground.height_m,
+            axes: axes(shapes.first()),
+            arrows: shows_arrows.then_some(ArrowKey {
+                mm_per_n: MM_PER_M * height_m / scale.force_n,
+                full_force_n: scale.force_n / FULL_FORCE,
+                torque_nm: scale.torque_nm,
+            }),
+            ..SceneFacts::default()
+        };
         self.begin(ground);
-        let shadows = shadows(&ground, palette, plate_radius_m, handle.position());
-        ground.shade(&mut self.mesh.vertices, &shadows);
         let pixels_per_mm = camera.pixels_per_mm(height_px);
+        let mut all_shadows = Vec::with_capacity(3 * samples.len());
+        for (device, sample) in samples.iter().enumerate() {
+            let place_m = placing.place_m(device);
+            let first = shapes.iter().find(|shape| shape.device() == device);
+            let handle = in_scene_frame(first, sample);
+            all_shadows.extend(
+                shadows(&ground, palette, plate_radius_m, handle.0.position())
+                    .map(|shadow| Shadow { center_m: shadow.center_m + place_m.truncate(), ..shadow }),
+            );
+            let start = self.mesh.vertices.len();
+            self.bodies(shapes, (device, sample), palette, pixels_per_mm, &mut facts);
+            if shows_arrows {
+                self.arrows(handle, palette, scale, height_m, plate_radius_m);
+            }
+            self.shift(start, place_m);
+        }
+        ground.shade(&mut self.mesh.vertices, &all_shadows);
+        self.corners_made += (self.mesh.vertices.len() - self.bare[0]) as u64;
+        (&self.mesh, facts)
+    }
+
+    /// Adds the bodies at a device.
+    fn bodies(
+        &mut self,
+        shapes: &mut [Shape],
+        (device, sample): (usize, &Sample),
+        palette: &Palette,
+        pixels_per_mm: f64,
+        facts: &mut SceneFacts,
+    ) {
+        let height_m = Self::height_mm(shapes) / MM_PER_M;
+        let here = shapes.iter_mut().filter(|shape| shape.device() == device);
+        let posed: Vec<(&Shape, Option<Posed>)> = here
+            .map(|shape| {
+                let posed = shape.at(&sample.pose);
+                (&*shape, posed)
+            })
+            .collect();
+        facts.no_shape |= posed.iter().any(|(_, posed)| posed.is_none());
+        let drawn = || posed.iter().filter_map(|(shape, posed)| Some((*shape, posed.as_ref()?)));
         for (shape, posed) in drawn() {
             let part = match (shape.rest(), posed) {
                 (Rest::Slender(body), Posed::Slender { curve, strain }) => {
@@ -147,7 +227,7 @@ impl SceneBuilder {
             };
             facts.peak_part = facts.peak_part.max(part);
         }
-        if shapes.is_empty() {
+        if posed.is_empty() {
             self.bare_handle(&sample.pose, palette, 0.25 * height_m);
         }
         // What is seen through comes after what is behind it: tools after surfaces, bodies that a handle enters after tools.
@@ -161,11 +241,17 @@ impl SceneBuilder {
         for solid in solids() {
             self.primitives(solid, Part::Body, with_opacity(palette.body, SEEN_THROUGH));
         }
-        if shows_arrows {
-            self.arrows((handle, wrench), palette, scale, height_m, plate_radius_m);
+    }
+
+    /// Moves what was added from a corner on.
+    fn shift(&mut self, from: usize, by_m: DVec3) {
+        if by_m == DVec3::ZERO {
+            return;
         }
-        self.corners_made += (self.mesh.vertices.len() - self.bare[0]) as u64;
-        (&self.mesh, facts)
+        let by_mm = (by_m * MM_PER_M).as_vec3().to_array();
+        for vertex in self.mesh.vertices.iter_mut().skip(from) {
+            vertex.position_mm = std::array::from_fn(|k| vertex.position_mm[k] + by_mm[k]);
+        }
     }
 
     /// Leaves nothing in the mesh but the ground.
@@ -250,7 +336,7 @@ fn ground(palette: &Palette, height_m: f64, depth_m: f64) -> Ground {
     Ground {
         height_m: -depth_m,
         radius_m: 3.2 * height_m,
-        spacing_m: 0.2 * height_m,
+        spacing_m: round_below(0.25 * height_m * MM_PER_M) / MM_PER_M,
         surface: palette.ground[0],
         line: palette.ground[1],
     }
@@ -277,6 +363,17 @@ fn in_scene_frame(first: Option<&Shape>, sample: &Sample) -> (Pose, Wrench) {
     // Only the direction turns: an arrow shows what the hand feels, not what the model says.
     let turn = mapping.rotation();
     (mapping.pose_to_model(&sample.pose), Wrench::new(turn * force_n, turn * torque_nm))
+}
+
+/// The largest radius of what bodies stand on, m.
+fn plates_m(shapes: &[Shape], height_m: f64) -> f64 {
+    shapes.iter().map(|shape| footprint_m(shape.rest())).fold(0.25 * height_m, f64::max)
+}
+
+/// Axes of the device frame in the frame in which the scene is drawn.
+fn axes(first: Option<&Shape>) -> [DVec3; 3] {
+    let turn = first.map(|shape| shape.mapping().rotation());
+    [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| turn.map_or(axis, |turn| turn * axis))
 }
 
 /// Radius of what a body stands on, m.
@@ -343,7 +440,7 @@ mod tests {
     fn build(builder: &mut SceneBuilder, sample: &Sample, shows_arrows: bool) -> Mesh {
         let (palette, camera) = (Palette::of(Look::Dark), Camera::experimenter(SceneBuilder::height_mm(&[])));
         let scale = ArrowScale::fitting([sample].into_iter());
-        builder.build(&mut [], sample, &palette, &camera, 400.0, scale, shows_arrows).0.clone()
+        builder.build(&mut [], &[*sample], &palette, &camera, 400.0, scale, shows_arrows).0.clone()
     }
 
     #[test]

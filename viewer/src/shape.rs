@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 /// A model that can be drawn.
 pub struct Shape {
     name: String,
+    device: usize,
     model: Model,
     mapping: Mapping,
     rest: Rest,
@@ -146,13 +147,19 @@ impl Shape {
         let settings = description.settings.iter().map(parse).collect::<Result<Vec<_>, _>>()?;
         let mut model = plugin.create_model(&settings)?;
         let Some(rest) = rest(&mut model) else { return Ok(None) };
-        Ok(Some(Self { name: name.clone(), model, mapping, rest }))
+        Ok(Some(Self { name: name.clone(), device: usize::from(description.device), model, mapping, rest }))
     }
 
     /// What the scene calls the model.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Number of the device it is on.
+    #[must_use]
+    pub fn device(&self) -> usize {
+        self.device
     }
 
     /// The body at rest.

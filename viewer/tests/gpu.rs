@@ -91,7 +91,7 @@ fn an_adapter_and_the_processor_draw_the_same_scene() {
         let palette = Palette::of(look);
         let (camera, size) = (Camera::experimenter(SceneBuilder::height_mm(&shapes)), [641, 400]);
         let (mut builder, scale) = (SceneBuilder::default(), ArrowScale::fitting([&sample].into_iter()));
-        let (mesh, _) = builder.build(&mut shapes, &sample, &palette, &camera, 400.0, scale, true);
+        let (mesh, _) = builder.build(&mut shapes, &[sample], &palette, &camera, 400.0, scale, true);
         let drawn = read(&state, gpu.draw(mesh, &camera, palette.backdrop, size).texture());
         let expected = Rasterizer::default().draw(mesh, &camera, palette.backdrop, size, 4);
         assert_eq!(drawn.size, expected.size);
@@ -107,7 +107,7 @@ fn an_adapter_and_the_processor_draw_the_same_scene() {
 fn start(at_s: f64) -> Start {
     let mut history = History::new(spring_run(&[]).0, Keep::All);
     (0..3000).for_each(|number| history.push(&tick(number, Events::NONE)));
-    Start::Recording(Box::new(history), Some(at_s), vec![plugin_file("spring")])
+    Start::Recording(vec![history], Some(at_s), vec![plugin_file("spring")])
 }
 
 fn by_processor(at_s: f64, look: Look) -> Vec<u8> {

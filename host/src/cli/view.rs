@@ -34,6 +34,9 @@ pub(crate) struct ViewArguments {
     /// Show the session of this process (default: the newest session)
     #[arg(long, value_name = "PID", conflicts_with = "file")]
     run: Option<u32>,
+    /// With --screenshot: device whose numbers and traces are shown, where there are several (default: the first)
+    #[arg(long, value_name = "NAME", requires = "screenshot")]
+    device: Option<String>,
     /// Moment to show, s (default: that of the largest force)
     #[arg(long, value_name = "SECONDS")]
     at: Option<String>,
@@ -87,6 +90,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     }
     let options = [
         ("--at", &arguments.at),
+        ("--device", &arguments.device),
         ("--look", &arguments.look),
         ("--size", &arguments.size),
         ("--scale", &arguments.scale),

@@ -3,12 +3,12 @@
 use super::source::{Parts, connect};
 use super::{Audience, Heading, Source, Viewer, Wanted};
 use crate::camera::Camera;
+use crate::devices::Devices;
 use crate::feed::{Arrivals, FeedState, STALE_AFTER};
-use crate::history::{History, Keep, Sample};
+use crate::history::{History, Keep};
 use crate::panel::Panel;
 use crate::player::Player;
 use crate::scene::SceneBuilder;
-use crate::tally::Tally;
 use egui::Context;
 use flotor_core::trace::Events;
 use flotor_live::{ChangeMessage, Outcome, Subject};
@@ -46,7 +46,7 @@ impl Viewer {
             // Before its arrivals: of a run that was over by then, nothing is missing from them.
             let is_running = feed.state() == FeedState::Running;
             let arrivals = feed.arrivals();
-            self.tally.dropped = feed.dropped();
+            self.devices.set_dropped(feed.dropped());
             if is_running {
                 context.request_repaint_after(STALE_AFTER); // to notice that nothing comes
             } else {
@@ -54,7 +54,7 @@ impl Viewer {
             }
             self.digest(arrivals);
             if !is_running {
-                self.player.stop_following(self.history.span_s());
+                self.player.stop_following(self.devices.history().span_s());
             }
         }
     }
@@ -64,13 +64,13 @@ impl Viewer {
         let parts = Parts::of_host(&feed);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a minute of ticks
         let kept = ((feed.run().rate_hz * KEPT_S) as usize).clamp(1, MOST_KEPT);
-        self.history = History::new(feed.run().clone(), Keep::Newest(kept));
+        self.devices = Devices::new(History::of_each_device(feed.run(), Keep::Newest(kept)));
         self.heading = Heading::of(feed.run());
         self.limits = feed.greeting().limits;
-        self.tally = Tally::default();
         self.player = Player::live();
         self.plots.start_over();
-        self.view.camera = Camera::experimenter(SceneBuilder::height_mm(&parts.shapes));
+        self.view.camera =
+            Camera::experimenter(SceneBuilder::framing_mm(&parts.shapes, self.devices.count()));
         (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);
         self.shape_version += 1;
         self.source = Source::Live { feed: Box::new(feed), wanted: wanted.clone() };
@@ -78,8 +78,7 @@ impl Viewer {
 
     fn digest(&mut self, arrivals: Arrivals) {
         for record in &arrivals.records {
-            self.history.push(record);
-            self.tally.add(&Sample::from(record));
+            self.devices.push(record);
             if record.events.intersects(EXCESS) {
                 self.bell.ring();
             }

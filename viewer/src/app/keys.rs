@@ -11,7 +11,7 @@ impl Viewer {
     /// Keys, unless somebody types into a field. The space bar is the largest key: with a run it is the emergency stop,
     /// whatever has the focus.
     pub(super) fn keys(&mut self, ui: &Ui) {
-        let span_s = self.history.span_s();
+        let span_s = self.devices.history().span_s();
         let is_live = self.source.is_running();
         let pressed = |key: Key| ui.input(|input| input.key_pressed(key) && !input.modifiers.command);
         if is_live && ui.input(|input| input.key_pressed(Key::Space)) {
@@ -33,7 +33,7 @@ impl Viewer {
                 - f64::from(u8::from(input.key_pressed(Key::ArrowLeft)))
         });
         if arrows != 0.0 {
-            let step_s = if tick { 1.0 / self.history.run().rate_hz.max(1.0) } else { step_s };
+            let step_s = if tick { 1.0 / self.devices.history().run().rate_hz.max(1.0) } else { step_s };
             self.player.seek(self.player.now_s + arrows * step_s, span_s);
         }
         if pressed(Key::Home) {
@@ -47,6 +47,23 @@ impl Viewer {
         }
         if pressed(Key::F) && is_live {
             self.player.toggle(true, span_s);
+        }
+        const DIGITS: [Key; 9] = [
+            Key::Num1,
+            Key::Num2,
+            Key::Num3,
+            Key::Num4,
+            Key::Num5,
+            Key::Num6,
+            Key::Num7,
+            Key::Num8,
+            Key::Num9,
+        ];
+        if let Some(number) = DIGITS.into_iter().position(pressed) {
+            self.look_at(number);
+        }
+        if pressed(Key::M) {
+            self.plots.switch_maximised(None);
         }
         if pressed(Key::U) {
             self.plots.switch_units();
@@ -67,7 +84,7 @@ impl Viewer {
         if pressed(Key::L) {
             self.switch_look(ui.ctx());
         }
-        self.view.keys(ui, SceneBuilder::height_mm(&self.shapes));
+        self.view.keys(ui, SceneBuilder::framing_mm(&self.shapes, self.devices.count()));
     }
 
     pub(super) fn switch_look(&mut self, context: &Context) {

@@ -13,16 +13,17 @@ mod words;
 pub use source::{Pace, Source, Wanted, connect};
 
 use crate::canvas::Canvas;
+use crate::devices::Devices;
 use crate::experiment::Prompt;
-use crate::history::{History, Keep, Sample, unknown_run};
+use crate::history::{History, Sample};
 use crate::palette::{Look, Palette};
 use crate::panel::Panel;
+use crate::picture::{PictureError, number_of};
 use crate::player::{Motion, Player};
 use crate::remembered::Remembered;
 use crate::scene::{SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use crate::sound::Bell;
-use crate::tally::Tally;
 use crate::ui::plot_stack::{PlotStack, Window};
 use crate::ui::view3d::View3d;
 use crate::ui::{help, playback, readout, style};
@@ -37,6 +38,8 @@ use std::time::{Duration, Instant};
 /// Width of the side, points: where nobody has pulled it, and how far it can be pulled.
 const SIDE_PT: f32 = 300.0;
 const SIDE_RANGE_PT: std::ops::RangeInclusive<f32> = 240.0..=480.0;
+/// How much of the height the 3D view can be given.
+pub(super) const VIEW_PARTS: std::ops::RangeInclusive<f32> = 0.15..=0.85;
 /// Width of a window from which on the panel stands beside the run unasked, points: narrower, the run would be squeezed.
 const ROOM_FOR_PANEL_PT: f32 = 900.0;
 
@@ -46,14 +49,14 @@ pub enum Start {
     Live(Wanted),
     /// A run, in front of a subject.
     Sitting(Wanted, Box<Prompt>),
-    /// A recording, at a moment, with the files of its plugins.
-    Recording(Box<History>, Option<f64>, Vec<PathBuf>),
+    /// A recording, of each device, at a moment, with the files of its plugins.
+    Recording(Vec<History>, Option<f64>, Vec<PathBuf>),
 }
 
 /// The window's state.
 pub struct Viewer {
     source: Source,
-    history: History,
+    devices: Devices,
     heading: Heading,
     shapes: Vec<Shape>,
     shape_version: u64,
@@ -64,11 +67,12 @@ pub struct Viewer {
     view: View3d,
     facts: SceneFacts,
     plots: PlotStack,
-    tally: Tally,
     look: Look,
     /// What was chosen, if anything was.
     shows_panel: Option<bool>,
     side_pt: f32,
+    /// Part of the height that the 3D view gets, where somebody has pulled the border.
+    view_part: Option<f32>,
     remark: Option<(String, Instant)>,
     done: Option<(String, Instant)>,
     /// Whether the list of keys is in sight.
@@ -115,24 +119,30 @@ impl Viewer {
             }
             other => (other, None),
         };
-        let (source, history, parts, player, window) = match start {
+        let (source, devices, parts, player, window) = match start {
             Start::Live(wanted) | Start::Sitting(wanted, _) => {
-                let nothing = History::new(unknown_run(), Keep::Newest(1));
                 let parts = Parts { shapes: Vec::new(), panels: Vec::new(), missing: Vec::new() };
-                (Source::Waiting(wanted), nothing, parts, Player::live(), Window::Newest(10.0))
+                (
+                    Source::Waiting(wanted),
+                    Devices::new(Vec::new()),
+                    parts,
+                    Player::live(),
+                    Window::Newest(10.0),
+                )
             }
-            Start::Recording(history, at_s, files) => {
+            Start::Recording(histories, at_s, files) => {
+                let devices = Devices::new(histories);
+                let history = devices.history();
                 let parts = Parts::of_recording(history.run(), &files);
                 let moment_s = at_s.or_else(|| history.strongest().map(Sample::time_s)).unwrap_or(0.0);
-                (Source::Recording, *history, parts, Player::at(moment_s), Window::Whole)
+                (Source::Recording, devices, parts, Player::at(moment_s), Window::Whole)
             }
         };
-        let height_mm = SceneBuilder::height_mm(&parts.shapes);
+        let height_mm = SceneBuilder::framing_mm(&parts.shapes, devices.count());
         Self {
             source,
-            tally: Tally::of(history.samples()),
-            heading: Heading::of(history.run()),
-            history,
+            heading: Heading::of(devices.history().run()),
+            devices,
             shapes: parts.shapes,
             shape_version: 0,
             panels: parts.panels,
@@ -145,6 +155,7 @@ impl Viewer {
             look,
             shows_panel: None,
             side_pt: SIDE_PT,
+            view_part: None,
             remark: None,
             done: None,
             shows_keys: false,
@@ -163,10 +174,25 @@ impl Viewer {
         &self.player
     }
 
-    /// What has been seen.
+    /// What has been seen of the device looked at.
     #[must_use]
     pub fn history(&self) -> &History {
-        &self.history
+        self.devices.history()
+    }
+
+    /// Numbers and traces are of the device of this name from now on.
+    ///
+    /// # Errors
+    /// [`PictureError::Device`].
+    pub fn look_at_named(&mut self, name: &str) -> Result<(), PictureError> {
+        self.look_at(number_of(&self.devices, name)?);
+        Ok(())
+    }
+
+    /// The devices.
+    #[must_use]
+    pub fn devices(&self) -> &Devices {
+        &self.devices
     }
 
     /// The panels, the device's first.
@@ -202,13 +228,14 @@ impl Viewer {
             traces: self.plots.shown.clone(),
             shows_panel: self.shows_panel,
             side_pt: self.side_pt.round(),
+            view_part: self.view_part,
             ..Remembered::default()
         }
     }
 
     /// Makes the window what it was the last time.
     pub fn recall(&mut self, context: &Context, remembered: &Remembered) {
-        let Remembered { look, units, traces, shows_panel, side_pt, .. } = remembered;
+        let Remembered { look, units, traces, shows_panel, side_pt, view_part, .. } = remembered;
         self.look = *look;
         style::apply(context, *look);
         self.plots.units = *units;
@@ -216,6 +243,7 @@ impl Viewer {
             self.plots.shown.clone_from(traces);
         }
         self.shows_panel = *shows_panel;
+        self.view_part = view_part.map(|part| part.clamp(*VIEW_PARTS.start(), *VIEW_PARTS.end()));
         self.side_pt = side_pt.clamp(*SIDE_RANGE_PT.start(), *SIDE_RANGE_PT.end());
     }
 
@@ -225,20 +253,20 @@ impl Viewer {
         self.take_in(ui.ctx());
         self.pace.set(if self.is_moving() { self.frame } else { FRAME_OF_WORDS });
         if self.sitting.is_some() {
-            self.player.advance(0.0, self.history.span_s());
+            self.player.advance(0.0, self.devices.history().span_s());
             self.sit(ui, &palette);
             return;
         }
         self.keys(ui);
         let elapsed_s = f64::from(ui.input(|input| input.stable_dt)).min(0.1);
-        self.player.advance(elapsed_s, self.history.span_s());
+        self.player.advance(elapsed_s, self.devices.history().span_s());
         if self.player.motion == Motion::Play {
             ui.ctx().request_repaint_after(self.frame);
         }
         let plain = |x: i8, y: i8| Frame::new().fill(palette.panel).inner_margin(Margin::symmetric(x, y));
         Edge::top("top").exact_size(48.0).frame(plain(16, 4)).show(ui, |ui| self.top(ui, &palette));
-        if !self.history.is_empty() {
-            let (span_s, is_live) = (self.history.span_s(), self.source.is_running());
+        if !self.devices.history().is_empty() {
+            let (span_s, is_live) = (self.devices.history().span_s(), self.source.is_running());
             Edge::bottom("playback").exact_size(44.0).frame(plain(16, 4)).show(ui, |ui| {
                 playback::playback(ui, &mut self.player, span_s, is_live, &palette);
             });

@@ -51,20 +51,20 @@ impl Viewer {
 
     fn screen(&mut self, ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
         const CALL: &str = "Please call the experimenter";
-        let sample = self.history.at(self.player.now_s).copied();
-        match (&self.source, prompt.screen(), sample) {
+        let samples = self.devices.at(self.player.now_s);
+        match (&self.source, prompt.screen(), samples) {
             (_, Some(Screen::Over), _) => screens::show(ui, area, prompt, palette),
             _ if prompt.is_lost() => self.words(ui, area, "The experiment has stopped", CALL, palette),
             (Source::Live { .. }, ..) if !self.source.is_running() => {
                 self.words(ui, area, "The device has stopped", CALL, palette);
             }
-            (Source::Live { .. }, Some(_), Some(sample)) => {
+            (Source::Live { .. }, Some(_), Some(samples)) => {
                 if prompt.shows_scene() {
                     // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
                     // largest force, and a wire that stays what it is.
                     self.view.shows_arrows = false;
-                    self.scene(ui, area, &sample);
-                    self.view.keys(ui, SceneBuilder::height_mm(&self.shapes));
+                    self.scene(ui, area, &samples);
+                    self.view.keys(ui, SceneBuilder::framing_mm(&self.shapes, self.devices.count()));
                 }
                 screens::show(ui, area, prompt, palette);
             }

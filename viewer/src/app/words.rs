@@ -21,8 +21,7 @@ const REMARK: Duration = Duration::from_secs(6);
 impl Viewer {
     /// How the run stands, and how well that is.
     pub(super) fn standing(&self) -> (String, RunStatus) {
-        let newest = self.history.at(f64::INFINITY);
-        let events = newest.map_or(Events::NONE, |sample| sample.events);
+        let events = self.devices.newest_events();
         match &self.source {
             Source::Waiting(_) => ("no run".to_owned(), RunStatus::Idle),
             Source::Recording => ("recording".to_owned(), RunStatus::Idle),
@@ -59,14 +58,19 @@ impl Viewer {
             }
         }
         // What happens in a tick is over in a millisecond: it stays in sight a while.
-        let mut shown = *sample;
-        if self.player.motion == Motion::Follow {
-            let now_s = sample.time_s();
-            self.history.between(now_s - IN_SIGHT_S, now_s).for_each(|past| shown.events.insert(past.events));
+        let now_s = sample.time_s();
+        let several = self.devices.count() > 1;
+        for (name, history) in self.devices.all() {
+            let mut events = history.at(self.player.now_s).map_or(Events::NONE, |sample| sample.events);
+            if self.player.motion == Motion::Follow {
+                history.between(now_s - IN_SIGHT_S, now_s).for_each(|past| events.insert(past.events));
+            }
+            let of = if several { format!("{name}: ") } else { String::new() };
+            said.extend(readout::happened(events).map(|words| format!("{of}{words}")));
         }
-        said.extend(readout::warnings(&shown, &self.facts).into_iter().map(str::to_owned));
+        said.extend(readout::of_shapes(&self.facts).map(str::to_owned));
         said.extend(self.missing.iter().cloned());
-        let notes = self.history.notes().iter().filter(|note| note.severity == Severity::Error);
+        let notes = self.devices.history().notes().iter().filter(|note| note.severity == Severity::Error);
         said.extend(notes.map(|note| format!("{}: {}", note.source, note.text)));
         let remark = self.remark.as_ref().filter(|(_, since)| since.elapsed() < REMARK);
         said.extend(remark.map(|(remark, _)| remark.clone()));

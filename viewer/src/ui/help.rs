@@ -3,7 +3,7 @@
 use egui::{Context, Grid, RichText, Window};
 
 /// Key and what it does.
-const KEYS: [(&str, &str); 17] = [
+const KEYS: [(&str, &str); 24] = [
     ("Space", "emergency stop; of a recording: play"),
     ("Enter", "takes a typed number; Escape leaves it"),
     ("Ctrl+Z", "the value before the last change"),
@@ -15,6 +15,13 @@ const KEYS: [(&str, &str); 17] = [
     ("Shift+Left  Right", "ten seconds"),
     ("Ctrl+Left  Right", "a tick"),
     ("Home  End", "beginning and end"),
+    ("M", "one trace in the room of all, and back"),
+    ("Right drag on a trace", "a box: these times and values"),
+    ("Wheel on a trace", "values larger or smaller"),
+    ("Ctrl+wheel on a trace", "time longer or shorter"),
+    ("Middle drag on a trace", "shifts the time"),
+    ("Double click on a trace", "all of it again"),
+    ("1 to 9", "numbers and traces of this device"),
     ("U", "millimetres or SI"),
     ("P", "parameters"),
     ("L", "light or dark"),

@@ -1,16 +1,19 @@
 //! What the colours of the 3D view mean.
 
+use crate::camera::Camera;
 use crate::palette::{Palette, strain_color};
-use crate::scene::{ColorScale, SceneFacts, field_color};
-use crate::ui::style::SMALL_PT;
+use crate::placing::round_below;
+use crate::scene::{ArrowKey, ColorScale, SceneFacts, field_color};
+use crate::ui::style::{BODY_PT, SMALL_PT};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, vec2};
+use flotor_hal::DVec3;
 
 /// Size of the scale of strain, points.
 const SCALE: egui::Vec2 = vec2(190.0, 9.0);
 const MARGIN: f32 = 22.0;
 
 /// Paints what the colours of bodies and of the arrows mean into the lower left.
-pub fn paint(painter: &Painter, area: Rect, facts: &SceneFacts, palette: &Palette) {
+pub fn paint(painter: &Painter, area: Rect, facts: &SceneFacts, camera: &Camera, palette: &Palette) {
     let font = FontId::proportional(SMALL_PT);
     let at = area.left_bottom() + vec2(MARGIN, -MARGIN - SCALE.y - SMALL_PT - 4.0);
     if let Some(scale) = facts.scale {
@@ -18,21 +21,48 @@ pub fn paint(painter: &Painter, area: Rect, facts: &SceneFacts, palette: &Palett
     }
 
     // In a narrow view they would stand before the body.
-    if area.width() < 1100.0 {
+    if area.width() < ROOM_FOR_SCALES_PT {
         return;
     }
-    let mut x = at.x + SCALE.x + 34.0;
-    for (color, name) in [(palette.force, "force on the hand"), (palette.torque, "torque on the hand")] {
-        painter.circle_filled(Pos2::new(x, at.y + 0.5 * SCALE.y), 5.0, opaque(color));
-        let shown = painter.text(
-            Pos2::new(x + 10.0, at.y + 0.5 * SCALE.y),
-            Align2::LEFT_CENTER,
-            name,
-            font.clone(),
-            palette.faint,
-        );
-        x = shown.right() + 22.0;
+    // Without a scale of colours they begin where it would.
+    let mut x = at.x + if facts.scale.is_some() { SCALE.x + 34.0 } else { 5.0 };
+    let y = at.y + 0.5 * SCALE.y;
+    let text = |x: f32, text: String| {
+        painter.text(Pos2::new(x, y), Align2::LEFT_CENTER, text, font.clone(), palette.faint).right() + 22.0
+    };
+    if let Some(key) = facts.arrows {
+        let (length_pt, words) = force_scale(key, camera, area.height());
+        let stroke = Stroke::new(3.0, opaque(palette.force));
+        painter.line_segment([Pos2::new(x, y), Pos2::new(x + length_pt, y)], stroke);
+        x = text(x + length_pt + 8.0, words);
+        if key.torque_nm > LEAST_TORQUE_NM {
+            painter.circle_stroke(Pos2::new(x + 5.0, y), 5.0, Stroke::new(2.5, opaque(palette.torque)));
+            x = text(
+                x + 16.0,
+                format!("torque on the hand, 3/4 turn = {} mN·m", significant(1.0e3 * key.torque_nm)),
+            );
+        }
     }
+    text(x, format!("grid {} mm", significant_short(1.0e3 * facts.grid_m)));
+}
+
+/// Narrower, the scales of arrows and ground would stand before the body, points.
+const ROOM_FOR_SCALES_PT: f32 = 800.0;
+/// A torque that is not above this was never there, N·m.
+const LEAST_TORQUE_NM: f64 = 1.0e-5;
+
+/// Length, points, of the arrow of a round force in the middle of the picture, and what it says.
+fn force_scale(key: ArrowKey, camera: &Camera, height_pt: f32) -> (f32, String) {
+    let force_n = round_below(key.full_force_n);
+    let length_pt = force_n * key.mm_per_n * camera.pixels_per_mm(f64::from(height_pt));
+    #[allow(clippy::cast_possible_truncation)] // points
+    let length_pt = length_pt.min(400.0) as f32;
+    (length_pt, format!("force on the hand, as long as {} N", significant_short(force_n)))
+}
+
+/// A round number without needless zeros.
+fn significant_short(number: f64) -> String {
+    format!("{}", (number * 1.0e6).round() / 1.0e6)
 }
 
 fn paint_scale(painter: &Painter, at: Pos2, scale: ColorScale, peak_part: f64, palette: &Palette) {
@@ -78,4 +108,43 @@ fn significant(number: f64) -> String {
 #[must_use]
 pub fn opaque([r, g, b, _]: crate::geometry::Color) -> Color32 {
     Color32::from_rgb(r, g, b)
+}
+
+/// Paints the axes of the device frame into the lower right: x, y and z in the colours of the traces.
+pub fn axes(painter: &Painter, area: Rect, facts: &SceneFacts, camera: &Camera, palette: &Palette) {
+    const LENGTH_PT: f64 = 24.0;
+    let middle = area.right_bottom() - vec2(2.4 * MARGIN, 2.2 * MARGIN);
+    let (right, up) = camera.right_and_up();
+    #[allow(clippy::cast_possible_truncation)] // points
+    let on_screen = |axis: DVec3| vec2(axis.dot(right) as f32, -axis.dot(up) as f32);
+    for ((axis, name), color) in facts.axes.into_iter().zip(["x", "y", "z"]).zip(palette.components) {
+        let tip = on_screen(axis * LENGTH_PT);
+        painter.line_segment([middle, middle + tip], Stroke::new(2.0, color));
+        let at = middle + on_screen(axis * 1.4 * LENGTH_PT);
+        painter.text(at, Align2::CENTER_CENTER, name, FontId::proportional(SMALL_PT), color);
+    }
+}
+
+/// Paints the name of each device before its place on the ground, the chosen one's brighter.
+pub fn names<'a>(
+    painter: &Painter,
+    area: Rect,
+    facts: &SceneFacts,
+    camera: &Camera,
+    (names, chosen): (impl Iterator<Item = &'a str>, usize),
+    palette: &Palette,
+) {
+    if facts.placing.count < 2 {
+        return;
+    }
+    for (device, name) in names.enumerate() {
+        let place_m = facts.placing.place_m(device) + DVec3::Z * facts.ground_m;
+        let Some([x, y]) = camera.on_screen(place_m * 1.0e3, f64::from(area.width() / area.height())) else {
+            continue;
+        };
+        #[allow(clippy::cast_possible_truncation)] // points
+        let at = area.min + vec2(x as f32 * area.width(), y as f32 * area.height() + 16.0);
+        let color = if device == chosen { palette.text } else { palette.faint };
+        painter.text(at, Align2::CENTER_TOP, name, FontId::proportional(BODY_PT + 1.0), color);
+    }
 }

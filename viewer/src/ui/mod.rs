@@ -13,3 +13,4 @@ pub mod style;
 pub mod top_bar;
 pub mod view3d;
 pub mod warnings;
+pub mod zoom;

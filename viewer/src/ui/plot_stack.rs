@@ -6,9 +6,10 @@ use crate::player::Motion;
 use crate::quantity::{Quantity, Units};
 use crate::trace::Trace;
 use crate::ui::marks::Marks;
-use crate::ui::plots::{PlotView, plot};
+use crate::ui::plots::{Maximise, PlotView, plot};
 use crate::ui::style::SMALL_PT;
-use egui::{Color32, ComboBox, RichText, Role, Ui, WidgetInfo};
+use crate::ui::zoom::ZoomRequest;
+use egui::{Color32, ComboBox, RichText, Role, ScrollArea, Ui, WidgetInfo};
 use std::collections::BTreeMap;
 
 /// Lengths of time that can be shown, s.
@@ -20,6 +21,16 @@ pub const FIRST_TRACES: [Quantity; 2] = [Quantity::Force, Quantity::Position];
 /// Narrower, the choices take two rows, points.
 const ROOM_FOR_ONE_ROW_PT: f32 = 720.0;
 
+/// Lower, the choice of traces is a menu, points.
+const ROOM_FOR_TABS_PT: f32 = 230.0;
+/// No trace is lower than this, points: three marks of an axis are still apart. What finds no room is scrolled to.
+const LEAST_TRACE_PT: f32 = 48.0;
+/// Height of what stands above a trace, and of the times below the last one, points.
+const HEADING_PT: f32 = 29.0;
+const TIMES_PT: f32 = 22.0;
+/// Shortest time that can be shown, s: a few ticks.
+const LEAST_TIME_S: f64 = 5.0e-3;
+
 /// How much of the past is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Window {
@@ -27,6 +38,8 @@ pub enum Window {
     Whole,
     /// So many seconds, ending at the newest.
     Newest(f64),
+    /// From one time to another, s.
+    Between(f64, f64),
 }
 
 /// What a person asks for beside the traces themselves.
@@ -58,6 +71,12 @@ pub struct PlotStack {
     pub window: Window,
     /// Units of all numbers.
     pub units: Units,
+    /// The one that has the room of all.
+    alone: Option<Quantity>,
+    /// Values shown of a trace that is zoomed, SI.
+    values: BTreeMap<Quantity, [f64; 2]>,
+    /// How much of the past was shown before a zoom.
+    unzoomed: Window,
     /// What has been made of the history, for each quantity shown so far.
     traces: BTreeMap<Quantity, Trace>,
     /// What happened, beneath the traces.
@@ -76,6 +95,9 @@ impl PlotStack {
             shown: FIRST_TRACES.to_vec(),
             window,
             units: Units::Handy,
+            alone: None,
+            values: BTreeMap::new(),
+            unzoomed: window,
             traces: BTreeMap::new(),
             marks: Marks::default(),
             end_s: f64::INFINITY,
@@ -85,9 +107,66 @@ impl PlotStack {
 
     /// Another run is shown from now on.
     pub fn start_over(&mut self) {
+        self.look_at_another();
+        self.end_s = f64::INFINITY;
+        self.zoom_out();
+        self.values.clear();
+    }
+
+    /// Another device of the same run is shown from now on.
+    pub fn look_at_another(&mut self) {
         self.traces.clear();
         self.marks = Marks::default();
-        self.end_s = f64::INFINITY;
+    }
+
+    /// The traces in sight, from the top.
+    #[must_use]
+    pub fn in_sight(&self) -> Vec<Quantity> {
+        self.alone.map_or_else(|| self.shown.clone(), |alone| vec![alone])
+    }
+
+    /// Values shown of a trace that is zoomed, SI.
+    #[must_use]
+    pub fn values_of(&self, quantity: Quantity) -> Option<[f64; 2]> {
+        self.values.get(&quantity).copied()
+    }
+
+    /// Gives the first trace, or the one named, the room of all; or all their own again.
+    pub fn switch_maximised(&mut self, quantity: Option<Quantity>) {
+        self.alone = match self.alone {
+            None if self.shown.len() > 1 => quantity.or_else(|| self.shown.first().copied()),
+            _ => None,
+        };
+    }
+
+    fn zoom_out(&mut self) {
+        if matches!(self.window, Window::Between(..)) {
+            self.window = self.unzoomed;
+        }
+    }
+
+    fn zoom(&mut self, quantity: Quantity, request: ZoomRequest) {
+        let (_, per_si) = quantity.unit(self.units);
+        let (time_s, values) = match request {
+            ZoomRequest::Box(time_s, values) => (Some(time_s), Some(values)),
+            ZoomRequest::Time(time_s) => (Some(time_s), None),
+            ZoomRequest::Values(values) => (None, Some(values)),
+            ZoomRequest::All => {
+                self.zoom_out();
+                self.values.remove(&quantity);
+                (None, None)
+            }
+        };
+        if let Some([from_s, to_s]) = time_s.filter(|[from_s, to_s]| to_s - from_s >= LEAST_TIME_S) {
+            if !matches!(self.window, Window::Between(..)) {
+                self.unzoomed = self.window;
+            }
+            self.window = Window::Between(from_s, to_s);
+        }
+        let is_range = |[low, high]: &[f64; 2]| low.is_finite() && high.is_finite() && low < high;
+        if let Some(values) = values.filter(is_range) {
+            self.values.insert(quantity, values.map(|value| value / per_si));
+        }
     }
 
     /// Samples looked at so far: once for each quantity, not once for each picture.
@@ -102,6 +181,7 @@ impl PlotStack {
         let [first_s, last_s] = history.span_s();
         match self.window {
             Window::Whole => [first_s, last_s.max(first_s + 1.0e-3)],
+            Window::Between(from_s, to_s) => [from_s, to_s],
             Window::Newest(length_s) => {
                 let end_s = self.end_s.min(last_s);
                 // Before the run there is nothing to show: its beginning stays at the left until it is longer.
@@ -111,18 +191,26 @@ impl PlotStack {
         }
     }
 
-    /// Shows the row of choices and the traces; says what was requested.
+    /// Shows the row of choices and the traces of what has been seen of a device, with its name where there are several; says what was
+    /// requested.
     pub fn show(
         &mut self,
         ui: &mut Ui,
-        history: &History,
+        seen: (&History, Option<&str>),
         now_s: f64,
         motion: Motion,
         palette: &Palette,
     ) -> Vec<PlotRequest> {
-        self.end_s = self.end_of_window(history.span_s(), now_s, motion);
+        self.end_s = self.end_of_window(seen.0.span_s(), now_s, motion);
         let mut requests = Vec::new();
-        if ui.available_width() < ROOM_FOR_ONE_ROW_PT {
+        if ui.available_height() < ROOM_FOR_TABS_PT {
+            ui.horizontal(|ui| {
+                ui.menu_button(RichText::new("Traces").size(SMALL_PT + 0.5), |ui| {
+                    ui.horizontal_wrapped(|ui| self.quantities(ui, palette));
+                });
+                self.presentation(ui, &mut requests);
+            });
+        } else if ui.available_width() < ROOM_FOR_ONE_ROW_PT {
             ui.horizontal_wrapped(|ui| self.quantities(ui, palette));
             ui.horizontal(|ui| self.presentation(ui, &mut requests));
         } else {
@@ -131,15 +219,42 @@ impl PlotStack {
                 self.presentation(ui, &mut requests);
             });
         }
-        let span_s = self.span_s(history);
-        let count = self.shown.len();
-        let height = (ui.available_height() - 29.0 * count as f32 - 22.0) / count.max(1) as f32;
+        let count = self.in_sight().len().max(1) as f32;
+        let room = (ui.available_height() - HEADING_PT * count - TIMES_PT) / count;
+        let mut stack = |ui: &mut Ui| self.stack(ui, seen, now_s, room.max(LEAST_TRACE_PT), palette);
+        if room >= LEAST_TRACE_PT {
+            requests.extend(stack(ui));
+        } else {
+            requests.extend(ScrollArea::vertical().auto_shrink(false).show(ui, stack).inner);
+        }
+        requests
+    }
+
+    /// The traces of this height, one above the other.
+    fn stack(
+        &mut self,
+        ui: &mut Ui,
+        (history, device): (&History, Option<&str>),
+        now_s: f64,
+        height: f32,
+        palette: &Palette,
+    ) -> Vec<PlotRequest> {
+        let (span_s, shown) = (self.span_s(history), self.in_sight());
         let cursor_s = self.hover_s.unwrap_or(now_s);
+        let maximise = match (self.alone, self.shown.len()) {
+            (Some(_), _) => Maximise::Done,
+            (None, 0 | 1) => Maximise::No,
+            (None, _) => Maximise::Possible,
+        };
         self.hover_s = None;
-        for (index, quantity) in self.shown.clone().into_iter().enumerate() {
-            let time_axis = index + 1 == count;
-            let height = if time_axis { height + 14.0 } else { height }.max(24.0);
-            let view = PlotView { span_s, cursor_s, units: self.units, height, time_axis };
+        let mut requests = Vec::new();
+        for (index, quantity) in shown.iter().copied().enumerate() {
+            let time_axis = index + 1 == shown.len();
+            let height = if time_axis { height + 14.0 } else { height };
+            let (_, per_si) = quantity.unit(self.units);
+            let values = self.values_of(quantity).map(|values| values.map(|value| value * per_si));
+            let view =
+                PlotView { device, span_s, cursor_s, units: self.units, height, time_axis, values, maximise };
             let trace = self.traces.entry(quantity).or_insert_with(|| Trace::of(quantity));
             let answer = plot(ui, history, trace, view, palette);
             if time_axis {
@@ -147,6 +262,12 @@ impl PlotStack {
             }
             self.hover_s = self.hover_s.or(answer.hover_s);
             requests.extend(answer.seek_s.map(PlotRequest::Seek));
+            if answer.switches_maximised {
+                self.switch_maximised(Some(quantity));
+            }
+            if let Some(request) = answer.zoom {
+                self.zoom(quantity, request);
+            }
         }
         requests
     }
@@ -156,7 +277,7 @@ impl PlotStack {
         /// Part of the window between the moment and an edge.
         const MARGIN: f64 = 0.1;
         match (motion, self.window) {
-            (Motion::Follow, _) | (_, Window::Whole) => last_s,
+            (Motion::Follow, _) | (_, Window::Whole | Window::Between(..)) => last_s,
             (_, Window::Newest(length_s)) => {
                 let margin_s = MARGIN * length_s;
                 let near = self.end_s.clamp(now_s + margin_s, now_s + length_s - margin_s);
@@ -204,6 +325,7 @@ impl PlotStack {
             let shown = match self.window {
                 Window::Whole => "all".to_owned(),
                 Window::Newest(length_s) => format!("{length_s} s"),
+                Window::Between(..) => "zoomed".to_owned(),
             };
             let list = ComboBox::from_id_salt("window").selected_text(shown).width(64.0).show_ui(ui, |ui| {
                 ui.selectable_value(&mut self.window, Window::Whole, "all");
@@ -217,6 +339,7 @@ impl PlotStack {
 
     /// Shows or hides a quantity; the last one stays.
     pub fn toggle(&mut self, quantity: Quantity) {
+        self.alone = None;
         match self.shown.iter().position(|shown| *shown == quantity) {
             Some(_) if self.shown.len() == 1 => {}
             Some(index) => {

@@ -4,12 +4,16 @@ use crate::history::History;
 use crate::palette::Palette;
 use crate::quantity::{Quantity, Units};
 use crate::trace::Trace;
-use egui::{Stroke, Ui};
+use crate::ui::style::quiet;
+use crate::ui::zoom::{ZoomRequest, requested};
+use egui::{Align, Layout, Stroke, Ui};
 use egui_plot::{AxisHints, GridMark, HPlacement, Line, Plot, PlotPoints, VLine};
 
 /// How a plot is shown.
 #[derive(Clone, Copy, Debug)]
-pub struct PlotView {
+pub struct PlotView<'a> {
+    /// Name of the device it is of, where there are several.
+    pub device: Option<&'a str>,
     /// First and last time, s.
     pub span_s: [f64; 2],
     /// Where the time is, s.
@@ -20,6 +24,21 @@ pub struct PlotView {
     pub height: f32,
     /// Whether time stands beneath: the lowest of a stack.
     pub time_axis: bool,
+    /// Smallest and largest value shown, in these units; without them, all that there are.
+    pub values: Option<[f64; 2]>,
+    /// Whether it can have the room of all.
+    pub maximise: Maximise,
+}
+
+/// Whether a trace can have the room of all, and whether it has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Maximise {
+    /// There is no other, or this is a picture.
+    No,
+    /// It can.
+    Possible,
+    /// It has.
+    Done,
 }
 
 /// What a person did to a plot.
@@ -29,6 +48,10 @@ pub struct PlotAnswer {
     pub seek_s: Option<f64>,
     /// Time under the pointer, s.
     pub hover_s: Option<f64>,
+    /// Another part of it.
+    pub zoom: Option<ZoomRequest>,
+    /// Whether the button for the room of all was pressed.
+    pub switches_maximised: bool,
     /// Where the traces are, points.
     pub frame: egui::Rect,
 }
@@ -38,13 +61,13 @@ pub fn plot(
     ui: &mut Ui,
     history: &History,
     trace: &mut Trace,
-    view: PlotView,
+    view: PlotView<'_>,
     palette: &Palette,
 ) -> PlotAnswer {
-    let PlotView { span_s, cursor_s, units, height, time_axis } = view;
+    let PlotView { span_s, cursor_s, units, height, time_axis, values, .. } = view;
     let quantity = trace.quantity();
     let (unit, per_si) = quantity.unit(units);
-    heading(ui, history, quantity, &view, palette);
+    let switches_maximised = heading(ui, history, quantity, &view, palette);
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // points
     let buckets = ui.available_width().max(50.0) as usize;
@@ -56,7 +79,8 @@ pub fn plot(
         .label_spacing(egui::Rangef::new(11.0, 30.0))
         .formatter(|mark, _| short(mark.value));
     let x_axis = AxisHints::new_x().formatter(|mark, _| format!("{} s", short(mark.value)));
-    let shown = Plot::new(("plot", quantity.name()))
+    // Bounds once set stay with a plot: one that shows all values is another than one that is zoomed.
+    let plot = Plot::new(("plot", quantity.name(), values.is_some()))
         .height(height)
         .show_axes([time_axis, true])
         .custom_x_axes(vec![x_axis])
@@ -73,36 +97,55 @@ pub fn plot(
         .grid_spacing(egui::Rangef::new(8.0, 60.0))
         .include_x(span_s[0])
         .include_x(span_s[1])
-        .include_y(0.0)
-        .label_formatter(|_| None)
-        .show(ui, |plot| {
-            plot.set_plot_bounds_x(span_s[0]..=span_s[1]);
-            for (component, stretches) in traces.iter().enumerate() {
-                let name = quantity.components()[component];
-                for points in stretches {
-                    // Two points a bucket are few enough: joined they are as wide everywhere.
-                    let line = Line::new(name, PlotPoints::Borrowed(points)).allow_band(false);
-                    plot.line(line.color(palette.components[component % 3]).width(1.6));
-                }
+        .label_formatter(|_| None);
+    // Zero is in sight unless somebody chose other values.
+    let plot = if values.is_none() { plot.include_y(0.0) } else { plot };
+    let shown = plot.show(ui, |plot| {
+        plot.set_plot_bounds_x(span_s[0]..=span_s[1]);
+        if let Some([low, high]) = values {
+            plot.set_plot_bounds_y(low..=high);
+        }
+        for (component, stretches) in traces.iter().enumerate() {
+            let name = quantity.components()[component];
+            for points in stretches {
+                // Two points a bucket are few enough: joined they are as wide everywhere.
+                let line = Line::new(name, PlotPoints::Borrowed(points)).allow_band(false);
+                plot.line(line.color(palette.components[component % 3]).width(1.6));
             }
-            plot.vline(VLine::new("time", cursor_s).stroke(Stroke::new(1.2, palette.cursor)));
-            plot.pointer_coordinate()
-        });
-    let time = format!("{} over time, {unit}", quantity.name());
+        }
+        plot.vline(VLine::new("time", cursor_s).stroke(Stroke::new(1.2, palette.cursor)));
+        plot.pointer_coordinate()
+    });
+    let of_device = view.device.map(|name| format!("{name}: ")).unwrap_or_default();
+    let time = format!("{of_device}{} over time, {unit}", quantity.name());
     shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &time));
     let hover_s = shown.inner.map(|at| at.x).filter(|_| shown.response.hovered());
-    let pressed = shown.response.is_pointer_button_down_on();
+    let pressed =
+        shown.response.is_pointer_button_down_on() && ui.input(|input| input.pointer.primary_down());
     PlotAnswer {
         seek_s: shown.inner.map(|at| at.x).filter(|_| pressed),
         hover_s,
+        zoom: requested(ui, &shown, palette),
+        switches_maximised,
         frame: *shown.transform.frame(),
     }
 }
 
-fn heading(ui: &mut Ui, history: &History, quantity: Quantity, view: &PlotView, palette: &Palette) {
+/// Name, unit and values at the cursor; whether the button for the room of all was pressed.
+fn heading(
+    ui: &mut Ui,
+    history: &History,
+    quantity: Quantity,
+    view: &PlotView<'_>,
+    palette: &Palette,
+) -> bool {
     let (unit, per_si) = quantity.unit(view.units);
+    let mut pressed = false;
     ui.horizontal(|ui| {
         ui.add_space(4.0);
+        if let Some(device) = view.device {
+            ui.weak(device);
+        }
         ui.strong(quantity.name());
         ui.weak(unit);
         let sample = history.seen_at(view.cursor_s);
@@ -112,7 +155,16 @@ fn heading(ui: &mut Ui, history: &History, quantity: Quantity, view: &PlotView, 
             let value = sample.map_or(f64::NAN, |sample| quantity.value(sample, component) * per_si);
             ui.monospace(digits(value, view.units));
         }
+        let (sign, help) = match view.maximise {
+            Maximise::No => return,
+            Maximise::Possible => ("🗖", format!("{} alone (M)", quantity.name())),
+            Maximise::Done => ("🗗", "All traces (M)".to_owned()),
+        };
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            pressed = quiet(ui, sign, &help).clicked();
+        });
     });
+    pressed
 }
 
 /// A number as it is read in these units: of metres and joules the digits that matter are behind the third place.

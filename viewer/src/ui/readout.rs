@@ -66,6 +66,10 @@ pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, pal
     };
     let shown = [Quantity::Force, Quantity::Torque, Quantity::Position, Quantity::Rotation, Quantity::Energy];
     for quantity in shown {
+        // In a low view the last ones would stand before what is below it.
+        if y + line > area.bottom() {
+            return;
+        }
         let (unit, per_si) = quantity.unit(units);
         painter.text(Pos2::new(right - 34.0, y), Align2::LEFT_TOP, unit, small.clone(), palette.faint);
         let mut x = right - 42.0;
@@ -85,6 +89,11 @@ pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, pal
 /// What people should know about a moment, and what to do about it; most urgent first.
 #[must_use]
 pub fn warnings(sample: &Sample, facts: &SceneFacts) -> Vec<&'static str> {
+    happened(sample.events).chain(of_shapes(facts)).collect()
+}
+
+/// What people should know about what happened to a device.
+pub fn happened(events: Events) -> impl Iterator<Item = &'static str> {
     const WORDS: [(Events, &str); 10] = [
         (Events::DEVICE_FAULT, "Device fault: force is off; see the log for what to do"),
         (Events::MODEL_FAULT, "A model failed: it gives no force any more; stop and look at the log"),
@@ -97,12 +106,16 @@ pub fn warnings(sample: &Sample, facts: &SceneFacts) -> Vec<&'static str> {
         (Events::MISSED, "Late: ticks were missed; `flotor doctor` says how to keep time"),
         (Events::MODEL_DEGRADED, "The model left its domain: its answer is a safe continuation"),
     ];
-    let said = WORDS.iter().filter(|(event, _)| sample.events.intersects(*event)).map(|(_, words)| *words);
+    WORDS.iter().filter(move |(event, _)| events.intersects(*event)).map(|(_, words)| *words)
+}
+
+/// What people should know about the bodies that are drawn.
+pub fn of_shapes(facts: &SceneFacts) -> impl Iterator<Item = &'static str> {
     let shape = [
         (facts.touching, "Coils touch: from here the spring is far stiffer than the model"),
         (facts.no_shape, "No shape at this pose: the model gives none"),
     ];
-    said.chain(shape.into_iter().filter(|(is, _)| *is).map(|(_, words)| words)).collect()
+    shape.into_iter().filter(|(is, _)| *is).map(|(_, words)| words)
 }
 
 /// Paints warnings beneath the title.

@@ -16,10 +16,21 @@ pub struct TopBar<'a> {
     pub status: RunStatus,
     /// Whether there is a run to stop.
     pub can_stop: bool,
-    /// Whether there is a panel to put away.
-    pub has_panel: bool,
+    /// What the button of the panel does.
+    pub panel: PanelSwitch,
     /// Light or dark.
     pub look: Look,
+}
+
+/// What the button of the panel does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PanelSwitch {
+    /// There is none.
+    None,
+    /// It puts the panel away.
+    PutAway,
+    /// It brings it out.
+    BringOut,
 }
 
 /// Whether a run is in order.
@@ -69,7 +80,13 @@ impl TopBar<'_> {
                     request = Some(TopBarRequest::EmergencyStop);
                 }
                 ui.add_space(4.0);
-                if self.has_panel && quiet(ui, "☰", "Parameters (P)").clicked() {
+                let sign = match self.panel {
+                    PanelSwitch::None => None,
+                    PanelSwitch::PutAway => Some("☰"),
+                    // Who does not see it is told that it is there.
+                    PanelSwitch::BringOut => Some("☰ Parameters"),
+                };
+                if sign.is_some_and(|sign| quiet(ui, sign, "Parameters (P)").clicked()) {
                     request = Some(TopBarRequest::SwitchPanel);
                 }
                 let (sign, help) = match self.look {

@@ -25,8 +25,8 @@ pub struct Subject<'a> {
     pub shapes: &'a mut [Shape],
     /// Raised whenever a body changes otherwise than by the pose.
     pub version: u64,
-    /// The moment.
-    pub sample: &'a Sample,
+    /// The moment, of each device.
+    pub samples: &'a [Sample],
     /// Lengths of arrows.
     pub scale: ArrowScale,
 }
@@ -43,10 +43,9 @@ pub struct View3d {
 }
 
 /// All that a picture depends on: equal ones are the same picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Look3d {
-    pose: Pose,
-    wrench: [f32; 6],
+    handles: Vec<(Pose, [f32; 6])>,
     version: u64,
     camera: Camera,
     shows_arrows: bool,
@@ -76,7 +75,7 @@ impl View3d {
 
     /// Shows the scene in a rectangle, follows the mouse, and says what is in the picture.
     pub fn show(&mut self, ui: &mut Ui, area: Rect, look: Look, subject: Subject<'_>) -> SceneFacts {
-        let height_mm = SceneBuilder::height_mm(subject.shapes);
+        let height_mm = SceneBuilder::framing_mm(subject.shapes, subject.samples.len());
         let response = ui.interact(area, ui.scope_id().with("3d view"), Sense::click_and_drag());
         if response.dragged_by(PointerButton::Primary) {
             let moved = response.drag_delta();
@@ -122,12 +121,11 @@ impl View3d {
     }
 
     fn picture(&mut self, ui: &Ui, size: Vec2, look: Look, subject: Subject<'_>) -> (TextureId, SceneFacts) {
-        let Subject { shapes, version, sample, scale } = subject;
+        let Subject { shapes, version, samples, scale } = subject;
         let (camera, shows_arrows) = (self.camera, self.shows_arrows);
         let size = pixels(size * ui.ctx().pixels_per_point());
         let wanted = Look3d {
-            pose: sample.pose,
-            wrench: sample.commanded,
+            handles: samples.iter().map(|sample| (sample.pose, sample.commanded)).collect(),
             version,
             camera,
             shows_arrows,
@@ -135,13 +133,13 @@ impl View3d {
             look,
             scale,
         };
-        match self.drawn {
-            Some((drawn, texture, facts)) if drawn == wanted => (texture, facts),
+        match &self.drawn {
+            Some((drawn, texture, facts)) if *drawn == wanted => (*texture, *facts),
             _ => {
                 let palette = Palette::of(look);
                 let height_px = size[1] as f64;
                 let (mesh, facts) =
-                    self.builder.build(shapes, sample, &palette, &camera, height_px, scale, shows_arrows);
+                    self.builder.build(shapes, samples, &palette, &camera, height_px, scale, shows_arrows);
                 let texture = self.canvas.draw(ui.ctx(), mesh, &camera, palette.backdrop, size);
                 self.drawn = Some((wanted, texture, facts));
                 (texture, facts)

@@ -49,8 +49,7 @@ fn a_picture_makes_what_is_new_and_nothing_else() {
         resting.commanded = tick(250, Events::NONE).commanded;
         history.push(&resting);
     }
-    let mut window =
-        window::window(Start::Recording(Box::new(history), Some(0.0), vec![plugin_file("spring")]));
+    let mut window = window::window(Start::Recording(vec![history], Some(0.0), vec![plugin_file("spring")]));
     window.run_steps(3);
     let before = work(&window);
     window.key_press(Key::Space);

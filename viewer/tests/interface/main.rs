@@ -1,6 +1,7 @@
 //! Every panel and screen by its accessibility tree, without display or GPU: what a person can find, press and pull, and
 //! what comes of it at the host.
 
+mod devices;
 mod effort;
 mod live;
 mod look;
@@ -8,4 +9,5 @@ mod recording;
 mod sitting;
 #[path = "../support/mod.rs"]
 mod support;
+mod traces;
 mod window;

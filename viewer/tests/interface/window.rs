@@ -27,7 +27,7 @@ pub(crate) fn recorded(ticks: u64, at_s: Option<f64>) -> Start {
     let (run, _) = spring_run(&[]);
     let mut history = History::new(run, Keep::All);
     (0..ticks).for_each(|number| history.push(&tick(number, Events::NONE)));
-    Start::Recording(Box::new(history), at_s, vec![plugin_file("spring")])
+    Start::Recording(vec![history], at_s, vec![plugin_file("spring")])
 }
 
 /// A window on three seconds of a recording.

@@ -1,0 +1,73 @@
+//! Where the devices of a run stand in the picture: side by side, each in its own frame, because nothing says where their bases are.
+
+use flotor_hal::DVec3;
+
+/// Places of devices along x.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Placing {
+    /// How many there are.
+    pub count: usize,
+    /// From one to the next, m.
+    pub spacing_m: f64,
+}
+
+impl Placing {
+    /// Of so many devices whose bodies are so high and reach so far from their middle.
+    #[must_use]
+    pub fn of(count: usize, height_m: f64, radius_m: f64) -> Self {
+        Self { count, spacing_m: (1.1 * height_m).max(2.6 * radius_m) }
+    }
+
+    /// Where the home of a device is, m.
+    #[must_use]
+    pub fn place_m(&self, device: usize) -> DVec3 {
+        let middle = 0.5 * (self.count.max(1) - 1) as f64;
+        DVec3::X * (self.spacing_m * (device as f64 - middle))
+    }
+
+    /// How much larger than one body all of them are in the picture, which is wider than high.
+    #[must_use]
+    pub fn framing(&self, height_m: f64) -> f64 {
+        /// Width of a picture in which a body of height 1 fills the height.
+        const WIDTH: f64 = 2.2;
+        let width_m = self.spacing_m * (self.count.max(1) - 1) as f64 + height_m;
+        (width_m / (WIDTH * height_m)).max(1.0)
+    }
+}
+
+/// The largest of 1, 2 and 5 times a power of ten that is not above a number; 0 for what is not above 0.
+#[must_use]
+pub fn round_below(number: f64) -> f64 {
+    if !(number > 0.0 && number.is_finite()) {
+        return 0.0;
+    }
+    let power = 10.0_f64.powf(number.log10().floor());
+    // A hair above, for the rounding of the power.
+    [5.0, 2.0, 1.0]
+        .map(|k| k * power)
+        .into_iter()
+        .find(|round| *round <= number * (1.0 + 1.0e-9))
+        .unwrap_or(power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_stand_beside_each_other_about_the_middle() {
+        let placing = Placing::of(2, 0.025, 0.006);
+        assert_eq!(placing.place_m(0), -placing.place_m(1));
+        assert!(placing.place_m(1).x > 0.012);
+        assert_eq!(Placing::of(1, 0.025, 0.006).place_m(0), DVec3::ZERO);
+        assert_eq!(Placing::of(1, 0.025, 0.006).framing(0.025), 1.0);
+    }
+
+    #[test]
+    fn round_numbers_are_not_above() {
+        let round = [0.99, 1.0, 4.9, 5.0, 0.3, 7e-3].map(round_below);
+        let expected = [0.5, 1.0, 2.0, 5.0, 0.2, 5e-3];
+        assert!(round.iter().zip(expected).all(|(a, b)| (a / b - 1.0_f64).abs() < 1e-9), "{round:?}");
+        assert_eq!([0.0, -1.0, f64::NAN].map(round_below), [0.0; 3]);
+    }
+}

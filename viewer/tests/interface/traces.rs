@@ -1,0 +1,132 @@
+//! The traces under a person's hands: pulled larger, zoomed, one in the room of all.
+
+use super::window::{Window, recorded, recording};
+use egui::accesskit::Role;
+use egui::{Key, PointerButton, Pos2, Rect, vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use flotor_viewer::app::Viewer;
+use flotor_viewer::palette::Look;
+use flotor_viewer::quantity::Quantity;
+
+const FORCE: &str = "Force over time, N";
+
+fn area(window: &Window<'_>, label: &str) -> Rect {
+    window.get_by_label(label).rect()
+}
+
+fn span_s(window: &Window<'_>) -> [f64; 2] {
+    window.state().plots().span_s(window.state().history())
+}
+
+fn button(window: &mut Window<'_>, button: PointerButton, at: Pos2, pressed: bool) {
+    window.event(egui::Event::PointerButton { pos: at, button, pressed, modifiers: egui::Modifiers::NONE });
+    window.run_steps(1);
+}
+
+fn drag(window: &mut Window<'_>, with: PointerButton, from: Pos2, to: Pos2) {
+    window.hover_at(from);
+    window.run_steps(1);
+    button(window, with, from, true);
+    for part in [0.5, 1.0] {
+        window.hover_at(from + (to - from) * part);
+        window.run_steps(1);
+    }
+    button(window, with, to, false);
+    window.run_steps(2);
+}
+
+/// Five traces in a small window at twice the scale: each is high enough to be read, and the others are scrolled to.
+#[test]
+fn five_traces_at_twice_the_scale_can_be_read() {
+    let harness = Harness::builder().with_size(vec2(640.0, 400.0)).with_pixels_per_point(2.0);
+    let start = recorded(1000, None);
+    let mut window =
+        harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, Look::Dark));
+    window.run_steps(3);
+    for name in ["Energy", "Torque", "Velocity"] {
+        window.get_by_label("Traces").click();
+        window.run_steps(2);
+        window.get_by_role_and_label(Role::Button, name).click();
+        window.run_steps(2);
+        window.key_press(Key::Escape);
+        window.run_steps(2);
+    }
+    for label in [FORCE, "Torque over time, mN·m", "Velocity over time, mm/s", "Energy over time, mJ"] {
+        assert!(area(&window, label).height() >= 48.0, "{label}: {:?}", area(&window, label));
+    }
+}
+
+#[test]
+fn the_border_between_view_and_traces_is_pulled_and_stays() {
+    let mut window = recording();
+    let border = area(&window, "Border between view and traces").center();
+    let before = area(&window, FORCE).height();
+    drag(&mut window, PointerButton::Primary, border, border - vec2(0.0, 150.0));
+    let after = area(&window, FORCE).height();
+    assert!((after - before - 75.0).abs() < 4.0, "half of what was pulled each: {before} to {after}");
+    let kept = window.state().remembered();
+    let mut next = recording();
+    let context = next.ctx.clone();
+    next.state_mut().recall(&context, &kept);
+    next.run_steps(3);
+    assert!((area(&next, FORCE).height() - after).abs() < 1.0, "the next time, too");
+}
+
+#[test]
+fn a_box_a_wheel_and_a_double_click_zoom() {
+    let mut window = recording();
+    let force = area(&window, FORCE);
+    let all_s = span_s(&window);
+    let at = |x: f32, y: f32| force.min + vec2(x * force.width(), y * force.height());
+    let now_s = window.state().player().now_s;
+    drag(&mut window, PointerButton::Secondary, at(0.3, 0.2), at(0.6, 0.7));
+    let boxed_s = span_s(&window);
+    let part = (boxed_s[1] - boxed_s[0]) / (all_s[1] - all_s[0]);
+    assert!((0.25..0.4).contains(&part) && boxed_s[0] > all_s[0], "{boxed_s:?} of {all_s:?}");
+    let values = window.state().plots().values_of(Quantity::Force).expect("values, too");
+    assert_eq!(window.state().plots().values_of(Quantity::Position), None, "of this trace only");
+    assert_eq!(window.state().player().now_s, now_s, "a box is no other moment");
+
+    window.hover_at(at(0.5, 0.5));
+    window.run_steps(1);
+    window.event(egui::Event::MouseWheel {
+        unit: egui::MouseWheelUnit::Point,
+        delta: vec2(0.0, 60.0),
+        phase: egui::TouchPhase::Move,
+        source: egui::MouseWheelSource::Unknown,
+        modifiers: egui::Modifiers::NONE,
+    });
+    window.run_steps(20);
+    let nearer = window.state().plots().values_of(Quantity::Force).expect("still zoomed");
+    assert!(nearer[1] - nearer[0] < values[1] - values[0], "{nearer:?} in {values:?}");
+    assert_eq!(span_s(&window), boxed_s, "the time is as it was");
+
+    let middle = at(0.5, 0.5);
+    drag(&mut window, PointerButton::Middle, middle, middle + vec2(50.0, 0.0));
+    let shifted_s = span_s(&window);
+    assert!(shifted_s[0] < boxed_s[0], "{shifted_s:?}");
+    for _ in 0..2 {
+        button(&mut window, PointerButton::Primary, middle, true);
+        button(&mut window, PointerButton::Primary, middle, false);
+    }
+    window.run_steps(2);
+    assert_eq!(span_s(&window), all_s);
+    assert_eq!(window.state().plots().values_of(Quantity::Force), None);
+}
+
+#[test]
+fn one_trace_takes_the_room_of_all_and_gives_it_back() {
+    let mut window = recording();
+    let before = area(&window, FORCE).height();
+    window.get_by_label("Force alone (M)").click();
+    window.run_steps(2);
+    assert!(area(&window, FORCE).height() > 1.8 * before);
+    assert!(window.query_by_label("Position over time, mm").is_none());
+    window.get_by_label("All traces (M)").click();
+    window.run_steps(2);
+    assert!((area(&window, FORCE).height() - before).abs() < 1.0);
+    window.key_press(Key::M);
+    window.run_steps(2);
+    assert!(window.query_by_label("Position over time, mm").is_none());
+}
