@@ -71,9 +71,9 @@ impl RunPicture {
             Series::line(name, samples)
         };
         let panel = Panel::new(Axis::linear(label, unit))
-            .series(component("x", |v| v.x).slot(0))
-            .series(component("y", |v| v.y).slot(1))
-            .series(component("z", |v| v.z).slot(2));
+            .series(component("x", |v| v.x).axis(0))
+            .series(component("y", |v| v.y).axis(1))
+            .series(component("z", |v| v.z).axis(2));
         match self.of(device).find(|record| record.events.intersects(Events::BOUNDARY)) {
             Some(record) => panel.mark(Mark::at_x(seconds(record), "boundary")),
             None => panel,

@@ -1,15 +1,18 @@
 //! Traces as files: numbers, lines, pixels.
 
+use crate::derived::ForcePosition;
 use crate::history::History;
 use crate::palette::{Look, Palette};
 use crate::picture::{draw_without_window, write_png};
 use crate::quantity::Quantity;
 use crate::trace::Trace;
+use crate::ui::force_position::said;
 use crate::ui::plot_stack::{ExportFormat, PlotStack};
 use crate::ui::plots::{Maximise, PlotView, plot};
+use crate::ui::readout::{subtitle_of, title_of};
 use crate::ui::view3d::pixels;
-use egui::vec2;
-use flotor_plot::{Axis, Figure, Panel, Series};
+use egui::{UiBuilder, vec2};
+use flotor_plot::{Axis, Figure, Panel, Paper, Series};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -22,20 +25,62 @@ pub struct ExportError {
     cause: std::io::Error,
 }
 
-/// Size of pictures, points; drawn twice as fine.
-const WIDTH: f32 = 900.0;
-const HEIGHT_OF_ONE: f32 = 190.0;
+/// How pictures of traces are made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExportOptions {
+    /// Light or dark.
+    pub look: Look,
+    /// Width and height, pixels.
+    pub size_px: [f64; 2],
+    /// What stands above; empty: the title of the run.
+    pub title: String,
+}
+
+impl Default for ExportOptions {
+    /// Light, for paper, and as wide as a page at 300 dots an inch.
+    fn default() -> Self {
+        Self { look: Look::Light, size_px: [1800.0, 1000.0], title: String::new() }
+    }
+}
+
+impl ExportOptions {
+    /// Lets a person choose.
+    pub fn choose(&mut self, ui: &mut egui::Ui) {
+        ui.horizontal(|ui| {
+            ui.selectable_value(&mut self.look, Look::Light, "Light");
+            ui.selectable_value(&mut self.look, Look::Dark, "Dark");
+        });
+        ui.horizontal(|ui| {
+            let [width, height] = &mut self.size_px;
+            for (length, name) in [(width, "Width"), (height, "Height")] {
+                let value = egui::DragValue::new(length).range(400.0..=8000.0).max_decimals(0).suffix(" px");
+                let value = ui.add(value.update_while_editing(false)).on_hover_text(name);
+                value.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, name));
+            }
+        });
+        let title =
+            egui::TextEdit::singleline(&mut self.title).hint_text("Title of the run").desired_width(180.0);
+        ui.add(title);
+    }
+
+    fn title(&self, history: &History, device: Option<&str>) -> String {
+        let title = if self.title.is_empty() { title_of(history.run()) } else { self.title.clone() };
+        device.map_or_else(|| title.clone(), |device| format!("{title}: {device}"))
+    }
+}
+
+/// Pixels a point of a picture of pixels.
 const SCALE: f32 = 2.0;
 
-/// Writes what is shown into the working folder, under a name that is not taken.
+/// Writes what is shown of a device, with its name where there are several, into the working folder, under a name that is not taken.
 ///
 /// # Errors
 /// [`ExportError`].
 pub fn export(
     history: &History,
+    device: Option<&str>,
     plots: &PlotStack,
     format: ExportFormat,
-    look: Look,
 ) -> Result<PathBuf, ExportError> {
     let ending = match format {
         ExportFormat::Csv => "csv",
@@ -43,7 +88,8 @@ pub fn export(
         ExportFormat::Png => "png",
     };
     let path = free_name(ending);
-    write(history, plots, format, look, &path).map_err(|cause| ExportError { path: path.clone(), cause })?;
+    write(history, device, plots, format, &path)
+        .map_err(|cause| ExportError { path: path.clone(), cause })?;
     Ok(path)
 }
 
@@ -53,16 +99,16 @@ pub fn export(
 /// What the system says.
 pub fn write(
     history: &History,
+    device: Option<&str>,
     plots: &PlotStack,
     format: ExportFormat,
-    look: Look,
     path: &Path,
 ) -> std::io::Result<()> {
     match format {
         ExportFormat::Csv => std::fs::write(path, csv(history, plots)),
-        ExportFormat::Svg => std::fs::write(path, svg(history, plots)),
+        ExportFormat::Svg => std::fs::write(path, svg(history, device, plots)),
         ExportFormat::Png => {
-            let image = png(history, plots, look);
+            let image = png(history, device, plots);
             write_png(path, &image).map_err(std::io::Error::other)
         }
     }
@@ -92,39 +138,90 @@ pub fn csv(history: &History, plots: &PlotStack) -> String {
     text
 }
 
-/// The traces as lines, as many points as can be seen.
+/// The traces as lines, as many points as can be seen, and force over position where it is shown.
 #[must_use]
-pub fn svg(history: &History, plots: &PlotStack) -> String {
+pub fn svg(history: &History, device: Option<&str>, plots: &PlotStack) -> String {
     let [from_s, to_s] = plots.span_s(history);
     let panel = |quantity: &Quantity| {
         let (unit, per_si) = quantity.unit(plots.units);
+        let count = quantity.components().len();
         let line = |(component, name): (usize, &&str)| {
             let samples = history.between(from_s, to_s);
-            Series::line(*name, samples.map(|s| (s.time_s(), quantity.value(s, component) * per_si)))
+            let line =
+                Series::line(*name, samples.map(|s| (s.time_s(), quantity.value(s, component) * per_si)));
+            if count == 3 { line.axis(component) } else { line }
+        };
+        let axis = Axis::linear(quantity.name(), unit);
+        let axis = match plots.values_of(*quantity) {
+            Some([low, high]) => axis.range(low * per_si, high * per_si),
+            None => axis,
         };
         let lines = quantity.components().iter().enumerate().map(line);
-        lines.fold(Panel::new(Axis::linear(quantity.name(), unit)), Panel::series)
+        lines.fold(Panel::new(axis), Panel::series)
     };
-    let figure = Figure::new("Traces", Axis::linear("Time", "s").range(from_s, to_s));
-    plots.in_sight().iter().map(panel).fold(figure, Figure::panel).to_svg()
+    let paper = match plots.export.look {
+        Look::Light => Paper::Light,
+        Look::Dark => Paper::Dark,
+    };
+    let figure =
+        Figure::new(plots.export.title(history, device), Axis::linear("Time", "s").range(from_s, to_s))
+            .subtitle(subtitle_of(history.run()))
+            .size_px(plots.export.size_px.map(|length| length / f64::from(SCALE)))
+            .paper(paper);
+    let figure = plots.in_sight().iter().map(panel).fold(figure, Figure::panel);
+    match plots.force_position.axis {
+        Some(axis) => figure.panel(force_position(history, plots, axis)),
+        None => figure,
+    }
+    .to_svg()
 }
 
-fn png(history: &History, plots: &PlotStack, look: Look) -> egui::ColorImage {
+/// Force over position along an axis, with slope and area.
+fn force_position(history: &History, plots: &PlotStack, axis: usize) -> Panel {
+    let [from_s, to_s] = plots.span_s(history);
+    let curve = ForcePosition::of(history.between(from_s, to_s), axis);
+    let (unit, per_m) = Quantity::Position.unit(plots.units);
+    let name = Quantity::Position.components().get(axis).copied().unwrap_or_default();
+    let points = curve.points.iter().map(|[x, force]| (x * per_m, *force));
+    Panel::with_x(Axis::linear(format!("Position {name}"), unit), Axis::linear("Force on the hand", "N"))
+        .title(said(&curve, plots.units))
+        .series(Series::line(name, points).axis(axis))
+}
+
+fn png(history: &History, device: Option<&str>, plots: &PlotStack) -> egui::ColorImage {
+    let (look, size_px) = (plots.export.look, plots.export.size_px);
     let palette = Palette::of(look);
+    let mut plots = plots.clone();
     let span_s = plots.span_s(history);
-    let size = vec2(WIDTH, HEIGHT_OF_ONE * plots.in_sight().len() as f32 + 20.0);
-    draw_without_window(pixels(size * SCALE), SCALE, look, |ui| {
-        let inside = ui.max_rect().shrink2(vec2(12.0, 4.0));
-        let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(inside));
-        for (index, quantity) in plots.in_sight().iter().enumerate() {
-            let time_axis = index + 1 == plots.in_sight().len();
-            let height = HEIGHT_OF_ONE - 30.0 + if time_axis { 14.0 } else { 0.0 };
+    #[allow(clippy::cast_possible_truncation)] // pixels
+    let size = vec2(size_px[0] as f32, size_px[1] as f32);
+    let title = plots.export.title(history, device);
+    draw_without_window(pixels(size), SCALE, look, |ui| {
+        let inside = ui.max_rect().shrink2(vec2(16.0, 8.0));
+        let mut ui = ui.new_child(UiBuilder::new().max_rect(inside));
+        ui.heading(&title);
+        ui.weak(subtitle_of(history.run()));
+        let mut all = ui.available_rect_before_wrap();
+        if plots.force_position.axis.is_some() {
+            let beside = all.with_min_x(all.right() - 0.36 * all.width());
+            all = all.with_max_x(beside.left() - 16.0);
+            let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
+            plots.force_position.show(&mut right, (history, f64::NAN), span_s, plots.units, &palette);
+        }
+        // The last time of an axis stands half beside it.
+        let mut ui = ui.new_child(UiBuilder::new().max_rect(all.with_max_x(all.right() - 16.0)));
+        let in_sight = plots.in_sight();
+        let count = in_sight.len().max(1) as f32;
+        let height = (ui.available_height() - 29.0 * count - 16.0) / count;
+        for (index, quantity) in in_sight.iter().enumerate() {
+            let time_axis = index + 1 == in_sight.len();
+            let height = height + if time_axis { 14.0 } else { 0.0 };
             let (_, per_si) = quantity.unit(plots.units);
             let values = plots.values_of(*quantity).map(|values| values.map(|value| value * per_si));
             let view = PlotView {
                 device: None,
                 span_s,
-                cursor_s: span_s[1],
+                cursor_s: f64::NAN,
                 units: plots.units,
                 height,
                 time_axis,

@@ -1,5 +1,6 @@
 //! What has been seen of a run: its description, and samples of its ticks in order.
 
+use crate::derived::felt_stiffness_n_per_m;
 use flotor_core::Clock;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Pose, rotation_vector};
@@ -24,6 +25,8 @@ pub struct Sample {
     pub energy_j: f32,
     /// How late the tick started, s.
     pub lateness_s: f32,
+    /// Stiffness felt along the motion, N/m; NaN where the handle rests.
+    pub stiffness_n_per_m: f32,
     /// How long the tick took, s.
     pub compute_s: f32,
     /// What happened.
@@ -70,6 +73,7 @@ impl From<&TickRecord> for Sample {
             commanded: six(record.commanded.force_n, record.commanded.torque_nm),
             energy_j: record.energy_j as f32,
             lateness_s: record.lateness_ns as f32 * 1.0e-9,
+            stiffness_n_per_m: f32::NAN,
             compute_s: record.compute_ns as f32 * 1.0e-9,
             events: record.events,
         }
@@ -179,7 +183,14 @@ impl History {
                 self.forgotten += 1;
             }
         }
-        self.samples.push_back(Sample::from(record));
+        /// Samples looked at for the stiffness: those of some 0.1 s.
+        const LOOKED_AT: usize = 100;
+        let mut sample = Sample::from(record);
+        let earlier = self.samples.iter().rev().take(LOOKED_AT);
+        #[allow(clippy::cast_possible_truncation)] // for pictures
+        let stiffness = felt_stiffness_n_per_m(earlier, &sample) as f32;
+        sample.stiffness_n_per_m = stiffness;
+        self.samples.push_back(sample);
     }
 
     /// How the run was set up.

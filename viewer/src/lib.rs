@@ -6,7 +6,7 @@
 //! - [`history`]: what has been seen of a run; [`feed`] reads it from a running host, [`player`] says which moment is shown,
 //!   [`tally`] counts what happened, [`panel`] is what can be set.
 //! - [`devices`]: the devices of a run, one of which is looked at.
-//! - [`quantity`]: what can be plotted, [`decimate`] with how few points, [`trace`] from picture to picture, [`export`] as files.
+//! - [`derived`]: stiffness felt, force over position. [`quantity`]: what can be plotted, [`decimate`] with how few points, [`trace`] from picture to picture, [`export`] as files.
 //! - [`shape`]: where the bodies of the models are; [`geometry`] makes triangles of them, [`scene`] a picture's worth, [`placing`] where devices stand,
 //!   seen by a [`camera`] in a [`light`].
 //! - [`gpu`]: draws the scene on a GPU or software adapter, [`raster`] without either; [`canvas`] is one of the two in the
@@ -23,6 +23,7 @@ pub mod camera;
 pub mod canvas;
 pub mod cost;
 pub mod decimate;
+pub mod derived;
 pub mod devices;
 pub mod experiment;
 pub mod export;

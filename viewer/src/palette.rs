@@ -278,4 +278,14 @@ mod tests {
         let lightness: Vec<f64> = lightness.collect();
         assert!(lightness.is_sorted_by(|a, b| a < b), "{lightness:?}");
     }
+
+    /// A component has one colour in the window, in pictures of the command line and in the book.
+    #[test]
+    fn components_have_the_colours_of_pictures() {
+        let written = |color: Color32| format!("#{:02x}{:02x}{:02x}", color.r(), color.g(), color.b());
+        for (axis, (light, dark)) in flotor_plot::AXIS_COLORS.into_iter().enumerate() {
+            assert_eq!(written(Palette::of(Look::Light).components[axis]), light);
+            assert_eq!(written(Palette::of(Look::Dark).components[axis]), dark);
+        }
+    }
 }

@@ -33,13 +33,15 @@ pub enum Quantity {
     AngularVelocity,
     /// Energy stored in the models.
     Energy,
+    /// Stiffness felt along the motion.
+    Stiffness,
     /// How late ticks started.
     Lateness,
 }
 
 impl Quantity {
     /// All of them, in the order of menus.
-    pub const ALL: [Quantity; 8] = [
+    pub const ALL: [Quantity; 9] = [
         Self::Force,
         Self::Torque,
         Self::Position,
@@ -47,6 +49,7 @@ impl Quantity {
         Self::Velocity,
         Self::AngularVelocity,
         Self::Energy,
+        Self::Stiffness,
         Self::Lateness,
     ];
 
@@ -85,6 +88,7 @@ impl Quantity {
                 ("Angular velocity", &["wx", "wy", "wz"], "rad/s", ("°/s", DEGREES_PER_RAD))
             }
             Self::Energy => ("Energy", &["stored"], "J", ("mJ", 1.0e3)),
+            Self::Stiffness => ("Stiffness", &["-dF/dx"], "N/m", ("N/mm", 1.0e-3)),
             Self::Lateness => ("Lateness", &["start", "compute"], "s", ("µs", 1.0e6)),
         }
     }
@@ -104,6 +108,7 @@ impl Quantity {
             Self::Velocity => of(&sample.twist[..3], 0),
             Self::AngularVelocity => of(&sample.twist, 3),
             Self::Energy => of(&[sample.energy_j], 0),
+            Self::Stiffness => of(&[sample.stiffness_n_per_m], 0),
             Self::Lateness => of(&[sample.lateness_s, sample.compute_s], 0),
         }
     }

@@ -70,7 +70,11 @@ impl Trace {
                 self.components.iter_mut().for_each(Buckets::interrupt);
             }
             for (component, buckets) in self.components.iter_mut().enumerate() {
-                buckets.push([time_s, self.quantity.value(sample, component)]);
+                let value = self.quantity.value(sample, component);
+                if value.is_nan() {
+                    buckets.interrupt();
+                }
+                buckets.push([time_s, value]);
             }
             self.covered.end += 1;
             self.visited += 1;

@@ -14,7 +14,7 @@ use super::series::Shape;
 use super::text;
 use super::theme::font_px;
 use super::ticks::{Spacing, Ticks};
-use super::{Figure, Panel, WIDTH_PX};
+use super::{Figure, Panel};
 
 pub(super) const MARGIN_PX: f64 = 24.0;
 pub(super) const TITLE_LINE_PX: f64 = 24.0;
@@ -58,7 +58,7 @@ pub(super) struct Cell<'a> {
 
 /// Arranges the whole figure.
 pub(super) fn arrange(figure: &Figure) -> Layout<'_> {
-    let inner_px = WIDTH_PX - 2.0 * MARGIN_PX;
+    let inner_px = figure.width_px - 2.0 * MARGIN_PX;
     // Semi-bold runs about a tenth wider than regular.
     let title = text::wrap(&figure.title, inner_px / 1.1, font_px::TITLE);
     let subtitle = text::wrap(&figure.subtitle, inner_px, font_px::SUBTITLE);
@@ -165,7 +165,7 @@ struct Column {
 
 fn columns(figure: &Figure, drafts: &[Draft<'_>]) -> Vec<Column> {
     let count = figure.columns.min(drafts.len());
-    let all_px = WIDTH_PX - 2.0 * MARGIN_PX + COLUMN_GAP_PX;
+    let all_px = figure.width_px - 2.0 * MARGIN_PX + COLUMN_GAP_PX;
     let pitch_px = all_px / count.max(1) as f64;
     (0..count)
         .map(|index| {

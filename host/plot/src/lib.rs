@@ -48,6 +48,7 @@ mod tests;
 pub use axis::Axis;
 pub use mark::Mark;
 pub use series::{Bin, Series};
+pub use theme::AXIS_COLORS;
 
 /// Width of a figure: fits the text column of the book and a laptop screen at full size.
 const WIDTH_PX: f64 = 960.0;
@@ -67,6 +68,9 @@ pub struct Figure {
     shared_x: Axis,
     columns: usize,
     panel_height_px: f64,
+    width_px: f64,
+    height_px: Option<f64>,
+    paper: Paper,
     panels: Vec<Panel>,
 }
 
@@ -79,6 +83,9 @@ impl Figure {
             shared_x,
             columns: 1,
             panel_height_px: DEFAULT_PANEL_HEIGHT_PX,
+            width_px: WIDTH_PX,
+            height_px: None,
+            paper: Paper::OfReader,
             panels: Vec::new(),
         }
     }
@@ -106,6 +113,22 @@ impl Figure {
         self
     }
 
+    /// Width and height of the whole picture, each held within 200 px and 8000 px; panels share the height that titles and labels
+    /// leave, at least 40 px each.
+    #[must_use]
+    pub fn size_px(mut self, [width_px, height_px]: [f64; 2]) -> Self {
+        let held = |length: f64| if length.is_nan() { WIDTH_PX } else { length.clamp(200.0, 8000.0) };
+        (self.width_px, self.height_px) = (held(width_px), Some(held(height_px)));
+        self
+    }
+
+    /// Light or dark, or as the page it is read on.
+    #[must_use]
+    pub fn paper(mut self, paper: Paper) -> Self {
+        self.paper = paper;
+        self
+    }
+
     /// Adds a panel after the ones already there.
     #[must_use]
     pub fn panel(mut self, panel: Panel) -> Self {
@@ -116,8 +139,24 @@ impl Figure {
     /// The picture as one SVG document. Never fails: a figure without data says so in its place.
     #[must_use]
     pub fn to_svg(&self) -> String {
-        svg::document(self, &layout::arrange(self))
+        let layout = layout::arrange(self);
+        let Some(height_px) = self.height_px else { return svg::document(self, &layout) };
+        let rows = self.panels.len().div_ceil(self.columns).max(1) as f64;
+        let fitted = self.clone().panel_height_px(self.panel_height_px + (height_px - layout.height) / rows);
+        svg::document(&fitted, &layout::arrange(&fitted))
     }
+}
+
+/// What a picture is read on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Paper {
+    /// Light, and dark on pages in dark mode.
+    #[default]
+    OfReader,
+    /// Light, for print.
+    Light,
+    /// Dark, for slides.
+    Dark,
 }
 
 /// One plotting area with its axes, series and marks.

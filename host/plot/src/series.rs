@@ -11,8 +11,15 @@ const OPEN_BIN_DECADES: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub struct Series {
     pub(super) label: String,
-    slot: Option<usize>,
+    slot: Option<Look>,
     pub(super) shape: Shape,
+}
+
+/// Where colour and dash come from.
+#[derive(Debug, Clone, Copy)]
+enum Look {
+    Slot(usize),
+    Axis(usize),
 }
 
 /// How the samples are drawn.
@@ -103,13 +110,24 @@ impl Series {
     /// panel, or a theory line matches its measured points.
     #[must_use]
     pub fn slot(mut self, slot: usize) -> Self {
-        self.slot = Some(slot);
+        self.slot = Some(Look::Slot(slot));
+        self
+    }
+
+    /// Draws as the component 0, 1 or 2 of a vector, x, y or z: in the same colour and dash in every panel and picture.
+    #[must_use]
+    pub fn axis(mut self, component: usize) -> Self {
+        self.slot = Some(Look::Axis(component));
         self
     }
 
     /// Colour, dash and marker of the series when it is number `index` of its panel.
     pub(super) fn look(&self, index: usize) -> Slot {
-        Slot::new(self.slot.unwrap_or(index))
+        match self.slot {
+            None => Slot::new(index),
+            Some(Look::Slot(slot)) => Slot::new(slot),
+            Some(Look::Axis(component)) => Slot::of_axis(component),
+        }
     }
 
     /// The x range of what can be drawn, in the coordinates of the x scale.

@@ -3,6 +3,7 @@
 //! Within a panel, from back to front: grid, reference lines, data (clipped to the frame), axis. The
 //! document has no ids and its style is confined to `.plot`, so that several pictures fit in one page.
 
+use super::Figure;
 use super::axis::{Domain, Scale};
 use super::labels::{
     HEADING_ROW_PX, LEGEND_ROW_PX, Legend, LegendEntry, MARK_ROW_PX, SIDE_LABEL_GAP_PX, baseline, side_labels,
@@ -16,7 +17,6 @@ use super::path::{Drawing, Path, Projection, draw};
 use super::series::Shape;
 use super::text::{self, escape, px};
 use super::theme::{Slot, font_px, style_sheet};
-use super::{Figure, WIDTH_PX};
 
 /// Lines may pass the frame by half their width before they are cut, markers by half their size.
 const LINE_SLACK_PX: f64 = 0.8;
@@ -31,14 +31,14 @@ const MINOR_GRID_DECADE_PX: f64 = 60.0;
 /// Writes the figure.
 pub(super) fn document(figure: &Figure, layout: &Layout<'_>) -> String {
     let mut writer = Writer::default();
-    let (width, height) = (px(WIDTH_PX), px(layout.height));
+    let (width, height) = (px(figure.width_px), px(layout.height));
     writer.raw(&format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" role=\"img\" width=\"{width}\" \
          height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n"
     ));
     writer.element("title", &figure.title);
     writer.element("desc", &description(figure, layout));
-    writer.raw(&format!("<style>\n{}</style>\n", style_sheet()));
+    writer.raw(&format!("<style>\n{}</style>\n", style_sheet(figure.paper)));
     writer.raw(&format!("<rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n"));
     let mut y = MARGIN_PX;
     for line in &layout.title {

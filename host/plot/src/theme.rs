@@ -5,6 +5,7 @@
 //! that many tools add to the palette; its black follows the text colour and so turns light on a dark page.
 //! Dash patterns and marker shapes repeat what the colour says.
 
+use super::Paper;
 use super::path::Path;
 
 /// Series colours on a light and on a dark page.
@@ -18,6 +19,10 @@ const PALETTE: [(&str, &str); 8] = [
     ("#1f2328", "#e6edf3"), // black: the text colour
     ("#8a8f98", "#8a8f98"), // grey
 ];
+
+/// Colours of the components x, y and z on a light and on a dark page, the same as in the viewer's window.
+pub const AXIS_COLORS: [(&str, &str); 3] =
+    [("#d55e00", "#e69f00"), ("#008c69", "#009e76"), ("#144a9b", "#96d0ff")];
 
 /// Dash patterns in pixels, drawn and left out in turn; the first is solid.
 const DASHES: [&str; 8] = ["", "8 3", "3 2", "9 3 2 3", "15 4", "6 2 1.5 2 1.5 2", "1.5 2", "11 3 4 3"];
@@ -35,6 +40,12 @@ impl Slot {
     pub(super) fn new(index: usize) -> Self {
         let color = index % PALETTE.len();
         Self { color, cue: (color + index / PALETTE.len()) % DASHES.len() }
+    }
+
+    /// The look of a component, x, y or z: the same in every panel.
+    pub(super) fn of_axis(component: usize) -> Self {
+        let component = component % AXIS_COLORS.len();
+        Self { color: PALETTE.len() + component, cue: component }
     }
 
     /// The style class that sets the colour.
@@ -85,9 +96,10 @@ pub(super) mod font_px {
 
 /// The style sheet: everything under `.plot`, so that a picture placed inside a page leaves the page alone.
 /// Colours are given twice, the second time for pages in dark mode.
-pub(super) fn style_sheet() -> String {
+pub(super) fn style_sheet(paper: Paper) -> String {
     let light = Page { paper: "#ffffff", ink: "#1f2328", muted: "#59636e", axis: "#8c959f", grid: "#e7eaee" };
     let dark = Page { paper: "#0d1117", ink: "#e6edf3", muted: "#9198a1", axis: "#656c76", grid: "#232a33" };
+    let (light, dark) = (light.rules(|(light, _)| light), dark.rules(|(_, dark)| dark));
     format!(
         ".plot{{max-width:100%;height:auto;font-family:system-ui,-apple-system,'Segoe UI',Roboto,\
          'Helvetica Neue',sans-serif;font-size:{tick}px;font-variant-numeric:tabular-nums}}\n\
@@ -106,9 +118,12 @@ pub(super) fn style_sheet() -> String {
          .plot .round{{stroke-linecap:round}}\n\
          .plot .points{{fill:currentColor;fill-opacity:.85}}\n\
          .plot .bars{{fill:currentColor;fill-opacity:.16;stroke:currentColor;stroke-width:1.2}}\n\
-         {}@media (prefers-color-scheme:dark){{\n{}}}\n",
-        light.rules(|(light, _)| light),
-        dark.rules(|(_, dark)| dark),
+         {}",
+        match paper {
+            Paper::Light => light,
+            Paper::Dark => dark,
+            Paper::OfReader => format!("{light}@media (prefers-color-scheme:dark){{\n{dark}}}\n"),
+        },
         title = font_px::TITLE,
         subtitle = font_px::SUBTITLE,
         heading = font_px::HEADING,
@@ -137,7 +152,7 @@ impl Page {
              .plot .axis{{stroke:{axis}}}\n\
              .plot .reference{{stroke:{muted}}}\n"
         );
-        for (index, colors) in PALETTE.into_iter().enumerate() {
+        for (index, colors) in PALETTE.into_iter().chain(AXIS_COLORS).enumerate() {
             rules.push_str(&format!(".plot .c{index}{{color:{}}}\n", series_color(colors)));
         }
         rules

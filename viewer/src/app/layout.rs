@@ -119,7 +119,7 @@ impl Viewer {
             match request {
                 PlotRequest::Seek(now_s) => self.player.seek(now_s, self.devices.history().span_s()),
                 PlotRequest::Export(format) => {
-                    match export(self.devices.history(), &self.plots, format, self.look) {
+                    match export(self.devices.history(), self.devices.name(), &self.plots, format) {
                         Ok(path) => {
                             let path = std::path::absolute(&path).unwrap_or(path);
                             self.done = Some((format!("Written: {}", path.display()), Instant::now()));

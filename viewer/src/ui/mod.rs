@@ -1,5 +1,6 @@
 //! The interface: parts that window, tests and headless pictures put together.
 
+pub mod force_position;
 pub mod help;
 pub mod legend;
 pub mod marks;

@@ -1,15 +1,18 @@
 //! Traces one above the other over one time, and what a person chooses about them.
 
+use crate::export::ExportOptions;
 use crate::history::History;
 use crate::palette::Palette;
 use crate::player::Motion;
 use crate::quantity::{Quantity, Units};
 use crate::trace::Trace;
+use crate::ui::force_position::ForcePositionPlot;
 use crate::ui::marks::Marks;
 use crate::ui::plots::{Maximise, PlotView, plot};
 use crate::ui::style::SMALL_PT;
 use crate::ui::zoom::ZoomRequest;
-use egui::{Color32, ComboBox, RichText, Role, ScrollArea, Ui, WidgetInfo};
+use egui::containers::menu::{MenuButton, MenuConfig};
+use egui::{Color32, ComboBox, PopupCloseBehavior, RichText, Role, ScrollArea, Ui, UiBuilder, WidgetInfo};
 use std::collections::BTreeMap;
 
 /// Lengths of time that can be shown, s.
@@ -71,6 +74,10 @@ pub struct PlotStack {
     pub window: Window,
     /// Units of all numbers.
     pub units: Units,
+    /// Force over position, beside the traces.
+    pub force_position: ForcePositionPlot,
+    /// How files of traces are made.
+    pub export: ExportOptions,
     /// The one that has the room of all.
     alone: Option<Quantity>,
     /// Values shown of a trace that is zoomed, SI.
@@ -95,6 +102,8 @@ impl PlotStack {
             shown: FIRST_TRACES.to_vec(),
             window,
             units: Units::Handy,
+            force_position: ForcePositionPlot::default(),
+            export: ExportOptions::default(),
             alone: None,
             values: BTreeMap::new(),
             unzoomed: window,
@@ -117,6 +126,7 @@ impl PlotStack {
     pub fn look_at_another(&mut self) {
         self.traces.clear();
         self.marks = Marks::default();
+        self.force_position.start_over();
     }
 
     /// The traces in sight, from the top.
@@ -219,6 +229,33 @@ impl PlotStack {
                 self.presentation(ui, &mut requests);
             });
         }
+        if self.force_position.axis.is_some() {
+            /// Part of the width that force over position gets.
+            const PART: f32 = 0.36;
+            let all = ui.available_rect_before_wrap();
+            let beside = all.with_min_x(all.right() - (PART * all.width()).round());
+            let span_s = self.span_s(seen.0);
+            let cursor_s = self.hover_s.unwrap_or(now_s);
+            let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
+            self.force_position.show(&mut right, (seen.0, cursor_s), span_s, self.units, palette);
+            let left = all.with_max_x(beside.left() - 12.0);
+            let mut left = ui.new_child(UiBuilder::new().max_rect(left).id_salt("over time"));
+            self.over_time(&mut left, seen, now_s, palette, &mut requests);
+        } else {
+            self.over_time(ui, seen, now_s, palette, &mut requests);
+        }
+        requests
+    }
+
+    /// The traces, in the room there is or scrolled.
+    fn over_time(
+        &mut self,
+        ui: &mut Ui,
+        seen: (&History, Option<&str>),
+        now_s: f64,
+        palette: &Palette,
+        requests: &mut Vec<PlotRequest>,
+    ) {
         let count = self.in_sight().len().max(1) as f32;
         let room = (ui.available_height() - HEADING_PT * count - TIMES_PT) / count;
         let mut stack = |ui: &mut Ui| self.stack(ui, seen, now_s, room.max(LEAST_TRACE_PT), palette);
@@ -227,7 +264,6 @@ impl PlotStack {
         } else {
             requests.extend(ScrollArea::vertical().auto_shrink(false).show(ui, stack).inner);
         }
-        requests
     }
 
     /// The traces of this height, one above the other.
@@ -298,13 +334,22 @@ impl PlotStack {
                 self.toggle(quantity);
             }
         }
+        let is_shown = self.force_position.axis.is_some();
+        let text = RichText::new("F(x)").size(SMALL_PT + 0.5);
+        let text = text.color(if is_shown { Color32::WHITE } else { palette.faint });
+        if ui.selectable_label(is_shown, text).on_hover_text("Force over position").clicked() {
+            self.force_position.toggle();
+        }
     }
 
     /// How they are shown, from the right.
     fn presentation(&mut self, ui: &mut Ui, requests: &mut Vec<PlotRequest>) {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.menu_button(RichText::new("Export").size(SMALL_PT + 0.5), |ui| {
+            let menu = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+            let button = MenuButton::new(RichText::new("Export").size(SMALL_PT + 0.5)).config(menu);
+            button.ui(ui, |ui| {
+                self.export.choose(ui);
                 for (format, name) in
                     [(ExportFormat::Csv, "CSV"), (ExportFormat::Svg, "SVG"), (ExportFormat::Png, "PNG")]
                 {

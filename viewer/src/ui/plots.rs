@@ -113,7 +113,9 @@ pub fn plot(
                 plot.line(line.color(palette.components[component % 3]).width(1.6));
             }
         }
-        plot.vline(VLine::new("time", cursor_s).stroke(Stroke::new(1.2, palette.cursor)));
+        if cursor_s.is_finite() {
+            plot.vline(VLine::new("time", cursor_s).stroke(Stroke::new(1.2, palette.cursor)));
+        }
         plot.pointer_coordinate()
     });
     let of_device = view.device.map(|name| format!("{name}: ")).unwrap_or_default();
@@ -153,7 +155,9 @@ fn heading(
             ui.add_space(10.0);
             ui.colored_label(palette.components[component % 3], *name);
             let value = sample.map_or(f64::NAN, |sample| quantity.value(sample, component) * per_si);
-            ui.monospace(digits(value, view.units));
+            if view.cursor_s.is_finite() {
+                ui.monospace(digits(value, view.units));
+            }
         }
         let (sign, help) = match view.maximise {
             Maximise::No => return,

@@ -4,7 +4,6 @@ use super::window::{Window, recorded, recording, window};
 use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
-use flotor_viewer::palette::Look;
 use flotor_viewer::player::Motion;
 use flotor_viewer::ui::plot_stack::ExportFormat;
 
@@ -89,8 +88,7 @@ fn traces_are_chosen_switched_and_written_to_files() {
     ] {
         let path = folder.path().join("traces");
         let viewer = window.state();
-        flotor_viewer::export::write(viewer.history(), viewer.plots(), format, Look::Light, &path)
-            .expect("written");
+        flotor_viewer::export::write(viewer.history(), None, viewer.plots(), format, &path).expect("written");
         let written = std::fs::read(&path).expect("it is there");
         assert!(written.starts_with(starts), "{:?}", String::from_utf8_lossy(&written[..20]));
         if format == ExportFormat::Csv {
@@ -111,4 +109,31 @@ fn traces_can_be_written_in_three_formats() {
     for format in ["CSV", "SVG", "PNG"] {
         window.get_by_role_and_label(Role::Button, format);
     }
+    window.get_by_role_and_label(Role::SpinButton, "Width");
+    window.get_by_role_and_label(Role::Button, "Light");
+}
+
+/// A spring that is pressed and released: the slope is its stiffness, and it takes no energy.
+#[test]
+fn force_over_position_says_stiffness_and_hysteresis() {
+    let mut window = recording();
+    window.get_by_role_and_label(Role::Button, "F(x)").click();
+    window.run_steps(3);
+    window.get_by_label_contains("Force over position, N and mm: 0.700 N/mm  ·  hysteresis");
+    window.get_by_label("Force over time, N");
+    let viewer = window.state();
+    let svg = flotor_viewer::export::svg(viewer.history(), None, viewer.plots());
+    assert!(svg.contains("width=\"900\" height=\"500\"") && svg.contains("A spring under test"));
+    assert!(svg.contains("0.700 N/mm") && !svg.contains("prefers-color-scheme"), "light, whatever the page");
+}
+
+/// The stiffness that the hand feels is a trace as any other, with gaps where the handle rests.
+#[test]
+fn the_stiffness_felt_is_a_trace() {
+    let mut window = recording();
+    window.get_by_role_and_label(Role::Button, "Stiffness").click();
+    window.run_steps(2);
+    window.get_by_label("Stiffness over time, N/mm");
+    let felt = window.state().history().at(0.25).expect("a sample").stiffness_n_per_m;
+    assert!((felt - 700.0).abs() < 1.0, "{felt}");
 }

@@ -303,3 +303,18 @@ fn x_labels_stand_once_at_the_foot_of_panels_that_share_an_axis() {
     let mixed = figure(1).panel(own()).panel(panel()).panel(own()).to_svg();
     assert_eq!((mixed.matches(">Time (s)<").count(), mixed.matches(">Position (mm)<").count()), (1, 2));
 }
+
+#[test]
+fn a_picture_has_the_size_and_the_paper_it_was_given() {
+    let panel = |name: &str| {
+        Panel::new(Axis::linear(name, "N")).series(Series::line("z", [(0.0, 1.0), (1.0, 2.0)]).axis(2))
+    };
+    let figure = Figure::new("Run", Axis::linear("Time", "s")).panel(panel("Force")).panel(panel("Limit"));
+    let svg = figure.clone().size_px([640.0, 480.0]).paper(crate::Paper::Light).to_svg();
+    well_formed(&svg);
+    assert!(svg.contains("width=\"640\" height=\"480\" viewBox=\"0 0 640 480\""), "{}", &svg[..200]);
+    assert!(!svg.contains("prefers-color-scheme") && svg.contains("#144a9b") && !svg.contains("#96d0ff"));
+    let dark = figure.clone().paper(crate::Paper::Dark).to_svg();
+    assert!(dark.contains("#96d0ff") && !dark.contains("#144a9b"));
+    assert_eq!(figure.to_svg().matches("class=\"line c10").count(), 4, "z is z in both panels and legends");
+}

@@ -1,0 +1,135 @@
+//! What follows from several samples: the stiffness felt along the motion, and force over position with its hysteresis.
+
+use crate::history::Sample;
+use flotor_hal::DVec3;
+
+/// The handle must have moved so far for a stiffness, m: ten steps of a common sensor.
+const LEAST_WAY_M: f64 = 50.0e-6;
+
+/// Stiffness felt along the motion, N/m: the secant `-dF/dx` from the newest of some earlier samples (the newest first) that is far
+/// enough away. Positive where the force grows against the motion; NaN where the handle rests.
+#[must_use]
+pub fn felt_stiffness_n_per_m<'a>(earlier: impl Iterator<Item = &'a Sample>, now: &Sample) -> f64 {
+    for before in earlier {
+        let way_m: DVec3 = now.pose.position() - before.pose.position();
+        let square = way_m.length_squared();
+        if square >= LEAST_WAY_M * LEAST_WAY_M {
+            return -(now.force_n() - before.force_n()).dot(way_m) / square;
+        }
+    }
+    f64::NAN
+}
+
+/// Force over position along an axis of the device frame, over a time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ForcePosition {
+    /// Position, m, and force on the hand, N, in order of time.
+    pub points: Vec<[f64; 2]>,
+    /// Stiffness, N/m: that of the straight line closest to the points. None where the handle rests.
+    pub stiffness_n_per_m: Option<f64>,
+    /// Whole cycles, and the energy that each takes from the hand, J: the area of the loop. None without a whole cycle.
+    pub cycles: Option<(u32, f64)>,
+}
+
+impl ForcePosition {
+    /// Of samples in order of time, for the axis x, y or z.
+    #[must_use]
+    pub fn of<'a>(samples: impl Iterator<Item = &'a Sample>, axis: usize) -> Self {
+        let axis = axis.min(2);
+        let points: Vec<[f64; 2]> = samples
+            .map(|sample| [sample.pose.position().to_array()[axis], sample.force_n().to_array()[axis]])
+            .filter(|point| point.iter().all(|part| part.is_finite()))
+            .collect();
+        Self { stiffness_n_per_m: stiffness(&points), cycles: cycles(&points), points }
+    }
+
+    /// At most so many of the points, evenly taken.
+    pub fn thinned(&self, most: usize) -> impl Iterator<Item = [f64; 2]> {
+        self.points.iter().copied().step_by(self.points.len().div_ceil(most.max(1)).max(1))
+    }
+}
+
+fn stiffness(points: &[[f64; 2]]) -> Option<f64> {
+    let count = points.len() as f64;
+    let mean = |k: usize| points.iter().map(|point| point[k]).sum::<f64>() / count;
+    let (x, force) = (mean(0), mean(1));
+    let square: f64 = points.iter().map(|point| (point[0] - x).powi(2)).sum();
+    let product: f64 = points.iter().map(|point| (point[0] - x) * (point[1] - force)).sum();
+    (square > count * LEAST_WAY_M * LEAST_WAY_M).then(|| -product / square)
+}
+
+/// From the first to the last time the handle comes up through the middle of its way: the work of the hand a cycle.
+fn cycles(points: &[[f64; 2]]) -> Option<(u32, f64)> {
+    /// The handle has left the middle when it is so much of the way from it.
+    const AWAY: f64 = 0.1;
+    let (low, high) =
+        points.iter().fold((f64::MAX, f64::MIN), |(low, high), [x, _]| (low.min(*x), high.max(*x)));
+    let (middle, away) = (0.5 * (low + high), AWAY * (high - low));
+    if points.is_empty() || high - low < LEAST_WAY_M {
+        return None;
+    }
+    let (mut was_below, mut crossings, mut work_j, mut whole_j) = (false, 0_u32, 0.0, 0.0);
+    for (from, to) in points.iter().zip(points.iter().skip(1)) {
+        if crossings > 0 {
+            work_j -= 0.5 * (from[1] + to[1]) * (to[0] - from[0]);
+        }
+        was_below |= to[0] < middle - away;
+        if was_below && to[0] >= middle {
+            (was_below, whole_j) = (false, work_j);
+            crossings += 1;
+            if crossings == 1 {
+                (work_j, whole_j) = (0.0, 0.0);
+            }
+        }
+    }
+    (crossings > 1).then(|| (crossings - 1, whole_j / f64::from(crossings - 1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_core::trace::{RECORD_WORDS, TickRecord};
+    use flotor_sync::Words;
+    use std::f64::consts::{PI, TAU};
+
+    const STIFFNESS: f64 = 700.0;
+    const DAMPING: f64 = 2.0;
+    const AMPLITUDE_M: f64 = 0.003;
+
+    /// Two and a half seconds of a spring with a damper, moved up and down once a second.
+    fn spring_and_damper(damping: f64) -> Vec<Sample> {
+        let sample = |tick: i32| {
+            let phase = TAU * f64::from(tick) * 1.0e-3;
+            let (z, v) = (AMPLITUDE_M * phase.sin(), AMPLITUDE_M * TAU * phase.cos());
+            let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
+            record.pose.position_m = [0.0, 0.0, z];
+            record.commanded.force_n = [0.0, 0.0, -STIFFNESS * z - damping * v];
+            Sample::from(&record)
+        };
+        (0..2500).map(sample).collect()
+    }
+
+    /// A damper takes pi c w A^2 a cycle.
+    #[test]
+    fn the_loop_of_a_damped_spring_has_the_area_of_its_ellipse() {
+        let found = ForcePosition::of(spring_and_damper(DAMPING).iter(), 2);
+        let (cycles, loss_j) = found.cycles.expect("two whole cycles at least");
+        let expected_j = PI * DAMPING * TAU * AMPLITUDE_M * AMPLITUDE_M;
+        assert!(cycles >= 1 && (loss_j / expected_j - 1.0).abs() < 0.01, "{loss_j} of {expected_j}");
+        let spring = ForcePosition::of(spring_and_damper(0.0).iter(), 2);
+        let stiffness = spring.stiffness_n_per_m.expect("it moved");
+        assert!((stiffness / STIFFNESS - 1.0).abs() < 1.0e-5, "{stiffness}");
+        assert!(spring.cycles.expect("cycles").1.abs() < 0.01 * expected_j, "a spring takes nothing");
+        assert!(spring.thinned(100).count() <= 100);
+        let at_rest = ForcePosition::of(spring_and_damper(0.0)[..2].iter(), 0);
+        assert_eq!((at_rest.stiffness_n_per_m, at_rest.cycles), (None, None));
+    }
+
+    #[test]
+    fn the_stiffness_along_the_motion_is_that_of_the_spring() {
+        let samples = spring_and_damper(0.0);
+        let felt = felt_stiffness_n_per_m(samples[..100].iter().rev(), &samples[100]);
+        assert!((felt / STIFFNESS - 1.0).abs() < 1.0e-3, "{felt}");
+        assert!(felt_stiffness_n_per_m(samples[..1].iter(), &samples[1]).is_nan(), "it has hardly moved");
+    }
+}
