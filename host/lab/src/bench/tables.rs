@@ -2,7 +2,7 @@
 
 use super::{DEMANDS, Distance, Losses, Speed, SplitTimes, Times};
 use flotor_command::tables::{table, to_csv};
-use flotor_plot::{Axis, Figure, Mark, Panel, Series};
+use flotor_plot::{Axis, Bin, Figure, Mark, Panel, Series};
 use serde::Serialize;
 
 /// Everything that was measured.
@@ -165,13 +165,16 @@ impl BenchReport {
         )
     }
 
-    /// Error over time, a point a case: the further down and left, the better.
+    /// Error over time, a point a case: the further down and left, the better. Without errors, the times of each case.
     #[must_use]
     pub fn to_svg(&self) -> String {
+        if self.rows.iter().all(|row| row.distance.is_none()) {
+            return self.times_to_svg();
+        }
         let title = format!("Work and precision of {} {}", self.model, self.version);
         let against = match &self.reference {
             Some(reference) => format!("errors against {reference}"),
-            None => "no errors: no reference".to_owned(),
+            None => "no reference".to_owned(),
         };
         let force = Panel::new(Axis::log("Force, rms error", "N"));
         // Error of a 1 kHz loop with an exact model: precision far below this line does not reach the hand.
@@ -213,11 +216,79 @@ impl BenchReport {
         .panel_height_px(220.0)
         .panel(drawn(force, true, |distance| distance.force_rms_n));
         // A sphere has no torque about its centre.
-        let figure = if has_torque || with_errors.is_empty() {
+        let figure = if has_torque {
             figure.panel(drawn(torque, false, |distance| distance.torque_rms_nm))
         } else {
             figure
         };
         figure.to_svg()
+    }
+
+    /// The times of each case as bars: as many as there are cases, in the order of the table.
+    fn times_to_svg(&self) -> String {
+        let panel = |title: &str, time: fn(&Times) -> f64| {
+            let rows = self.rows.iter().zip(1_u32..);
+            rows.fold(
+                Panel::new(Axis::linear(title, "ns")),
+                |panel, (CaseRow { name, times: [_, wrench, _], .. }, at)| {
+                    let (middle, height) = (f64::from(at), time(wrench));
+                    panel.series(Series::histogram(
+                        name,
+                        [Bin { from: middle - 0.4, to: middle + 0.4, height }],
+                    ))
+                },
+            )
+        };
+        Figure::new(
+            format!("Time of {} {}", self.model, self.version),
+            Axis::linear("Case, in the order of the table", ""),
+        )
+        .subtitle(format!(
+            "A tick with force and torque; {} ticks of a smooth path of 1 to 3 Hz at 1 kHz; no errors: no --reference; a tick has \
+             1 000 000 ns",
+            self.ticks
+        ))
+        .panel_height_px(220.0)
+        .panel(panel("Mean", |times| times.mean_ns))
+        .panel(panel("99.9th percentile", |times| times.warm_p999_ns))
+        .to_svg()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without a reference there are no errors to draw, and a picture all the same.
+    #[test]
+    fn without_a_reference_the_picture_has_the_times() {
+        let times = |mean_ns: f64| Times {
+            mean_ns,
+            of_yardstick: 1.0,
+            batch_ns: None,
+            batch_gain: None,
+            warm_median_ns: mean_ns,
+            warm_p999_ns: 2.0 * mean_ns,
+            cold_median_ns: mean_ns,
+            cold_p999_ns: mean_ns,
+        };
+        let row = |name: &str, mean_ns: f64| CaseRow {
+            name: name.to_owned(),
+            distance: None,
+            times: [times(mean_ns), times(mean_ns), times(mean_ns)],
+        };
+        let report = BenchReport {
+            model: "spring".to_owned(),
+            version: "0.1.0".to_owned(),
+            reference: None,
+            yardstick: None,
+            ticks: 1000,
+            rows: vec![row("variant=energy", 300.0), row("variant=rod", 900.0)],
+            losses: Vec::new(),
+            apart: Vec::new(),
+        };
+        let svg = report.to_svg();
+        assert!(!svg.contains("no data") && svg.contains("variant=rod") && svg.contains("900"), "{svg}");
+        assert!(svg.contains("Mean") && svg.contains("99.9th percentile"));
     }
 }
