@@ -2,7 +2,7 @@
 
 use crate::conduct::{ConductError, OutsideError, Presenter, conduct};
 use crate::dataset::{Dataset, DatasetError, Earlier, Progress};
-use crate::log::{Begin, FORMAT, LogWriter};
+use crate::log::{Begin, FORMAT, LogWriter, Plan};
 use crate::observer::{Population, SimulatedSubject};
 use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::Sitting;
@@ -27,6 +27,8 @@ pub struct Cohort {
     pub apparatus: serde_json::Value,
     /// Version of the program, for the log.
     pub version: String,
+    /// The study file that is followed, for the log.
+    pub plan: Option<Plan>,
     /// What to do about subjects who have begun before.
     pub earlier: Earlier,
 }
@@ -80,6 +82,7 @@ impl Cohort {
             version: self.version.clone(),
             subject,
             seed: self.seed,
+            plan: self.plan.clone(),
             protocol: self.protocol.clone(),
             observer: json!({ "simulated": self.population }),
             apparatus: self.apparatus.clone(),

@@ -5,6 +5,7 @@ mod choices;
 mod explore;
 mod front;
 mod person;
+mod plan;
 mod power;
 mod spring;
 
@@ -26,7 +27,7 @@ use flotor_study::apparatus::{Apparatus, ApparatusError, Kinematics};
 use flotor_study::cohort::{Cohort, CohortError};
 use flotor_study::conduct::{ConductError, Nothing, OutsideError, Presenter};
 use flotor_study::dataset::{Dataset, Earlier};
-use flotor_study::log::Person;
+use flotor_study::log::{Person, Plan};
 use flotor_study::observer::Population;
 use flotor_study::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
 use flotor_study::protocol::{
@@ -63,6 +64,8 @@ enum Task {
     Magnitude(MagnitudeArguments),
     /// Just noticeable difference of a force, felt or exerted
     Force(ForceArguments),
+    /// What a study file says: begins, or goes on with what was broken off
+    Run(plan::RunArguments),
     /// Feel a spring while its dimensions and material change, without trials
     Explore(explore::ExploreArguments),
     /// Fit a spring to the measured curve of a real one
@@ -169,6 +172,9 @@ struct Common {
     /// If the handle leaves its range: repeat the trial (at most three times) or keep its answer
     #[arg(long, value_enum, default_value_t)]
     boundary: BoundaryChoice,
+    /// The study file that it follows.
+    #[arg(skip)]
+    plan: Option<Plan>,
     #[command(flatten)]
     plugin_path: PluginPathOption,
     #[command(flatten)]
@@ -295,6 +301,7 @@ const FORCE: Subject = Subject { stimulus: "load.force_n", bases: [3.0, 6.0, 9.0
 
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     match &arguments.task {
+        Task::Run(arguments) => plan::run(arguments),
         Task::Note(arguments) => note(arguments),
         Task::Power(arguments) => power::run(arguments),
         Task::Bias(arguments) => bias::run(arguments),
@@ -444,6 +451,7 @@ fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) 
             |apparatus| json!({ "feel_s": common.feel, "scene": apparatus.description() }),
         ),
         version: env!("CARGO_PKG_VERSION").to_owned(),
+        plan: common.plan.clone(),
         earlier: common.earlier(),
         protocol,
     };

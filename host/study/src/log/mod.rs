@@ -24,6 +24,7 @@ use crate::sitting::Verdict;
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Exploration, Response, Trial};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 /// Revision of the format: 2 has times of day and incidents.
@@ -69,6 +70,9 @@ pub struct Begin {
     pub subject: SubjectNumber,
     /// Seed of order, presentation and simulated answers.
     pub seed: u64,
+    /// The study file that was followed, if there was one.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub plan: Option<Plan>,
     /// The experiment.
     pub protocol: Protocol,
     /// What is known of the person; nothing is requested.
@@ -85,10 +89,11 @@ impl Begin {
     #[must_use]
     pub fn differs(&self, earlier: &Self) -> Option<String> {
         let parts = [
-            ("another protocol".to_owned(), self.protocol == earlier.protocol),
+            (another("protocol", &earlier.protocol, &self.protocol), self.protocol == earlier.protocol),
             (format!("--seed {}, not {}", earlier.seed, self.seed), self.seed == earlier.seed),
-            ("another observer".to_owned(), self.observer == earlier.observer),
-            ("another apparatus".to_owned(), self.apparatus == earlier.apparatus),
+            (another("observer", &earlier.observer, &self.observer), self.observer == earlier.observer),
+            (another("apparatus", &earlier.apparatus, &self.apparatus), self.apparatus == earlier.apparatus),
+            (another("study file", &earlier.plan, &self.plan), self.plan == earlier.plan),
         ];
         parts.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("begun with {what}"))
     }
@@ -105,6 +110,48 @@ impl Begin {
         let text = serde_json::to_string(&(self.seed, &self.protocol, &self.observer, &self.apparatus));
         let digest = Sha256::digest(text.unwrap_or_default().as_bytes());
         hexadecimal(&digest).chars().take(16).collect()
+    }
+}
+
+/// A study file: what was decided before there were data.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Its name.
+    pub file: String,
+    /// SHA-256 of its text.
+    pub sha256: String,
+}
+
+/// What is another part of a sitting, with the first place where the two differ.
+fn another(what: &str, earlier: &impl Serialize, now: &impl Serialize) -> String {
+    let [earlier, now] =
+        [serde_json::to_value(earlier), serde_json::to_value(now)].map(Result::unwrap_or_default);
+    match difference(&earlier, &now, String::new()) {
+        Some(place) => format!("another {what}: {place}"),
+        None => format!("another {what}"),
+    }
+}
+
+/// The first place where two values differ, with both.
+fn difference(earlier: &Value, now: &Value, place: String) -> Option<String> {
+    /// Longer values are not shown.
+    const MOST: usize = 60;
+    match (earlier, now) {
+        (Value::Object(one), Value::Object(two)) => {
+            one.keys().chain(two.keys().filter(|key| !one.contains_key(*key))).find_map(|key| {
+                let place = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
+                difference(one.get(key).unwrap_or(&Value::Null), two.get(key).unwrap_or(&Value::Null), place)
+            })
+        }
+        (earlier, now) if earlier == now => None,
+        (earlier, now) => {
+            let [earlier, now] = [earlier, now].map(|value| match value.to_string() {
+                text if text.chars().count() > MOST => text.chars().take(MOST).chain(['…']).collect(),
+                text => text,
+            });
+            let place = if place.is_empty() { place } else { format!("{place} ") };
+            Some(format!("{place}{earlier}, not {now}"))
+        }
     }
 }
 

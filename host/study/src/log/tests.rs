@@ -38,6 +38,7 @@ fn begin() -> Begin {
         version: "0.0.0".to_owned(),
         subject: SubjectNumber::new(3).unwrap(),
         seed: 11,
+        plan: None,
         protocol: Protocol::Jnd(jnd),
         observer: serde_json::Value::Null,
         apparatus: serde_json::Value::Null,
@@ -197,4 +198,22 @@ fn notes_are_kept_with_their_place_and_change_nothing_else() {
     assert_eq!(after.trials, trials);
     let number = u32::try_from(trials.len()).unwrap();
     assert_eq!(after.notes, [(number, "asked for a break".to_owned())]);
+}
+
+/// Who resumes with other options is told which, and a changed study file is another study.
+#[test]
+fn a_sitting_of_another_study_says_where_it_differs() {
+    let earlier = begin();
+    let mut now = begin();
+    let Protocol::Jnd(jnd) = &mut now.protocol else { unreachable!("it is one") };
+    jnd.bases = vec![17.0, 26.0];
+    let said = now.differs(&earlier).expect("another base");
+    assert!(said.starts_with("begun with another protocol: "), "{said}");
+    assert!(said.ends_with("bases [26.0], not [17.0,26.0]"), "{said}");
+    let plan = |text: &str| Some(Plan { file: "a.study.toml".to_owned(), sha256: digest(text) });
+    let (one, other) = (Begin { plan: plan("a"), ..begin() }, Begin { plan: plan("b"), ..begin() });
+    assert!(one.differs(&one.clone()).is_none());
+    let said = other.differs(&one).expect("another file");
+    assert!(said.starts_with("begun with another study file: sha256 "), "{said}");
+    assert!(!serde_json::to_string(&begin()).unwrap().contains("plan"), "logs without one are as before");
 }

@@ -30,6 +30,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         version: env!("CARGO_PKG_VERSION").to_owned(),
         subject,
         seed: common.seed,
+        plan: common.plan.clone(),
         protocol: protocol.clone(),
         observer: json!("human"),
         apparatus: apparatus.description(),
