@@ -129,6 +129,21 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
             });
         });
     }
+    let (mut shapes, missing) = shapes_of(&two_solids(), &[library("solid")]);
+    assert!(missing.is_empty() && shapes.len() == 2, "{missing:?}");
+    let camera = Camera::experimenter(SceneBuilder::framing_mm(&shapes, 2));
+    let mut builder = SceneBuilder::default();
+    let mut moment_s = 0.0;
+    criterion.bench_function("shape and mesh, two devices with a solid each", |bench| {
+        bench.iter(|| {
+            moment_s = (moment_s + 0.016) % 10.0;
+            let sample = *history.at(moment_s).expect("ten seconds");
+            let samples = [sample, sample];
+            let (mesh, facts) =
+                builder.build(&mut shapes, &samples, &palette, &camera, HEIGHT_PX, scale, true);
+            black_box((mesh.indices.len(), facts))
+        });
+    });
     // As while ticks come: each picture has 16 new ones.
     let mut coming = History::new(run("spring"), Keep::Newest(20_000));
     let mut ticks = (0..).map(record);
@@ -143,6 +158,21 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
             }
         });
     });
+}
+
+/// Two devices, each with a solid of 4 900 triangles in its hand.
+fn two_solids() -> RunDescription {
+    let mut run = run("solid");
+    let model = run.plugins[0].clone();
+    let device = |number: u16| PluginDescription {
+        name: ["left", "right"][usize::from(number)].to_owned(),
+        id: "simulated".to_owned(),
+        role: Role::Device,
+        device: number,
+        ..model.clone()
+    };
+    run.plugins = vec![device(0), device(1), model.clone(), PluginDescription { device: 1, ..model.clone() }];
+    run
 }
 
 /// The whole picture but its rasterising: interface, six traces of ten seconds, 3D scene, and egui's triangles of it all.
@@ -193,6 +223,19 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     picture(&mut viewer, Vec::new());
     picture(&mut viewer, vec![space(true), space(false)]); // plays: every picture is another moment
     criterion.bench_function("whole picture at 1280x800", |bench| {
+        bench.iter(|| black_box(picture(&mut viewer, Vec::new())));
+    });
+    let mut histories = History::of_each_device(&two_solids(), Keep::All);
+    for record in (0..TICKS).map(record) {
+        for (device, history) in (0..).zip(&mut histories) {
+            history.push(&TickRecord { device, ..record });
+        }
+    }
+    let start = Start::Recording(histories, Some(0.0), vec![library("solid")]);
+    let mut viewer = Viewer::new(&context, state.as_ref(), start, Look::Dark);
+    picture(&mut viewer, Vec::new());
+    picture(&mut viewer, vec![space(true), space(false)]);
+    criterion.bench_function("whole picture of two devices with a solid each", |bench| {
         bench.iter(|| black_box(picture(&mut viewer, Vec::new())));
     });
 }

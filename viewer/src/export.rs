@@ -185,7 +185,7 @@ fn force_position(history: &History, plots: &PlotStack, axis: usize) -> Panel {
     let points = curve.points.iter().map(|[x, force]| (x * per_m, *force));
     Panel::with_x(Axis::linear(format!("Position {name}"), unit), Axis::linear("Force on the hand", "N"))
         .title(said(&curve, plots.units))
-        .series(Series::line(name, points).axis(axis))
+        .series(Series::line("", points).axis(axis))
 }
 
 fn png(history: &History, device: Option<&str>, plots: &PlotStack) -> egui::ColorImage {

@@ -3,18 +3,24 @@
 
 use clap::Parser;
 use flotor_live::Directory;
+use flotor_study::screen::{Screen, Told};
 use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::camera::View;
-use flotor_viewer::experiment::StopKey;
+use flotor_viewer::devices::Devices;
 use flotor_viewer::experiment::wire::at_standard_streams;
+use flotor_viewer::experiment::{Prompt, StopKey};
+use flotor_viewer::export;
 use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
-use flotor_viewer::picture::{PictureOptions, draw_without_window, picture, write_png};
+use flotor_viewer::picture::{PictureOptions, draw_without_window, number_of, picture, write_png};
+use flotor_viewer::quantity::Quantity;
 use flotor_viewer::shape::shapes_of;
+use flotor_viewer::ui::plot_stack::{ExportFormat, PlotStack, Window};
 use flotor_viewer::window::{WindowError, WindowOptions, open};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::mpsc::channel;
 
 /// Shows what the hand feels: the model in 3D, and plots over time.
 #[derive(Parser)]
@@ -50,13 +56,40 @@ struct Arguments {
     )]
     view: Option<View>,
     /// Name of the device that numbers and traces are of, where there are several (default: the first)
-    #[arg(long, value_name = "NAME", requires = "screenshot")]
+    #[arg(long, value_name = "NAME", requires = "recording")]
     device: Option<String>,
     /// The moment to show, s (default: that of the largest force)
     #[arg(long, value_name = "SECONDS")]
     at: Option<f64>,
+    /// Write the traces of the recording instead of opening a window: numbers (.csv), lines (.svg) or pixels (.png); --look light
+    /// unless another is named
+    #[arg(long, value_name = "OUT", requires = "recording", conflicts_with = "screenshot")]
+    export: Option<PathBuf>,
+    /// Traces of the picture (default: force,position)
+    #[arg(long, value_name = "LIST", value_delimiter = ',', hide_possible_values = true)]
+    traces: Vec<Quantity>,
+    /// Force over position along this axis, beside the traces
+    #[arg(long, value_name = "x|y|z", value_parser = axis)]
+    force_position: Option<usize>,
+    /// Title of the file of traces (default: that of the run)
+    #[arg(long, value_name = "TEXT", requires = "export")]
+    title: Option<String>,
+    /// The picture is what a person in a sitting sees on a screen, as `flotor study --screen json` writes it
+    #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view"], value_parser = screen)]
+    screen: Option<Screen>,
     #[command(flatten)]
     request: WindowOptions,
+}
+
+/// `z`
+fn axis(text: &str) -> Result<usize, String> {
+    let known = ["x", "y", "z"].into_iter().position(|name| name == text);
+    known.ok_or_else(|| format!("`{text}` is no axis; write x, y or z"))
+}
+
+/// A line of an experiment.
+fn screen(text: &str) -> Result<Screen, String> {
+    serde_json::from_str(text).map_err(|error| format!("no screen: {error}"))
 }
 
 /// Why there is nothing to see, with an exit code: 2 where the recording or an option is wrong, else 1.
@@ -93,7 +126,10 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let read = |path: &PathBuf| History::read(path).map_err(Failure::usage);
     let history = arguments.recording.as_ref().map(read).transpose()?;
     match (history, &arguments.screenshot) {
-        (Some(history), Some(out)) if arguments.window => whole_window(arguments, history, out),
+        (Some(history), None) if arguments.export.is_some() => traces(arguments, history),
+        (Some(history), Some(out)) if arguments.window || arguments.screen.is_some() => {
+            whole_window(arguments, history, out)
+        }
         (Some(history), Some(out)) => screenshot(arguments, history, out),
         (history, _) => {
             let start = match history {
@@ -126,8 +162,44 @@ fn whole_window(arguments: &Arguments, history: Vec<History>, out: &Path) -> Res
     if let Some(name) = &arguments.device {
         viewer.look_at_named(name).map_err(Failure::usage)?;
     }
+    choose(arguments, viewer.plots_mut());
+    // The experiment's end of the way to the screen stays open while it is drawn.
+    let ((teller, told), (said, _hears)) = (channel(), channel());
+    if let Some(screen) = &arguments.screen {
+        viewer.rehearse(Prompt::new(told, said));
+        let _ = teller.send(Told::Screen(screen.clone())); // its other end is above
+    }
     let image = draw_without_window(size, scale, look, |ui| viewer.show(ui));
     write_png(out, &image).map_err(Failure::file)
+}
+
+/// The traces, as the command line wants them.
+fn choose(arguments: &Arguments, plots: &mut PlotStack) {
+    if !arguments.traces.is_empty() {
+        plots.shown.clone_from(&arguments.traces);
+        plots.shown.sort();
+        plots.shown.dedup();
+    }
+    plots.force_position.axis = arguments.force_position;
+}
+
+/// A file of the traces.
+fn traces(arguments: &Arguments, histories: Vec<History>) -> Result<(), Failure> {
+    let Some(out) = &arguments.export else { return Ok(()) };
+    let mut devices = Devices::new(histories);
+    if let Some(name) = &arguments.device {
+        devices.choose(number_of(&devices, name).map_err(Failure::usage)?);
+    }
+    let mut plots = PlotStack::new(Window::Whole);
+    choose(arguments, &mut plots);
+    plots.export.look = arguments.request.look.unwrap_or(Look::Light);
+    if let Some(size) = arguments.request.size {
+        plots.export.size_px = size.map(|length| length as f64);
+    }
+    plots.export.title = arguments.title.clone().unwrap_or_default();
+    let format = ExportFormat::of_file(out).map_err(Failure::usage)?;
+    export::write(devices.history(), devices.name(), &plots, format, out)
+        .map_err(|cause| Failure::file(format!("cannot write `{}`: {cause}", out.display())))
 }
 
 /// Look, size and scale of a picture: the same for everybody.

@@ -16,7 +16,7 @@ pub enum Units {
 }
 
 /// A measured quantity with one component or three. They are in the order of menus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
     /// Force sent to the device.

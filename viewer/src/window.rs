@@ -93,7 +93,9 @@ pub fn open(start: Start, request: WindowOptions) -> Result<Option<Cost>, Window
         .with_title("Flotor")
         .with_app_id("flotor-viewer")
         .with_inner_size(size)
-        .with_min_inner_size([640.0, 480.0]);
+        .with_min_inner_size([640.0, 480.0])
+        // In front of a subject there is nothing but the screen of the sitting.
+        .with_fullscreen(matches!(start, Start::Sitting(..)));
     let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
     let (tells, watched) = channel();
     watched_over(|opened| {

@@ -34,8 +34,23 @@ pub(crate) struct ViewArguments {
     /// Show the session of this process (default: the newest session)
     #[arg(long, value_name = "PID", conflicts_with = "file")]
     run: Option<u32>,
-    /// With --screenshot: device whose numbers and traces are shown, where there are several (default: the first)
-    #[arg(long, value_name = "NAME", requires = "screenshot")]
+    /// Write the traces of the recording as numbers (.csv), lines (.svg) or pixels (.png), light unless --look says dark
+    #[arg(long, value_name = "OUT", requires = "file", conflicts_with = "screenshot")]
+    export: Option<PathBuf>,
+    /// Traces shown, by name, such as force,stiffness (default: force,position)
+    #[arg(long, value_name = "LIST")]
+    traces: Option<String>,
+    /// Show force over position along this axis beside the traces
+    #[arg(long, value_name = "x|y|z")]
+    force_position: Option<String>,
+    /// With --export: title (default: that of the scene)
+    #[arg(long, value_name = "TEXT", requires = "export")]
+    title: Option<String>,
+    /// With --screenshot: draw a screen of a sitting, as `flotor study --screen json` writes it
+    #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view"])]
+    screen: Option<String>,
+    /// With --screenshot or --export: device whose numbers and traces are shown, where there are several (default: the first)
+    #[arg(long, value_name = "NAME", requires = "file")]
     device: Option<String>,
     /// Moment to show, s (default: that of the largest force)
     #[arg(long, value_name = "SECONDS")]
@@ -91,6 +106,10 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     let options = [
         ("--at", &arguments.at),
         ("--device", &arguments.device),
+        ("--traces", &arguments.traces),
+        ("--force-position", &arguments.force_position),
+        ("--title", &arguments.title),
+        ("--screen", &arguments.screen),
         ("--look", &arguments.look),
         ("--size", &arguments.size),
         ("--scale", &arguments.scale),
@@ -102,6 +121,9 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     }
     if let Some(process) = arguments.run {
         add("--run", process.to_string().into());
+    }
+    if let Some(export) = &arguments.export {
+        add("--export", export.into());
     }
     if let Some(screenshot) = &arguments.screenshot {
         add("--screenshot", screenshot.into());

@@ -37,13 +37,14 @@ impl Viewer {
             subtitle,
             standing: &standing,
             status,
-            can_stop: self.source.is_running(),
+            // A rehearsal shows what a person sees.
+            can_stop: self.source.is_running() || self.is_rehearsal(),
             panel: match (self.audience, self.is_panel_shown(ui.ctx())) {
                 (Audience::Subject, _) => PanelSwitch::None,
                 (Audience::Experimenter, true) => PanelSwitch::PutAway,
                 (Audience::Experimenter, false) => PanelSwitch::BringOut,
             },
-            look: self.look,
+            look: (self.audience == Audience::Experimenter).then_some(self.look),
         };
         match bar.show(ui, palette) {
             Some(TopBarRequest::EmergencyStop) => self.ask(Ask::EmergencyStop),

@@ -213,6 +213,21 @@ impl Viewer {
         &self.plots
     }
 
+    /// The traces, to choose others.
+    pub fn plots_mut(&mut self) -> &mut PlotStack {
+        &mut self.plots
+    }
+
+    /// Shows the screens of a sitting over what it shows, as the person would see them.
+    pub fn rehearse(&mut self, prompt: Prompt) {
+        (self.sitting, self.audience) = (Some(prompt), Audience::Subject);
+    }
+
+    /// Whether screens of a sitting are shown without one.
+    fn is_rehearsal(&self) -> bool {
+        matches!(self.source, Source::Recording) && self.audience == Audience::Subject
+    }
+
     /// Light or dark.
     #[must_use]
     pub fn look(&self) -> Look {

@@ -58,7 +58,7 @@ impl Viewer {
             (Source::Live { .. }, ..) if !self.source.is_running() => {
                 self.words(ui, area, "The device has stopped", CALL, palette);
             }
-            (Source::Live { .. }, Some(_), Some(samples)) => {
+            (Source::Live { .. } | Source::Recording, Some(_), Some(samples)) => {
                 if prompt.shows_scene() {
                     // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
                     // largest force, and a wire that stays what it is.

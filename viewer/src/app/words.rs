@@ -24,6 +24,7 @@ impl Viewer {
         let events = self.devices.newest_events();
         match &self.source {
             Source::Waiting(_) => ("no run".to_owned(), RunStatus::Idle),
+            Source::Recording if self.is_rehearsal() => ("running".to_owned(), RunStatus::InOrder),
             Source::Recording => ("recording".to_owned(), RunStatus::Idle),
             Source::Live { feed, .. } => match feed.state() {
                 FeedState::Ended(words, EndKind::InOrder) if !events.intersects(FATAL) => {

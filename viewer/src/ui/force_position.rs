@@ -4,7 +4,8 @@ use crate::derived::ForcePosition;
 use crate::history::History;
 use crate::palette::Palette;
 use crate::quantity::{Quantity, Units};
-use egui::{Stroke, Ui};
+use crate::ui::plots::{marks, short};
+use egui::{Color32, Rangef, RichText, Ui};
 use egui_plot::{AxisHints, HPlacement, Line, Plot, PlotPoints, Points};
 
 /// Points drawn at most.
@@ -55,8 +56,14 @@ impl ForcePositionPlot {
         let (length, per_m) = Quantity::Position.unit(units);
         ui.horizontal(|ui| {
             ui.strong("Force over position");
+            // A picture, in which no moment is shown, has nothing to press.
+            if cursor_s.is_nan() {
+                ui.weak(Quantity::Position.components()[axis]);
+                return;
+            }
             for (number, name) in Quantity::Position.components().iter().enumerate() {
-                ui.selectable_value(&mut axis, number, *name);
+                let color = if number == axis { Color32::WHITE } else { palette.faint };
+                ui.selectable_value(&mut axis, number, RichText::new(*name).color(color));
             }
         });
         self.axis = Some(axis);
@@ -64,9 +71,15 @@ impl ForcePositionPlot {
         let said = said(curve, units);
         ui.weak(&said);
         let points: Vec<[f64; 2]> = curve.thinned(MOST_POINTS).map(|[x, force]| [x * per_m, force]).collect();
-        let y_axis = AxisHints::new_y().placement(HPlacement::Left).min_thickness(40.0).label("N");
+        let y_axis = AxisHints::new_y()
+            .placement(HPlacement::Left)
+            .min_thickness(44.0)
+            .label_spacing(Rangef::new(11.0, 30.0))
+            .formatter(|mark, _| short(mark.value))
+            .label("N");
         let name = Quantity::Position.components()[axis];
-        let x_axis = AxisHints::new_x().label(format!("{name}, {length}"));
+        let x_axis =
+            AxisHints::new_x().formatter(|mark, _| short(mark.value)).label(format!("{name}, {length}"));
         let shown = Plot::new(("force over position", axis))
             .custom_x_axes(vec![x_axis])
             .custom_y_axes(vec![y_axis])
@@ -77,6 +90,9 @@ impl ForcePositionPlot {
             .show_background(false)
             .show_crosshair(false)
             .grid_color(palette.grid)
+            .x_grid_spacer(|grid| marks(grid.bounds))
+            .y_grid_spacer(|grid| marks(grid.bounds))
+            .grid_spacing(Rangef::new(8.0, 60.0))
             .label_formatter(|_| None)
             .show(ui, |plot| {
                 let line = Line::new("curve", PlotPoints::from(points)).allow_band(false);
@@ -85,7 +101,7 @@ impl ForcePositionPlot {
                     let at =
                         [Quantity::Position, Quantity::Force].map(|quantity| quantity.value(sample, axis));
                     let dot = Points::new("moment", vec![[at[0] * per_m, at[1]]]).radius(4.0);
-                    plot.points(dot.color(Stroke::new(1.0, palette.cursor).color));
+                    plot.points(dot.color(palette.cursor));
                 }
             });
         let label = format!("Force over position, N and {length}: {said}");

@@ -24,30 +24,27 @@ pub fn paint(painter: &Painter, area: Rect, facts: &SceneFacts, camera: &Camera,
     if area.width() < ROOM_FOR_SCALES_PT {
         return;
     }
-    // Without a scale of colours they begin where it would.
-    let mut x = at.x + if facts.scale.is_some() { SCALE.x + 34.0 } else { 5.0 };
-    let y = at.y + 0.5 * SCALE.y;
-    let text = |x: f32, text: String| {
-        painter.text(Pos2::new(x, y), Align2::LEFT_CENTER, text, font.clone(), palette.faint).right() + 22.0
+    let text = |at: Pos2, align: Align2, text: String| {
+        painter.text(at, align, text, font.clone(), palette.faint);
     };
-    if let Some(key) = facts.arrows {
-        let (length_pt, words) = force_scale(key, camera, area.height());
-        let stroke = Stroke::new(3.0, opaque(palette.force));
-        painter.line_segment([Pos2::new(x, y), Pos2::new(x + length_pt, y)], stroke);
-        x = text(x + length_pt + 8.0, words);
-        if key.torque_nm > LEAST_TORQUE_NM {
-            painter.circle_stroke(Pos2::new(x + 5.0, y), 5.0, Stroke::new(2.5, opaque(palette.torque)));
-            x = text(
-                x + 16.0,
-                format!("torque on the hand, 3/4 turn = {} mN·m", significant(1.0e3 * key.torque_nm)),
-            );
-        }
+    let grid = area.right_bottom() - vec2(4.4 * MARGIN, MARGIN);
+    text(grid, Align2::RIGHT_CENTER, format!("grid {} mm", significant_short(1.0e3 * facts.grid_m)));
+    let Some(key) = facts.arrows else { return };
+    let above = if facts.scale.is_some() { SMALL_PT + 22.0 } else { 0.0 };
+    let line = at + vec2(0.0, 0.5 * SCALE.y - above);
+    let (length_pt, words) = force_scale(key, camera, area.height());
+    painter.line_segment([line, line + vec2(length_pt, 0.0)], Stroke::new(3.0, opaque(palette.force)));
+    text(line + vec2(length_pt + 8.0, 0.0), Align2::LEFT_CENTER, words);
+    if key.torque_nm > LEAST_TORQUE_NM {
+        let line = line - vec2(0.0, SMALL_PT + 8.0);
+        painter.circle_stroke(line + vec2(5.0, 0.0), 5.0, Stroke::new(2.5, opaque(palette.torque)));
+        let words = format!("torque on the hand, 3/4 turn = {} mN·m", significant(1.0e3 * key.torque_nm));
+        text(line + vec2(18.0, 0.0), Align2::LEFT_CENTER, words);
     }
-    text(x, format!("grid {} mm", significant_short(1.0e3 * facts.grid_m)));
 }
 
 /// Narrower, the scales of arrows and ground would stand before the body, points.
-const ROOM_FOR_SCALES_PT: f32 = 800.0;
+const ROOM_FOR_SCALES_PT: f32 = 600.0;
 /// A torque that is not above this was never there, N·m.
 const LEAST_TORQUE_NM: f64 = 1.0e-5;
 
@@ -143,7 +140,9 @@ pub fn names<'a>(
             continue;
         };
         #[allow(clippy::cast_possible_truncation)] // points
-        let at = area.min + vec2(x as f32 * area.width(), y as f32 * area.height() + 16.0);
+        let [x, y] = [x as f32 * area.width(), y as f32 * area.height() + 16.0];
+        // All of it in sight, above the legend.
+        let at = area.min + vec2(x, y.min(area.height() - 3.2 * MARGIN));
         let color = if device == chosen { palette.text } else { palette.faint };
         painter.text(at, Align2::CENTER_TOP, name, FontId::proportional(BODY_PT + 1.0), color);
     }

@@ -14,6 +14,7 @@ use crate::ui::zoom::ZoomRequest;
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Color32, ComboBox, PopupCloseBehavior, RichText, Role, ScrollArea, Ui, UiBuilder, WidgetInfo};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Lengths of time that can be shown, s.
 pub const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];
@@ -63,6 +64,21 @@ pub enum ExportFormat {
     Svg,
     /// A picture of pixels.
     Png,
+}
+
+impl ExportFormat {
+    /// What a file is to be, by the ending of its name.
+    ///
+    /// # Errors
+    /// In a line: it has another.
+    pub fn of_file(file: &Path) -> Result<Self, String> {
+        match file.extension().and_then(|ending| ending.to_str()) {
+            Some("csv") => Ok(Self::Csv),
+            Some("svg") => Ok(Self::Svg),
+            Some("png") => Ok(Self::Png),
+            _ => Err(format!("`{}` ends neither with .csv, nor .svg, nor .png", file.display())),
+        }
+    }
 }
 
 /// The traces shown.

@@ -203,7 +203,7 @@ pub fn fixed(value: f64) -> String {
 
 /// Marks of an axis at steps of 1, 2 or 5 times a power of ten, three to six of them.
 #[allow(clippy::cast_possible_truncation)] // a handful
-fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
+pub(super) fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
     let wanted = (high - low) / 4.0;
     if !(wanted > 0.0 && wanted.is_finite()) {
         return Vec::new();
@@ -216,7 +216,7 @@ fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
 }
 
 /// A mark of an axis: no more digits than it has, no minus on zero.
-fn short(value: f64) -> String {
+pub(super) fn short(value: f64) -> String {
     let rounded = (value * 1.0e6).round() / 1.0e6;
     if rounded == 0.0 { "0".to_owned() } else { format!("{rounded}") }
 }

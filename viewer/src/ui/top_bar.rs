@@ -18,8 +18,8 @@ pub struct TopBar<'a> {
     pub can_stop: bool,
     /// What the button of the panel does.
     pub panel: PanelSwitch,
-    /// Light or dark.
-    pub look: Look,
+    /// Light or dark, where that can be switched.
+    pub look: Option<Look>,
 }
 
 /// What the button of the panel does.
@@ -89,11 +89,11 @@ impl TopBar<'_> {
                 if sign.is_some_and(|sign| quiet(ui, sign, "Parameters (P)").clicked()) {
                     request = Some(TopBarRequest::SwitchPanel);
                 }
-                let (sign, help) = match self.look {
+                let switch = self.look.map(|look| match look {
                     Look::Dark => ("☀", "Light (L)"),
                     Look::Light => ("🌙", "Dark (L)"),
-                };
-                if quiet(ui, sign, help).clicked() {
+                });
+                if switch.is_some_and(|(sign, help)| quiet(ui, sign, help).clicked()) {
                     request = Some(TopBarRequest::SwitchLook);
                 }
                 ui.add_space(6.0);

@@ -56,6 +56,7 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
         window.get_by_label("EMERGENCY STOP");
         assert!(window.query_by_label_contains("spring 0.1.0").is_none(), "no names of plugins");
         assert!(window.query_by_label("Parameters (P)").is_none());
+        assert!(window.query_by_label("Light (L)").is_none(), "no controls but the stop");
         let headline = match &screen {
             Screen::Ready { reason: Pause::Welcome, .. } => "How stiff is the spring?",
             Screen::Ready { next, .. } if next.phase == Phase::Main => "From now on it counts",

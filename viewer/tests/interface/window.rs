@@ -3,6 +3,7 @@
 use crate::support::{FakeHost, PATIENCE, plugin_file, spring_run, tick};
 use egui::vec2;
 use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT, Queryable};
 use flotor_core::trace::Events;
 use flotor_live::Ask;
 use flotor_viewer::app::{Start, Viewer, Wanted};
@@ -53,7 +54,13 @@ pub(crate) fn live<'a>(settings: &[(&str, &str)]) -> (Window<'a>, FakeHost, temp
 pub(crate) fn until(window: &mut Window<'_>, mut is_true: impl FnMut(&Window<'_>) -> bool) {
     let end = Instant::now() + PATIENCE;
     while !is_true(window) {
-        assert!(Instant::now() < end, "it does not happen");
+        if Instant::now() >= end {
+            let warned: Vec<String> = window
+                .query_all_by_label_contains("⚠")
+                .filter_map(|node| node.accesskit_node().label())
+                .collect();
+            panic!("it does not happen; warned of {warned:?}");
+        }
         std::thread::sleep(Duration::from_millis(5));
         window.run_steps(1);
     }
