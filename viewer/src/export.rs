@@ -167,6 +167,7 @@ pub fn svg(history: &History, device: Option<&str>, plots: &PlotStack) -> String
         Figure::new(plots.export.title(history, device), Axis::linear("Time", "s").range(from_s, to_s))
             .subtitle(subtitle_of(history.run()))
             .size_px(plots.export.size_px.map(|length| length / f64::from(SCALE)))
+            .scale(f64::from(SCALE))
             .paper(paper);
     let figure = plots.in_sight().iter().map(panel).fold(figure, Figure::panel);
     match plots.force_position.axis {

@@ -71,6 +71,7 @@ pub struct Figure {
     width_px: f64,
     height_px: Option<f64>,
     paper: Paper,
+    scale: f64,
     panels: Vec<Panel>,
 }
 
@@ -86,6 +87,7 @@ impl Figure {
             width_px: WIDTH_PX,
             height_px: None,
             paper: Paper::OfReader,
+            scale: 1.0,
             panels: Vec::new(),
         }
     }
@@ -119,6 +121,15 @@ impl Figure {
     pub fn size_px(mut self, [width_px, height_px]: [f64; 2]) -> Self {
         let held = |length: f64| if length.is_nan() { WIDTH_PX } else { length.clamp(200.0, 8000.0) };
         (self.width_px, self.height_px) = (held(width_px), Some(held(height_px)));
+        self
+    }
+
+    /// Shows the picture so many times as large, text and lines included, held within 0.1 and 10; NaN changes nothing.
+    #[must_use]
+    pub fn scale(mut self, scale: f64) -> Self {
+        if !scale.is_nan() {
+            self.scale = scale.clamp(0.1, 10.0);
+        }
         self
     }
 

@@ -32,9 +32,10 @@ const MINOR_GRID_DECADE_PX: f64 = 60.0;
 pub(super) fn document(figure: &Figure, layout: &Layout<'_>) -> String {
     let mut writer = Writer::default();
     let (width, height) = (px(figure.width_px), px(layout.height));
+    let (shown_width, shown_height) = (px(figure.scale * figure.width_px), px(figure.scale * layout.height));
     writer.raw(&format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" role=\"img\" width=\"{width}\" \
-         height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" role=\"img\" width=\"{shown_width}\" \
+         height=\"{shown_height}\" viewBox=\"0 0 {width} {height}\">\n"
     ));
     writer.element("title", &figure.title);
     writer.element("desc", &description(figure, layout));

@@ -8,6 +8,9 @@ use egui::{CentralPanel, Frame, Key, Panel as Edge, Rect, Ui, ViewportCommand};
 use flotor_live::Ask;
 use flotor_study::screen::Screen;
 
+/// Height of the words beneath the 3D view, points.
+const ROOM_FOR_WORDS_PT: f32 = 84.0;
+
 impl Viewer {
     /// The sitting under way, if this window is one.
     #[must_use]
@@ -63,7 +66,9 @@ impl Viewer {
                     // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
                     // largest force, and a wire that stays what it is.
                     self.view.shows_arrows = false;
-                    self.scene(ui, area, &samples);
+                    // What to press stands beneath it, not before it.
+                    let view = area.with_max_y(area.bottom() - ROOM_FOR_WORDS_PT);
+                    self.scene(ui, view, &samples);
                     self.view.keys(ui, SceneBuilder::framing_mm(&self.shapes, self.devices.count()));
                 }
                 screens::show(ui, area, prompt, palette);

@@ -123,7 +123,10 @@ fn force_over_position_says_stiffness_and_hysteresis() {
     window.get_by_label("Force over time, N");
     let viewer = window.state();
     let svg = flotor_viewer::export::svg(viewer.history(), None, viewer.plots());
-    assert!(svg.contains("width=\"900\" height=\"500\"") && svg.contains("A spring under test"));
+    assert!(
+        svg.contains("width=\"1800\" height=\"1000\" viewBox=\"0 0 900 500\"")
+            && svg.contains("A spring under test")
+    );
     assert!(svg.contains("0.700 N/mm") && !svg.contains("prefers-color-scheme"), "light, whatever the page");
 }
 
