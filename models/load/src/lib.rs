@@ -13,7 +13,8 @@
 
 use flotor_hal::{
     Choices, DQuat, DVec3, Demand, ForceModel, Form, Input, ModelInfo, OutOfRange, Output, Parameter, Part,
-    Pose, Primitive, Refusal, Settings, Shape, ShapeModel, StepStatus, Wrench, choices, math,
+    Pose, Primitive, Refusal, Settings, Shape, ShapeModel, SoftRange, SoftRangeModel, StepStatus, Wrench,
+    choices, math,
 };
 
 /// Farther from home than this there is no handle, m: the energy there is that at the edge, and the answer says so.
@@ -146,4 +147,23 @@ impl ShapeModel for Load {
     }
 }
 
-flotor_hal::export_model!(Load, shape);
+impl SoftRangeModel for Load {
+    /// What a hand holds without tiring, from nothing on; the host's own ceiling is 20 N.
+    const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("force_n", 0.0, 15.0, 0.1)];
+}
+
+flotor_hal::export_model!(Load, shape, soft_range);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn soft_ranges_are_of_parameters_and_legal() {
+        for range in Load::SOFT_RANGES {
+            let parameter = Load::PARAMETERS.iter().find(|one| one.id() == range.id()).expect("one of ours");
+            let legal = range.within(parameter).expect("a range of numbers");
+            assert_eq!((legal.min(), legal.max()), (range.min(), range.max()));
+        }
+    }
+}

@@ -5,7 +5,7 @@ use crate::shape::Shape;
 use flotor_hal::{
     self as hal, ActiveRegion, ActiveRegionModel, Choices, DQuat, DVec3, Demand, ForceModel, Form, Input,
     Memory, ModelInfo, OutOfRange, Output, Parameter, Part, Pose, Primitive, Refusal, Settings, ShapeModel,
-    StepStatus, Wrench, choices,
+    SoftRange, SoftRangeModel, StepStatus, Wrench, choices,
 };
 
 /// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
@@ -153,4 +153,23 @@ impl ShapeModel for Wall {
     }
 }
 
-flotor_hal::export_model!(Wall, active_region, shape);
+impl SoftRangeModel for Wall {
+    /// Dry metal on metal has 0.15, rubber on asphalt 1; around a wall without friction nothing above a half could be reached.
+    const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("friction", 0.0, 1.5, 0.01)];
+}
+
+flotor_hal::export_model!(Wall, active_region, shape, soft_range);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn soft_ranges_are_of_parameters_and_legal() {
+        for range in Wall::SOFT_RANGES {
+            let parameter = Wall::PARAMETERS.iter().find(|one| one.id() == range.id()).expect("one of ours");
+            let legal = range.within(parameter).expect("a range of numbers");
+            assert_eq!((legal.min(), legal.max()), (range.min(), range.max()));
+        }
+    }
+}
