@@ -125,6 +125,14 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Failure> {
     let read = |path: &PathBuf| History::read(path).map_err(Failure::usage);
     let history = arguments.recording.as_ref().map(read).transpose()?;
+    if let Some(out) =
+        arguments.screenshot.as_ref().filter(|out| out.extension().is_none_or(|is| is != "png"))
+    {
+        return Err(Failure::usage(format!(
+            "`{}` does not end with .png, and the picture is one",
+            out.display()
+        )));
+    }
     match (history, &arguments.screenshot) {
         (Some(history), None) if arguments.export.is_some() => traces(arguments, history),
         (Some(history), Some(out)) if arguments.window || arguments.screen.is_some() => {

@@ -78,6 +78,25 @@ fn scale(text: &str) -> Result<f32, String> {
     text.parse().ok().filter(|scale| (1.0..=3.0).contains(scale)).ok_or_else(wrong)
 }
 
+/// What is kept of a window: its choices, but those that a command line made and nobody has changed since.
+fn for_the_next_time(mut now: Remembered, before: &Remembered, request: WindowOptions) -> Remembered {
+    let zoom = now.zoom;
+    if request.look == Some(now.look) {
+        now.look = before.look;
+    }
+    if request.scale.is_some_and(|scale| (scale - zoom).abs() < 1.0e-3) {
+        now.zoom = before.zoom;
+    }
+    // Larger text makes fewer points of the same window.
+    let is_as_requested = |size: [usize; 2]| {
+        size.iter().zip(now.size_pt).all(|(requested, is)| (*requested as f32 - is * zoom).abs() < 2.0)
+    };
+    if request.size.is_some_and(is_as_requested) {
+        now.size_pt = before.size_pt;
+    }
+    now
+}
+
 /// Opens a window and stays until it is closed; gives what it cost, if that was requested.
 ///
 /// # Errors
@@ -86,6 +105,7 @@ pub fn open(start: Start, request: WindowOptions) -> Result<Option<Cost>, Window
     // A sitting looks the same for everybody.
     let file = if matches!(start, Start::Sitting(..)) { None } else { Remembered::file() };
     let mut remembered = file.as_deref().map(Remembered::load).unwrap_or_default();
+    let before = remembered.clone();
     remembered.look = request.look.unwrap_or(remembered.look);
     remembered.zoom = request.scale.unwrap_or(remembered.zoom);
     let size = request.size.map_or(remembered.size_pt, |size| size.map(|length| length as f32));
@@ -113,6 +133,8 @@ pub fn open(start: Start, request: WindowOptions) -> Result<Option<Cost>, Window
                     viewer,
                     file,
                     kept: remembered,
+                    before,
+                    request,
                     pointer: PointerOrder::default(),
                     measure: request.measure.map(|duration| (duration, tells)),
                 }))
@@ -161,6 +183,9 @@ struct Kept {
     viewer: Viewer,
     file: Option<PathBuf>,
     kept: Remembered,
+    /// What was chosen the last time, and what the command line said instead, for this time only.
+    before: Remembered,
+    request: WindowOptions,
     pointer: PointerOrder,
     /// What is still to be watched, and who wants to know.
     measure: Option<(Duration, Sender<Cost>)>,
@@ -179,6 +204,7 @@ impl eframe::App for Kept {
             zoom: ui.ctx().zoom_factor(),
             ..self.viewer.remembered()
         };
+        let now = for_the_next_time(now, &self.before, self.request);
         // Not with every picture while something is pulled.
         if now != self.kept && !ui.input(|input| input.pointer.any_down()) {
             let _ = now.save(file); // a full disk costs the choices of the next time, and nothing now
@@ -213,6 +239,25 @@ fn one_line(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_command_line_says_is_for_this_time_only() {
+        let before = Remembered::default();
+        let request = WindowOptions {
+            look: Some(Look::Light),
+            size: Some([640, 400]),
+            scale: Some(2.0),
+            measure: None,
+        };
+        let as_requested =
+            Remembered { look: Look::Light, zoom: 2.0, size_pt: [320.0, 200.0], ..Remembered::default() };
+        assert_eq!(for_the_next_time(as_requested.clone(), &before, WindowOptions::default()), as_requested);
+        let pulled = Remembered { zoom: 1.5, size_pt: [900.0, 700.0], ..as_requested.clone() };
+        let kept = for_the_next_time(pulled.clone(), &before, request);
+        assert_eq!(kept, Remembered { look: before.look, ..pulled }, "what was changed since is kept");
+        let kept = for_the_next_time(as_requested, &before, request);
+        assert_eq!(kept, before);
+    }
 
     /// One test: the hook that is told of panics is one for all threads.
     #[test]
