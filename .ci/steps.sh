@@ -200,7 +200,7 @@ deny() {
 wheel() {
     cargo clippy --manifest-path host/python/Cargo.toml --target-dir target --all-targets -- -D warnings
     python3 -m venv target/venv
-    target/venv/bin/pip install --quiet 'host/python[test]' mcap-protobuf-support
+    CARGO_TARGET_DIR=$PWD/target target/venv/bin/pip install --quiet 'host/python[test]' mcap-protobuf-support
     cargo build --release
     cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep
     FLOTOR=target/release/flotor FLOTOR_SWEEP=target/sweep/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
@@ -258,17 +258,46 @@ bridge() {
 }
 
 # The archive of a release, unpacked into an empty folder: the demo and the scenes of the repository, and a picture by the viewer,
-# without a network. The wheel, in a Python of its own: the demo, with the plugins that it contains.
+# without a network; on this machine, and on a Debian with nothing but its base system, where nothing may be written outside that
+# folder. The wheel, in a Python of its own: the demo, with the plugins that it contains.
 archive() {
-    local trial=target/ci/archive made
+    local trial=target/ci/archive bare=target/ci/bare made
     rm -rf "$trial"
     cargo build --release --locked -p flotor-viewer
-    made=$(.ci/archive)
-    .ci/archive.d/trial "${made%%$'\n'*}" "$trial"
-    [ "$made" != "${made##*$'\n'}" ] || return 0
+    mapfile -t made < <(.ci/archive)
+    .ci/archive.d/trial "${made[0]}" "$trial"
+    if has_bare_root; then
+        .ci/bare-root "$bare" 'rm -rf /tmp/trial'
+        find "$bare" -xdev | sort > target/ci/before
+        .ci/bare-root "$bare" "/given/archive.d/trial /given/${made[0]##*/} /tmp/trial" .ci/archive.d "${made[0]}"
+        find "$bare" -xdev -not -path "$bare/tmp/trial*" -not -path "$bare/given*" | sort | diff target/ci/before -
+    fi
+    [ ${#made[@]} -gt 1 ] || return 0
     python3 -m venv --clear target/ci/installed
-    target/ci/installed/bin/pip install --quiet "${made##*$'\n'}"
+    target/ci/installed/bin/pip install --quiet "${made[1]}"
     (cd target/ci && env -u FLOTOR_PLUGIN_PATH installed/bin/python -c 'import flotor; print(flotor.run(duration_s=1)["peak_force_n"], "N")')
+}
+
+# The commands of the book for a newcomer, from a clone to a passing test, and to failing ones after four mistakes: on a bare Debian
+# with Rust and a C compiler. What this clone has fetched from the registry is all that there is: there is no network.
+newcomer() {
+    local root=target/ci/newcomer
+    has_bare_root || return 0
+    cargo fetch --locked
+    PACKAGES=gcc,libc6-dev,git,ca-certificates RUST=1 .ci/bare-root "$root" 'rm -rf /tmp/newcomer
+        git config --global --replace-all safe.directory "*"
+        FLOTOR_REPOSITORY=/given/flotor /given/flotor/tests/newcomer /tmp/newcomer' .
+    rm -rf "$root/tmp/newcomer"
+}
+
+# True if a bare Debian can be made here.
+has_bare_root() {
+    if [ "$(id -u)" != 0 ]; then
+        echo "skipped: only root can make a bare Debian"
+        return 1
+    fi
+    command -v debootstrap > /dev/null || apt-get -qq install -y --no-install-recommends debootstrap > /dev/null || true
+    command -v debootstrap > /dev/null || { echo "skipped: debootstrap is not installed"; return 1; }
 }
 
 # Every crate that is meant to be published compiles from its package alone. Needs the network, for the registry's index.
