@@ -120,7 +120,7 @@ every_change() {
     step lint cargo clippy --workspace --all-targets --all-features -- -D warnings
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
     # Counts of instructions of the optimised program against their budgets.
-    step budgets cargo test --release -p flotor-tests --features budgets --test instructions
+    step budgets cargo test --release -p flotor-instructions --features budgets
     # Every interleaving of the lock-free cell. A target folder of its own: the flag changes every crate. The crate forbids
     # `unsafe`, so that data races are left to the compiler.
     step loom env RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom

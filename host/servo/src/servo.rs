@@ -178,7 +178,7 @@ impl Servo {
     }
 
     /// What was to change before this tick does so now.
-    #[inline(never)] // seldom called; its instructions are counted: tests/tests/instructions.rs
+    #[inline(never)] // seldom called; its instructions are counted: tests/instructions
     fn apply_changes(&mut self, tick: &Tick, events: &mut Events) {
         let Self { stations, forces, parameters, swaps, .. } = self;
         let devices = stations.len();

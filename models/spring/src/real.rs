@@ -16,7 +16,7 @@ use pulp::Simd;
 
 /// Functions that are always inlined. In lanes they must be: only where the code around them is compiled for a set of
 /// instructions do they become those. With `#[inline]` alone a batch takes ten times as many (`energy` 3436 a pose instead
-/// of 326, `closed-form` 1961 instead of 192, tests/tests/instructions.rs), and that holds for the laws over [`Real`] as well.
+/// of 326, `closed-form` 1961 instead of 192, tests/instructions), and that holds for the laws over [`Real`] as well.
 macro_rules! in_lanes {
     ($($(#[$meta:meta])* $visibility:vis fn $name:ident $arguments:tt -> $result:ty $body:block)*) => {
         $($(#[$meta])* #[inline(always)] $visibility fn $name $arguments -> $result $body)*

@@ -159,7 +159,7 @@ fn servo_rod_follows_a_smooth_hand() {
     }
 }
 
-/// Instructions of a tick from what it did, in thousands. Counted on x86-64 with AVX2 (`tests/tests/instructions.rs` counts ticks one by
+/// Instructions of a tick from what it did, in thousands. Counted on x86-64 with AVX2 (`tests/instructions` counts ticks one by
 /// one): one evaluation takes 7.6, one that computes a matrix and factors it 50 more.
 fn thousand_instructions(work: Work) -> f64 {
     7.6 * f64::from(work.evaluations) + 38.0 * f64::from(work.matrices) + 12.0 * f64::from(work.factorings)

@@ -140,6 +140,7 @@ impl Role {
         let listed = CRATES.iter().find(|(of, ..)| *of == folder);
         Some(match folder {
             _ if listed.is_some() => listed?.1,
+            "tests/instructions" => Tests,
             _ if folder.starts_with("tests/fixtures/") => Fixture,
             _ if folder.starts_with("devices/") && folder.ends_with("/emulator") => Emulator,
             _ if folder.starts_with("devices/") || folder.starts_with("models/") => Plugin,

@@ -1,4 +1,4 @@
-//! What `tests/tests/instructions.rs` counts: runs one workload, by name. What is counted happens within [`one_counted_part`],
+//! What `tests/budgets.rs` counts: runs one workload, by name. What is counted happens within [`one_counted_part`],
 //! so that what is made before it, which takes time that depends on the machine, is left out.
 
 #[allow(dead_code)] // the spring's tests use the rest
@@ -9,9 +9,11 @@ use flotor_core::trace::TickRecord;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{Demand as Demanded, DeviceState, Input, Output, Tick};
 use flotor_lab::bench::{BenchDevice, WholeTick};
+use flotor_live::Directory;
 use flotor_servo::{Clock, StopSwitch};
-use flotor_session::Observer;
 use flotor_session::registry::Registry;
+use flotor_session::scene::Scene;
+use flotor_session::{Observer, RunOptions, Session};
 use flotor_simulated::machine::{Machine, MachineParameters};
 use flotor_simulated::plant::{State, Wrench};
 use flotor_simulated::simulation::{Setup, Simulation};
@@ -26,9 +28,9 @@ use flotor_spring::response::Demand;
 use flotor_spring::rod::{Accuracy, Rod};
 use flotor_spring::rod_blend::RodBlend;
 use flotor_spring::thesis::Thesis;
-use flotor_tests::watched::prepared;
 use sample::{Sampler, Workspace};
 use std::hint::black_box;
+use std::path::Path;
 
 /// Where the counter begins and ends.
 #[inline(never)]
@@ -90,11 +92,20 @@ fn scenes(beside: &str) {
 
 fn scene(ticks: u32, beside: &str) {
     let scene = format!("duration_s = {}\n{ALONE}{beside}", f64::from(ticks) * 1.0e-3);
-    let mut session = Some(prepared(Clock::Virtual, &scene));
+    let mut session = Some(prepared(&scene));
     one_counted_part(&mut || {
         let run = session.take().map(|session| session.run(&mut Nobody, &StopSwitch::default()));
         assert!(run.is_some_and(|run| run.is_ok()));
     });
+}
+
+/// A scene on the virtual clock, with the plugins built beside this program.
+fn prepared(scene: &str) -> Session {
+    let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
+    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
+    let session = Session::prepare(&scene, &Registry::search(&[]), &options);
+    // No folder: an emergency stop of another run is not looked for.
+    session.expect("the plugins are built").latched_in(&Directory::at("/dev/null/no-folder"))
 }
 
 /// Another model every 100 ms, in turns, and a change of a parameter of the one between.

@@ -1,16 +1,19 @@
 //! What a tick, a law and a step cost, in instructions: the same on every machine of a kind, busy or not.
 //!
 //! Callgrind (valgrind) counts while `counted_workload` runs, and only within a function. Counts are of optimised programs;
-//! `tests/data/instruction_budgets.toml` has the budgets. To print what is counted now:
+//! `budgets.toml` has the budgets. To print what is counted now:
 //!
 //! ```text
-//! cargo test --release -p flotor-tests --features budgets --test instructions -- --nocapture
+//! cargo test --release -p flotor-instructions --features budgets -- --nocapture
 //! ```
 
-use flotor_tests::scratch::Scratch;
-use flotor_tests::tools::{self, Tool};
+#[allow(dead_code, unreachable_pub)] // the other tests use the rest
+#[path = "../../src/tools.rs"]
+mod tools;
+
 use std::path::Path;
 use std::process::Command;
+use tools::Tool;
 
 /// The function of `counted_workload` that is called for each part.
 const PART: &str = "*::one_counted_part";
@@ -21,7 +24,7 @@ fn counts(workload: &str, function: &str) -> Option<Vec<f64>> {
     if !tools::required(Tool::Valgrind) {
         return None;
     }
-    let scratch = Scratch::default();
+    let scratch = tempfile::tempdir().expect("there is a place for temporary files");
     let file = scratch.path().join("count");
     let counted = Command::new("valgrind")
         .args(["--tool=callgrind", "--collect-atstart=no"])
@@ -52,7 +55,7 @@ fn keep_budget(name: &str, counted: f64) {
     if cfg!(not(target_arch = "x86_64")) {
         return tools::skipped("budgets are of x86-64");
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/instruction_budgets.toml");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("budgets.toml");
     let text = std::fs::read_to_string(file).expect("the budgets are there");
     let budgets: toml::Table = text.parse().expect("the budgets are TOML");
     let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
