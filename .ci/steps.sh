@@ -118,7 +118,10 @@ every_change() {
     # command: of two, the second builds half of what both use again, with other features.
     step test env FLOTOR_TEST_SIZE=daily cargo test --workspace --features flotor-tests/formats,flotor-tests/drop-ins --no-fail-fast
     step lint cargo clippy --workspace --all-targets --all-features -- -D warnings
-    step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+    # With the features and examples of `lint`: else what wgpu and serde depend on is checked a second time, with fewer features.
+    # The named program is the only one without a library beside it.
+    step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --all-features --lib --examples \
+        --bin flotor-haply-service-emulator
     # Counts of instructions of the optimised program against their budgets.
     step budgets cargo test --release -p flotor-instructions --features budgets
     # Every interleaving of the lock-free cell. A target folder of its own: the flag changes every crate. The crate forbids
