@@ -323,21 +323,31 @@ fn validate(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Ou
 
 fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outcome) -> Option<Vec<String>> {
     let stress = file.stress.as_ref()?;
+    let only = |measures: &[&String]| -> Vec<String> {
+        measures.iter().flat_map(|id| ["--only".to_owned(), (*id).clone()]).collect()
+    };
     let mut failing = None;
     for model in models {
-        let arguments =
-            with_settings(&["stress", "--model", &model.file, "--size", &stress.size], &stress.set);
-        let asked: Vec<String> =
-            arguments.iter().cloned().chain(["--json".to_owned(), "-".to_owned()]).collect();
+        let score = with_settings(&["stress", "--model", &model.file, "--size", &stress.size], &stress.set);
+        let counted: Vec<&String> = stress.pass.iter().collect();
+        // What does not count is not computed.
+        let asked = [&score[..], &only(&counted), &["--json".to_owned(), "-".to_owned()]].concat();
         let answered = flotor.run(asked, "");
         let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
-        let before = outcome.failures.len();
-        match answered.ok().and_then(|ran| ran.json()) {
-            None => outcome.failures.push(Failure::new("stress", "an answer", error)),
-            Some(json) => outcome.failures.extend(stress.pass.iter().filter_map(|id| measure(&json, id))),
-        }
-        if outcome.failures.len() > before {
-            failing.get_or_insert(arguments);
+        let failed = match answered.ok().and_then(|ran| ran.json()) {
+            None => {
+                outcome.failures.push(Failure::new("stress", "an answer", error));
+                counted
+            }
+            Some(json) => {
+                let failures = counted.into_iter().filter_map(|id| Some((id, measure(&json, id)?)));
+                let (failed, failures): (Vec<&String>, Vec<Failure>) = failures.unzip();
+                outcome.failures.extend(failures);
+                failed
+            }
+        };
+        if !failed.is_empty() {
+            failing.get_or_insert([score, only(&failed)].concat());
         }
     }
     outcome.repeat = failing.as_deref().map(command_line);

@@ -155,7 +155,7 @@ struct StressTable {
 }
 
 /// The measures of a stress test that no load of the machine can change: all but the cost.
-const MEASURES: [&str; 9] = ["M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8"];
+const MEASURES: [&str; 10] = ["M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9"];
 const COST: &str = "M7";
 
 impl TestFile {
@@ -407,7 +407,7 @@ mod tests {
             ("[set]\nspring = 3", "F:3: `spring` is not PLUGIN.PARAMETER"),
             ("[expect]\nlate_ticks = 0\npeak_force_n = { min = 2, max = 1 }", "F:4: `peak_force_n`: min = 2"),
             ("stress = \"shrt\"\n", "F:2: unknown size `shrt`"),
-            ("[stress]\nsize = \"short\"\npass = [\"M9\"]", "unknown measure `M9`"),
+            ("[stress]\nsize = \"short\"\npass = [\"M11\"]", "unknown measure `M11`"),
             ("[golden]\nrecording = \"no.mcap\"\nwithin_n = 1", "F:3: there is no file"),
             ("", "nothing is expected"),
             ("validate = 3", "F:2: write true, or the path"),

@@ -231,6 +231,33 @@ fn a_reference_and_a_golden_recording_are_compared_within_a_tolerance() {
     }
 }
 
+#[test]
+fn a_stress_test_holds_the_model_to_what_counts_and_repeats_what_failed() {
+    let scratch = Scratch::default();
+    let model = plugin_file("fixture-defective-model");
+    let scene =
+        format!("duration_s = 0.1\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = {model:?}\n");
+    let _ = scratch.file("scene.toml", scene);
+    let step = |pass: &str| {
+        format!(
+            "scene = \"scene.toml\"\n[stress]\nsize = \"short\"\npass = [{pass}]\nset = {{ defect = \"force-step\" }}\n"
+        )
+    };
+    // A step of the force at one plane: the search finds it, and the same poses give the same bits.
+    let _ = scratch.file("model.test.toml", step("\"M8\""));
+    let ran = test(scratch.path(), &[]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    let _ = scratch.file("model.test.toml", step("\"M8\", \"M9\""));
+    let ran = test(scratch.path(), &["--json", "-"]);
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    let report = json(&ran);
+    let failures = report["cases"][0]["failures"].as_array().expect("failures");
+    assert_eq!(failures.len(), 1, "{report:#}");
+    assert_eq!(failures[0]["what"], "M9 search");
+    let repeat = report["cases"][0]["repeat"].as_str().expect("a command");
+    assert!(repeat.ends_with("--size short --set defect=force-step --only M9"), "{repeat}");
+}
+
 // ---------------------------------------------------------------- reports
 
 /// Numbers of cases and of failures, by a parser of XML that knows nothing of us.

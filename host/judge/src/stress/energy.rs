@@ -29,8 +29,10 @@ use flotor_hal::{DVec3, Memory, Pose, Twist, rotation_vector};
 const LOOPS: &str = "loop energy";
 /// Relative work that counts as none.
 pub(super) const CONSERVATIVE: f64 = 1.0e-9;
-/// Samples of a lap: doubled from the first to the last until the work has settled.
-const SAMPLES: [usize; 7] = [256, 512, 1024, 2048, 4096, 8192, 16384];
+/// Samples of a lap: doubled until the work has settled, or there are [`MOST_SAMPLES`].
+const FEWEST_SAMPLES: usize = 256;
+/// See [`FEWEST_SAMPLES`].
+const MOST_SAMPLES: usize = 16384;
 /// Relative change between two numbers of samples that counts as settled.
 const SETTLED: f64 = 1.0e-12;
 /// Steps a lap may cross: a motion of three harmonics meets a plane six times, and there may be two of them.
@@ -126,18 +128,30 @@ impl Lap {
     }
 }
 
+/// At a part of a lap, from 0 to 1.
+fn sample(subject: &mut Subject<'_>, path: &Trajectory, part: f64) -> Option<Sample> {
+    let (pose, motion_m, turn_rad) = path.at(part);
+    let answer = subject.ask(pose).ok()?;
+    let power_j = answer.wrench.force().dot(motion_m) + answer.wrench.torque().dot(turn_rad);
+    let (force_n, torque_nm) = (answer.wrench.force(), answer.wrench.torque());
+    let most_j = force_n.length() * motion_m.length() + torque_nm.length() * turn_rad.length();
+    Some(Sample { power_j, most_j, stored_j: answer.energy_j })
+}
+
 /// Along a lap, at evenly spaced samples.
 pub(super) fn samples(subject: &mut Subject<'_>, path: &Trajectory, samples: usize) -> Option<Vec<Sample>> {
-    let sample = |index: usize| {
-        let part = index as f64 / samples as f64;
-        let (pose, motion_m, turn_rad) = path.at(part);
-        let answer = subject.ask(pose).ok()?;
-        let power_j = answer.wrench.force().dot(motion_m) + answer.wrench.torque().dot(turn_rad);
-        let (force_n, torque_nm) = (answer.wrench.force(), answer.wrench.torque());
-        let most_j = force_n.length() * motion_m.length() + torque_nm.length() * turn_rad.length();
-        Some(Sample { power_j, most_j, stored_j: answer.energy_j })
-    };
-    (0..samples).map(sample).collect()
+    (0..samples).map(|index| sample(subject, path, index as f64 / samples as f64)).collect()
+}
+
+/// Twice as many samples of a lap: those that are known, and one between each and the next, in the order of the lap.
+fn doubled(subject: &mut Subject<'_>, path: &Trajectory, known: &[Sample]) -> Option<Vec<Sample>> {
+    let count = 2 * known.len();
+    let mut samples = Vec::with_capacity(count);
+    for (index, known) in known.iter().enumerate() {
+        samples.push(*known);
+        samples.push(sample(subject, path, (2 * index + 1) as f64 / count as f64)?);
+    }
+    Some(samples)
 }
 
 fn lap(subject: &mut Subject<'_>, path: &Trajectory) -> Option<Lap> {
@@ -147,17 +161,16 @@ fn lap(subject: &mut Subject<'_>, path: &Trajectory) -> Option<Lap> {
         samples(subject, path, 4096)?;
         return Some(Lap::from_samples(&samples(subject, path, 4096)?, memory));
     }
-    let mut last = None;
-    for count in SAMPLES {
-        let lap = Lap::from_samples(&samples(subject, path, count)?, memory);
+    let mut samples = samples(subject, path, FEWEST_SAMPLES)?;
+    loop {
+        let lap = Lap::from_samples(&samples, memory);
         // The work of a smooth lap settles long before the trapezoidal rule between its samples does.
         let is_done = lap.is_settled() && lap.mismatch <= SAME_ENERGY;
-        last = Some(lap);
-        if is_done {
-            break;
+        if is_done || samples.len() >= MOST_SAMPLES {
+            return Some(lap);
         }
+        samples = doubled(subject, path, &samples)?;
     }
-    last
 }
 
 tally! {
