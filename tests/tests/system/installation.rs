@@ -3,6 +3,7 @@
 use flotor_tests::library::{build_folder, plugin_bytes, plugin_file};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::{crate_name_of, plugin_folders, workspace_root};
 use rustix::process::geteuid;
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::os::unix::process::CommandExt;
@@ -94,6 +95,16 @@ fn a_folder_of_somebody_else_is_not_searched_and_the_reason_is_reported() {
     let listed = listed();
     assert!(listed.contains("not searched: user 65534 owns it"), "{listed}");
     assert!(!listed.contains("foreign/libflotor_spring.so"), "{listed}");
+}
+
+#[test]
+fn the_wheel_contains_every_plugin() {
+    let manifest = workspace_root().join("host/python/Cargo.toml");
+    let manifest = std::fs::read_to_string(manifest).expect("it is there");
+    for folder in plugin_folders() {
+        let dependency = format!("{} = {{ path = \"../../{folder}\" }}", crate_name_of(&folder));
+        assert!(manifest.lines().any(|line| line == dependency), "the wheel lacks {folder}: {dependency}");
+    }
 }
 
 #[test]
