@@ -16,6 +16,7 @@
 pub mod calibration_file;
 mod calls;
 mod estimates;
+mod feel;
 pub mod headless;
 mod machine;
 pub mod program;

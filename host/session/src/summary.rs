@@ -1,5 +1,6 @@
 //! What a run says about itself: numbers for machines, a page for people.
 
+use crate::feel::Feel;
 use crate::telemetry::LinkCounts;
 use crate::{Misbehaved, Observer, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
@@ -32,12 +33,14 @@ struct DeviceTally {
     work_j: f64,
     generated_j: f64,
     port_lowest_j: f64,
+    feel: Feel,
 }
 
 impl DeviceTally {
     fn observe(&mut self, record: &TickRecord) {
         self.peak_force_n = self.peak_force_n.max(record.commanded.force().length());
         self.peak_torque_nm = self.peak_torque_nm.max(record.commanded.torque().length());
+        self.feel.observe(record);
         // Work of the models on the hand, with the wrench held over the tick as the device holds it.
         let first_energy_j = match &self.last {
             None => record.energy_j,
@@ -131,6 +134,10 @@ pub struct RunSummary {
     pub peak_force_n: f64,
     /// Largest torque sent, N·m.
     pub peak_torque_nm: f64,
+    /// Largest rise of the force against a handle over its way, 0.1 mm at a time, while no limit and no ramp changed the force, N/m.
+    pub peak_stiffness_n_per_m: f64,
+    /// Time from which on the handles stayed within 0.1 mm and 1 mrad of one place, s.
+    pub settled_after_s: f64,
     /// Energy tanks, all devices together.
     pub energy: EnergySummary,
     /// Each device.
@@ -367,6 +374,8 @@ impl RunSummary {
             },
             peak_force_n: tally.largest(|device| device.peak_force_n),
             peak_torque_nm: tally.largest(|device| device.peak_torque_nm),
+            peak_stiffness_n_per_m: tally.largest(|device| device.feel.peak_stiffness_n_per_m()),
+            settled_after_s: tally.largest(|device| device.feel.settled_after_s()),
             energy: EnergySummary {
                 device_residual_relative: ledgers()
                     .map(relative_residual)

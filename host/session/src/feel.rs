@@ -1,0 +1,118 @@
+//! What a hand feels of a run beyond its largest force: how stiff it was, and when the handle came to rest.
+
+use flotor_core::trace::{Events, TickRecord};
+use flotor_hal::{DVec3, Pose, rotation_vector};
+
+/// Way over which a change of force counts as stiffness, and within which a handle rests, m: beyond a step of a sensor, and far
+/// within a press of a hand.
+const WAY_M: f64 = 1.0e-4;
+/// Turn within which a handle rests, rad.
+const TURN_RAD: f64 = 1.0e-3;
+
+/// Sees the ticks of one device, in order. Needs no more memory after an hour than after a tick.
+#[derive(Debug, Default)]
+pub(crate) struct Feel {
+    /// Place and force of a tick less than a way ago, while nothing but the models made the force.
+    before: Option<(DVec3, DVec3)>,
+    /// Where the handle rests, or will have left soon.
+    rest: Option<Pose>,
+    peak_stiffness_n_per_m: f64,
+    settled_ns: u64,
+}
+
+impl Feel {
+    pub(crate) fn observe(&mut self, record: &TickRecord) {
+        self.observe_force(record);
+        let is_near = |rest: &Pose| {
+            let turn = record.pose.orientation() * rest.orientation().conjugate();
+            record.pose.position().distance(rest.position()) <= WAY_M
+                && rotation_vector(turn).length() <= TURN_RAD
+        };
+        if !self.rest.as_ref().is_some_and(is_near) {
+            self.settled_ns = if self.rest.is_some() { record.time_ns } else { 0 };
+            self.rest = Some(record.pose);
+        }
+    }
+
+    fn observe_force(&mut self, record: &TickRecord) {
+        // A ramp, a limit or a change of a parameter moves the force, not the hand.
+        if record.events != Events::NONE {
+            self.before = None;
+            return;
+        }
+        let (here_m, force_n) = (record.pose.position(), record.commanded.force());
+        let (before_m, before_n) = *self.before.get_or_insert((here_m, force_n));
+        let way_m = here_m - before_m;
+        if way_m.length() >= WAY_M {
+            let stiffness_n_per_m = -(force_n - before_n).dot(way_m) / way_m.length_squared();
+            self.peak_stiffness_n_per_m = self.peak_stiffness_n_per_m.max(stiffness_n_per_m);
+            self.before = Some((here_m, force_n));
+        }
+    }
+
+    /// Largest rise of the force against the handle over its way, 0.1 mm at a time, N/m; 0 where the force never rose so.
+    pub(crate) fn peak_stiffness_n_per_m(&self) -> f64 {
+        self.peak_stiffness_n_per_m
+    }
+
+    /// Time from which on the handle stayed within 0.1 mm and 1 mrad of one place, s.
+    pub(crate) fn settled_after_s(&self) -> f64 {
+        self.settled_ns as f64 * 1.0e-9
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::{DQuat, Twist, Wrench};
+
+    /// A handle that goes down a way within a number of ticks of 1 ms, in a spring, and then rests for as many.
+    fn felt(stiffness_n_per_m: f64, way_m: f64, ticks: u16, events: Events) -> Feel {
+        let mut feel = Feel::default();
+        for tick in 0..2 * ticks {
+            let depth_m = way_m * f64::from(tick.min(ticks)) / f64::from(ticks);
+            let force = Wrench::from_force(DVec3::Z * (stiffness_n_per_m * depth_m));
+            feel.observe(&TickRecord {
+                tick: tick.into(),
+                device: 0,
+                time_ns: u64::from(tick) * 1_000_000,
+                dt_ns: 1_000_000,
+                pose: Pose::new(DVec3::Z * -depth_m, DQuat::IDENTITY),
+                twist: Twist::ZERO,
+                model: force,
+                commanded: force,
+                delivered: force,
+                energy_j: 0.0,
+                port_energy_j: 0.0,
+                events,
+                buttons: 0,
+                lateness_ns: 0,
+                compute_ns: 0,
+            });
+        }
+        feel
+    }
+
+    #[test]
+    fn a_spring_is_as_stiff_as_it_is_at_any_speed() {
+        for (stiffness_n_per_m, way_m, ticks) in
+            [(500.0, 4.0e-3, 400), (2000.0, 4.0e-3, 10), (0.0, 4.0e-3, 400)]
+        {
+            let felt_n_per_m = felt(stiffness_n_per_m, way_m, ticks, Events::NONE).peak_stiffness_n_per_m();
+            // Digits of differences of forces.
+            assert!((felt_n_per_m - stiffness_n_per_m).abs() <= 1.0e-9 * stiffness_n_per_m, "{felt_n_per_m}");
+        }
+        let pumped = felt(-500.0, 4.0e-3, 400, Events::NONE);
+        assert_eq!(pumped.peak_stiffness_n_per_m(), 0.0, "a force along the way is no stiffness");
+        let ramped = felt(500.0, 4.0e-3, 400, Events::RAMPING);
+        assert_eq!(ramped.peak_stiffness_n_per_m(), 0.0, "the force of a ramp is not the model's");
+    }
+
+    #[test]
+    fn a_handle_has_settled_within_the_last_tenth_of_a_millimetre() {
+        // 4 mm in 400 ms are 0.1 mm in 10 ms.
+        let settled_s = felt(500.0, 4.0e-3, 400, Events::NONE).settled_after_s();
+        assert!((0.385..=0.400).contains(&settled_s), "{settled_s}");
+        assert_eq!(felt(500.0, 0.0, 400, Events::NONE).settled_after_s(), 0.0, "it never moved");
+    }
+}
