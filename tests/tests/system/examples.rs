@@ -5,6 +5,8 @@ use flotor_tests::program::Flotor;
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tools::{Tool, required, skipped};
 use flotor_tests::{TestSize, files_under, workspace_root};
+use rayon::prelude::*;
+use std::path::Path;
 use std::process::Command;
 
 /// Environment variable: a Python interpreter with the packages that the page names.
@@ -122,12 +124,37 @@ fn the_gallery_has_every_scene_and_its_picture() {
         if needs_more {
             continue;
         }
-        // The title of the scene, and the peak that the book's test compares with what the command prints.
+        // The title of the scene; the book's test compares the numbers beside it with what the command prints.
         let title =
             Scene::load(&workspace_root().join(format!("host/scenes/{name}.toml"))).expect("a scene").title;
         let picture = text(&format!("docs/src/images/scenes/{name}.svg"));
         assert!(picture.contains(&format!("<title>{title}</title>")), "{name}: another picture");
     }
+}
+
+#[test]
+fn the_pictures_of_the_gallery_are_what_its_commands_draw() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let gallery = text("docs/src/gallery.md");
+    let commands: Vec<&str> = gallery.lines().filter_map(|line| line.strip_prefix("$ flotor ")).collect();
+    assert!(commands.len() >= 8, "{commands:?}");
+    let scratch = Scratch::default();
+    let another = commands.into_par_iter().filter_map(|command| {
+        let words = command.split(' ').map(|word| match word.strip_suffix(".svg") {
+            Some(_) => scratch.path().join(word).display().to_string(),
+            None => word.to_owned(),
+        });
+        let words: Vec<String> = words.collect();
+        let ran = Flotor::with(&words).inside(&workspace_root()).run();
+        assert_eq!(ran.code, Some(0), "{command}: {ran:#?}");
+        let drawn = Path::new(words.last().expect("it has words"));
+        let name = drawn.file_name()?.to_str()?;
+        let kept = text(&format!("docs/src/images/scenes/{name}"));
+        (std::fs::read_to_string(drawn).ok() != Some(kept)).then_some(command)
+    });
+    assert_eq!(another.collect::<Vec<_>>(), Vec::<&str>::new(), "they draw another picture");
 }
 
 #[test]
