@@ -3,7 +3,7 @@
 //! Where the endpoints are, and what kind they are, is read from the descriptors. They are looked for in alternate
 //! settings other than 0 first: a device that keeps setting 0 empty is told by the kernel when this process dies.
 //!
-//! Reads wait on the bus all the time, several of them, and a write is submitted and not waited for ([`queue`]): a tick
+//! Reads wait on the bus all the time, several of them, and a write is submitted and not waited for (`queue`): a tick
 //! only ever takes what is there.
 
 mod queue;
