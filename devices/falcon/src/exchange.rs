@@ -10,7 +10,7 @@ use crate::trouble::Trouble;
 pub use flotor_force_switch::ForceSwitch;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{JoinHandle, Thread};
 use std::time::{Duration, Instant};
 
@@ -37,13 +37,14 @@ struct Slots {
     /// Commands without a report, and since when there is one.
     unanswered: u32,
     silent_since: Option<Instant>,
-    trouble: Option<Trouble>,
 }
 
 #[derive(Default)]
 struct Shared {
     /// Each holds it to copy a few numbers, and the tick never waits for it.
     slots: Mutex<Slots>,
+    /// What went wrong first.
+    trouble: OnceLock<Trouble>,
     /// Nobody wants it any more, and then: the last command is answered.
     is_over: AtomicBool,
     is_done: AtomicBool,
@@ -55,8 +56,12 @@ impl Shared {
     }
 
     fn fail(&self, trouble: Trouble) {
-        let mut slots = self.lock();
-        slots.trouble = slots.trouble.or(Some(trouble));
+        // The first one counts.
+        let _ = self.trouble.set(trouble);
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        self.trouble.get().copied()
     }
 
     fn is_over(&self) -> bool {
@@ -94,10 +99,10 @@ impl Exchange {
     /// # Errors
     /// A [`Trouble`], from then on in each call.
     pub fn take(&self) -> Result<Option<Report>, Trouble> {
-        match self.shared.slots.try_lock() {
-            Ok(mut slots) => slots.trouble.map_or(Ok(slots.report.take()), Err),
-            // A thread is leaving something.
-            Err(_) => Ok(None),
+        match self.shared.trouble() {
+            Some(trouble) => Err(trouble),
+            // Where it is locked a thread is leaving something.
+            None => Ok(self.shared.slots.try_lock().ok().and_then(|mut slots| slots.report.take())),
         }
     }
 
@@ -122,7 +127,7 @@ impl Exchange {
         if let Some(reader) = self.reader.take() {
             let _ = reader.join();
         }
-        self.shared.lock().trouble
+        self.shared.trouble()
     }
 }
 
@@ -135,7 +140,7 @@ impl Drop for Exchange {
 /// Reads until the exchange is over, or something is wrong.
 fn read(chip: &dyn Chip, shared: &Shared, writer: &Thread) {
     let (mut frames, mut packets, mut noise) = (Frames::default(), [0; READ_BYTES], 0);
-    while !shared.is_done.load(Ordering::Acquire) && shared.lock().trouble.is_none() {
+    while !shared.is_done.load(Ordering::Acquire) && shared.trouble().is_none() {
         let heard = chip.read(&mut packets, LOOK).map_err(Trouble::from).and_then(|length| {
             let read = packets.get(..length).unwrap_or_default();
             let mut trouble = None;
@@ -176,10 +181,7 @@ fn write(chip: &dyn Chip, shared: &Shared, switch: &ForceSwitch, timeout: Durati
     // If it still listens.
     let is_gone = chip.write(&Command::REST.bytes()).is_err();
     let since = Instant::now();
-    let is_awaited = || {
-        let slots = shared.lock();
-        slots.trouble.is_none() && slots.unanswered > 0
-    };
+    let is_awaited = || shared.trouble().is_none() && shared.lock().unanswered > 0;
     while !is_gone && is_awaited() && since.elapsed() < LAST_REPORT {
         std::thread::park_timeout(LOOK);
     }
@@ -190,11 +192,12 @@ fn send_commands(chip: &dyn Chip, shared: &Shared, switch: &ForceSwitch, timeout
     let (mut last, mut left, mut sent) = (Command::REST, Instant::now(), None::<Instant>);
     loop {
         let mut slots = shared.lock();
-        if shared.is_over() || slots.trouble.is_some() {
+        if shared.is_over() || shared.trouble().is_some() {
             return;
         }
         if slots.silent_since.is_some_and(|since| since.elapsed() > timeout) {
-            slots.trouble = Some(Trouble::Silent);
+            drop(slots);
+            shared.fail(Trouble::Silent);
             return;
         }
         let since = sent.map_or(FORGET, |sent| sent.elapsed());
