@@ -31,8 +31,8 @@ const LONGEST_WAY: f64 = 0.097;
 const LONGEST_UNFELT_STEP: f64 = 0.4;
 /// How often a search that is not felt may begin anew.
 const MOST_SEARCHES: u32 = 3;
-/// What these searches may cost together, in evaluations of the energy, if each costs no more than the one before.
-const MOST_COST: u32 = 200;
+/// What the searches of a tick may cost together, in evaluations of the energy, if each costs no more than the one before.
+const MOST_COST: u32 = 160;
 /// Curvature that counts as none. Bending has 4; the softest stable directions have 1e-5; rounding makes
 /// 1e-14.
 const NEUTRAL: f64 = 1.0e-9;
@@ -276,7 +276,9 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             // it was.
             self.shape = before;
             let work = std::mem::take(&mut self.work);
-            outcome = self.search(plate, demand);
+            // Where there is no time for it, the next tick does it.
+            let has_time = work.and(&work).cost() <= MOST_COST;
+            outcome = if has_time { self.search(plate, demand) } else { self.moving(plate) };
             self.work = work.and(&self.work);
         }
         self.remember(plate, &before, &outcome);
