@@ -53,25 +53,37 @@ fn copy(from: &Path, to: &Path) -> Result<(), ScaffoldError> {
 fn standalone(manifest: &str, workspace: &str) -> Result<String, String> {
     let parsed = |text: &str| text.parse::<Table>().map_err(|error| error.to_string());
     let (mut manifest, workspace) = (parsed(manifest)?, parsed(workspace)?);
-    let shared = |section: &str| workspace.get("workspace")?.get(section)?.as_table();
     manifest.remove("lints"); // for those who change the contract
+    let shared = |section: &str| workspace.get("workspace")?.get(section)?.as_table();
     for section in ["package", "dependencies"] {
         let Some(entries) = manifest.get_mut(section).and_then(Value::as_table_mut) else { continue };
-        for (name, value) in entries {
-            let Some(own) = value.as_table_mut().filter(|own| own.contains_key("workspace")) else {
-                continue;
-            };
-            let theirs = shared(section).and_then(|shared| shared.get(name));
-            let theirs = theirs.ok_or_else(|| format!("its workspace has no `{name}`"))?;
-            own.remove("workspace");
-            *value = with(theirs, std::mem::take(own));
-        }
+        write_out(entries, shared(section))?;
+    }
+    // What one system needs alone.
+    let systems = manifest.get_mut("target").and_then(Value::as_table_mut).into_iter().flatten();
+    for (_, system) in systems {
+        let Some(entries) = system.get_mut("dependencies").and_then(Value::as_table_mut) else { continue };
+        write_out(entries, shared("dependencies"))?;
     }
     Ok(manifest.to_string())
 }
 
-/// An entry of the workspace with what a member adds to it.
-fn with(theirs: &Value, own: Table) -> Value {
+/// Replaces what entries take from their workspace by what stands there.
+fn write_out(entries: &mut Table, shared: Option<&Table>) -> Result<(), String> {
+    for (name, value) in entries {
+        let Some(own) = value.as_table_mut().filter(|own| own.contains_key("workspace")) else {
+            continue;
+        };
+        let theirs = shared.and_then(|shared| shared.get(name));
+        let theirs = theirs.ok_or_else(|| format!("its workspace has no `{name}`"))?;
+        own.remove("workspace");
+        *value = with(theirs, std::mem::take(own));
+    }
+    Ok(())
+}
+
+/// An entry of the workspace with what a member adds to it: its features are more features.
+fn with(theirs: &Value, mut own: Table) -> Value {
     if own.is_empty() {
         return theirs.clone();
     }
@@ -79,6 +91,12 @@ fn with(theirs: &Value, own: Table) -> Value {
         Value::Table(table) => table.clone(),
         version => Table::from_iter([("version".to_owned(), version.clone())]),
     };
+    if let (Some(Value::Array(theirs)), Some(Value::Array(more))) =
+        (all.get_mut("features"), own.get("features"))
+    {
+        theirs.extend(more.iter().cloned());
+        own.remove("features");
+    }
     all.extend(own);
     Value::Table(all)
 }
@@ -92,11 +110,14 @@ mod tests {
         let workspace = "[workspace.package]\nedition = \"2024\"\n[workspace.dependencies]\na = \"1.2\"\n\
                          b = { version = \"3\", features = [\"x\"] }\n";
         let manifest = "[package]\nname = \"m\"\nedition.workspace = true\n[dependencies]\na = { workspace = true, \
-                        optional = true }\nb.workspace = true\nc = \"4\"\n[lints]\nworkspace = true\n";
+                        optional = true }\nb.workspace = true\nc = \"4\"\n\
+                        [target.'cfg(unix)'.dependencies]\nb = { workspace = true, features = [\"y\"] }\n\
+                        [lints]\nworkspace = true\n";
         let written: Table = standalone(manifest, workspace).unwrap().parse().unwrap();
         let expected: Table =
             "[package]\nname = \"m\"\nedition = \"2024\"\n[dependencies]\na = { version = \"1.2\", \
-                               optional = true }\nb = { version = \"3\", features = [\"x\"] }\nc = \"4\"\n"
+                               optional = true }\nb = { version = \"3\", features = [\"x\"] }\nc = \"4\"\n\
+             [target.'cfg(unix)'.dependencies]\nb = { version = \"3\", features = [\"x\", \"y\"] }\n"
                 .parse()
                 .unwrap();
         assert_eq!(written, expected);
