@@ -117,7 +117,7 @@ impl Effort {
     fn with(self, coils: Coils) -> Self {
         match coils {
             Coils::Pass => self,
-            Coils::Touch => Self { most_steps: 18, most_matrices: 8, ..self },
+            Coils::Touch => Self { most_steps: 16, most_matrices: 6, ..self },
         }
     }
 }
