@@ -53,7 +53,9 @@ fn copy(from: &Path, to: &Path) -> Result<(), ScaffoldError> {
 fn standalone(manifest: &str, workspace: &str) -> Result<String, String> {
     let parsed = |text: &str| text.parse::<Table>().map_err(|error| error.to_string());
     let (mut manifest, workspace) = (parsed(manifest)?, parsed(workspace)?);
-    manifest.remove("lints"); // for those who change the contract
+    // For those who change the contract.
+    manifest.remove("lints");
+    manifest.remove("example");
     let shared = |section: &str| workspace.get("workspace")?.get(section)?.as_table();
     for section in ["package", "dependencies"] {
         let Some(entries) = manifest.get_mut(section).and_then(Value::as_table_mut) else { continue };
@@ -112,7 +114,7 @@ mod tests {
         let manifest = "[package]\nname = \"m\"\nedition.workspace = true\n[dependencies]\na = { workspace = true, \
                         optional = true }\nb.workspace = true\nc = \"4\"\n\
                         [target.'cfg(unix)'.dependencies]\nb = { workspace = true, features = [\"y\"] }\n\
-                        [lints]\nworkspace = true\n";
+                        [[example]]\nname = \"e\"\n[lints]\nworkspace = true\n";
         let written: Table = standalone(manifest, workspace).unwrap().parse().unwrap();
         let expected: Table =
             "[package]\nname = \"m\"\nedition = \"2024\"\n[dependencies]\na = { version = \"1.2\", \

@@ -353,6 +353,7 @@ const UNSAFE: &[(&str, &str)] = &[
         "the binary contract: function tables across shared libraries, the export macros, the loader",
     ),
     ("hal/src/extension/", "the function tables of the extensions"),
+    ("hal/examples/load_model.rs", "a host of fifty lines loads the plugin file that its user names"),
     (
         "host/session/src/registry/mod.rs",
         "the one place of the host that loads a plugin file, which the user guarantees",

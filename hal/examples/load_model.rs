@@ -1,0 +1,45 @@
+//! Loads model plugins from their files and asks each at a hundred poses: what a host does, without the rest of one.
+//!
+//! `cargo run -p flotor-hal --features loader --example load_model -- target/debug/libflotor_wall.so`
+//!
+//! Each file has one line: what it is and the bits of the last answer with a sum of the bits of all, or why it is refused. The same
+//! model gives the same line on every system.
+
+#![allow(unsafe_code)] // a plugin file is loaded: its user trusts it
+
+use flotor_hal::abi::loader::{LoadError, Plugin};
+use flotor_hal::{Input, LoopConfig, Output, Pose};
+use std::path::Path;
+
+const POSES: u32 = 100;
+
+fn main() {
+    for file in std::env::args().skip(1) {
+        match ask(Path::new(&file)) {
+            Ok(line) => println!("{line}"),
+            // The end of the sentence, without the path.
+            Err(error) => println!("refused: {}", error.to_string().replace(&file, "it")),
+        }
+    }
+}
+
+fn ask(file: &Path) -> Result<String, LoadError> {
+    // SAFETY: whoever names a file on the command line trusts it, as a program that is started.
+    let plugin = unsafe { Plugin::load(file) }?;
+    let mut model = plugin.create_model(&[])?;
+    if let Err(refusal) = model.prepare(&LoopConfig { period_ns: 1_000_000, seed: 1 }) {
+        return Ok(format!("{}: {refusal}", plugin.metadata().id));
+    }
+    let (mut output, mut sum) = (Output::default(), 0_u64);
+    for number in 0..POSES {
+        let part = f64::from(number) / f64::from(POSES);
+        // Down by 10 mm, aside by 3 mm, in a straight line.
+        let pose = Pose { position_m: [0.003 * part, -0.001 * part, -0.010 * part], ..Pose::HOME };
+        model.step(&Input::at_rest(pose), &mut output);
+        let components = output.wrench.force_n.iter().chain(&output.wrench.torque_nm);
+        sum = components.fold(sum, |sum, component| sum.rotate_left(7) ^ component.to_bits());
+    }
+    let last: Vec<String> = output.wrench.force_n.iter().map(|force_n| format!("{force_n:.6}")).collect();
+    let facts = plugin.metadata();
+    Ok(format!("{} {}: last force {} N, bits of all {sum:016x}", facts.id, facts.version, last.join(" ")))
+}
