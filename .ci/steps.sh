@@ -284,12 +284,13 @@ archive() {
 # The commands of the book for a newcomer, from a clone to a passing test, and to failing ones after four mistakes: on a bare Debian
 # with Rust and a C compiler. What this clone has fetched from the registry is all that there is: there is no network.
 newcomer() {
-    local root=target/ci/newcomer
+    local root=target/ci/newcomer here
+    here=/given/$(basename "$PWD")
     has_bare_root || return 0
     cargo fetch --locked
-    PACKAGES=gcc,libc6-dev,git,ca-certificates RUST=1 .ci/bare-root "$root" 'rm -rf /tmp/newcomer
-        git config --global --replace-all safe.directory "*"
-        FLOTOR_REPOSITORY=/given/flotor /given/flotor/tests/newcomer /tmp/newcomer' .
+    PACKAGES=gcc,libc6-dev,git,ca-certificates RUST=1 .ci/bare-root "$root" "rm -rf /tmp/newcomer
+        git config --global --replace-all safe.directory '*'
+        FLOTOR_REPOSITORY=$here $here/tests/newcomer /tmp/newcomer" .
     rm -rf "$root/tmp/newcomer"
 }
 

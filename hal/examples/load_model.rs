@@ -14,11 +14,16 @@ use std::path::Path;
 const POSES: u32 = 100;
 
 fn main() {
-    for file in std::env::args().skip(1) {
+    let files: Vec<_> = std::env::args_os().skip(1).collect();
+    if files.is_empty() {
+        eprintln!("name plugin files of models");
+        std::process::exit(2);
+    }
+    for file in files {
         match ask(Path::new(&file)) {
             Ok(line) => println!("{line}"),
             // The end of the sentence, without the path.
-            Err(error) => println!("refused: {}", error.to_string().replace(&file, "it")),
+            Err(error) => println!("refused: {}", error.to_string().replace(&*file.to_string_lossy(), "it")),
         }
     }
 }
