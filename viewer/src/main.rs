@@ -55,7 +55,7 @@ struct Arguments {
         allow_hyphen_values = true
     )]
     view: Option<View>,
-    /// Name of the device that numbers and traces are of, where there are several (default: the first)
+    /// In files: device that numbers and traces are of, where there are several (default: the first)
     #[arg(long, value_name = "NAME", requires = "recording")]
     device: Option<String>,
     /// The moment to show, s (default: that of the largest force)
@@ -68,7 +68,7 @@ struct Arguments {
     /// Traces of the picture (default: force,position)
     #[arg(long, value_name = "LIST", value_delimiter = ',', hide_possible_values = true)]
     traces: Vec<Quantity>,
-    /// Force over position along this axis, beside the traces
+    /// In files: force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z", value_parser = axis)]
     force_position: Option<usize>,
     /// Title of the file of traces (default: that of the run)

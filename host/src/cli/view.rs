@@ -37,10 +37,10 @@ pub(crate) struct ViewArguments {
     /// Write the traces of the recording as numbers (.csv), lines (.svg) or pixels (.png), light unless --look says dark
     #[arg(long, value_name = "OUT", requires = "file", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
-    /// Traces shown, by name, such as force,stiffness (default: force,position)
+    /// With --export or --screenshot --window: traces shown, by name, such as force,stiffness (default: force,position)
     #[arg(long, value_name = "LIST")]
     traces: Option<String>,
-    /// Show force over position along this axis beside the traces
+    /// With --export or --screenshot --window: force over position along this axis beside the traces
     #[arg(long, value_name = "x|y|z")]
     force_position: Option<String>,
     /// With --export: title (default: that of the scene)

@@ -33,7 +33,7 @@ const PATHS: [&str; 4] = ["out", "scene", "consent", "instructions"];
 )]
 pub(super) struct RunArguments {
     /// Study file (default: the one NAME.study.toml in this folder)
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", allow_hyphen_values = true)]
     file: Option<PathBuf>,
     /// Further options of the task, such as --subject 3
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
@@ -182,6 +182,17 @@ mod tests {
         let further = further.iter().map(OsString::from).collect();
         let words = words(Path::new("here/weber.study.toml"), text, further).expect("a study file");
         words.into_iter().map(|word| word.to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn options_may_stand_without_a_file() {
+        let command = RunArguments::augment_args(clap::Command::new("run").no_binary_name(true));
+        for line in [&["--subject", "3"][..], &["a.study.toml", "--subject", "3"]] {
+            let matches = command.clone().try_get_matches_from(line);
+            let arguments =
+                RunArguments::from_arg_matches(&matches.expect("it is read")).expect("it is whole");
+            assert_eq!(arguments.further.len(), line.len() - 1, "{line:?}");
+        }
     }
 
     #[test]
