@@ -16,7 +16,7 @@ const POSES: u32 = 100;
 fn main() {
     let files: Vec<_> = std::env::args_os().skip(1).collect();
     if files.is_empty() {
-        eprintln!("name plugin files of models");
+        eprintln!("usage: load_model PLUGIN_FILE...");
         std::process::exit(2);
     }
     for file in files {

@@ -3,7 +3,7 @@
 use crate::history::Sample;
 use flotor_hal::DVec3;
 
-/// The handle must have moved so far for a stiffness, m: ten steps of a common sensor.
+/// Least displacement of the handle from which a stiffness is computed, m: ten steps of a common position sensor.
 const LEAST_WAY_M: f64 = 50.0e-6;
 
 /// Stiffness felt along the motion, N/m: the secant `-dF/dx` from the newest of some earlier samples (the newest first) that is far

@@ -1,4 +1,4 @@
-//! What a hand feels of a run beyond its largest force: how stiff it was, and when the handle came to rest.
+//! Stiffness felt at the handle and settling time of a run, from its ticks.
 
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Pose, rotation_vector};

@@ -327,7 +327,7 @@ fn least(of: [Jet; 3]) -> Jet {
     least * root
 }
 
-/// Distance to a box (negative inside) of the distances beyond its pairs of faces, and the share of each pair in it. Where
+/// Signed distance to a box (negative inside) from the distances beyond each pair of faces, and the weight of each pair in it. Where
 /// several pairs are as near, both are bent over `width` on both sides: second derivatives are continuous everywhere.
 fn distance(beyond: [Jet; 3], width: f64) -> (Jet, [Jet; 3]) {
     let outside = beyond.map(|b| above(b, width));

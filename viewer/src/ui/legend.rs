@@ -48,7 +48,7 @@ const ROOM_FOR_SCALES_PT: f32 = 600.0;
 /// A torque that is not above this was never there, N·m.
 const LEAST_TORQUE_NM: f64 = 1.0e-5;
 
-/// Length, points, of the arrow of a round force in the middle of the picture, and what it says.
+/// Scale of the force arrows: length, points, of an arrow for a round number of newtons at the centre of the view, and its label.
 fn force_scale(key: ArrowKey, camera: &Camera, height_pt: f32) -> (f32, String) {
     let force_n = round_below(key.full_force_n);
     let length_pt = force_n * key.mm_per_n * camera.pixels_per_mm(f64::from(height_pt));

@@ -27,7 +27,7 @@ pub(crate) type Handle = OwnedFd;
 /// What is wrong with the descriptor.
 ///
 /// # Safety
-/// Whoever owns the descriptor keeps it open during the call. A number that is none is told by the system.
+/// The descriptor is open during the call, as the contract obliges the plugin that owns it.
 pub(crate) unsafe fn writable_duplicate(descriptor: i32) -> Result<Handle, String> {
     if descriptor < 0 {
         return Err(format!("names the descriptor {descriptor}"));

@@ -31,7 +31,7 @@ pub(crate) type Handle = OwnedHandle;
 /// Always: a device that needs a message to stop has to stop by itself on this system.
 ///
 /// # Safety
-/// None is needed; as on other systems.
+/// As on other systems; here nothing is done with the descriptor.
 pub(crate) unsafe fn writable_duplicate(descriptor: i32) -> Result<Handle, String> {
     Err(format!("names the descriptor {descriptor}, which no other program of this system can use"))
 }
