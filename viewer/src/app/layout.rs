@@ -60,7 +60,7 @@ impl Viewer {
             ui.set_max_width(ui.available_width() - 12.0); // room for the bar that scrolls
             // How close the hand is to the limits comes before anything that can be changed.
             if let Some(sample) = self.devices.history().at(self.player.now_s) {
-                standing::standing(ui, sample, &self.limits, self.devices.tally(), palette);
+                standing::limits(ui, sample, &self.limits, palette);
                 ui.add_space(8.0);
             }
             // Models before devices: they are what people came for.
@@ -71,6 +71,7 @@ impl Viewer {
                 values.extend(changed.into_iter().filter_map(|index| panel.change(index)));
                 ui.add_space(8.0);
             }
+            standing::events(ui, self.devices.tally(), palette);
         });
         if !values.is_empty() {
             self.ask(Ask::Set { values });

@@ -1,4 +1,4 @@
-//! Limits and faults: how close to the limits the run is, and what has happened in it so far.
+//! How close to the limits the run is, and what has happened in it so far.
 
 use crate::history::Sample;
 use crate::palette::Palette;
@@ -11,9 +11,9 @@ use egui::{
 use flotor_core::trace::Events;
 use flotor_live::WrenchLimits;
 
-/// Shows how much of each limit is used, and a line for everything that has happened.
-pub fn standing(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, tally: &Tally, palette: &Palette) {
-    CollapsingHeader::new(RichText::new("Limits and faults").strong()).default_open(true).show(ui, |ui| {
+/// Shows how much of each limit is used.
+pub fn limits(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, palette: &Palette) {
+    CollapsingHeader::new(RichText::new("Limits").strong()).default_open(true).show(ui, |ui| {
         let of_force = (Quantity::Force, limits.force_n, limits.force_norm_n);
         let of_torque = (Quantity::Torque, limits.torque_nm, limits.torque_norm_nm);
         for (quantity, axes, norm) in [of_force, of_torque] {
@@ -26,7 +26,12 @@ pub fn standing(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, tally: &Tal
             }
             bar(ui, "norm", squares.sqrt(), norm, unit, palette);
         }
-        ui.add_space(4.0);
+    });
+}
+
+/// Shows a line for everything that has happened. A new line moves what is beneath it: nothing that a pointer may be on.
+pub fn events(ui: &mut Ui, tally: &Tally, palette: &Palette) {
+    CollapsingHeader::new(RichText::new("Events").strong()).default_open(true).show(ui, |ui| {
         let events =
             Events::NAMES.iter().map(|name| name.replace('_', " ")).zip(tally.counts().iter().copied());
         let counts = events.chain([("not shown".to_owned(), tally.dropped)]);

@@ -56,6 +56,23 @@ fn warnings_say_what_and_what_to_do_and_stay_in_sight_a_while() {
     window.get_by_label_contains("Stale data");
 }
 
+/// A slider that goes down under the pointer leaves it on another one.
+#[test]
+fn nothing_that_happens_moves_a_slider() {
+    let (mut window, mut host, _folder) = live(&[]);
+    host.run_ticks(10, Events::NONE);
+    until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
+    let place = |window: &Window<'_>| window.get_by_role_and_label(Role::Slider, "gamma").rect();
+    let before = place(&window);
+    for (events, name) in
+        [(Events::FORCE_LIMITED, "force limited"), (Events::TORQUE_LIMITED, "torque limited")]
+    {
+        host.run_ticks(10, events);
+        until(&mut window, |window| window.query_by_label(name).is_some());
+        assert_eq!(place(&window), before, "{name}");
+    }
+}
+
 #[test]
 fn limits_say_how_much_of_them_is_used() {
     let (mut window, mut host, _folder) = live(&[]);
