@@ -20,6 +20,7 @@
 //! - [`curve`]: a measured curve of a real spring, and the spring fitted to it.
 //! - [`conduct`]: a sitting with presenter, simulated subject and log put together.
 //! - [`cohort`]: many simulated subjects at once.
+//! - [`exclusion`]: what does not count, by rules decided beforehand.
 //! - [`analysis`]: from logs to thresholds, tests and effects.
 //!
 //! Nothing here is real-time.
@@ -34,6 +35,7 @@ pub mod conduct;
 pub mod curve;
 pub mod dataset;
 pub mod estimate;
+pub mod exclusion;
 pub mod kinematics;
 pub mod log;
 pub mod observer;

@@ -23,6 +23,10 @@ pub(crate) enum Purpose {
     Hand = 5,
     /// Which code stands for which condition.
     Blinding = 6,
+    /// Before which trials of a track or a replication a check is presented.
+    CheckPlace = 7,
+    /// Which earlier trial a check repeats.
+    CheckTrial = 8,
 }
 
 /// A stream of random numbers.

@@ -2,7 +2,7 @@
 
 use crate::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
 use crate::random::{Purpose, Stream};
-use crate::trial::Modality;
+use crate::trial::{Modality, Phase};
 
 /// Order of the bases in each replication, as indices: the rows of Latin squares, no row twice before all were used.
 ///
@@ -66,6 +66,56 @@ pub(crate) fn magnitude_order(
     let mut values = protocol.values.clone();
     Stream::new(seed, Purpose::Schedule, subject.get(), 10 + replication).shuffle(&mut values);
     values
+}
+
+/// The checks of a track, each with the number of trials of the track before it, in order: as many as there are, at
+/// random places after the first trial, all before a track can be over.
+pub(crate) fn track_checks(
+    protocol: &JndProtocol,
+    seed: u64,
+    subject: SubjectNumber,
+    track: u32,
+) -> Vec<(u32, Phase)> {
+    let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), track);
+    let (catch, repeats) = (protocol.checks.catch as usize, protocol.checks.repeats as usize);
+    let kinds =
+        std::iter::repeat_n(Phase::Catch, catch).chain(std::iter::repeat_n(Phase::RepeatCheck, repeats));
+    let places = (1..protocol.procedure.trials_least()).collect::<Vec<_>>();
+    let place = |kind| (places.get(stream.below(places.len())).copied().unwrap_or(1), kind);
+    let mut checks: Vec<(u32, Phase)> = kinds.map(place).collect();
+    checks.sort_by_key(|(place, _)| *place);
+    checks
+}
+
+/// One replication of a magnitude experiment with its checks: each presents one of its stimuli once more, with another one or
+/// several between the two.
+pub(crate) fn with_repeat_checks(
+    protocol: &MagnitudeProtocol,
+    seed: u64,
+    subject: SubjectNumber,
+    replication: u32,
+    order: &[f64],
+) -> Vec<(Phase, f64)> {
+    let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), replication);
+    let count = order.len();
+    let mut check = || {
+        let which = stream.below(count.saturating_sub(2));
+        // After at least one more of the others.
+        let place = which + 2 + stream.below(count.saturating_sub(which + 1));
+        (place, order.get(which).copied())
+    };
+    let checks: Vec<_> = (0..protocol.repeat_checks).map(|_| check()).collect();
+    let before = |place: usize| {
+        let here = checks.iter().filter(move |(at, _)| *at == place);
+        here.filter_map(|(_, value)| Some((Phase::RepeatCheck, (*value)?)))
+    };
+    let mut all: Vec<(Phase, f64)> = Vec::new();
+    for (place, value) in order.iter().enumerate() {
+        all.extend(before(place));
+        all.push((Phase::Main, *value));
+    }
+    all.extend(before(count));
+    all
 }
 
 /// The demo before a modality of a magnitude experiment: the extremes and others, in random order.

@@ -72,6 +72,17 @@ enum Item {
 struct Running {
     track: Track,
     trials: u32,
+    /// Checks yet to come, each after so many trials.
+    checks: VecDeque<(u32, Phase)>,
+    /// What was presented so far.
+    pairs: Vec<Pair>,
+}
+
+impl Running {
+    /// The check that is due now, if one is.
+    fn check(&self) -> Option<Phase> {
+        self.checks.front().filter(|(after, _)| *after <= self.trials).map(|(_, check)| *check)
+    }
 }
 
 /// One subject in one experiment.
@@ -145,9 +156,8 @@ impl Sitting {
                 (phase, replication, 0, modality, presented)
             }
             Item::Adapt { replication, modality, base } => {
-                let delta = self.running.as_ref().map_or(0.0, |running| running.track.delta());
-                let presented = Presented::Pair(self.pair(base, delta, number));
-                (Phase::Main, replication, self.tracks_begun, modality, presented)
+                let (phase, pair) = self.of_track(base, number);
+                (phase, replication, self.tracks_begun, modality, Presented::Pair(pair))
             }
         };
         Some(Trial { number, phase, replication, track, modality, presented, repeat: self.repeat })
@@ -169,6 +179,10 @@ impl Sitting {
             return Ok(Verdict::Repeated);
         }
         self.repeat = 0;
+        if let (Phase::Catch | Phase::RepeatCheck, Some(running)) = (trial.phase, &mut self.running) {
+            running.checks.pop_front();
+            return Ok(Verdict::Taken);
+        }
         let judgement = match (trial.phase, trial.presented) {
             (Phase::Main, Presented::Pair(pair)) => judge(&pair, response),
             _ => None,
@@ -179,6 +193,9 @@ impl Sitting {
             return Ok(Verdict::Taken);
         };
         running.trials += 1;
+        if let Presented::Pair(pair) = trial.presented {
+            running.pairs.push(pair);
+        }
         let reversal = running.track.answer(judgement);
         if running.track.is_done() {
             self.end_track();
@@ -188,8 +205,10 @@ impl Sitting {
 
     fn begin_track(&mut self) {
         if let (Some(Item::Adapt { .. }), Protocol::Jnd(jnd)) = (self.items.front(), &self.protocol) {
-            self.running = Some(Running { track: jnd.procedure.start(), trials: 0 });
             self.tracks_begun += 1;
+            let checks = schedule::track_checks(jnd, self.seed, self.subject, self.tracks_begun).into();
+            self.running =
+                Some(Running { track: jnd.procedure.start(), trials: 0, checks, pairs: Vec::new() });
         }
     }
 
@@ -202,6 +221,23 @@ impl Sitting {
             self.results.push(TrackResult { track, replication, modality, base, threshold, trials });
         }
         self.begin_track();
+    }
+
+    /// What a track presents now: its next pair, or a check.
+    fn of_track(&self, base: f64, number: u32) -> (Phase, Pair) {
+        let Some(running) = &self.running else { return (Phase::Main, self.pair(base, 0.0, number)) };
+        match running.check() {
+            Some(Phase::Catch) => (Phase::Catch, self.pair(base, 0.0, number)),
+            Some(Phase::RepeatCheck) => {
+                // Not the last one, where there are others: two equal pairs in a row would be noticed.
+                let earlier = running.pairs.len().saturating_sub(1).max(1);
+                let which =
+                    Stream::new(self.seed, Purpose::CheckTrial, self.subject.get(), number).below(earlier);
+                let pair = running.pairs.get(which).copied();
+                (Phase::RepeatCheck, pair.unwrap_or_else(|| self.pair(base, 0.0, number)))
+            }
+            _ => (Phase::Main, self.pair(base, running.track.delta(), number)),
+        }
     }
 
     fn pair(&self, base: f64, delta: f64, number: u32) -> Pair {
@@ -283,7 +319,8 @@ fn magnitude_items(protocol: &Protocol, seed: u64, subject: SubjectNumber) -> Ve
         for replication in 1..=magnitude.replications {
             let stream = if block == 0 { replication } else { magnitude.replications + replication };
             let order = schedule::magnitude_order(magnitude, seed, subject, stream);
-            items.extend(order.into_iter().map(show(Phase::Main, replication)));
+            let order = schedule::with_repeat_checks(magnitude, seed, subject, stream, &order);
+            items.extend(order.into_iter().map(|(phase, value)| show(phase, replication)(value)));
         }
     }
     items

@@ -45,6 +45,29 @@ pub enum Phase {
     Practice,
     /// Counts.
     Main,
+    /// A check: a pair of equal stimuli, for a false alarm. Not analysed with those that count.
+    Catch,
+    /// A check: what was presented once before, for how alike the two answers are. Not analysed with those that count.
+    RepeatCheck,
+}
+
+impl Phase {
+    /// As in the tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Practice => "practice",
+            Self::Main => "main",
+            Self::Catch => "catch",
+            Self::RepeatCheck => "repeat_check",
+        }
+    }
+
+    /// What the subject may know of it: a check looks like a trial that counts.
+    #[must_use]
+    pub fn shown(self) -> Self {
+        if self == Self::Practice { Self::Practice } else { Self::Main }
+    }
 }
 
 /// First or second of a pair.

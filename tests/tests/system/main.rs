@@ -51,6 +51,7 @@ mod scene_test;
 mod services;
 mod simulated;
 mod study;
+mod study_file;
 mod supply;
 mod swap;
 mod teleoperation;

@@ -6,14 +6,16 @@ use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, print_result, style, write_text};
 use flotor_statistics::anova::SumOfSquares;
 use flotor_study::analysis::{
-    Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectQuality, SubjectRecord,
+    Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectChecks, SubjectQuality, SubjectRecord,
 };
 use flotor_study::analysis::{SCRIPT_PYTHON, SCRIPT_R};
 use flotor_study::apparatus::page::html;
 use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, trials_csv};
+use flotor_study::exclusion::Exclusion;
 use flotor_study::log::{Incident, SittingLog};
 use flotor_study::protocol::RatingScale;
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Analyse the data of a perception experiment
@@ -97,6 +99,10 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     }
     let complete = logs.iter().filter(|log| log.complete).map(SubjectRecord::of_log);
     let subjects: Vec<SubjectRecord> = complete.collect();
+    let checks: Vec<SubjectChecks> = match first.begin.protocol.has_checks() {
+        true => subjects.iter().map(SubjectChecks::of).collect(),
+        false => Vec::new(),
+    };
     let options = AnalysisOptions {
         sums_of_squares: match arguments.sums {
             SumsOption::Two => SumOfSquares::Two,
@@ -106,7 +112,16 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         estimator: arguments.estimator,
     };
     let protocol = &first.begin.protocol;
-    let analysis = Analysis::of(protocol, &subjects, &options)
+    let rules = first.begin.exclusion();
+    let applied = rules.apply(protocol, subjects, options.estimator, first.begin.rate_hz());
+    let subjects = &applied.kept;
+    if !applied.excluded.is_empty() {
+        let (kept, excluded) = (subjects.len(), applied.excluded.len());
+        note(format_args!(
+            "the exclusion rules of the study file leave {kept} sittings ({excluded} exclusions)"
+        ));
+    }
+    let analysis = Analysis::of(protocol, subjects, &options)
         .map_err(|error| CommandError::Usage(format!("{}: {error}", arguments.data.display())))?;
     if arguments.blind {
         let codes = Codes::new(protocol, first.begin.seed);
@@ -114,10 +129,14 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     }
     let text = || {
         let title = format!("{} of {}", protocol.task(), protocol.stimulus());
-        format!("{}\n{}", style::title(&title), analysis.to_text())
+        let analysed = format!("{}\n{}", style::title(&title), analysis.to_text());
+        let excluded = (!rules.are_none()).then(|| applied.to_text(&rules));
+        let checked = (!checks.is_empty()).then(|| checks_text(&checks));
+        [Some(analysed), checked, excluded].into_iter().flatten().collect::<Vec<_>>().join("\n\n")
     };
-    print_result(arguments.json.file(), &analysis, text)?;
-    write_text(arguments.html.as_deref(), || html(&first.begin, &subjects, &analysis))?;
+    let report = Report { analysis: &analysis, checks: &checks, excluded: &applied.excluded };
+    print_result(arguments.json.file(), &report, text)?;
+    write_text(arguments.html.as_deref(), || html(&first.begin, subjects, &analysis))?;
     write_text(arguments.csv.as_deref(), || to_csv([], analysis.responses()))?;
     let Some(path) = &arguments.trials else { return Ok(()) };
     if path.extension().is_none_or(|extension| extension != "csv") {
@@ -125,16 +144,39 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         return Err(CommandError::Usage(format!("--trials {path}: name a file that ends in .csv")));
     }
     let complete: Vec<SittingLog> = logs.into_iter().filter(|log| log.complete).collect();
-    write_text(Some(path), || trials_csv(&complete))?;
+    write_text(Some(path), || trials_csv(&complete, &applied.excluded))?;
     write_text(Some(&path.with_extension("py")), || SCRIPT_PYTHON.to_owned())?;
     write_text(Some(&path.with_extension("R")), || SCRIPT_R.to_owned())
+}
+
+/// A result with what came of checks and exclusion rules; the keys beside those of the analysis are there where the study has them.
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    analysis: &'a Analysis,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    checks: &'a [SubjectChecks],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    excluded: &'a [Exclusion],
+}
+
+fn checks_text(checks: &[SubjectChecks]) -> String {
+    let line = |one: &SubjectChecks| format!("\n  {:<30}{}", one.subject, one.to_text());
+    format!("  Checks{}", checks.iter().map(line).collect::<String>())
 }
 
 /// Every subject by themselves.
 fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), CommandError> {
     let of = |log: &SittingLog| {
+        let (protocol, record) = (&log.begin.protocol, SubjectRecord::of_log(log));
         let incidents: Vec<Incident> = log.incidents.iter().map(|(.., incident)| incident.clone()).collect();
-        SubjectQuality::of(&log.begin.protocol, &SubjectRecord::of_log(log), &incidents)
+        let mut quality = SubjectQuality::of(protocol, &record, &incidents);
+        if log.complete {
+            let rules = log.begin.exclusion();
+            let applied = rules.apply(protocol, vec![record], arguments.estimator, log.begin.rate_hz());
+            quality.flags.extend(applied.excluded.iter().map(|one| one.to_text(&rules)));
+        }
+        quality
     };
     let each: Vec<SubjectQuality> = logs.iter().map(of).collect();
     let text = || {

@@ -31,7 +31,7 @@ use flotor_study::log::{Person, Plan};
 use flotor_study::observer::Population;
 use flotor_study::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
 use flotor_study::protocol::{
-    ComparisonSide, JndDemo, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, Stimulus,
+    Checks, ComparisonSide, JndDemo, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, Stimulus,
     SubjectNumber,
 };
 use serde_json::json;
@@ -248,6 +248,12 @@ struct JndArguments {
     /// Which of a pair comes first
     #[arg(long, value_enum, default_value_t)]
     order: PresentationOrder,
+    /// Catch trials in each track: pairs without any difference, which do not count
+    #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
+    catch_trials: u32,
+    /// Pairs presented once more in each track, which do not count: how alike are the answers?
+    #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
+    repeat_checks: u32,
     /// No practice pairs
     #[arg(long)]
     no_demo: bool,
@@ -266,6 +272,9 @@ struct MagnitudeArguments {
     /// Replications in each modality
     #[arg(long, default_value_t = 3, value_parser = count(1..=1000_u32), value_name = "N")]
     replications: u32,
+    /// Stimuli presented once more in each replication, which do not count: how alike are the ratings?
+    #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
+    repeat_checks: u32,
     /// Stimuli shown before each modality
     #[arg(long, default_value_t = 5, value_parser = count(0..=1000_u32), value_name = "N")]
     demo: u32,
@@ -399,6 +408,7 @@ impl JndArguments {
             order: self.order,
             at_boundary: self.common.boundary.into(),
             demo: JndDemo { shown: !self.no_demo, ..JndDemo::default() },
+            checks: Checks { catch: self.catch_trials, repeats: self.repeat_checks },
         })
     }
 }
@@ -412,6 +422,7 @@ impl MagnitudeArguments {
             replications: self.replications,
             first_modality: self.common.first.into(),
             demo: self.demo,
+            repeat_checks: self.repeat_checks,
             at_boundary: self.common.boundary.into(),
         })
     }
@@ -426,6 +437,11 @@ fn set(scene: &mut Scene, texts: &[&str]) -> Result<(), CommandError> {
 /// Checks everything, then carries the study out; of a force, `way` says how it is felt.
 fn carry_out(common: &Common, protocol: Protocol, way: Option<ForceWay>) -> Result<(), CommandError> {
     protocol.check().map_err(|error| CommandError::Usage(error.to_string()))?;
+    if let Some(plan) = &common.plan {
+        plan.exclusion
+            .check(&protocol)
+            .map_err(|error| CommandError::Usage(format!("{}: {error}", plan.file)))?;
+    }
     let scene = common.scene(protocol.stimulus(), way)?;
     let strength = common.strength.strength();
     let apparatus = Apparatus::check_with(scene, &protocol, strength).map_err(unfit)?;

@@ -1,6 +1,7 @@
 //! From sittings to results: thresholds, Weber fractions, trends, effects, next to what was published.
 
 mod blinded;
+mod checks;
 mod jnd;
 mod kinematics;
 mod magnitude;
@@ -10,6 +11,7 @@ mod subject;
 mod text;
 
 pub use blinded::{BlindedAnalysis, BlindedCell, BlindedRow};
+pub use checks::SubjectChecks;
 pub use jnd::{JndAnalysis, ThresholdCell, WeberFractions, analyse_jnd};
 pub use kinematics::KinematicMeasure;
 pub use magnitude::{MagnitudeAnalysis, RatingCell, analyse_magnitude};

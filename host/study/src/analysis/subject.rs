@@ -1,7 +1,7 @@
 //! One subject by themselves, from the first trial on: the tracks as far as they came, psychometric functions, and whether the
 //! answers are those of somebody who felt what was presented.
 
-use super::SubjectRecord;
+use super::{SubjectChecks, SubjectRecord};
 use crate::estimate::{Observation, Prior, Psychometric, psychometric};
 use crate::log::Incident;
 use crate::protocol::Protocol;
@@ -43,6 +43,8 @@ pub struct SubjectQuality {
     pub dont_know: Option<f64>,
     /// Share of "the first" among the answers that name one.
     pub first: Option<f64>,
+    /// What came of catch trials and repeated ones.
+    pub checks: SubjectChecks,
     /// What is suspicious, a sentence each.
     pub flags: Vec<String>,
 }
@@ -67,6 +69,7 @@ impl SubjectQuality {
             response_time_s: (!times.is_empty()).then_some(quartiles),
             dont_know: share(unsure, first + second + unsure),
             first: share(first, first + second),
+            checks: SubjectChecks::of(record),
             flags: Vec::new(),
             conditions,
         };
@@ -106,6 +109,15 @@ impl SubjectQuality {
         }
         if self.dont_know.is_some_and(|share| share > 0.5) {
             flags.push("more than half of the answers are \"I don't know\"".to_owned());
+        }
+        if self.checks.false_alarm_share().is_some_and(|share| share > 0.5) {
+            flags.push("more than half of the catch trials named one of two equal stimuli".to_owned());
+        }
+        if self.checks.agreement.is_some_and(|share| share < 0.5) {
+            flags.push("fewer than half of the repeated pairs had the same answer".to_owned());
+        }
+        if self.checks.retest_deviation.is_some_and(|share| share > 0.5) {
+            flags.push("a rating and its repetition deviate by more than half of the mean rating".to_owned());
         }
         flags
     }
@@ -156,6 +168,8 @@ impl SubjectQuality {
             let (unsure, first) = (percent(unsure), percent(first));
             lines.push(format!("  \"I don't know\" {unsure}; of the others {first} named the first"));
         }
+        let checks = self.checks.to_text();
+        lines.extend((!checks.is_empty()).then(|| format!("  checks: {checks}")));
         lines.extend(self.flags.iter().map(|flag| format!("  ! {flag}")));
         lines.join("\n")
     }

@@ -13,6 +13,7 @@
 
 mod table;
 
+use crate::exclusion::Exclusion;
 use crate::log::{Begin, Event, LogError, LogWriter, SittingLog};
 use crate::protocol::SubjectNumber;
 use crate::sitting::Sitting;
@@ -287,10 +288,10 @@ impl Dataset {
     }
 }
 
-/// All trials of all sittings as one table with commas, a row each, for other programs.
+/// All trials of all sittings as one table with commas, a row each, for other programs; of what is excluded it says by which rule.
 #[must_use]
-pub fn trials_csv(logs: &[SittingLog]) -> String {
-    table::long(logs)
+pub fn trials_csv(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
+    table::long(logs, excluded)
 }
 
 /// Whether a sitting belongs to the study of a log.

@@ -1,12 +1,13 @@
 //! The tidy tables: one row per presentation, one column per fact, `n/a` for what is not known.
 
 use crate::blinding::Codes;
+use crate::exclusion::Exclusion;
 use crate::kinematics::StimulusKinematics;
 use crate::log::{Begin, SittingLog, TrialRecord};
 use crate::protocol::Protocol;
 use crate::sitting::Verdict;
 use crate::time_of_day::TimeOfDay;
-use crate::trial::{Judgement, Phase, Position, Presented, Response};
+use crate::trial::{Judgement, Position, Presented, Response};
 use serde_json::{Value, json};
 
 /// Missing, as BIDS writes it.
@@ -15,7 +16,10 @@ const MISSING: &str = "n/a";
 /// Name and meaning of each column.
 const COLUMNS: [(&str, &str); 29] = [
     ("trial", "Count of presentations in the sitting, from 1"),
-    ("phase", "practice, or main: only main counts"),
+    (
+        "phase",
+        "practice, main, catch (a pair of equal stimuli) or repeat_check (presented once before): only main counts",
+    ),
     ("replication", "Replication, from 1; 0 for practice"),
     ("track", "Track of the adaptive procedure, from 1; 0 where there is none"),
     ("repeat", "How often this presentation was repeated before because the handle left its range"),
@@ -57,17 +61,20 @@ pub(super) fn trials(log: &SittingLog) -> String {
 }
 
 /// All trials of all sittings as one table with commas, for other programs: subject and first modality before the columns of
-/// [`trials`]; a list in a cell has spaces.
-pub(super) fn long(logs: &[SittingLog]) -> String {
+/// [`trials`], after them the rule that excluded the trial; a list in a cell has spaces.
+pub(super) fn long(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
     let head = COLUMNS.iter().map(|(name, _)| *name);
-    let mut text = ["subject", "first_modality"].into_iter().chain(head).collect::<Vec<_>>().join(",") + "\n";
+    let head = ["subject", "first_modality"].into_iter().chain(head).chain(["excluded"]);
+    let mut text = head.collect::<Vec<_>>().join(",") + "\n";
     for log in logs {
         let codes = Codes::new(&log.begin.protocol, log.begin.seed);
         let subject = log.begin.subject;
         let first = log.begin.protocol.first_modality().of(subject).word();
         for record in &log.trials {
             let cells = row(record, &codes, log.began).into_iter().map(|cell| cell.replace(',', " "));
-            let cells = [subject.to_string(), first.to_owned()].into_iter().chain(cells);
+            let by = excluded.iter().find(|exclusion| exclusion.covers(subject, &record.event.trial));
+            let by = by.map_or(MISSING, |exclusion| exclusion.rule).to_owned();
+            let cells = [subject.to_string(), first.to_owned()].into_iter().chain(cells).chain([by]);
             text += &(cells.collect::<Vec<_>>().join(",") + "\n");
         }
     }
@@ -101,10 +108,7 @@ fn row(record: &TrialRecord, codes: &Codes, began: Option<TimeOfDay>) -> Vec<Str
     let stiffness: Vec<String> = felt.iter().map(|one| number(one.felt_stiffness_n_per_m)).collect();
     vec![
         trial.number.to_string(),
-        match trial.phase {
-            Phase::Practice => "practice".to_owned(),
-            Phase::Main => "main".to_owned(),
-        },
+        trial.phase.word().to_owned(),
         trial.replication.to_string(),
         trial.track.to_string(),
         trial.repeat.to_string(),

@@ -19,6 +19,7 @@ pub use incident::Incident;
 pub use reader::{LogError, LogProblem, SittingLog, TrialRecord};
 pub use writer::LogWriter;
 
+use crate::exclusion::ExclusionRules;
 use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::Verdict;
 use crate::time_of_day::TimeOfDay;
@@ -104,6 +105,19 @@ impl Begin {
         self.observer == serde_json::json!("human")
     }
 
+    /// Rate of the servo, Hz, where a scene was presented.
+    #[must_use]
+    pub fn rate_hz(&self) -> Option<f64> {
+        let scene = self.apparatus.get("scene").filter(|scene| scene.is_object()).unwrap_or(&self.apparatus);
+        scene.get("rate_hz")?.as_f64()
+    }
+
+    /// What does not count, as the study file said.
+    #[must_use]
+    pub fn exclusion(&self) -> ExclusionRules {
+        self.plan.as_ref().map(|plan| plan.exclusion.clone()).unwrap_or_default()
+    }
+
     /// Digest of the configuration: equal for sittings that differ in the subject only.
     #[must_use]
     pub fn config_hash(&self) -> String {
@@ -114,12 +128,18 @@ impl Begin {
 }
 
 /// A study file: what was decided before there were data.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Its name.
     pub file: String,
     /// SHA-256 of its text.
     pub sha256: String,
+    /// Its text, so that a change can be shown.
+    #[serde(skip_serializing_if = "String::is_empty", default)]
+    pub text: String,
+    /// What does not count.
+    #[serde(skip_serializing_if = "ExclusionRules::are_none", default)]
+    pub exclusion: ExclusionRules,
 }
 
 /// What is another part of a sitting, with the first place where the two differ.

@@ -210,7 +210,10 @@ fn a_sitting_of_another_study_says_where_it_differs() {
     let said = now.differs(&earlier).expect("another base");
     assert!(said.starts_with("begun with another protocol: "), "{said}");
     assert!(said.ends_with("bases [26.0], not [17.0,26.0]"), "{said}");
-    let plan = |text: &str| Some(Plan { file: "a.study.toml".to_owned(), sha256: digest(text) });
+    let plan = |text: &str| {
+        let (file, text, sha256) = ("a.study.toml".to_owned(), text.to_owned(), digest(text));
+        Some(Plan { file, sha256, text, exclusion: ExclusionRules::default() })
+    };
     let (one, other) = (Begin { plan: plan("a"), ..begin() }, Begin { plan: plan("b"), ..begin() });
     assert!(one.differs(&one.clone()).is_none());
     let said = other.differs(&one).expect("another file");

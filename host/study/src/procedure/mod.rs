@@ -58,6 +58,15 @@ impl Procedure {
         }
     }
 
+    /// Trials a track takes at least: each reversal is one, and no first trial is a reversal.
+    #[must_use]
+    pub fn trials_least(&self) -> u32 {
+        match self {
+            Self::WeightedUpDown(rule) => rule.stop_after,
+            Self::QuestPlus(rule) => rule.trials,
+        }
+    }
+
     /// The largest difference a track can ask for.
     #[must_use]
     pub fn largest_delta(&self) -> f64 {

@@ -1,7 +1,8 @@
 //! Just noticeable difference: pairs of stimuli, an adaptive procedure for each base and modality.
 
 use super::{
-    AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, extremes, positive_and_different,
+    AtBoundary, Checks, FirstModality, ProtocolError, Stimulus, at_least_one, extremes,
+    positive_and_different,
 };
 use crate::procedure::Procedure;
 use serde::{Deserialize, Serialize};
@@ -72,6 +73,9 @@ pub struct JndProtocol {
     pub at_boundary: AtBoundary,
     /// Practice.
     pub demo: JndDemo,
+    /// Trials that check the subject, in each track.
+    #[serde(default, skip_serializing_if = "Checks::are_none")]
+    pub checks: Checks,
 }
 
 impl Default for JndProtocol {
@@ -87,6 +91,7 @@ impl Default for JndProtocol {
             order: PresentationOrder::default(),
             at_boundary: AtBoundary::default(),
             demo: JndDemo::default(),
+            checks: Checks::default(),
         }
     }
 }
@@ -96,6 +101,11 @@ impl JndProtocol {
         positive_and_different("--bases", &self.bases)?;
         at_least_one("--replications", self.replications)?;
         self.procedure.check()?;
+        if !self.checks.are_none() && self.procedure.trials_least() < 2 {
+            let value = f64::from(self.procedure.trials_least());
+            let what = "trials of a track with checks";
+            return Err(ProtocolError::Value { what, value, legal: "must be 2 or more" });
+        }
         for (what, value) in [("close", self.demo.close), ("nearly equal", self.demo.nearly_equal)] {
             if !(0.0..1.0).contains(&value) {
                 return Err(ProtocolError::Value { what, value, legal: "must be a share from 0 to below 1" });
@@ -119,7 +129,7 @@ impl JndProtocol {
     pub(super) fn presentations_about(&self) -> u64 {
         let practice = if self.demo.shown { 6 } else { 0 };
         practice
-            + u64::from(self.procedure.trials_about())
+            + u64::from(self.procedure.trials_about() + self.checks.in_a_track())
                 * u64::from(self.replications)
                 * self.bases.len() as u64
     }

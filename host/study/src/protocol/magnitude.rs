@@ -35,6 +35,14 @@ pub struct MagnitudeProtocol {
     pub demo: u32,
     /// When the handle leaves its range.
     pub at_boundary: AtBoundary,
+    /// Stimuli presented once more in each replication, to check how alike the ratings are; they do not count.
+    #[serde(default, skip_serializing_if = "is_0")]
+    pub repeat_checks: u32,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+fn is_0(number: &u32) -> bool {
+    *number == 0
 }
 
 impl Default for MagnitudeProtocol {
@@ -47,6 +55,7 @@ impl Default for MagnitudeProtocol {
             first_modality: FirstModality::default(),
             demo: 5,
             at_boundary: AtBoundary::default(),
+            repeat_checks: 0,
         }
     }
 }
@@ -71,7 +80,8 @@ impl MagnitudeProtocol {
 
     /// Demo and replications in both modalities, without repeats.
     pub(super) fn presentations(&self) -> u64 {
-        2 * (u64::from(self.demo) + u64::from(self.replications) * self.values.len() as u64)
+        let one = self.values.len() as u64 + u64::from(self.repeat_checks);
+        2 * (u64::from(self.demo) + u64::from(self.replications) * one)
     }
 
     /// Smallest and largest stimulus.

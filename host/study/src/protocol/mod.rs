@@ -114,6 +114,29 @@ impl Default for AtBoundary {
     }
 }
 
+/// Trials that check whether a subject does what they are asked; none of them counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Checks {
+    /// Pairs without any difference, in each track.
+    pub catch: u32,
+    /// Pairs of the track presented once more in the same order, in each track.
+    pub repeats: u32,
+}
+
+impl Checks {
+    /// Whether there are none, as in protocols from before there were any.
+    #[must_use]
+    pub fn are_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Checks in a track.
+    #[must_use]
+    pub fn in_a_track(self) -> u32 {
+        self.catch + self.repeats
+    }
+}
+
 /// Number of a subject, from 1: all that is known of a person here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "u16", into = "u16")]
@@ -269,6 +292,15 @@ impl Protocol {
         match self {
             Self::Jnd(protocol) => protocol.check(),
             Self::Magnitude(protocol) => protocol.check(),
+        }
+    }
+
+    /// Whether there are trials that check the subject.
+    #[must_use]
+    pub fn has_checks(&self) -> bool {
+        match self {
+            Self::Jnd(protocol) => !protocol.checks.are_none(),
+            Self::Magnitude(protocol) => protocol.repeat_checks > 0,
         }
     }
 

@@ -203,7 +203,7 @@ impl Attended {
         let Some(next) = self.sitting.next() else { return Stage::Ask };
         let pause = if verdict == Verdict::Repeated {
             Some(Pause::OutOfRange)
-        } else if next.phase != before.phase {
+        } else if next.phase.shown() != before.phase.shown() {
             Some(Pause::PhaseChanges)
         } else if next.modality != before.modality {
             Some(Pause::ModalityChanges)
@@ -222,7 +222,7 @@ impl Attended {
         TrialView {
             number: trial.number,
             of_about: self.of_about.max(trial.number.into()),
-            phase: trial.phase,
+            phase: trial.phase.shown(),
             object_is_shown: trial.modality == Modality::Vh,
             repeat: trial.repeat,
             stimuli: trial.presented.values().len(),

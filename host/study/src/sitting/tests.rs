@@ -107,3 +107,90 @@ fn answers_of_the_wrong_kind_change_nothing() {
     let error = rating.answer(Response::Rating(f64::NAN), &Exploration::default());
     assert_eq!(error, Err(AnswerError::NotFinite));
 }
+
+/// Catch trials have no difference, repeated ones are to the bit what was there before; both are placed by the seed, and the
+/// track goes on as if they had not been.
+#[test]
+fn checks_are_placed_by_the_seed_and_do_not_count() {
+    use crate::protocol::Checks;
+    let with = |checks| Protocol::Jnd(JndProtocol { checks, ..JndProtocol::default() });
+    let sit = |protocol: &Protocol, seed| {
+        let mut sitting = Sitting::new(protocol, seed, subject(3));
+        let mut trials: Vec<Trial> = Vec::new();
+        while let Some(trial) = sitting.next() {
+            let verdict = sitting.answer(unsure_below(&trial, 0.1), &Exploration::default()).unwrap();
+            let is_check = matches!(trial.phase, Phase::Catch | Phase::RepeatCheck);
+            assert!(!is_check || verdict == Verdict::Taken);
+            trials.push(trial);
+        }
+        (trials, sitting.results().to_vec())
+    };
+    let protocol = with(Checks { catch: 1, repeats: 2 });
+    let (trials, results) = sit(&protocol, 5);
+    assert_eq!(sit(&protocol, 5).0, trials, "the same seed, the same places");
+    assert_eq!(sit(&with(Checks::default()), 5).1.len(), results.len());
+    let places = |trials: &[Trial]| {
+        let is_check = |(place, trial): (usize, &Trial)| (trial.phase != Phase::Main).then_some(place);
+        trials.iter().enumerate().filter_map(is_check).collect::<Vec<_>>()
+    };
+    assert_ne!(places(&trials), places(&sit(&protocol, 6).0), "another seed, other places");
+    for track in 1..=12 {
+        let here: Vec<&Trial> = trials.iter().filter(|trial| trial.track == track).collect();
+        let count = |phase| here.iter().filter(|trial| trial.phase == phase).count();
+        assert_eq!((count(Phase::Catch), count(Phase::RepeatCheck)), (1, 2), "track {track}");
+        assert_eq!(here[0].phase, Phase::Main);
+        for (place, trial) in here.iter().enumerate() {
+            let Presented::Pair(pair) = trial.presented else { panic!("{trial:?}") };
+            if trial.phase == Phase::Catch {
+                assert_eq!((pair.delta, pair.base), (0.0, pair.comparison));
+            }
+            if trial.phase == Phase::RepeatCheck {
+                let before = here[..place].iter().filter(|other| other.phase == Phase::Main);
+                assert!(before.clone().any(|other| other.presented == trial.presented), "{trial:?}");
+            }
+        }
+    }
+    // Which of a pair comes first is drawn by the number of the trial: only the differences can be compared.
+    let deltas = |trials: &[Trial]| {
+        let main = trials.iter().filter(|trial| trial.phase == Phase::Main);
+        main.filter_map(|trial| match trial.presented {
+            Presented::Pair(pair) => Some(pair.delta),
+            Presented::One { .. } => None,
+        })
+        .collect::<Vec<_>>()
+    };
+    assert_eq!(deltas(&trials), deltas(&sit(&with(Checks::default()), 5).0));
+}
+
+/// Right where the difference is large, else "I don't know".
+fn unsure_below(trial: &Trial, least: f64) -> Response {
+    match trial.presented {
+        Presented::Pair(pair) if trial.phase != Phase::Practice && pair.delta < least => Response::DontKnow,
+        _ => right(trial),
+    }
+}
+
+#[test]
+fn a_rating_is_asked_for_once_more_and_not_right_after() {
+    let magnitude = MagnitudeProtocol { repeat_checks: 3, ..MagnitudeProtocol::default() };
+    let mut sitting = Sitting::new(&Protocol::Magnitude(magnitude), 1, subject(2));
+    let mut trials = Vec::new();
+    while let Some(trial) = sitting.next() {
+        trials.push(trial);
+        sitting.answer(right(&trial), &Exploration::default()).unwrap();
+    }
+    let main = trials.iter().filter(|trial| trial.phase == Phase::Main).count();
+    let checks: Vec<usize> =
+        (0..trials.len()).filter(|place| trials[*place].phase == Phase::RepeatCheck).collect();
+    assert_eq!((main, checks.len()), (72, 18));
+    for place in checks {
+        let check = trials[place];
+        let same = |other: &Trial| {
+            other.phase == Phase::Main
+                && (other.modality, other.replication) == (check.modality, check.replication)
+                && other.presented == check.presented
+        };
+        let first = trials[..place].iter().rposition(same).expect("it was presented before");
+        assert!(trials[first + 1..place].iter().any(|other| other.phase == Phase::Main), "{check:?}");
+    }
+}

@@ -7,6 +7,7 @@
 use super::{StudyArguments, Task};
 use clap::{Args, FromArgMatches};
 use flotor_command::CommandError;
+use flotor_study::exclusion::ExclusionRules;
 use flotor_study::log::{Plan, digest};
 use serde::Deserialize;
 use std::ffi::OsString;
@@ -21,11 +22,18 @@ const PATHS: [&str; 4] = ["out", "scene", "consent", "instructions"];
 #[command(
     after_help = "A study file has the task, what was decided beforehand, and options of that task by name:\n  \
     task = \"jnd\"\n  \
-    exclusion = \"sittings with more than a fifth of don't-know answers\"\n  \
-    analysis = \"mixed ANOVA of the Weber fractions, Holm's correction\"\n  \
+      analysis = \"mixed ANOVA of the Weber fractions, Holm's correction\"\n  \
     [options]\n  \
     out = \"data\"\n  \
-    bases = [17, 26, 35]\n\n\
+    bases = [17, 26, 35]\n  \
+    catch_trials = 1\n  \
+    [exclusion]\n  \
+    most_false_alarms = 0.5\n  \
+    response_time_s = [0.2, 20]\n\n\
+    Exclusion rules, which `flotor analyse` applies. About a sitting, the largest or least share: most_false_alarms (of \
+    catch trials), least_agreement (of repeated pairs), most_retest_deviation (of repeated ratings), most_dont_know, \
+    most_missed_ticks, most_excluded_trials. About a trial: response_time_s = [shortest, longest], least_movement_mm; a \
+    trial of an adaptive track takes the track with it, unless the estimator is map.\n\n\
     Examples:\n  \
     flotor study run weber.study.toml\n  \
     flotor study run weber.study.toml --observer human --subject 3\n  \
@@ -48,8 +56,7 @@ struct StudyFile {
     task: TaskName,
     /// When a sitting or a trial does not count, decided beforehand.
     #[serde(default)]
-    #[allow(dead_code)] // for people, and for the digest
-    exclusion: String,
+    exclusion: ExclusionRules,
     /// What is to be computed, decided beforehand.
     #[serde(default)]
     #[allow(dead_code)] // for people, and for the digest
@@ -81,7 +88,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
     let text = std::fs::read_to_string(&file)
         .map_err(|cause| CommandError::Usage(format!("{}: {cause}; name a study file", file.display())))?;
-    let words = words(&file, &text, further)?;
+    let (words, exclusion) = words(&file, &text, further)?;
     let command = clap::Command::new("study").no_binary_name(true);
     let matches = StudyArguments::augment_args(command)
         .try_get_matches_from(words)
@@ -89,7 +96,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let mut study = StudyArguments::from_arg_matches(&matches)
         .map_err(|error| CommandError::Usage(of_file(&file, &error.to_string())))?;
     let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let plan = Plan { file: name, sha256: digest(&text) };
+    let plan = Plan { file: name, sha256: digest(&text), text, exclusion };
     match &mut study.task {
         Task::Jnd(task) => task.common.plan = Some(plan),
         Task::Magnitude(task) => task.common.plan = Some(plan),
@@ -116,8 +123,12 @@ fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
     }
 }
 
-/// The command line that says what a study file says, from the task on.
-fn words(file: &Path, text: &str, further: Vec<OsString>) -> Result<Vec<OsString>, CommandError> {
+/// The command line that says what a study file says, from the task on, and what does not count.
+fn words(
+    file: &Path,
+    text: &str,
+    further: Vec<OsString>,
+) -> Result<(Vec<OsString>, ExclusionRules), CommandError> {
     let study: StudyFile =
         toml::from_str(text).map_err(|error| CommandError::Usage(of_file(file, &error.to_string())))?;
     let task = match study.task {
@@ -157,7 +168,7 @@ fn words(file: &Path, text: &str, further: Vec<OsString>) -> Result<Vec<OsString
     if !words.iter().any(|word| word == "--resume") {
         words.push("--resume".into());
     }
-    Ok(words)
+    Ok((words, study.exclusion))
 }
 
 fn plain(value: &toml::Value) -> String {
@@ -175,12 +186,12 @@ fn of_file(file: &Path, reason: &str) -> String {
 mod tests {
     use super::*;
 
-    const FILE: &str = "task = \"jnd\"\nexclusion = \"none\"\n[options]\nout = \"data\"\nbases = [17, 26.5]\nno_demo = true\n\
+    const FILE: &str = "task = \"jnd\"\n[options]\nout = \"data\"\nbases = [17, 26.5]\nno_demo = true\n\
                         set = [\"spring.wire=1\", \"device.hand=hold\"]\nsubjects = 4\n";
 
     fn said(text: &str, further: &[&str]) -> Vec<String> {
         let further = further.iter().map(OsString::from).collect();
-        let words = words(Path::new("here/weber.study.toml"), text, further).expect("a study file");
+        let (words, _) = words(Path::new("here/weber.study.toml"), text, further).expect("a study file");
         words.into_iter().map(|word| word.to_string_lossy().into_owned()).collect()
     }
 
@@ -206,7 +217,13 @@ mod tests {
 
     #[test]
     fn what_is_no_study_file_is_refused_with_its_name() {
-        for wrong in ["", "task = \"nothing\"", "task = \"jnd\"\nexclusions = \"x\"", "task = "] {
+        for wrong in [
+            "",
+            "task = \"nothing\"",
+            "task = \"jnd\"\nexclusion = \"x\"",
+            "task = \"jnd\"\n[exclusion]\nmost = 1",
+            "task = ",
+        ] {
             let error = words(Path::new("a.study.toml"), wrong, Vec::new()).expect_err("it is none");
             assert!(error.to_string().starts_with("a.study.toml: "), "{error}");
             assert_eq!(error.to_string().lines().count(), 1, "{error}");

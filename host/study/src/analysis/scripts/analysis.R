@@ -9,7 +9,7 @@ arguments <- commandArgs(trailingOnly = TRUE)
 script <- sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE))
 path <- if (length(arguments) > 0) arguments[1] else sub("\\.R$", ".csv", script)
 trials <- read.csv(path, na.strings = "n/a")
-counted <- trials[trials$phase == "main" & trials$repeated == 0, ]
+counted <- trials[trials$phase == "main" & trials$repeated == 0 & is.na(trials$excluded), ]
 is_jnd <- any(!is.na(counted$base))
 level_name <- if (is_jnd) "base" else "stimulus"
 

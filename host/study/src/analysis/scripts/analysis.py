@@ -16,7 +16,7 @@ from scipy import stats
 
 path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".csv")
 trials = pd.read_csv(path, na_values="n/a")
-counted = trials[(trials.phase == "main") & (trials.repeated == 0)]
+counted = trials[(trials.phase == "main") & (trials.repeated == 0) & trials.excluded.isna()]
 is_jnd = counted.base.notna().any()
 LEVEL = "base" if is_jnd else "stimulus"
 

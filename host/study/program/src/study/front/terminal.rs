@@ -110,8 +110,8 @@ fn place(trial: &TrialView) -> String {
 fn pause(reason: Pause, next: &TrialView) -> &'static str {
     match (reason, next.phase, next.object_is_shown) {
         (Pause::Welcome, ..) => "Ready",
-        (Pause::PhaseChanges, Phase::Main, _) => "Practice is over: the next answers count",
         (Pause::PhaseChanges, Phase::Practice, _) => "Practice: these answers do not count",
+        (Pause::PhaseChanges, ..) => "Practice is over: the next answers count",
         (Pause::ModalityChanges, _, true) => "From now on you see what you feel",
         (Pause::ModalityChanges, _, false) => "From now on you feel only",
         (Pause::Rest, ..) => "Time to rest your hand",

@@ -1,0 +1,382 @@
+//! What does not count, by rules that were decided before there were data, and what each rule found.
+//!
+//! A rule is about a whole sitting (`most_...`, `least_agreement`), or about single trials (`response_time_s`,
+//! `least_movement_mm`). A trial of ratings is left out by itself. A trial of an adaptive track takes the track with it, because
+//! the differences after it follow from its answer; only an estimate from all answers (`--estimator map`) can do without
+//! that trial alone.
+
+use crate::analysis::{Estimator, SubjectChecks, SubjectRecord};
+use crate::log::TrialEvent;
+use crate::protocol::{Protocol, SubjectNumber};
+use crate::trial::{Modality, Phase, Presented, Response, Trial};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// The rules of a study; what is not said excludes nothing.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExclusionRules {
+    /// Sitting: largest share of catch trials in which one of two equal stimuli was named.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub most_false_alarms: Option<f64>,
+    /// Sitting: least share of repeated pairs with the same answer.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub least_agreement: Option<f64>,
+    /// Sitting: largest deviation of a repeated rating, as a share of the mean rating.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub most_retest_deviation: Option<f64>,
+    /// Sitting: largest share of "I don't know".
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub most_dont_know: Option<f64>,
+    /// Sitting: largest share of missed ticks while stimuli were felt.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub most_missed_ticks: Option<f64>,
+    /// Trial: least way of the handle with each stimulus, up and down together, mm.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub least_movement_mm: Option<f64>,
+    /// Trial: shortest and longest time to the answer, s.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub response_time_s: Option<[f64; 2]>,
+    /// Sitting: largest share of trials that the rules about trials exclude.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub most_excluded_trials: Option<f64>,
+}
+
+/// What is excluded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scope {
+    /// Everything of the subject.
+    Sitting,
+    /// One track, by its number.
+    Track(u32),
+    /// One trial, by its number.
+    Trial(u32),
+}
+
+/// Something that was excluded.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Exclusion {
+    /// Whose.
+    pub subject: SubjectNumber,
+    /// What.
+    pub scope: Scope,
+    /// By which rule, as the study file has it.
+    pub rule: &'static str,
+    /// What was found.
+    pub found: String,
+}
+
+impl Exclusion {
+    /// Whether a trial that would count is excluded by this.
+    #[must_use]
+    pub fn covers(&self, subject: SubjectNumber, trial: &Trial) -> bool {
+        let is_here = match self.scope {
+            Scope::Sitting => true,
+            Scope::Track(track) => trial.track == track,
+            Scope::Trial(number) => trial.number == number,
+        };
+        self.subject == subject && trial.phase == Phase::Main && is_here
+    }
+}
+
+/// What the rules leave, and what they took.
+#[derive(Clone, Debug, Default)]
+pub struct Applied {
+    /// What is left to analyse.
+    pub kept: Vec<SubjectRecord>,
+    /// What was excluded.
+    pub excluded: Vec<Exclusion>,
+    /// Rules that could not be applied, with whom and why.
+    pub not_known: Vec<String>,
+}
+
+impl Exclusion {
+    /// One line for people.
+    #[must_use]
+    pub fn to_text(&self, rules: &ExclusionRules) -> String {
+        format!("excluded: {}, {} ({})", self.scope, rules.text_of(self.rule), self.found)
+    }
+}
+
+impl std::fmt::Display for Scope {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Sitting => f.write_str("sitting"),
+            Self::Track(track) => write!(f, "track {track}"),
+            Self::Trial(trial) => write!(f, "trial {trial}"),
+        }
+    }
+}
+
+impl ExclusionRules {
+    /// Whether there are no rules.
+    #[must_use]
+    pub fn are_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether the rules make sense for this experiment.
+    ///
+    /// # Errors
+    /// The first that does not, in words.
+    pub fn check(&self, protocol: &Protocol) -> Result<(), String> {
+        let shares = [
+            ("most_false_alarms", self.most_false_alarms),
+            ("least_agreement", self.least_agreement),
+            ("most_dont_know", self.most_dont_know),
+            ("most_missed_ticks", self.most_missed_ticks),
+            ("most_excluded_trials", self.most_excluded_trials),
+        ];
+        for (rule, share) in shares {
+            if share.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
+                return Err(format!("exclusion.{rule}: a share from 0 to 1"));
+            }
+        }
+        for (rule, value) in [
+            ("most_retest_deviation", self.most_retest_deviation),
+            ("least_movement_mm", self.least_movement_mm),
+        ] {
+            if value.is_some_and(|value| !(value > 0.0 && value.is_finite())) {
+                return Err(format!("exclusion.{rule}: a number above 0"));
+            }
+        }
+        if self.response_time_s.is_some_and(|[shortest, longest]| !(0.0 <= shortest && shortest < longest)) {
+            return Err("exclusion.response_time_s: the shortest and the longest time, s".to_owned());
+        }
+        let has_trial_rule = self.least_movement_mm.is_some() || self.response_time_s.is_some();
+        if self.most_excluded_trials.is_some() && !has_trial_rule {
+            return Err(
+                "exclusion.most_excluded_trials needs response_time_s or least_movement_mm".to_owned()
+            );
+        }
+        let (catch, repeats, is_jnd) = match protocol {
+            Protocol::Jnd(jnd) => (jnd.checks.catch, jnd.checks.repeats, true),
+            Protocol::Magnitude(magnitude) => (0, magnitude.repeat_checks, false),
+        };
+        for (rule, is_said, is_had, needs) in [
+            (
+                "most_false_alarms",
+                self.most_false_alarms,
+                catch > 0,
+                "catch_trials of a difference experiment",
+            ),
+            (
+                "least_agreement",
+                self.least_agreement,
+                is_jnd && repeats > 0,
+                "repeat_checks of a difference experiment",
+            ),
+            (
+                "most_retest_deviation",
+                self.most_retest_deviation,
+                !is_jnd && repeats > 0,
+                "repeat_checks of an experiment with ratings",
+            ),
+            ("most_dont_know", self.most_dont_know, is_jnd, "a difference experiment"),
+        ] {
+            if is_said.is_some() && !is_had {
+                return Err(format!("exclusion.{rule} needs {needs}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Applies the rules to complete sittings; `rate_hz` is the rate of the servo, if there was one.
+    #[must_use]
+    pub fn apply(
+        &self,
+        protocol: &Protocol,
+        subjects: Vec<SubjectRecord>,
+        estimator: Estimator,
+        rate_hz: Option<f64>,
+    ) -> Applied {
+        let mut applied = Applied::default();
+        for record in subjects {
+            let before = applied.excluded.len();
+            let trials = self.trials(&record, estimator, &mut applied);
+            self.sitting(&record, &trials, rate_hz, &mut applied);
+            let new = applied.excluded.split_off(before);
+            let is_out = |exclusion: &&Exclusion| exclusion.scope == Scope::Sitting;
+            if let Some(whole) = new.iter().find(is_out) {
+                applied.excluded.push(whole.clone());
+                continue;
+            }
+            let kept = without(record, &new);
+            let missing = missing_condition(protocol, &kept);
+            let subject = kept.subject;
+            applied.excluded.extend(new);
+            match missing {
+                // Nothing to compare with would be left: the whole sitting goes.
+                Some((modality, level)) => applied.excluded.push(Exclusion {
+                    subject,
+                    scope: Scope::Sitting,
+                    rule: "nothing left",
+                    found: format!("{} at {level}", modality.word()),
+                }),
+                None => applied.kept.push(kept),
+            }
+        }
+        applied.not_known.sort_unstable();
+        applied.not_known.dedup();
+        applied
+    }
+
+    /// Rules about trials. Returns the numbers of the trials excluded.
+    fn trials(&self, record: &SubjectRecord, estimator: Estimator, applied: &mut Applied) -> BTreeSet<u32> {
+        let mut numbers = BTreeSet::new();
+        for event in record.counted() {
+            let Some((rule, found)) = self.of_trial(event, applied) else { continue };
+            let Trial { number, track, .. } = event.trial;
+            numbers.insert(number);
+            let (scope, found) = match estimator {
+                Estimator::Procedure if track > 0 => {
+                    (Scope::Track(track), format!("trial {number}: {found}"))
+                }
+                _ => (Scope::Trial(number), found),
+            };
+            let is_known = |known: &Exclusion| known.subject == record.subject && known.scope == scope;
+            if !applied.excluded.iter().any(is_known) {
+                applied.excluded.push(Exclusion { subject: record.subject, scope, rule, found });
+            }
+        }
+        numbers
+    }
+
+    fn of_trial(&self, event: &TrialEvent, applied: &mut Applied) -> Option<(&'static str, String)> {
+        let exploration = &event.exploration;
+        if let Some([shortest, longest]) = self.response_time_s {
+            match exploration.response_time_s {
+                Some(time_s) if !(shortest..=longest).contains(&time_s) => {
+                    return Some(("response_time_s", format!("{time_s:.2} s")));
+                }
+                Some(_) => {}
+                None => {
+                    applied.not_known.push("response_time_s: not known of simulated observers".to_owned())
+                }
+            }
+        }
+        let least_mm = self.least_movement_mm?;
+        if exploration.kinematics.is_empty() {
+            applied.not_known.push("least_movement_mm: no movement was stored".to_owned());
+        }
+        let ways_mm =
+            exploration.kinematics.iter().map(|one| 1.0e3 * one.mean_speed_m_per_s * one.duration_s);
+        let least = ways_mm.fold(f64::INFINITY, f64::min);
+        (least < least_mm).then(|| ("least_movement_mm", format!("{least:.1} mm")))
+    }
+
+    fn sitting(
+        &self,
+        record: &SubjectRecord,
+        trials: &BTreeSet<u32>,
+        rate_hz: Option<f64>,
+        applied: &mut Applied,
+    ) {
+        let checks = SubjectChecks::of(record);
+        let counted: Vec<&TrialEvent> = record.counted().collect();
+        let share = |part: usize| (!counted.is_empty()).then(|| part as f64 / counted.len() as f64);
+        let unsure = counted.iter().filter(|event| event.response == Response::DontKnow).count();
+        let missed = missed_share(&counted, rate_hz);
+        if self.most_missed_ticks.is_some() && missed.is_none() {
+            applied.not_known.push("most_missed_ticks: no movement was stored".to_owned());
+        }
+        let above = |most: Option<f64>, found: Option<f64>| {
+            Some((most?, found?)).filter(|(most, found)| found > most)
+        };
+        let below = |least: Option<f64>, found: Option<f64>| {
+            Some((least?, found?)).filter(|(least, found)| found < least)
+        };
+        let found = [
+            ("most_false_alarms", above(self.most_false_alarms, checks.false_alarm_share())),
+            ("least_agreement", below(self.least_agreement, checks.agreement)),
+            ("most_retest_deviation", above(self.most_retest_deviation, checks.retest_deviation)),
+            ("most_dont_know", above(self.most_dont_know, share(unsure))),
+            ("most_missed_ticks", above(self.most_missed_ticks, missed)),
+            ("most_excluded_trials", above(self.most_excluded_trials, share(trials.len()))),
+        ];
+        let first = found.into_iter().find_map(|(rule, outside)| Some((rule, outside?.1)));
+        applied.excluded.extend(first.map(|(rule, value)| Exclusion {
+            subject: record.subject,
+            scope: Scope::Sitting,
+            rule,
+            found: format!("{value:.3}"),
+        }));
+    }
+
+    /// The rule as the study file has it: `most_false_alarms = 0.5`.
+    #[must_use]
+    pub fn text_of(&self, rule: &str) -> String {
+        let said = serde_json::to_value(self).unwrap_or_default();
+        said.get(rule).map_or_else(|| rule.to_owned(), |value| format!("{rule} = {value}"))
+    }
+
+    /// The rules by name.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        let said = serde_json::to_value(self).unwrap_or_default();
+        said.as_object().map(|rules| rules.keys().cloned().collect()).unwrap_or_default()
+    }
+}
+
+impl Applied {
+    /// What was excluded by which rule, for people.
+    #[must_use]
+    pub fn to_text(&self, rules: &ExclusionRules) -> String {
+        let mut lines = vec![
+            "  Excluded                      by rule of the study file                     found".to_owned(),
+        ];
+        for Exclusion { subject, scope, rule, found } in &self.excluded {
+            lines.push(format!("  {:<30}{:<46}{found}", format!("{subject} {scope}"), rules.text_of(rule)));
+        }
+        for rule in rules.names() {
+            let unknown = self.not_known.iter().find(|text| text.starts_with(&rule));
+            let took = self.excluded.iter().any(|exclusion| exclusion.rule == rule);
+            match unknown {
+                Some(why) => lines.push(format!("  not applied                   {why}")),
+                None if !took => {
+                    lines.push(format!("  nothing                       {}", rules.text_of(&rule)))
+                }
+                None => {}
+            }
+        }
+        lines.join("\n")
+    }
+}
+
+/// Share of the ticks missed while stimuli were felt.
+fn missed_share(counted: &[&TrialEvent], rate_hz: Option<f64>) -> Option<f64> {
+    let felt = counted.iter().filter(|event| !event.exploration.kinematics.is_empty());
+    let time_s =
+        |event: &&&TrialEvent| event.exploration.kinematics.iter().map(|one| one.duration_s).sum::<f64>();
+    let ticks = felt.clone().map(|event| time_s(&event)).sum::<f64>() * rate_hz?;
+    let missed: u64 = felt.map(|event| event.exploration.missed_ticks).sum();
+    (ticks > 0.0).then(|| missed as f64 / ticks)
+}
+
+fn without(mut record: SubjectRecord, excluded: &[Exclusion]) -> SubjectRecord {
+    let subject = record.subject;
+    record.trials.retain(|event| !excluded.iter().any(|exclusion| exclusion.covers(subject, &event.trial)));
+    record
+        .tracks
+        .retain(|track| !excluded.iter().any(|exclusion| exclusion.scope == Scope::Track(track.track)));
+    record
+}
+
+/// A condition of which nothing is left.
+fn missing_condition(protocol: &Protocol, record: &SubjectRecord) -> Option<(Modality, f64)> {
+    let level = |event: &TrialEvent| match event.trial.presented {
+        Presented::Pair(pair) => pair.base,
+        Presented::One { value } => value,
+    };
+    let all = Modality::ALL
+        .into_iter()
+        .flat_map(|modality| protocol.levels().iter().map(move |at| (modality, *at)));
+    let is_there = |(modality, at): (Modality, f64)| {
+        record.counted().any(|event| event.trial.modality == modality && level(event) == at)
+    };
+    all.into_iter().find(|condition| !is_there(*condition))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,171 @@
+use super::*;
+use crate::kinematics::StimulusKinematics;
+use crate::protocol::{Checks, JndProtocol, MagnitudeProtocol};
+use crate::sitting::Sitting;
+use crate::trial::{Exploration, Position};
+
+fn number(number: u16) -> SubjectNumber {
+    SubjectNumber::new(number).unwrap()
+}
+
+fn jnd() -> Protocol {
+    let checks = Checks { catch: 1, repeats: 1 };
+    let mut jnd = JndProtocol { bases: vec![26.0], replications: 4, checks, ..JndProtocol::default() };
+    jnd.demo.shown = false;
+    Protocol::Jnd(jnd)
+}
+
+/// A sitting with answers and movements given by the trial.
+fn sit(
+    protocol: &Protocol,
+    subject: u16,
+    respond: impl Fn(&Trial) -> Response,
+    time_s: impl Fn(&Trial) -> f64,
+) -> SubjectRecord {
+    let subject = number(subject);
+    let mut sitting = Sitting::new(protocol, 1, subject);
+    let mut trials = Vec::new();
+    while let Some(trial) = sitting.next() {
+        let felt = StimulusKinematics {
+            duration_s: 1.0,
+            mean_speed_m_per_s: 0.02,
+            mean_acceleration_m_per_s2: 0.0,
+            mean_force_n: 1.0,
+            peak_force_n: 1.0,
+            cycles: 1,
+            felt_stiffness_n_per_m: None,
+        };
+        let exploration = Exploration {
+            response_time_s: Some(time_s(&trial)),
+            kinematics: vec![felt; trial.presented.values().len()],
+            missed_ticks: u64::from(subject.get() == 3) * 200,
+            ..Exploration::default()
+        };
+        let response = respond(&trial);
+        let verdict = sitting.answer(response, &exploration).unwrap();
+        trials.push(TrialEvent { trial, response, verdict, exploration });
+    }
+    let first_modality = protocol.first_modality().of(subject);
+    SubjectRecord { subject, first_modality, trials, tracks: sitting.results().to_vec() }
+}
+
+/// Names the larger one if it is much larger; `trigger` says what of equal ones.
+fn honest(trial: &Trial, of_equal: Response) -> Response {
+    match trial.presented {
+        Presented::One { value } => Response::Rating(value),
+        Presented::Pair(pair) if pair.delta == 0.0 && trial.phase == Phase::Catch => of_equal,
+        Presented::Pair(pair) if pair.delta < 0.1 => Response::DontKnow,
+        Presented::Pair(pair) if pair.larger_at == Position::First => Response::First,
+        Presented::Pair(_) => Response::Second,
+    }
+}
+
+fn all(protocol: &Protocol) -> Vec<SubjectRecord> {
+    let usual = |_: &Trial| 1.0;
+    vec![
+        sit(protocol, 1, |trial| honest(trial, Response::DontKnow), usual),
+        sit(protocol, 2, |trial| honest(trial, Response::First), usual),
+        sit(protocol, 3, |trial| honest(trial, Response::DontKnow), usual),
+        sit(
+            protocol,
+            4,
+            |trial| honest(trial, Response::DontKnow),
+            |trial| {
+                if trial.track == 2 && trial.phase == Phase::Main { 0.1 } else { 1.0 }
+            },
+        ),
+    ]
+}
+
+#[test]
+fn each_rule_excludes_what_it_names_and_nothing_else() {
+    let protocol = jnd();
+    let excluded = |rules: &ExclusionRules, estimator| {
+        rules.check(&protocol).unwrap();
+        rules.apply(&protocol, all(&protocol), estimator, Some(1000.0))
+    };
+    let none = excluded(&ExclusionRules::default(), Estimator::Procedure);
+    assert_eq!((none.kept.len(), none.excluded.len()), (4, 0));
+    for (rules, subject, rule) in [
+        (
+            ExclusionRules { most_false_alarms: Some(0.5), ..ExclusionRules::default() },
+            2,
+            "most_false_alarms",
+        ),
+        (
+            ExclusionRules { most_missed_ticks: Some(0.05), ..ExclusionRules::default() },
+            3,
+            "most_missed_ticks",
+        ),
+    ] {
+        let applied = excluded(&rules, Estimator::Procedure);
+        let [Exclusion { subject: who, scope: Scope::Sitting, rule: by, .. }] = applied.excluded.as_slice()
+        else {
+            panic!("{:?}", applied.excluded)
+        };
+        assert_eq!((who.get(), *by, applied.kept.len()), (subject, rule, 3));
+        assert!(applied.to_text(&rules).contains(&rules.text_of(rule)));
+    }
+    let times = ExclusionRules { response_time_s: Some([0.2, 20.0]), ..ExclusionRules::default() };
+    let applied = excluded(&times, Estimator::Procedure);
+    let [Exclusion { subject: who, scope: Scope::Track(2), .. }] = applied.excluded.as_slice() else {
+        panic!("{:?}", applied.excluded)
+    };
+    let kept = applied.kept.iter().find(|record| record.subject == *who).unwrap();
+    assert_eq!((who.get(), kept.tracks.len()), (4, 3));
+    assert!(kept.counted().all(|event| event.trial.track != 2));
+    let applied = excluded(&times, Estimator::Map);
+    assert!(applied.excluded.len() > 5, "trial by trial: {:?}", applied.excluded);
+    let few = ExclusionRules { most_excluded_trials: Some(0.1), ..times };
+    let applied = excluded(&few, Estimator::Map);
+    assert_eq!((applied.excluded.len(), applied.kept.len()), (1, 3), "{:?}", applied.excluded);
+    let movement = ExclusionRules { least_movement_mm: Some(30.0), ..ExclusionRules::default() };
+    let applied = excluded(&movement, Estimator::Procedure);
+    assert_eq!(applied.kept.len(), 0, "nobody moved 30 mm");
+    assert!(applied.excluded.iter().any(|exclusion| exclusion.rule == "nothing left"));
+}
+
+#[test]
+fn rules_that_cannot_be_are_refused_with_their_name() {
+    let magnitude = Protocol::Magnitude(MagnitudeProtocol::default());
+    let none = ExclusionRules::default();
+    for (protocol, rules, name) in [
+        (jnd(), ExclusionRules { most_dont_know: Some(1.5), ..none.clone() }, "most_dont_know"),
+        (jnd(), ExclusionRules { response_time_s: Some([3.0, 2.0]), ..none.clone() }, "response_time_s"),
+        (jnd(), ExclusionRules { least_movement_mm: Some(f64::NAN), ..none.clone() }, "least_movement_mm"),
+        (jnd(), ExclusionRules { most_excluded_trials: Some(0.5), ..none.clone() }, "most_excluded_trials"),
+        (magnitude.clone(), ExclusionRules { most_false_alarms: Some(0.5), ..none.clone() }, "catch_trials"),
+        (
+            magnitude.clone(),
+            ExclusionRules { most_retest_deviation: Some(0.5), ..none.clone() },
+            "repeat_checks",
+        ),
+        (magnitude, ExclusionRules { most_dont_know: Some(0.5), ..none }, "most_dont_know"),
+    ] {
+        assert!(rules.check(&protocol).unwrap_err().contains(name), "{name}");
+    }
+}
+
+/// Without answers that check anything nothing is said; with them, the shares are those that were answered.
+#[test]
+fn checks_are_counted_by_what_was_answered() {
+    let records = all(&jnd());
+    let checks: Vec<SubjectChecks> = records.iter().map(SubjectChecks::of).collect();
+    assert_eq!(checks.iter().map(|one| one.catch_trials).collect::<Vec<_>>(), [4; 4]);
+    assert_eq!(checks.iter().map(|one| one.false_alarms).collect::<Vec<_>>(), [0, 4, 0, 0]);
+    assert!(checks.iter().all(|one| one.agreement == Some(1.0) && one.repeat_checks == 4), "{checks:?}");
+    let magnitude = MagnitudeProtocol { repeat_checks: 2, ..MagnitudeProtocol::default() };
+    let exact =
+        sit(&Protocol::Magnitude(magnitude.clone()), 1, |trial| honest(trial, Response::DontKnow), |_| 1.0);
+    assert_eq!(SubjectChecks::of(&exact).retest_deviation, Some(0.0));
+    // Every second rating is larger by 2: deviation of a single one is 2 / sqrt(2) where the two differ.
+    let rate = |trial: &Trial| match trial.presented {
+        Presented::One { value } => {
+            Response::Rating(value + f64::from(u8::from(trial.phase == Phase::RepeatCheck)) * 2.0)
+        }
+        Presented::Pair(_) => Response::DontKnow,
+    };
+    let one = SubjectChecks::of(&sit(&Protocol::Magnitude(magnitude), 1, rate, |_| 1.0));
+    let expected = 2.0_f64.sqrt() / 30.0;
+    assert!((one.retest_deviation.unwrap() - expected).abs() < 1.0e-12, "{one:?}");
+}

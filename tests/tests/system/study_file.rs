@@ -1,0 +1,86 @@
+//! A study that is a file: its options, its checks, and its exclusion rules up to the analysis.
+
+#![allow(clippy::unwrap_used)] // tests may panic
+
+use flotor_study::log::SittingLog;
+use flotor_study::trial::Phase;
+use flotor_tests::program::{Flotor, Ran, exit_code};
+use flotor_tests::scratch::Scratch;
+use serde_json::Value;
+use std::path::Path;
+
+const FILE: &str = "task = \"jnd\"\n[options]\nout = \"data\"\nsubjects = 6\napparatus = \"none\"\nbases = [17, 26]\n\
+                    replications = 2\ncatch_trials = 1\nrepeat_checks = 2\n";
+
+fn flotor(folder: &Path, arguments: &[&str]) -> Ran {
+    Flotor::with(arguments).inside(folder).run()
+}
+
+fn log(folder: &Path, subject: u16) -> SittingLog {
+    SittingLog::read(
+        &folder.join(format!("data/sourcedata/sub-{subject:02}/sub-{subject:02}_task-jnd_log.jsonl")),
+    )
+    .unwrap()
+}
+
+/// Checks are in the log and in the table and do not count; what the rules of the file exclude is left out of the analysis, listed
+/// with its rule, and marked in the table of trials.
+#[test]
+fn checks_and_exclusion_rules_of_a_study_file_reach_the_analysis() {
+    let scratch = Scratch::default();
+    let folder = scratch.path();
+    // Who names one of two equal springs in more than a quarter of the catch trials, or is mostly unsure.
+    let rules = "[exclusion]\nmost_false_alarms = 0.25\nresponse_time_s = [0.2, 20]\n";
+    let _ = scratch.file("a.study.toml", &format!("{FILE}{rules}"));
+    let ran = flotor(folder, &["study", "run", "a.study.toml"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let first = log(folder, 1);
+    let count = |phase| first.trials.iter().filter(|record| record.event.trial.phase == phase).count();
+    assert_eq!((count(Phase::Catch), count(Phase::RepeatCheck)), (4, 8));
+
+    let analyse = ["analyse", "data", "--json", "result.json", "--trials", "trials.csv"];
+    let ran = flotor(folder, &analyse);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(ran.stdout.contains("catch trials named one of two equal stimuli"), "{ran:?}");
+    assert!(ran.stdout.contains("most_false_alarms = 0.25"), "{ran:?}");
+    assert!(ran.stdout.contains("response_time_s: not known of simulated observers"), "{ran:?}");
+    let result: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join("result.json")).unwrap()).unwrap();
+    let alarms = result["checks"].as_array().unwrap();
+    let out: Vec<&str> = alarms
+        .iter()
+        .filter(|one| one["false_alarms"].as_f64().unwrap() > 1.0)
+        .map(|one| one["subject"].as_str().unwrap())
+        .collect();
+    assert!(!out.is_empty() && out.len() < 5, "{alarms:?}");
+    let excluded = result["excluded"].as_array().unwrap();
+    assert_eq!((excluded.len(), alarms.len()), (out.len(), 6), "{excluded:?}");
+    assert!(excluded.iter().all(|one| one["rule"] == "most_false_alarms" && one["scope"] == "sitting"));
+    assert_eq!(result["subjects"].as_u64(), Some(6 - out.len() as u64));
+
+    let table = std::fs::read_to_string(folder.join("trials.csv")).unwrap();
+    for line in table.lines().skip(1) {
+        let is_out = out.iter().any(|subject| line.starts_with(subject)) && line.contains(",main,");
+        assert_eq!(line.ends_with(",most_false_alarms"), is_out, "{line}");
+    }
+    assert!(table.contains(",catch,") && table.contains(",repeat_check,"));
+    let ran = flotor(folder, &["analyse", "data", "--each"]);
+    assert!(ran.stdout.contains("! excluded: sitting, most_false_alarms = 0.25 (0."), "{ran:?}");
+}
+
+/// A rule that cannot be applied is refused before the first trial.
+#[test]
+fn a_rule_without_what_it_needs_is_refused() {
+    let scratch = Scratch::default();
+    for (rules, reason) in [
+        ("most_retest_deviation = 0.5", "repeat_checks of an experiment with ratings"),
+        ("most_dont_know = 20", "a share from 0 to 1"),
+        ("most_unsure = 0.2", "unknown field `most_unsure`"),
+    ] {
+        let _ = scratch.file("a.study.toml", &format!("{FILE}[exclusion]\n{rules}\n"));
+        let ran = flotor(scratch.path(), &["study", "run", "a.study.toml"]);
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+        assert!(ran.error().contains(reason) && ran.error().contains("a.study.toml"), "{rules}: {ran:?}");
+        assert!(!scratch.path().join("data").exists());
+    }
+}
