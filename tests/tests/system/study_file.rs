@@ -84,3 +84,28 @@ fn a_rule_without_what_it_needs_is_refused() {
         assert!(!scratch.path().join("data").exists());
     }
 }
+
+/// Who goes on with another version of the file is told which lines changed; what is no study file, where.
+#[test]
+fn a_changed_study_file_is_refused_with_the_lines_that_changed() {
+    let scratch = Scratch::default();
+    let _ = scratch.file("a.study.toml", FILE);
+    let go = || flotor(scratch.path(), &["study", "run"]);
+    assert_eq!(go().code, Some(exit_code::OK));
+    assert_eq!(go().code, Some(exit_code::OK), "nothing is left to do");
+    let _ = scratch.file("a.study.toml", &FILE.replace("[17, 26]", "[17]"));
+    let ran = go();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    let said =
+        "another version of a.study.toml: line 6 on had `bases = [17, 26]`, and has `bases = [17]` now";
+    assert!(ran.error().contains(said), "{ran:?}");
+    for (text, reason) in [
+        ("task = \"jnd\"\n[options]\nbases = [17\n", "a.study.toml:3: "),
+        ("task = \"jnd\"\n[options]\nhelp = true\n", "options.help: `flotor study jnd` has no such option"),
+    ] {
+        let _ = scratch.file("a.study.toml", text);
+        let ran = go();
+        assert_eq!((ran.code, ran.stdout.as_str()), (Some(exit_code::CONFIGURATION), ""), "{ran:?}");
+        assert!(ran.error().contains(reason) && ran.stderr.lines().count() == 1, "{ran:?}");
+    }
+}

@@ -90,11 +90,14 @@ impl Begin {
     #[must_use]
     pub fn differs(&self, earlier: &Self) -> Option<String> {
         let parts = [
+            (
+                Plan::differs(self.plan.as_ref(), earlier.plan.as_ref()).unwrap_or_default(),
+                self.plan == earlier.plan,
+            ),
             (another("protocol", &earlier.protocol, &self.protocol), self.protocol == earlier.protocol),
             (format!("--seed {}, not {}", earlier.seed, self.seed), self.seed == earlier.seed),
             (another("observer", &earlier.observer, &self.observer), self.observer == earlier.observer),
             (another("apparatus", &earlier.apparatus, &self.apparatus), self.apparatus == earlier.apparatus),
-            (another("study file", &earlier.plan, &self.plan), self.plan == earlier.plan),
         ];
         parts.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("begun with {what}"))
     }
@@ -140,6 +143,41 @@ pub struct Plan {
     /// What does not count.
     #[serde(skip_serializing_if = "ExclusionRules::are_none", default)]
     pub exclusion: ExclusionRules,
+}
+
+impl Plan {
+    /// How the file that is followed now differs from the earlier one, in words.
+    fn differs(now: Option<&Self>, earlier: Option<&Self>) -> Option<String> {
+        match (earlier, now) {
+            (None, None) => None,
+            (Some(earlier), None) => Some(format!("the study file {}, and there is none now", earlier.file)),
+            (None, Some(now)) => Some(format!("no study file, and there is {} now", now.file)),
+            (Some(earlier), Some(now)) if earlier.text == now.text => {
+                Some(format!("the study file {}, not {}", earlier.file, now.file))
+            }
+            (Some(earlier), Some(now)) => {
+                Some(format!("another version of {}{}", now.file, changed(earlier, now)))
+            }
+        }
+    }
+}
+
+/// The lines that changed from one version of a file to the next.
+fn changed(earlier: &Plan, now: &Plan) -> String {
+    let [before, after] = [earlier, now].map(|plan| plan.text.lines().map(str::trim).collect::<Vec<_>>());
+    let pairs = || before.iter().zip(&after);
+    let same = pairs().take_while(|(one, other)| one == other).count();
+    let rest = before.len().min(after.len()) - same;
+    let backwards = before.iter().rev().zip(after.iter().rev()).take(rest);
+    let same_end = backwards.take_while(|(one, other)| one == other).count();
+    let middle = |lines: &[&str]| {
+        let lines = lines.get(same..lines.len() - same_end).unwrap_or_default().join("; ");
+        if lines.is_empty() { "nothing".to_owned() } else { format!("`{lines}`") }
+    };
+    if earlier.text.is_empty() {
+        return String::new(); // an early log has the digest alone
+    }
+    format!(": line {} on had {}, and has {} now", same + 1, middle(&before), middle(&after))
 }
 
 /// What is another part of a sitting, with the first place where the two differ.

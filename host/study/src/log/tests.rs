@@ -216,7 +216,21 @@ fn a_sitting_of_another_study_says_where_it_differs() {
     };
     let (one, other) = (Begin { plan: plan("a"), ..begin() }, Begin { plan: plan("b"), ..begin() });
     assert!(one.differs(&one.clone()).is_none());
-    let said = other.differs(&one).expect("another file");
-    assert!(said.starts_with("begun with another study file: sha256 "), "{said}");
+    for (before, after, expected) in [
+        ("a", "b", "line 1 on had `a`, and has `b` now"),
+        (
+            "x\nbases = [17, 26]\ny",
+            "x\nbases = [17]\ny",
+            "line 2 on had `bases = [17, 26]`, and has `bases = [17]` now",
+        ),
+        ("x\ny", "x\nseed = 2\ny", "line 2 on had nothing, and has `seed = 2` now"),
+        ("x\ny\nz", "x\nz", "line 2 on had `y`, and has nothing now"),
+    ] {
+        let (one, other) = (Begin { plan: plan(before), ..begin() }, Begin { plan: plan(after), ..begin() });
+        let said = other.differs(&one).expect("another file");
+        assert_eq!(said, format!("begun with another version of a.study.toml: {expected}"));
+    }
+    let said = begin().differs(&other).expect("none now");
+    assert_eq!(said, "begun with the study file a.study.toml, and there is none now");
     assert!(!serde_json::to_string(&begin()).unwrap().contains("plan"), "logs without one are as before");
 }

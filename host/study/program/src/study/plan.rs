@@ -7,16 +7,19 @@
 use super::{StudyArguments, Task};
 use clap::{Args, FromArgMatches};
 use flotor_command::CommandError;
+use flotor_hal::abi::loader::nearest;
 use flotor_study::exclusion::ExclusionRules;
 use flotor_study::log::{Plan, digest};
 use serde::Deserialize;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 /// What the name of a study file ends with.
 const ENDING: &str = ".study.toml";
 /// Options whose values are files or folders: relative to that of the study file.
-const PATHS: [&str; 4] = ["out", "scene", "consent", "instructions"];
+const PATHS: [&str; 5] = ["out", "scene", "consent", "instructions", "plugin-path"];
+/// Options that decide how `study run` goes on; a file has no say in them.
+const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
 
 #[derive(Args)]
 #[command(
@@ -129,50 +132,113 @@ fn words(
     text: &str,
     further: Vec<OsString>,
 ) -> Result<(Vec<OsString>, ExclusionRules), CommandError> {
-    let study: StudyFile =
-        toml::from_str(text).map_err(|error| CommandError::Usage(of_file(file, &error.to_string())))?;
+    let study: StudyFile = toml::from_str(text).map_err(|error| {
+        let line = error.span().map_or(0, |span| text[..span.start].lines().count().max(1));
+        let message = error.message().replace('\n', " ");
+        CommandError::Usage(format!("{}:{line}: {message}", file.display()))
+    })?;
     let task = match study.task {
         TaskName::Jnd => "jnd",
         TaskName::Magnitude => "magnitude",
         TaskName::Force => "force",
     };
+    let study_command = StudyArguments::augment_args(clap::Command::new("study"));
+    let known: Vec<&clap::Arg> =
+        study_command.find_subcommand(task).into_iter().flat_map(|task| task.get_arguments()).collect();
     let folder = file.parent().unwrap_or(Path::new(""));
+    let said = Said(&further);
     let mut words: Vec<OsString> = vec![task.into()];
-    let is_said = |name: &str| {
-        let (long, with_value) = (format!("--{name}"), format!("--{name}="));
-        further.iter().any(|word| *word == *long || word.to_string_lossy().starts_with(&with_value))
-    };
-    for (name, value) in &study.options {
-        let name = name.replace('_', "-");
-        if name == "resume" || is_said(&name) {
-            continue; // of the command line, which goes before
+    // Folders that are searched after those of the command line.
+    let mut last: Vec<OsString> = Vec::new();
+    for (key, value) in &study.options {
+        let name = key.replace('_', "-");
+        let refuse = |why: String| CommandError::Usage(format!("{}: options.{key}: {why}", file.display()));
+        if OF_THE_COMMAND_LINE.contains(&name.as_str()) {
+            return Err(refuse("belongs on the command line, after the name of the file".to_owned()));
         }
-        let option = || OsString::from(format!("--{name}"));
-        match value {
-            toml::Value::Boolean(true) => words.push(option()),
-            toml::Value::Boolean(false) => {}
-            toml::Value::Array(values) if name == "set" => {
-                words.extend(values.iter().flat_map(|value| [option(), plain(value).into()]));
+        let option = known.iter().find(|option| option.get_long() == Some(&name)).ok_or_else(|| {
+            let names = known.iter().filter_map(|option| option.get_long());
+            let near =
+                nearest(&name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            refuse(format!("`flotor study {task}` has no such option{near}"))
+        })?;
+        let value_of = |value: &toml::Value| match plain(value) {
+            Some(text) if PATHS.contains(&name.as_str()) => Ok(folder.join(text).into_os_string()),
+            Some(text) => Ok(OsString::from(text)),
+            None => Err(refuse(format!("a {} is no value of it", kind(value)))),
+        };
+        let values = match (value, option.get_action()) {
+            (toml::Value::Boolean(is_set), clap::ArgAction::SetTrue) => {
+                words.extend((*is_set && !said.has(&name)).then(|| format!("--{name}").into()));
+                continue;
             }
-            toml::Value::Array(values) => {
-                let values: Vec<String> = values.iter().map(plain).collect();
-                words.extend([option(), values.join(",").into()]);
+            (_, clap::ArgAction::SetTrue) => return Err(refuse("true or false".to_owned())),
+            (toml::Value::Array(values), clap::ArgAction::Append)
+                if option.get_value_delimiter().is_none() =>
+            {
+                values.iter().map(value_of).collect::<Result<Vec<_>, _>>()?
             }
-            value if PATHS.contains(&name.as_str()) => {
-                words.extend([option(), folder.join(plain(value)).into_os_string()]);
+            (toml::Value::Array(values), _) if option.get_value_delimiter().is_some() => {
+                let values = values.iter().map(value_of).collect::<Result<Vec<_>, _>>()?;
+                vec![values.join(OsStr::new(","))]
             }
-            value => words.extend([option(), plain(value).into()]),
+            (value, _) => vec![value_of(value)?],
+        };
+        for value in values {
+            let one = [OsString::from(format!("--{name}")), value];
+            match name.as_str() {
+                "plugin-path" => last.extend(one),
+                // A setting of the command line replaces the one of the same parameter; others stay.
+                "set" if said.sets(&one[1]) => {}
+                "set" => words.extend(one),
+                _ if said.has(&name) => {}
+                _ => words.extend(one),
+            }
         }
     }
-    words.extend(further);
-    if !words.iter().any(|word| word == "--resume") {
+    words.extend(further.iter().cloned());
+    words.extend(last);
+    if !said.has("resume") {
         words.push("--resume".into());
     }
     Ok((words, study.exclusion))
 }
 
-fn plain(value: &toml::Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+/// The options of the command line, which go before those of the file.
+struct Said<'a>(&'a [OsString]);
+
+impl Said<'_> {
+    fn has(&self, name: &str) -> bool {
+        let (long, with_value) = (format!("--{name}"), format!("--{name}="));
+        self.0.iter().any(|word| *word == *long || word.to_string_lossy().starts_with(&with_value))
+    }
+
+    /// Whether the parameter of `PLUGIN.KEY=VALUE` is set.
+    fn sets(&self, setting: &OsStr) -> bool {
+        let key = |text: &str| text.split('=').next().unwrap_or_default().to_owned();
+        let wanted = key(&setting.to_string_lossy());
+        self.0.iter().enumerate().any(|(place, word)| match word.to_string_lossy().strip_prefix("--set") {
+            Some("") => self.0.get(place + 1).is_some_and(|next| key(&next.to_string_lossy()) == wanted),
+            Some(rest) => rest.strip_prefix('=').is_some_and(|rest| key(rest) == wanted),
+            None => false,
+        })
+    }
+}
+
+fn kind(value: &toml::Value) -> &'static str {
+    match value {
+        toml::Value::Array(_) => "list",
+        other => other.type_str(),
+    }
+}
+
+/// A value as the command line has it; none of a table, a list or a date.
+fn plain(value: &toml::Value) -> Option<String> {
+    match value {
+        toml::Value::String(text) => Some(text.clone()),
+        toml::Value::Integer(_) | toml::Value::Float(_) => Some(value.to_string()),
+        _ => None,
+    }
 }
 
 /// A reason in one line, with the file it is about.
@@ -215,6 +281,34 @@ mod tests {
         );
     }
 
+    /// A setting of the command line goes before the one of the same parameter, and the others stay; folders for plugins are
+    /// relative to the file and searched after those of the command line.
+    #[test]
+    fn repeatable_options_are_joined_by_what_they_are() {
+        let words = said(FILE, &["--set", "device.hand=still", "--set=wall.size_mm=2"]).join(" ");
+        assert!(words.contains("--set spring.wire=1 ") && !words.contains("hand=hold"), "{words}");
+        let text = "task = \"jnd\"\n[options]\nplugin_path = [\"mine\", \"/yours\"]\n";
+        let words = said(text, &["--plugin-path", "first"]).join(" ");
+        assert_eq!(words, "jnd --plugin-path first --plugin-path here/mine --plugin-path /yours --resume");
+    }
+
+    #[test]
+    fn an_option_that_is_none_is_refused_with_its_name() {
+        for (options, reason) in [
+            ("help = true", "options.help: `flotor study jnd` has no such option"),
+            ("subjets = 3", "did you mean `subjects`?"),
+            ("range = \"1-2\"", "options.range: `flotor study jnd` has no such option"),
+            ("subjects = true", "options.subjects: a boolean is no value of it"),
+            ("subjects = [3, 4]", "options.subjects: a list is no value of it"),
+            ("no_demo = 1", "options.no_demo: true or false"),
+            ("resume = true", "options.resume: belongs on the command line"),
+        ] {
+            let text = format!("task = \"jnd\"\n[options]\n{options}\n");
+            let error = words(Path::new("a.study.toml"), &text, Vec::new()).expect_err(options).to_string();
+            assert!(error.starts_with("a.study.toml: ") && error.contains(reason), "{error}");
+        }
+    }
+
     #[test]
     fn what_is_no_study_file_is_refused_with_its_name() {
         for wrong in [
@@ -225,8 +319,8 @@ mod tests {
             "task = ",
         ] {
             let error = words(Path::new("a.study.toml"), wrong, Vec::new()).expect_err("it is none");
-            assert!(error.to_string().starts_with("a.study.toml: "), "{error}");
-            assert_eq!(error.to_string().lines().count(), 1, "{error}");
+            assert!(error.to_string().starts_with("a.study.toml:"), "{error}");
+            assert!(!error.to_string().contains(['|', '^', '\n']), "{error}");
         }
     }
 }
