@@ -25,11 +25,24 @@ pub enum Tool {
     Qemu,
     /// Python, without any package.
     Python,
+    /// Python with numpy, pandas and scipy. Who needs it calls [`lacks`], as it may be another Python (`FLOTOR_SCIENCE_PYTHON`).
+    SciencePython,
+    /// R, without any package.
+    R,
 }
 
 impl Tool {
-    const ALL: [Self; 7] =
-        [Self::Cc, Self::Cxx, Self::Valgrind, Self::Display, Self::Adapter, Self::Qemu, Self::Python];
+    const ALL: [Self; 9] = [
+        Self::Cc,
+        Self::Cxx,
+        Self::Valgrind,
+        Self::Display,
+        Self::Adapter,
+        Self::Qemu,
+        Self::Python,
+        Self::SciencePython,
+        Self::R,
+    ];
 
     /// Its word in [`VARIABLE`].
     const fn word(self) -> &'static str {
@@ -41,6 +54,8 @@ impl Tool {
             Self::Adapter => "adapter",
             Self::Qemu => "qemu",
             Self::Python => "python",
+            Self::SciencePython => "science-python",
+            Self::R => "r",
         }
     }
 
@@ -50,9 +65,10 @@ impl Tool {
             Self::Cxx => &["c++"],
             Self::Valgrind => &["valgrind"],
             Self::Display => &["Xvfb", "xdotool"],
-            Self::Adapter => &[],
+            Self::Adapter | Self::SciencePython => &[],
             Self::Qemu => &["qemu-system-x86_64"],
             Self::Python => &["python3"],
+            Self::R => &["Rscript"],
         }
     }
 }

@@ -52,6 +52,7 @@ mod services;
 mod simulated;
 mod study;
 mod study_file;
+mod study_scripts;
 mod supply;
 mod swap;
 mod teleoperation;

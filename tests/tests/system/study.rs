@@ -548,40 +548,6 @@ fn a_sitting_goes_from_consent_to_analysis_by_keyboard() {
     assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
 }
 
-/// What other programs make of the trials is what `analyse` prints, to every digit.
-#[test]
-fn the_script_beside_the_trials_repeats_every_table() {
-    let scratch = Scratch::default();
-    let out = scratch.path().join("data");
-    let small = ["jnd", "--apparatus", "none", "--subjects", "6", "--replications", "2"];
-    assert_eq!(study(&small, &out).run().code, Some(exit_code::OK));
-    let arguments = ["analyse", "data", "--trials", "trials.csv"];
-    let ran = Flotor::with(arguments).inside(scratch.path()).run();
-    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    let python = std::env::var("FLOTOR_SCIENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let mut command = std::process::Command::new(&python);
-    let has =
-        command.args(["-c", "import numpy, pandas, scipy"]).output().is_ok_and(|ran| ran.status.success());
-    if !has {
-        flotor_tests::tools::skipped(
-            "the script: numpy, pandas and scipy are missing (FLOTOR_SCIENCE_PYTHON)",
-        );
-        return;
-    }
-    let mut command = std::process::Command::new(&python);
-    let script = command.arg("trials.py").current_dir(scratch.path()).output().unwrap();
-    let said = String::from_utf8(script.stdout).unwrap();
-    assert!(script.status.success(), "{said} {}", String::from_utf8_lossy(&script.stderr));
-    let here: String = ran.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
-    for line in said.lines().skip(1) {
-        // Weber fractions, tests, thresholds and comparisons: what stands after the name.
-        let value = line.split_once(": ").map_or(line, |(_, value)| value).replace("  ", " ");
-        let value = value.split(", d = ").next().unwrap_or_default().to_owned();
-        assert!(here.contains(&value), "`{line}` is not in {here}");
-    }
-    assert!(said.lines().count() > 15, "{said}");
-}
-
 /// A key pressed by accident or ahead is no answer: a stimulus has to be felt for a time.
 #[test]
 fn what_was_not_felt_is_not_answered() {

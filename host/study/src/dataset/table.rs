@@ -61,10 +61,10 @@ pub(super) fn trials(log: &SittingLog) -> String {
 }
 
 /// All trials of all sittings as one table with commas, for other programs: subject and first modality before the columns of
-/// [`trials`], after them the rule that excluded the trial; a list in a cell has spaces.
+/// [`trials`], after them the movement with each stimulus and the rule that excluded the trial; a list in a cell has spaces.
 pub(super) fn long(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
     let head = COLUMNS.iter().map(|(name, _)| *name);
-    let head = ["subject", "first_modality"].into_iter().chain(head).chain(["excluded"]);
+    let head = ["subject", "first_modality"].into_iter().chain(head).chain(EACH).chain(["excluded"]);
     let mut text = head.collect::<Vec<_>>().join(",") + "\n";
     for log in logs {
         let codes = Codes::new(&log.begin.protocol, log.begin.seed);
@@ -74,11 +74,28 @@ pub(super) fn long(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
             let cells = row(record, &codes, log.began).into_iter().map(|cell| cell.replace(',', " "));
             let by = excluded.iter().find(|exclusion| exclusion.covers(subject, &record.event.trial));
             let by = by.map_or(MISSING, |exclusion| exclusion.rule).to_owned();
-            let cells = [subject.to_string(), first.to_owned()].into_iter().chain(cells).chain([by]);
+            let cells = [subject.to_string(), first.to_owned()]
+                .into_iter()
+                .chain(cells)
+                .chain(each(record))
+                .chain([by]);
             text += &(cells.collect::<Vec<_>>().join(",") + "\n");
         }
     }
     text
+}
+
+/// Columns of movement with a number for each stimulus of a trial, in order.
+const EACH: [&str; 3] = ["speed_each", "acceleration_each", "force_each"];
+
+fn each(record: &TrialRecord) -> [String; 3] {
+    let felt = &record.event.exploration.kinematics;
+    let measures: [fn(&StimulusKinematics) -> f64; 3] =
+        [|one| one.mean_speed_m_per_s, |one| one.mean_acceleration_m_per_s2, |one| one.mean_force_n];
+    measures.map(|measure| {
+        let numbers: Vec<String> = felt.iter().map(|one| measure(one).to_string()).collect();
+        if numbers.is_empty() { MISSING.to_owned() } else { numbers.join(" ") }
+    })
 }
 
 fn row(record: &TrialRecord, codes: &Codes, began: Option<TimeOfDay>) -> Vec<String> {

@@ -1,68 +1,196 @@
-# Repeats the tables of `flotor analyse` from the trials, and draws figures 17 and 18 of CMU-RI-TR-07-21.
+# Repeats the tables of `flotor analyse` from the trials, line by line, and draws figures 17 and 18 of CMU-RI-TR-07-21.
 #
 #     Rscript THIS.R [TRIALS.csv]
 #
-# Needs base R alone. Written beside the trials by `flotor analyse --trials`. The analysis of variance is that of groups of
-# equal size, where all types of sums of squares agree; for others use car::Anova(type = 3).
+# Needs base R alone. Written beside the trials by `flotor analyse --trials`. It knows the defaults of `flotor analyse`: thresholds
+# of the procedure, ratings divided by the mean, sums of squares of type III.
 
 arguments <- commandArgs(trailingOnly = TRUE)
 script <- sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE))
 path <- if (length(arguments) > 0) arguments[1] else sub("\\.R$", ".csv", script)
-trials <- read.csv(path, na.strings = "n/a")
-counted <- trials[trials$phase == "main" & trials$repeated == 0 & is.na(trials$excluded), ]
+trials <- read.csv(path, na.strings = "n/a", stringsAsFactors = FALSE)
+main <- trials[trials$phase == "main" & is.na(trials$excluded), ]
+counted <- main[main$repeated == 0, ]
 is_jnd <- any(!is.na(counted$base))
 level_name <- if (is_jnd) "base" else "stimulus"
+modalities <- c("vh", "h")
+names_of <- c(vh = "vision + haptics", h = "haptics alone")
+counted$level <- counted[[level_name]]
 
 if (is_jnd) {
+  # Thresholds in the unit of the stimulus: the mean over the replications whose track came to one.
   ends <- counted[!is.na(counted$threshold), ]
-  ends$value <- ends$threshold * ends$base
+  ends$value <- ends$threshold
 } else {
+  # Ratings divided by the mean of all ratings of the subject.
   ends <- counted
   ends$value <- ends$rating / ave(ends$rating, ends$subject)
 }
-ends$level <- ends[[level_name]]
-cells <- aggregate(value ~ subject + first_modality + modality + level, ends, mean)
-cells <- cells[order(cells$subject, cells$modality, cells$level), ]
+levels <- sort(unique(counted$level))
+subjects <- sort(unique(counted$subject))
+n <- length(subjects)
+# Subjects by modality and level, the levels of a modality side by side.
+cells_of <- function(rows) {
+  cell <- function(subject, modality, level) {
+    mean(rows$value[rows$subject == subject & rows$modality == modality & rows$level == level])
+  }
+  t(sapply(subjects, function(subject) {
+    unlist(lapply(modalities, function(modality) sapply(levels, function(level) cell(subject, modality, level))))
+  }))
+}
+responses <- cells_of(ends)
+if (is_jnd) responses <- sweep(responses, 2, c(levels, levels), "*")
+vh <- responses[, seq_along(levels), drop = FALSE]
+h <- responses[, length(levels) + seq_along(levels), drop = FALSE]
+first <- sapply(subjects, function(subject) trials$first_modality[trials$subject == subject][1])
+
+number <- function(value) format(value, digits = 15, trim = TRUE)
+say <- function(...) cat(paste(...), "\n", sep = "")
+p_text <- function(p) if (p < 0.001) "p < 0.001" else sprintf("p = %.3f", p)
+size_text <- function(size) sprintf("%.2f (%.2f to %.2f)", size[1], size[2], size[3])
+se <- function(x) sd(x) / sqrt(length(x))
+
+contrasts_of <- function(count) qr.Q(qr(cbind(1, diag(count)[, -1, drop = FALSE])))[, -1, drop = FALSE]
+
+# Sums of squares of type III: a group of two between subjects, factors within them; a list of effects by name.
+anova_of <- function(values, factors, counts, groups) {
+  has_order <- length(unique(groups)) == 2 && nrow(values) > 2
+  one <- rep(1, nrow(values))
+  between <- list(one)
+  names(between) <- ""
+  if (has_order) between$order <- ifelse(groups == "vh", 1, -1)
+  full <- do.call(cbind, between)
+  left_by <- function(design, seen) if (is.null(design)) seen else qr.resid(qr(design), seen)
+  found <- list()
+  for (chosen in 0:(2^length(factors) - 1)) {
+    is_in <- bitwAnd(chosen, 2^(seq_along(factors) - 1)) > 0
+    within <- matrix(1)
+    for (k in seq_along(factors)) {
+      within <- kronecker(within, if (is_in[k]) contrasts_of(counts[k]) else matrix(1 / sqrt(counts[k]), counts[k], 1))
+    }
+    seen <- values %*% within
+    left <- left_by(full, seen)
+    error <- sum(left^2)
+    error_df <- (nrow(values) - ncol(full)) * ncol(within)
+    for (name in names(between)) {
+      parts <- c(if (name != "") name, factors[is_in])
+      if (length(parts) == 0) next
+      rest <- do.call(cbind, between[names(between) != name])
+      squares <- sum(left_by(rest, seen)^2) - error
+      df <- ncol(within)
+      effect <- list(f = NA)
+      if (max(squares, error) > 1e-20 * sum(values^2)) {
+        products <- t(left) %*% left
+        epsilon <- sum(diag(products))^2 / (df * sum(products^2))
+        effect <- list(f = (squares / df) / (error / error_df), df = df, error_df = error_df, epsilon = epsilon)
+      }
+      found[[paste(parts, collapse = ":")]] <- effect
+    }
+  }
+  found
+}
+
+effect_text <- function(effect) {
+  if (is.na(effect$f)) return("not testable: nothing of it is left in the responses")
+  upper <- function(scale) pf(effect$f, scale * effect$df, scale * effect$error_df, lower.tail = FALSE)
+  text <- sprintf("F(%d, %d) = %.2f, %s", effect$df, effect$error_df, effect$f, p_text(upper(1)))
+  epsilon <- min(max(effect$epsilon, 1 / effect$df), 1)
+  if (effect$df > 1) sprintf("%s (GG %s)", text, p_text(upper(epsilon))) else text
+}
+
+solve_for <- function(of, low, high) uniroot(of, c(low, high), tol = 1e-12)$root
+
+partial_eta_squared <- function(effect) {
+  end <- function(below) {
+    at <- function(shift) pf(effect$f, effect$df, effect$error_df, ncp = shift) - below
+    if (pf(effect$f, effect$df, effect$error_df) <= below) 0 else solve_for(at, 0, 10 + 4 * effect$f * effect$df)
+  }
+  share <- function(shift) shift / (shift + effect$df + effect$error_df + 1)
+  explained <- effect$f * effect$df
+  c(explained / (explained + effect$error_df), share(end(0.975)), share(end(0.025)))
+}
+
+cohen_d <- function(t, df) {
+  end <- function(below) solve_for(function(shift) suppressWarnings(pt(t, df, ncp = shift)) - below, -37, 37)
+  c(t, end(0.975), end(0.025)) / sqrt(df + 1)
+}
+
+effects <- function(values, factors, counts, groups, sizes) {
+  found <- anova_of(values, factors, counts, groups)
+  for (name in names(found)) say(name, effect_text(found[[name]]))
+  for (name in names(found)) {
+    if (sizes && !is.na(found[[name]]$f)) say(name, size_text(partial_eta_squared(found[[name]])))
+  }
+}
+
+comparisons <- function(names, first, second) {
+  tests <- lapply(seq_along(names), function(k) t.test(first[[k]], second[[k]], paired = TRUE))
+  p <- p.adjust(sapply(tests, function(test) test$p.value), "holm")
+  for (k in seq_along(names)) {
+    t <- tests[[k]]$statistic
+    say(names[k], sprintf("t(%d) = %.2f, %s", n - 1, t, p_text(p[k])), size_text(cohen_d(t, n - 1)))
+  }
+}
+
+columns_of <- function(values) lapply(seq_len(ncol(values)), function(k) values[, k])
 
 if (is_jnd) {
-  cells$fraction <- cells$value / cells$level
-  weber <- aggregate(fraction ~ subject + modality, cells, mean)
-  vh <- weber$fraction[weber$modality == "vh"]
-  h <- weber$fraction[weber$modality == "h"]
-  for (name in c("vh", "h")) {
-    test <- t.test(if (name == "vh") vh else h)
-    cat(sprintf("Weber fraction %s: %.1f %%  (95 %%: %.1f to %.1f)\n", name, 100 * test$estimate,
-                100 * test$conf.int[1], 100 * test$conf.int[2]))
+  say(sprintf("%d subjects, %.1f pairs each", n, nrow(counted) / n))
+  fractions <- list(vh = sweep(vh, 2, levels, "/"), h = sweep(h, 2, levels, "/"))
+  weber <- lapply(fractions, rowMeans)
+  for (modality in modalities) {
+    test <- t.test(weber[[modality]])
+    say(sprintf("%s %.1f %% (95 %%: %.1f to %.1f)", names_of[modality], 100 * test$estimate, 100 * test$conf.int[1],
+                100 * test$conf.int[2]))
   }
-  test <- t.test(h, vh, paired = TRUE)
-  cat(sprintf("difference: t(%d) = %.2f, p = %.3f\n", test$parameter, test$statistic, test$p.value))
-}
-print(aggregate(value ~ modality + level, cells, function(x) c(mean = mean(x), se = sd(x) / sqrt(length(x)))))
-
-cells$subject <- factor(cells$subject)
-cells$order <- factor(cells$first_modality)
-cells$modality <- factor(cells$modality, levels = c("vh", "h"))
-cells$level <- factor(cells$level)
-formula <- if (nlevels(cells$order) > 1) {
-  value ~ order * modality * level + Error(subject / (modality * level))
+  test <- t.test(weber$h, weber$vh, paired = TRUE)
+  say(sprintf("difference t(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
 } else {
-  value ~ modality * level + Error(subject / (modality * level))
+  say(sprintf("%d subjects, %s ratings each", n, number(nrow(counted) / n)))
+  say(sum(main$repeat. > 0), "presentations repeated because the handle left its range")
+  say(sprintf("Linear trend R\u00b2 = %.3f", cor(levels, colMeans(vh + h))^2))
 }
-print(summary(aov(formula, cells)))
+for (k in seq_along(levels)) {
+  name <- if (is_jnd) paste("base", number(levels[k])) else sprintf("stimulus %.2f", levels[k])
+  cell <- function(values) sprintf("%.3f (se %.3f)", mean(values[, k]), se(values[, k]))
+  say(name, cell(vh), cell(h))
+}
 
-p <- sapply(levels(cells$level), function(level) {
-  here <- cells[cells$level == level, ]
-  t.test(here$value[here$modality == "h"], here$value[here$modality == "vh"], paired = TRUE)$p.value
-})
-cat("h - vh at each level, p after Holm:\n")
-print(p.adjust(p, "holm"))
+several <- length(levels) > 1
+counts <- c(2, if (several) length(levels))
+effects(responses, c("modality", if (several) level_name), counts, first, TRUE)
+comparisons(sprintf("h - vh, %s %s", level_name, sapply(round(levels, 4), number)), columns_of(h), columns_of(vh))
+if (is_jnd && several) {
+  both <- (fractions$vh + fractions$h) / 2
+  pairs <- combn(seq_along(levels), 2)
+  text <- sprintf("fraction, base %s - %s", sapply(levels[pairs[2, ]], number), sapply(levels[pairs[1, ]], number))
+  comparisons(text, lapply(pairs[2, ], function(k) both[, k]), lapply(pairs[1, ], function(k) both[, k]))
+  for (modality in modalities) {
+    constancy <- anova_of(fractions[[modality]], "base", length(levels), rep("", n))
+    say(sprintf("fraction over base, %s", modality), effect_text(constancy$base))
+  }
+}
+for (measure in c("speed", "acceleration", "force")) {
+  # One number for each stimulus of a trial.
+  each <- strsplit(as.character(counted[[paste0(measure, "_each")]]), " ")
+  rows <- counted[rep(seq_along(each), lengths(each)), c("subject", "modality", "level")]
+  rows$value <- as.numeric(unlist(each))
+  moved <- cells_of(rows[!is.na(rows$value), ])
+  if (!anyNA(moved)) effects(moved, c("modality", if (several) "stimulus"), counts, rep("", n), FALSE)
+}
+if (is_jnd) {
+  none <- aggregate(!is.na(threshold) ~ subject + track, counted, any)
+  none <- sum(!none[[3]])
+  if (none > 0) say(none, "tracks did not reach a threshold and are omitted")
+}
 
 svg(sub("\\.csv$", "-R.svg", path), width = 6, height = 4)
-means <- tapply(cells$value, list(cells$level, cells$modality), mean)
-errors <- tapply(cells$value, list(cells$level, cells$modality), function(x) sd(x) / sqrt(length(x)))
-at <- as.numeric(rownames(means))
-matplot(at, means, type = "p", pch = c(16, 17), col = c("#0072B2", "#D55E00"), xlab = level_name,
+means <- cbind(colMeans(vh), colMeans(h))
+errors <- cbind(apply(vh, 2, se), apply(h, 2, se))
+matplot(levels, means, type = "p", pch = c(16, 17), col = c("#0072B2", "#D55E00"), xlab = level_name,
         ylab = if (is_jnd) "threshold" else "rating, scaled", ylim = range(means - errors, means + errors))
-for (k in 1:2) arrows(at, means[, k] - errors[, k], at, means[, k] + errors[, k], angle = 90, code = 3, length = 0.03)
-legend("topleft", c("vision + haptics", "haptics alone"), pch = c(16, 17), col = c("#0072B2", "#D55E00"), bty = "n")
+for (k in 1:2) {
+  arrows(levels, means[, k] - errors[, k], levels, means[, k] + errors[, k], angle = 90, code = 3, length = 0.03)
+}
+legend("topleft", names_of, pch = c(16, 17), col = c("#0072B2", "#D55E00"), bty = "n")
 invisible(dev.off())

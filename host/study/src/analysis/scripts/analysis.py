@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Repeats the tables of `flotor analyse` from the trials, and draws figures 17 and 18 of CMU-RI-TR-07-21.
+"""Repeats the tables of `flotor analyse` from the trials, line by line, and draws figures 17 and 18 of CMU-RI-TR-07-21.
 
     python3 THIS.py [TRIALS.csv]
 
-Needs numpy, scipy and pandas, and matplotlib for the figures. Written beside the trials by `flotor analyse --trials`.
+Needs numpy, scipy and pandas, and matplotlib for the figures. Written beside the trials by `flotor analyse --trials`. It knows the
+defaults of `flotor analyse`: thresholds of the procedure, ratings divided by the mean, sums of squares of type III.
 """
 
 import itertools
@@ -12,30 +13,38 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy import optimize, stats
 
 path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".csv")
 trials = pd.read_csv(path, na_values="n/a")
-counted = trials[(trials.phase == "main") & (trials.repeated == 0) & trials.excluded.isna()]
+main = trials[(trials.phase == "main") & trials.excluded.isna()]
+counted = main[main.repeated == 0]
 is_jnd = counted.base.notna().any()
 LEVEL = "base" if is_jnd else "stimulus"
+MODALITIES = ("vh", "h")
 
 if is_jnd:
     # Thresholds in the unit of the stimulus: the mean over the replications whose track came to one.
-    ends = counted[counted.threshold.notna()].copy()
-    ends["response_value"] = ends.threshold * ends.base
-    cells = ends.groupby(["subject", "modality", "base"]).response_value.mean()
+    ends = counted[counted.threshold.notna()]
+    cells = ends.groupby(["subject", "modality", "base"]).threshold.mean()
+    cells = cells * cells.index.get_level_values("base")
 else:
     # Ratings divided by the mean of all ratings of the subject.
-    scaled = counted.copy()
-    scaled["response_value"] = scaled.rating / scaled.groupby("subject").rating.transform("mean")
-    cells = scaled.groupby(["subject", "modality", "stimulus"]).response_value.mean()
+    scaled = counted.assign(scaled=counted.rating / counted.groupby("subject").rating.transform("mean"))
+    cells = scaled.groupby(["subject", "modality", "stimulus"]).scaled.mean()
 
-table = cells.unstack([1, 2])
-levels = sorted(counted[LEVEL].dropna().unique())
-table = table[[(modality, level) for modality in ("vh", "h") for level in levels]]
+levels = list(counted[LEVEL].dropna().drop_duplicates())
+levels.sort()
+columns = [(modality, level) for modality in MODALITIES for level in levels]
+table = cells.unstack([1, 2])[columns]
 responses = table.to_numpy()
+subjects = len(table)
 order = trials.groupby("subject").first_modality.first().loc[table.index].to_numpy()
+
+
+def number(value):
+    """The shortest text that is this number."""
+    return repr(float(value)).removesuffix(".0")
 
 
 def interval(values):
@@ -44,7 +53,7 @@ def interval(values):
 
 
 def holm(p):
-    p, ranked = np.asarray(p), np.argsort(p)
+    p, ranked = np.asarray(p), np.argsort(p, kind="stable")
     steps = np.maximum.accumulate(p[ranked] * np.arange(len(p), 0, -1))
     corrected = np.empty(len(p))
     corrected[ranked] = np.minimum(steps, 1.0)
@@ -55,69 +64,142 @@ def p_text(p):
     return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
 
 
+def size_text(value, low, high):
+    return f"{value:.2f} ({low:.2f} to {high:.2f})"
+
+
 def contrasts(count):
     """Orthonormal contrasts of a factor with so many levels."""
     basis, _ = np.linalg.qr(np.column_stack([np.ones(count), np.eye(count)[:, 1:]]))
     return basis[:, 1:]
 
 
-def anova():
-    """Sums of squares of type III: order between subjects, modality and level within."""
-    subjects = len(responses)
-    has_order = len(set(order)) == 2 and subjects > 2
-    coded = np.where(order == "vh", 1.0, -1.0)[:, None]
-    between = {"": np.ones((subjects, 1))} | ({"order": coded} if has_order else {})
-    ones = [np.ones((2, 1)) / np.sqrt(2), np.ones((len(levels), 1)) / np.sqrt(len(levels))]
-    apart = [contrasts(2), contrasts(len(levels))]
-    for first, second in [(0, 0), (1, 0), (0, 1), (1, 1)]:
-        within = np.kron((ones, apart)[first][0], (ones, apart)[second][1])
-        seen = responses @ within
-        full = np.column_stack(list(between.values()))
-        error = np.sum((seen - full @ np.linalg.lstsq(full, seen, rcond=None)[0]) ** 2)
-        error_df = (subjects - full.shape[1]) * within.shape[1]
+def anova(values, factors, groups):
+    """Sums of squares of type III: a group of two between subjects, factors (name, levels) within them."""
+    coded = np.where(groups == "vh", 1.0, -1.0)[:, None]
+    has_order = len(set(groups)) == 2 and len(values) > 2
+    between = {"": np.ones((len(values), 1))} | ({"order": coded} if has_order else {})
+    full = np.column_stack(list(between.values()))
+    for chosen in itertools.product((0, 1), repeat=len(factors)):
+        chosen = chosen[::-1]
+        within = np.ones((1, 1))
+        for (_, count), is_in in zip(factors, chosen):
+            within = np.kron(within, contrasts(count) if is_in else np.ones((count, 1)) / np.sqrt(count))
+        seen = values @ within
+        left = seen - full @ np.linalg.lstsq(full, seen, rcond=None)[0]
+        error, error_df = np.sum(left**2), (len(values) - full.shape[1]) * within.shape[1]
         for name in between:
-            parts = [name] * bool(name) + ["modality"] * first + [LEVEL] * second
+            parts = [name] * bool(name) + [factor for (factor, _), is_in in zip(factors, chosen) if is_in]
             if not parts:
                 continue
-            rest = [columns for other, columns in between.items() if other != name]
-            smaller = np.column_stack(rest) if rest else np.zeros((subjects, 0))
-            fit = smaller @ np.linalg.lstsq(smaller, seen, rcond=None)[0] if smaller.shape[1] else 0.0 * seen
+            rest = [column for other, column in between.items() if other != name]
+            fit = 0.0 * seen
+            if rest:
+                smaller = np.column_stack(rest)
+                fit = smaller @ np.linalg.lstsq(smaller, seen, rcond=None)[0]
             squares, df = np.sum((seen - fit) ** 2) - error, within.shape[1]
-            if max(squares, error) <= 1e-20 * np.sum(responses**2):
-                yield ":".join(parts), "not testable: nothing of it is left in the responses"
+            if max(squares, error) <= 1e-20 * np.sum(values**2):
+                yield ":".join(parts), None
                 continue
-            f = (squares / df) / (error / error_df)
-            yield ":".join(parts), f"F({df}, {error_df}) = {f:.2f}, {p_text(stats.f.sf(f, df, error_df))}"
+            epsilon = None
+            if df > 1:
+                products = left.T @ left
+                epsilon = np.trace(products) ** 2 / (df * np.sum(products**2))
+            yield ":".join(parts), ((squares / df) / (error / error_df), df, error_df, epsilon)
 
 
-print(f"{len(table)} subjects")
-if is_jnd:
-    fractions = table / np.array([level for _, level in table.columns])
-    weber = {modality: fractions[modality].mean(axis=1).to_numpy() for modality in ("vh", "h")}
-    for modality, values in weber.items():
-        mean, low, high = interval(values)
-        print(f"Weber fraction {modality}: {mean * 100:.1f} %  (95 %: {low * 100:.1f} to {high * 100:.1f})")
-    test = stats.ttest_rel(weber["h"], weber["vh"])
-    print(f"difference: t({len(table) - 1}) = {test.statistic:.2f}, {p_text(test.pvalue)}")
-for (modality, level), column in table.items():
-    print(f"{LEVEL} {level:.6g} {modality}: {column.mean():.3f} (se {column.sem():.3f})")
-for effect, text in anova():
-    print(f"{effect}: {text}")
+def effect_text(effect):
+    if effect is None:
+        return "not testable: nothing of it is left in the responses"
+    f, df, error_df, epsilon = effect
+    text = f"F({df}, {error_df}) = {f:.2f}, {p_text(stats.f.sf(f, df, error_df))}"
+    if epsilon is not None:
+        epsilon = min(max(epsilon, 1.0 / df), 1.0)
+        text += f" (GG {p_text(stats.f.sf(f, epsilon * df, epsilon * error_df))})"
+    return text
+
+
+def noncentral_f(f, df, error_df, below):
+    """The noncentrality at which an F is as small as this with a probability."""
+    if stats.f.cdf(f, df, error_df) <= below:
+        return 0.0
+    most = 10.0 + 4.0 * f * df
+    return optimize.brentq(lambda shift: stats.ncf.cdf(f, df, error_df, shift) - below, 1e-12, most, xtol=1e-12)
+
+
+def partial_eta_squared(effect):
+    f, df, error_df, _ = effect
+    ends = [noncentral_f(f, df, error_df, below) for below in (0.975, 0.025)]
+    return (f * df / (f * df + error_df), *(end / (end + df + error_df + 1.0) for end in ends))
+
+
+def cohen_d(t, df):
+    root = np.sqrt(df + 1.0)
+    ends = [optimize.brentq(lambda d: stats.nct.cdf(t, df, d) - below, -37.0, 37.0, xtol=1e-12) for below in (0.975, 0.025)]
+    return t / root, ends[0] / root, ends[1] / root
+
+
+def effects(values, factors, groups, sizes):
+    found = list(anova(values, factors, groups))
+    for name, effect in found:
+        print(name, effect_text(effect))
+    for name, effect in found if sizes else []:
+        if effect is not None:
+            print(name, size_text(*partial_eta_squared(effect)))
 
 
 def comparisons(pairs):
     tests = [(name, stats.ttest_rel(first, second)) for name, first, second in pairs]
     for (name, test), p in zip(tests, holm([test.pvalue for _, test in tests])):
-        size = test.statistic / np.sqrt(len(table))
-        print(f"{name}: t({len(table) - 1}) = {test.statistic:.2f}, {p_text(p)}, d = {size:.2f}")
+        df = subjects - 1
+        print(f"{name} t({df}) = {test.statistic:.2f}, {p_text(p)} {size_text(*cohen_d(test.statistic, df))}")
 
 
-comparisons([(f"h - vh, {LEVEL} {round(level, 4):.10g}", table["h"][level], table["vh"][level]) for level in levels])
+if is_jnd:
+    print(f"{subjects} subjects, {len(counted) / subjects:.1f} pairs each")
+    fractions = table / np.array([level for _, level in columns])
+    weber = {modality: fractions[modality].mean(axis=1).to_numpy() for modality in MODALITIES}
+    for modality, name in (("vh", "vision + haptics"), ("h", "haptics alone")):
+        mean, low, high = interval(weber[modality])
+        print(f"{name} {mean * 100:.1f} % (95 %: {low * 100:.1f} to {high * 100:.1f})")
+    test = stats.ttest_rel(weber["h"], weber["vh"])
+    print(f"difference t({subjects - 1}) = {test.statistic:.2f}, {p_text(test.pvalue)}")
+else:
+    print(f"{subjects} subjects, {number(len(counted) / subjects)} ratings each")
+    repeats = main[main.repeat > 0]
+    print(f"{len(repeats)} presentations repeated because the handle left its range")
+    means = (table["vh"] + table["h"]).mean()[levels] / 2
+    print(f"Linear trend R² = {np.corrcoef(levels, means)[0, 1] ** 2:.3f}")
+for level in levels:
+    name = f"base {number(level)}" if is_jnd else f"stimulus {level:.2f}"
+    print(name, *(f"{table[m][level].mean():.3f} (se {table[m][level].sem():.3f})" for m in MODALITIES))
+
+several = [(LEVEL, len(levels))] if len(levels) > 1 else []
+effects(responses, [("modality", 2), *several], order, sizes=True)
+comparisons([(f"h - vh, {LEVEL} {number(round(level, 4))}", table["h"][level], table["vh"][level]) for level in levels])
 if is_jnd:
     both = {level: (fractions["vh"][level] + fractions["h"][level]) / 2 for level in levels}
     comparisons(
-        [(f"fraction, base {high:g} - {low:g}", both[high], both[low]) for low, high in itertools.combinations(levels, 2)]
+        (f"fraction, base {number(high)} - {number(low)}", both[high], both[low])
+        for low, high in itertools.combinations(levels, 2)
     )
+    for modality in MODALITIES if several else ():
+        for _, effect in anova(fractions[modality].to_numpy(), [("base", len(levels))], np.array([""] * subjects)):
+            print(f"fraction over base, {modality}", effect_text(effect))
+
+for measure in ("speed", "acceleration", "force"):
+    # One number for each stimulus of a trial.
+    each = counted[["subject", "modality", LEVEL]].assign(value=counted[f"{measure}_each"].astype(str).str.split(" "))
+    each = each.explode("value").assign(value=lambda rows: pd.to_numeric(rows.value, errors="coerce")).dropna()
+    moved = each.groupby(["subject", "modality", LEVEL]).value.mean().unstack([1, 2])
+    if set(columns) <= set(moved.columns) and len(moved) == subjects and moved.notna().all(axis=None):
+        seen = moved.loc[table.index][columns].to_numpy()
+        several = [("stimulus", len(levels))] if len(levels) > 1 else []
+        effects(seen, [("modality", 2), *several], np.array([""] * subjects), sizes=False)
+if is_jnd:
+    last = counted.groupby(["subject", "track"]).threshold.last()
+    if last.isna().any():
+        print(f"{last.isna().sum()} tracks did not reach a threshold and are omitted")
 
 try:
     import matplotlib
