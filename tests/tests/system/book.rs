@@ -382,6 +382,35 @@ fn every_block_of_the_book_does_what_the_book_says() {
     assert!(wrong.is_empty(), "{} places of the book are wrong:\n{}", wrong.len(), wrong.join("\n"));
 }
 
+/// The chapter on experiments goes from nothing to the analysis of a pilot: its commands, in its order, in one folder.
+#[test]
+fn the_chapter_on_experiments_leads_to_the_analysis_of_a_pilot() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let name = "docs/src/experiments.md";
+    let text = std::fs::read_to_string(workspace_root().join(name)).expect("a chapter is text");
+    let given = Scratch::default();
+    let chapter = Chapter::read(name, &text, given.path(), TestSize::Daily).expect("a chapter of blocks");
+    let place = |command: &str| {
+        let found = chapter.steps.iter().position(|step| step.command.contains(command));
+        found.unwrap_or_else(|| panic!("`{command}` does not run: {:?}", chapter.steps))
+    };
+    let way = [
+        "weber.study.toml'",
+        "study run weber.study.toml",
+        "study note pilot",
+        "analyse pilot --each",
+        "--trials",
+    ];
+    assert!(way.map(place).is_sorted(), "{:?}", chapter.steps);
+    assert_eq!(chapter.run(), Vec::<String>::new());
+    let said =
+        |command: &str| std::fs::read_to_string(chapter.said(place(command))).expect("it printed something");
+    assert!(said("analyse pilot --each").contains("threshold"), "{}", said("analyse pilot --each"));
+    assert!(said("--trials").contains("vision + haptics"), "{}", said("--trials"));
+}
+
 /// What is wrong with a chapter.
 fn wrong_with(markdown: &str) -> Vec<String> {
     let given = Scratch::default();
