@@ -68,13 +68,21 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
         scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
             CommandError::Usage(format!("{}: the scene has no model to explore", scene.title))
         })?;
+    let mapping =
+        scene.models.first().map_or(1.0, |model| model.mapping.motion_scale * model.mapping.force_scale);
     let watch = Shared::default();
     watch.lock().meter = Some(KinematicsMeter::default());
     let description = describe(&scene, &options, session.plugins());
     let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
     let hint = if publication.is_ok() { "; `flotor view` shows it and has sliders" } else { "" };
-    let mut prompt =
-        Prompt { controls: session.controls(), registry, model, settings: Vec::new(), watch: watch.clone() };
+    let mut prompt = Prompt {
+        controls: session.controls(),
+        registry,
+        model,
+        settings: Vec::new(),
+        watch: watch.clone(),
+        mapping,
+    };
     let (switch, mut observers) = (stop.clone(), Watched { observer: watch, publication: publication.ok() });
     let run = std::thread::spawn(move || {
         let outcome = session.run(&mut observers, &switch);
@@ -142,6 +150,8 @@ struct Prompt {
     /// All changes so far: a new model gets them too.
     settings: Vec<(String, String)>,
     watch: Shared,
+    /// How many times stiffer the hand feels the model.
+    mapping: f64,
 }
 
 impl Prompt {
@@ -215,9 +225,31 @@ impl Prompt {
         let felt = self.watch.lock().meter.replace(KinematicsMeter::default());
         let words = |felt: StimulusKinematics| {
             let stiffness = felt.felt_stiffness_n_per_m;
-            let stiffness = stiffness.map_or("no".to_owned(), |k| format!("{:.3} N/mm", k * 1.0e-3));
-            format!("  felt at the hand: {stiffness} stiffness, up to {:.2} N", felt.peak_force_n)
+            let at_hand = stiffness.map_or("no".to_owned(), |k| format!("{:.3} N/mm", k * 1.0e-3));
+            let model = stiffness.map(|k| model_text(k, self.mapping)).unwrap_or_default();
+            format!("  felt at the hand: {at_hand} stiffness{model}, up to {:.2} N", felt.peak_force_n)
         };
         felt.and_then(|meter| meter.finish()).map_or("  nothing felt yet".to_owned(), words)
+    }
+}
+
+/// The model's own stiffness beside the one at the hand, N/m, where a mapping makes them differ.
+fn model_text(at_hand: f64, mapping: f64) -> String {
+    if (mapping - 1.0).abs() < 1.0e-6 || mapping <= 0.0 {
+        return String::new();
+    }
+    format!(" ({:.3} N/mm of the model, times {mapping:.4} by the mapping)", at_hand / mapping * 1.0e-3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1.471 N/mm of wire are 2.452 N/mm at a hand whose 15 mm are 25 mm of the spring.
+    #[test]
+    fn the_stiffness_of_the_model_stands_beside_that_at_the_hand() {
+        let text = model_text(2452.0, 25.0 / 15.0);
+        assert_eq!(text, " (1.471 N/mm of the model, times 1.6667 by the mapping)");
+        assert_eq!(model_text(2452.0, 1.0), "");
     }
 }
