@@ -38,7 +38,8 @@ fn checks_and_exclusion_rules_of_a_study_file_reach_the_analysis() {
     let count = |phase| first.trials.iter().filter(|record| record.event.trial.phase == phase).count();
     assert_eq!((count(Phase::Catch), count(Phase::RepeatCheck)), (4, 8));
 
-    let analyse = ["analyse", "data", "--json", "result.json", "--trials", "trials.csv"];
+    let analyse =
+        ["analyse", "data", "--json", "result.json", "--trials", "trials.csv", "--html", "page.html"];
     let ran = flotor(folder, &analyse);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     assert!(ran.stdout.contains("catch trials named one of two equal stimuli"), "{ran:?}");
@@ -57,6 +58,9 @@ fn checks_and_exclusion_rules_of_a_study_file_reach_the_analysis() {
     assert_eq!((excluded.len(), alarms.len()), (out.len(), 6), "{excluded:?}");
     assert!(excluded.iter().all(|one| one["rule"] == "most_false_alarms" && one["scope"] == "sitting"));
     assert_eq!(result["subjects"].as_u64(), Some(6 - out.len() as u64));
+
+    let page = std::fs::read_to_string(folder.join("page.html")).unwrap();
+    assert!(page.contains("<h2>Exclusions</h2>") && page.contains("<td>most_false_alarms = 0.25</td>"));
 
     let table = std::fs::read_to_string(folder.join("trials.csv")).unwrap();
     for line in table.lines().skip(1) {

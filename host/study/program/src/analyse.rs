@@ -136,7 +136,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     };
     let report = Report { analysis: &analysis, checks: &checks, excluded: &applied.excluded };
     print_result(arguments.json.file(), &report, text)?;
-    write_text(arguments.html.as_deref(), || html(&first.begin, subjects, &analysis))?;
+    write_text(arguments.html.as_deref(), || html(&first.begin, subjects, &analysis, &applied.excluded))?;
     write_text(arguments.csv.as_deref(), || to_csv([], analysis.responses()))?;
     let Some(path) = &arguments.trials else { return Ok(()) };
     if path.extension().is_none_or(|extension| extension != "csv") {

@@ -97,6 +97,10 @@ impl SubjectQuality {
         say(short, "answers after less than half a second with a stimulus");
         say(still, "answers without a whole movement down and up");
         say(self.lapses(record), "wrong answers to a difference of more than 2.5 thresholds");
+        say(
+            without_difference(record),
+            "answers to equal stimuli, judged by where the larger one would have been (--floor)",
+        );
         let stuck = self.tracks.iter().filter(|track| track.threshold.is_none()).count();
         say(stuck, "tracks that did not reach a threshold");
         say(incidents.len(), "interruptions and disturbances in the log");
@@ -173,6 +177,15 @@ impl SubjectQuality {
         lines.extend(self.flags.iter().map(|flag| format!("  ! {flag}")));
         lines.join("\n")
     }
+}
+
+/// A track whose smallest difference is none comes there: such an answer is right or wrong by chance, and moves the track.
+fn without_difference(record: &SubjectRecord) -> usize {
+    let is_judged = |event: &&crate::log::TrialEvent| {
+        let named = matches!(event.response, Response::First | Response::Second);
+        named && matches!(event.trial.presented, Presented::Pair(pair) if pair.delta == 0.0)
+    };
+    record.counted().filter(is_judged).count()
 }
 
 fn conditions(protocol: &Protocol, record: &SubjectRecord) -> Vec<SubjectCondition> {

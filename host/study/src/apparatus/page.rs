@@ -7,6 +7,7 @@ use crate::analysis::{
     Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, effect_text,
     p_text, published,
 };
+use crate::exclusion::{Exclusion, ExclusionRules};
 use crate::log::Begin;
 use crate::protocol::{Protocol, Stimulus};
 use flotor_statistics::anova::Effect;
@@ -17,7 +18,12 @@ use std::fmt::Write;
 ///
 /// `begin` is the first line of any log of the study; `subjects` are the sittings that were analysed.
 #[must_use]
-pub fn html(begin: &Begin, subjects: &[SubjectRecord], analysis: &Analysis) -> String {
+pub fn html(
+    begin: &Begin,
+    subjects: &[SubjectRecord],
+    analysis: &Analysis,
+    excluded: &[Exclusion],
+) -> String {
     let stimulus = begin.protocol.stimulus();
     let levels = begin.protocol.levels();
     let mut page = Page::default();
@@ -31,6 +37,7 @@ pub fn html(begin: &Begin, subjects: &[SubjectRecord], analysis: &Analysis) -> S
             format!("Perceived magnitude of {stimulus}")
         }
     };
+    exclusions(&mut page, &begin.exclusion(), excluded);
     provenance(&mut page, begin);
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
@@ -39,6 +46,24 @@ pub fn html(begin: &Begin, subjects: &[SubjectRecord], analysis: &Analysis) -> S
         title = escaped(&title),
         body = page.text,
     )
+}
+
+/// What the rules of the study file took; nothing where there are no rules.
+fn exclusions(page: &mut Page, rules: &ExclusionRules, excluded: &[Exclusion]) {
+    if rules.are_none() {
+        return;
+    }
+    page.heading("Exclusions");
+    let names: Vec<String> = rules.names().iter().map(|rule| rules.text_of(rule)).collect();
+    page.paragraph(&format!("Rules of the study file: {}. They took:", names.join("; ")));
+    page.table(&["Subject", "What", "Rule", "Found"], |rows| {
+        if excluded.is_empty() {
+            rows.row(&["nothing".to_owned(), String::new(), String::new(), String::new()]);
+        }
+        for Exclusion { subject, scope, rule, found } in excluded {
+            rows.row(&[subject.to_string(), scope.to_string(), rules.text_of(rule), found.clone()]);
+        }
+    });
 }
 
 fn jnd_page(
