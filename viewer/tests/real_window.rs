@@ -129,8 +129,8 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
     }
 }
 
-/// A whole sitting as a person goes through it: `flotor study` opens the window, everything is answered with keys, and the log,
-/// the tables and the movements are there in the end.
+/// A whole sitting as a person goes through it: `flotor study` opens the window with the consent, everything is read and answered
+/// with keys, the log, the tables and the movements are there in the end, and `flotor analyse` reads them.
 #[test]
 fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
     if !required(Tool::Display) {
@@ -142,6 +142,13 @@ fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
     let mut study = alone("flotor", folder.path(), Some(&display));
     study.args(["study", "magnitude", "--observer", "human", "--stimuli", "3", "--replications", "1"]);
     study.arg("--scene").arg(patient_scene(folder.path(), "study"));
+    for (option, text) in
+        [("--consent", "Consent\nI take part freely."), ("--instructions", "How it goes\nRate springs.")]
+    {
+        let file = folder.path().join(format!("{}.txt", option.trim_start_matches('-')));
+        std::fs::write(&file, text).expect("a scratch folder can be written to");
+        study.arg(option).arg(file);
+    }
     study.args(["--demo", "2", "--noise", "off", "--out"]).arg(&out);
     study.stdout(Stdio::null()).stderr(Stdio::null());
     let mut study = Owned::start(&mut study);
@@ -176,6 +183,16 @@ fn a_sitting_in_a_real_window_is_gone_through_by_keyboard() {
         assert!(out.join("sourcedata/sub-01/motion").join(file).is_file(), "every tick is kept");
     }
     assert!(out.join("sub-01/beh/sub-01_task-magnitude_beh.tsv").is_file());
+    let read: Vec<&str> =
+        log.notes.iter().filter(|(trials, _)| *trials == 0).map(|(_, text)| text.as_str()).collect();
+    let place = |title: &str| {
+        read.iter().position(|text| text.starts_with(&format!("read and went on: {title} (SHA")))
+    };
+    assert!(place("Consent").is_some() && place("Consent") < place("How it goes"), "{read:?}");
+    let analysed = alone("flotor", folder.path(), None).arg("analyse").arg(&out).output().expect("it starts");
+    let said = String::from_utf8_lossy(&analysed.stdout);
+    assert!(analysed.status.success(), "{}", String::from_utf8_lossy(&analysed.stderr));
+    assert!(said.contains("sub-01: 6 answers that count") && said.contains("answers after"), "{said}");
 }
 
 /// No display: one line of the viewer, one of the study, exit code 2, and no data folder is begun.
