@@ -174,7 +174,7 @@ impl Analysis {
     }
 }
 
-/// An effect in words, as papers print it: `F(2, 30) = 1.46, p = 0.250 (GG p = 0.251)`.
+/// An effect in words, as papers print it: `F(2, 30) = 1.46, p = 0.250 (HF p = 0.251)`.
 #[must_use]
 pub fn effect_text(effect: &Effect) -> String {
     text::effect_text(effect)

@@ -171,7 +171,7 @@ pub(super) fn effect_text(effect: &Effect) -> String {
     if !effect.is_testable() {
         return "not testable: nothing of it is left in the responses".to_owned();
     }
-    let corrected = effect.sphericity.map_or(String::new(), |s| format!(" (GG {})", p_text(s.p_gg)));
+    let corrected = effect.sphericity.map_or(String::new(), |s| format!(" (HF {})", p_text(s.p_hf)));
     format!("F({}, {}) = {:.2}, {}{corrected}", effect.df, effect.error_df, effect.f, p_text(effect.p))
 }
 

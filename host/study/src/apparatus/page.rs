@@ -261,7 +261,7 @@ impl Page {
     }
 
     fn effects(&mut self, effects: &[Effect], report: &[published::Published]) {
-        self.table(&["Effect", "F", "p", "ε (GG)", "p (GG)", "η² partial", "thesis"], |rows| {
+        self.table(&["Effect", "F", "p", "ε (HF)", "p (HF)", "η² partial", "thesis"], |rows| {
             for effect in effects {
                 if !effect.is_testable() {
                     let name = effect.effect.replace(':', " × ");
@@ -277,8 +277,8 @@ impl Page {
                     effect.effect.replace(':', " × "),
                     format!("F({}, {}) = {:.2}", effect.df, effect.error_df, effect.f),
                     p_text(effect.p).replace("p = ", "").replace("p ", ""),
-                    corrected(|s| format!("{:.3}", s.epsilon_gg)),
-                    corrected(|s| p_text(s.p_gg).replace("p = ", "").replace("p ", "")),
+                    corrected(|s| format!("{:.3}", s.epsilon_hf.min(1.0))),
+                    corrected(|s| p_text(s.p_hf).replace("p = ", "").replace("p ", "")),
                     format!("{:.3}", effect.partial_eta_squared),
                     beside.map_or(String::new(), |(_, text)| (*text).to_owned()),
                 ]);

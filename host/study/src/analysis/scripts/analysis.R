@@ -81,7 +81,10 @@ anova_of <- function(values, factors, counts, groups) {
       effect <- list(f = NA)
       if (max(squares, error) > 1e-20 * sum(values^2)) {
         products <- t(left) %*% left
-        epsilon <- sum(diag(products))^2 / (df * sum(products^2))
+        gg <- sum(diag(products))^2 / (df * sum(products^2))
+        # Huynh and Feldt's correction, with Lecoutre's of it.
+        freedom <- nrow(values) - ncol(full)
+        epsilon <- ((freedom + 1) * df * gg - 2) / (df * (freedom - df * gg))
         effect <- list(f = (squares / df) / (error / error_df), df = df, error_df = error_df, epsilon = epsilon)
       }
       found[[paste(parts, collapse = ":")]] <- effect
@@ -95,7 +98,7 @@ effect_text <- function(effect) {
   upper <- function(scale) pf(effect$f, scale * effect$df, scale * effect$error_df, lower.tail = FALSE)
   text <- sprintf("F(%d, %d) = %.2f, %s", effect$df, effect$error_df, effect$f, p_text(upper(1)))
   epsilon <- min(max(effect$epsilon, 1 / effect$df), 1)
-  if (effect$df > 1) sprintf("%s (GG %s)", text, p_text(upper(epsilon))) else text
+  if (effect$df > 1) sprintf("%s (HF %s)", text, p_text(upper(epsilon))) else text
 }
 
 solve_for <- function(of, low, high) uniroot(of, c(low, high), tol = 1e-12)$root

@@ -104,7 +104,10 @@ def anova(values, factors, groups):
             epsilon = None
             if df > 1:
                 products = left.T @ left
-                epsilon = np.trace(products) ** 2 / (df * np.sum(products**2))
+                gg = np.trace(products) ** 2 / (df * np.sum(products**2))
+                # Huynh and Feldt's correction, with Lecoutre's of it.
+                freedom = len(values) - full.shape[1]
+                epsilon = ((freedom + 1) * df * gg - 2) / (df * (freedom - df * gg))
             yield ":".join(parts), ((squares / df) / (error / error_df), df, error_df, epsilon)
 
 
@@ -115,7 +118,7 @@ def effect_text(effect):
     text = f"F({df}, {error_df}) = {f:.2f}, {p_text(stats.f.sf(f, df, error_df))}"
     if epsilon is not None:
         epsilon = min(max(epsilon, 1.0 / df), 1.0)
-        text += f" (GG {p_text(stats.f.sf(f, epsilon * df, epsilon * error_df))})"
+        text += f" (HF {p_text(stats.f.sf(f, epsilon * df, epsilon * error_df))})"
     return text
 
 

@@ -1,0 +1,220 @@
+//! Every p that `flotor analyse` prints, over many studies of observers without any effect: after its correction it is below 5 % in
+//! 5 % of the studies. And the power that `flotor study power` prints is the share of studies in which `analyse` finds the
+//! difference.
+//!
+//! `FLOTOR_TEST_SIZE=full` takes 1000 studies, `daily` 60, anything else 10; the bounds are three standard errors of each.
+
+#![allow(clippy::unwrap_used)] // tests may panic
+
+use flotor_statistics::anova::Effect;
+use flotor_study::analysis::{
+    AnalysisOptions, PostHoc, SubjectQuality, SubjectRecord, analyse_jnd, analyse_magnitude,
+};
+use flotor_study::kinematics::StimulusKinematics;
+use flotor_study::log::TrialEvent;
+use flotor_study::observer::{Population, SimulatedSubject};
+use flotor_study::power::{population, power, study};
+use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, SubjectNumber};
+use flotor_study::sitting::Sitting;
+use flotor_study::trial::Exploration;
+use std::collections::BTreeMap;
+
+/// Level of the tests.
+const LEVEL: f64 = 0.05;
+
+fn studies() -> u64 {
+    match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
+        Ok("full") => 1000,
+        Ok("daily") => 60,
+        _ => 10,
+    }
+}
+
+/// Numbers without any order, for movements that nothing depends on.
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        // SplitMix64 (Steele, Lea and Flood 2014): seeds that are alike give streams that are not.
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// About normal: the sum of twelve.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+
+    fn movement(&mut self) -> StimulusKinematics {
+        StimulusKinematics {
+            duration_s: 1.0,
+            mean_speed_m_per_s: 0.05 + 0.01 * self.normal(),
+            mean_acceleration_m_per_s2: 1.0 + 0.2 * self.normal(),
+            mean_force_n: 4.0 + 0.5 * self.normal(),
+            peak_force_n: 9.0,
+            cycles: 1,
+            felt_stiffness_n_per_m: None,
+        }
+    }
+}
+
+/// So many subjects of a population, who move as they like.
+fn subjects(protocol: &Protocol, population: &Population, count: u16, seed: u64) -> Vec<SubjectRecord> {
+    let sit = |subject| {
+        let middle = flotor_statistics::describe::mean(protocol.levels());
+        let simulated = SimulatedSubject::new(population, seed, subject, middle);
+        // Streams far apart: the first number of one names the next.
+        let name = Random(seed * 1000 + u64::from(subject.get())).uniform();
+        let mut random = Random(name.to_bits());
+        let mut sitting = Sitting::new(protocol, seed, subject);
+        let mut trials = Vec::new();
+        while let Some(trial) = sitting.next() {
+            let response = simulated.respond(&trial);
+            let kinematics = trial.presented.values().iter().map(|_| random.movement()).collect();
+            let exploration = Exploration { kinematics, ..Exploration::default() };
+            let verdict = sitting.answer(response, &exploration).unwrap();
+            trials.push(TrialEvent { trial, response, verdict, exploration });
+        }
+        let first_modality = protocol.first_modality().of(subject);
+        SubjectRecord { subject, first_modality, trials, tracks: sitting.results().to_vec() }
+    };
+    (1..=count).filter_map(SubjectNumber::new).map(sit).collect()
+}
+
+/// How often each test said yes, by its name; a test that is not made in a study does not count.
+#[derive(Default)]
+struct Tally(BTreeMap<String, (u64, u64)>);
+
+impl Tally {
+    fn take(&mut self, name: &str, p: f64) {
+        if !p.is_nan() {
+            let (yes, all) = self.0.entry(name.to_owned()).or_default();
+            *yes += u64::from(p < LEVEL);
+            *all += 1;
+        }
+    }
+
+    /// The p that counts is the corrected one.
+    fn effects(&mut self, of: &str, effects: &[Effect]) {
+        for effect in effects {
+            let p = effect.sphericity.map_or(effect.p, |sphericity| sphericity.p_hf);
+            self.take(&format!("{of}: {}", effect.effect), p);
+        }
+    }
+
+    /// The smallest p of all comparisons of a kind: one false alarm or more.
+    fn family(&mut self, name: &str, comparisons: &[PostHoc]) {
+        let here = comparisons.iter().filter(|one| one.comparison.starts_with(name));
+        self.take(name, here.map(|one| one.p_holm).fold(f64::NAN, f64::min));
+    }
+
+    /// Each share but those of effects that are there, and the largest distance from the level allowed.
+    fn check(&self, there: &[&str]) {
+        let share_of = |(yes, all): (u64, u64)| {
+            let error = (LEVEL * (1.0 - LEVEL) / all as f64).sqrt();
+            (yes as f64 / all as f64, error)
+        };
+        for (name, counts) in &self.0 {
+            let (share, error) = share_of(*counts);
+            let (percent, errors) = (share * 100.0, (share - LEVEL) / error);
+            eprintln!("{percent:5.1} % of {:4} studies, {errors:+.1} standard errors: {name}", counts.1);
+        }
+        for (name, counts) in &self.0 {
+            let (share, error) = share_of(*counts);
+            if there.contains(&name.as_str()) {
+                assert!(share > LEVEL + 3.0 * error, "{name}: {share}");
+                continue;
+            }
+            assert!(share <= LEVEL + 3.0 * error, "{name}: {share}");
+            // Holm's correction is for the worst case; comparisons that share a level are better than that.
+            let is_family = name.starts_with("h - vh") || name.starts_with("fraction");
+            assert!(is_family || share >= LEVEL - 3.0 * error, "{name}: {share}");
+        }
+    }
+}
+
+#[test]
+fn every_p_of_a_difference_experiment_is_one() {
+    let protocol = JndProtocol { replications: 2, ..JndProtocol::default() };
+    let whole = Protocol::Jnd(protocol.clone());
+    let mut tally = Tally::default();
+    for seed in 0..studies() {
+        let records = subjects(&whole, &population(1.0, 0.0), 16, 90_000 + seed);
+        let analysis = analyse_jnd(&protocol, &records, &AnalysisOptions::default()).unwrap();
+        tally.take("difference", analysis.t.p);
+        tally.effects("thresholds", &analysis.anova);
+        for (name, effect) in [("vh", &analysis.constancy.vh), ("h", &analysis.constancy.h)] {
+            tally.effects(&format!("fraction over base, {name}"), effect.as_slice());
+        }
+        tally.family("h - vh", &analysis.post_hoc);
+        tally.family("fraction", &analysis.post_hoc);
+        assert_eq!(analysis.kinematics.len(), 3);
+        for measure in &analysis.kinematics {
+            tally.effects(measure.measure, &measure.anova);
+        }
+    }
+    assert_eq!(tally.0.len(), 1 + 7 + 2 + 2 + 3 * 3, "{:?}", tally.0.keys());
+    // A threshold in newtons is larger at a larger base: that is there.
+    tally.check(&["thresholds: base"]);
+}
+
+#[test]
+fn every_p_of_an_experiment_with_ratings_is_one() {
+    let protocol = MagnitudeProtocol { demo: 0, ..MagnitudeProtocol::default() };
+    let whole = Protocol::Magnitude(protocol.clone());
+    let mut tally = Tally::default();
+    for seed in 0..studies() {
+        let records = subjects(&whole, &Population::default(), 16, 50_000 + seed);
+        let analysis = analyse_magnitude(&protocol, &records, &AnalysisOptions::default()).unwrap();
+        tally.effects("ratings", &analysis.anova);
+        tally.family("h - vh", &analysis.post_hoc);
+        for measure in &analysis.kinematics {
+            tally.effects(measure.measure, &measure.anova);
+        }
+    }
+    // Scaling leaves nothing of the order by itself.
+    assert_eq!(tally.0.len(), 6 + 1 + 3 * 3, "{:?}", tally.0.keys());
+    tally.check(&["ratings: stimulus"]);
+}
+
+/// A preference for the first of a pair is said of one in twenty who have none, at most.
+#[test]
+fn a_preference_is_rarely_said_of_those_who_have_none() {
+    let protocol = JndProtocol { bases: vec![26.0], replications: 4, ..JndProtocol::default() };
+    let protocol = Protocol::Jnd(protocol);
+    let mut tally = Tally::default();
+    for seed in 0..studies().div_ceil(20) {
+        for record in subjects(&protocol, &Population::default(), 20, 30_000 + seed) {
+            let quality = SubjectQuality::of(&protocol, &record, &[]);
+            let is_said = quality.flags.iter().any(|flag| flag.starts_with("a preference"));
+            tally.take("a preference", if is_said { 0.0 } else { 1.0 });
+        }
+    }
+    let (yes, all) = tally.0["a preference"];
+    let bound = LEVEL + 3.0 * (LEVEL * (1.0 - LEVEL) / all as f64).sqrt();
+    eprintln!("a preference is said of {yes} of {all} who have none");
+    assert!(yes as f64 / all as f64 <= bound, "{yes} of {all}");
+}
+
+/// `study power` and the studies themselves, of other seeds, agree within three standard errors of their difference.
+#[test]
+fn power_is_what_studies_find() {
+    let protocol = JndProtocol { replications: 2, ..JndProtocol::default() };
+    let observers = population(1.25, 0.0);
+    for count in [6, 12] {
+        let said = (0..studies()).map(|seed| study(&protocol, &observers, count, 10_000 + seed).unwrap());
+        let said = power(count, &said.collect::<Vec<_>>());
+        let whole = Protocol::Jnd(protocol.clone());
+        let found = (0..studies()).filter(|seed| {
+            let records = subjects(&whole, &observers, count, 20_000 + seed);
+            analyse_jnd(&protocol, &records, &AnalysisOptions::default()).unwrap().t.p < LEVEL
+        });
+        let found = found.count() as f64 / studies() as f64;
+        let error = (2.0_f64).sqrt() * (said.power * (1.0 - said.power) / studies() as f64).sqrt();
+        eprintln!("{count} subjects: power {:.3}, found {found:.3}, standard error {error:.3}", said.power);
+        assert!((said.power - found).abs() <= 3.0 * error, "{count} subjects: {said:?}, found {found}");
+    }
+}
