@@ -31,7 +31,7 @@ fn checks_and_exclusion_rules_of_a_study_file_reach_the_analysis() {
     let folder = scratch.path();
     // Who names one of two equal springs in more than a quarter of the catch trials, or is mostly unsure.
     let rules = "[exclusion]\nmost_false_alarms = 0.25\nresponse_time_s = [0.2, 20]\n";
-    let _ = scratch.file("a.study.toml", &format!("{FILE}{rules}"));
+    let _ = scratch.file("a.study.toml", format!("{FILE}{rules}"));
     let ran = flotor(folder, &["study", "run", "a.study.toml"]);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let first = log(folder, 1);
@@ -81,7 +81,7 @@ fn a_rule_without_what_it_needs_is_refused() {
         ("most_dont_know = 20", "a share from 0 to 1"),
         ("most_unsure = 0.2", "unknown field `most_unsure`"),
     ] {
-        let _ = scratch.file("a.study.toml", &format!("{FILE}[exclusion]\n{rules}\n"));
+        let _ = scratch.file("a.study.toml", format!("{FILE}[exclusion]\n{rules}\n"));
         let ran = flotor(scratch.path(), &["study", "run", "a.study.toml"]);
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
         assert!(ran.error().contains(reason) && ran.error().contains("a.study.toml"), "{rules}: {ran:?}");
@@ -97,7 +97,7 @@ fn a_changed_study_file_is_refused_with_the_lines_that_changed() {
     let go = || flotor(scratch.path(), &["study", "run"]);
     assert_eq!(go().code, Some(exit_code::OK));
     assert_eq!(go().code, Some(exit_code::OK), "nothing is left to do");
-    let _ = scratch.file("a.study.toml", &FILE.replace("[17, 26]", "[17]"));
+    let _ = scratch.file("a.study.toml", FILE.replace("[17, 26]", "[17]"));
     let ran = go();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     let said =
