@@ -1,12 +1,12 @@
 //! The 3D view as a texture of the interface: drawn by a GPU or software adapter, on the CPU where the interface has
 //! neither (tests).
 
-use crate::camera::Camera;
-use crate::geometry::Mesh;
-use crate::gpu::GpuScene;
-use crate::raster::solid::{Backdrop, Rasterizer};
 use eframe::egui_wgpu::RenderState;
 use egui::{ColorImage, Context, TextureHandle, TextureId, TextureOptions};
+use flotor_drawing::camera::Camera;
+use flotor_drawing::geometry::Mesh;
+use flotor_drawing::gpu::GpuScene;
+use flotor_drawing::raster::{Backdrop, Rasterizer};
 
 /// What draws the 3D view, and what it has drawn last.
 pub enum Canvas {

@@ -7,10 +7,9 @@
 //!   [`tally`] counts what happened, [`panel`] is what can be set.
 //! - [`devices`]: the devices of a run, one of which is looked at.
 //! - [`derived`]: stiffness felt, force over position. [`quantity`]: what can be plotted, [`decimate`] with how few points, [`trace`] from picture to picture, [`export`] as files.
-//! - [`shape`]: where the bodies of the models are; [`geometry`] makes triangles of them, [`scene`] a picture's worth, [`placing`] where devices stand,
-//!   seen by a [`camera`] in a [`light`].
-//! - [`gpu`]: draws the scene on a GPU or software adapter, [`raster`] without either; [`canvas`] is one of the two in the
-//!   interface, [`picture`] a whole picture without a window.
+//! - [`shape`]: where the bodies of the models are; [`scene`] makes triangles of them with `flotor-drawing`, [`placing`] says where devices stand.
+//! - [`canvas`]: the 3D view in the interface, drawn on a GPU or the processor; [`picture`] a whole picture without a window, whose
+//!   interface [`flat`] draws.
 //! - [`ui`], [`palette`]: the parts of the interface; [`app`] puts them together. [`sound`] warns the ear.
 //! - [`window`]: opens it, or says why there is none; [`cost`] is what it takes of the machine.
 //! - [`remembered`]: what a person has chosen about the window, from one time to the next.
@@ -19,7 +18,6 @@
 //! Nothing here is real-time.
 
 pub mod app;
-pub mod camera;
 pub mod canvas;
 pub mod cost;
 pub mod decimate;
@@ -28,10 +26,8 @@ pub mod devices;
 pub mod experiment;
 pub mod export;
 pub mod feed;
-pub mod geometry;
-pub mod gpu;
+pub mod flat;
 pub mod history;
-pub mod light;
 pub mod palette;
 pub mod panel;
 pub mod picture;
@@ -39,7 +35,6 @@ pub mod placing;
 pub mod player;
 pub mod pointer_order;
 pub mod quantity;
-pub mod raster;
 pub mod remembered;
 pub mod scene;
 pub mod shape;

@@ -2,10 +2,10 @@
 //! plugins are.
 
 use clap::Parser;
+use flotor_drawing::camera::View;
 use flotor_live::Directory;
 use flotor_study::screen::{Screen, Told};
 use flotor_viewer::app::{Start, Viewer, Wanted};
-use flotor_viewer::camera::View;
 use flotor_viewer::devices::Devices;
 use flotor_viewer::experiment::wire::at_standard_streams;
 use flotor_viewer::experiment::{Prompt, StopKey};

@@ -4,10 +4,10 @@
 //! theirs, which alike in lightness are one colour to who sees no blue. Strain: viridis (van der Walt and Smith, 2015),
 //! whose lightness rises all the way, so that it reads in grey as well.
 
-use crate::geometry::Color;
-use crate::raster::solid::Backdrop;
 use clap::builder::Resettable;
 use egui::Color32;
+use flotor_drawing::geometry::Color;
+use flotor_drawing::raster::Backdrop;
 use serde::{Deserialize, Serialize};
 
 /// Light or dark.

@@ -1,12 +1,11 @@
 //! A picture of a moment of a run, without a window, a display or a GPU.
 
-use crate::camera::{Camera, View};
 use crate::canvas::Canvas;
 use crate::devices::Devices;
+use crate::flat::FlatRasterizer;
 use crate::history::History;
 use crate::palette::{Look, Palette};
 use crate::quantity::{Quantity, Units};
-use crate::raster::flat::FlatRasterizer;
 use crate::scene::SceneBuilder;
 use crate::shape::Shape;
 use crate::trace::Trace;
@@ -14,6 +13,7 @@ use crate::ui::plots::{Maximise, PlotView, plot};
 use crate::ui::view3d::{Subject, View3d};
 use crate::ui::{legend, readout, style};
 use egui::{ColorImage, Context, RawInput, Rect, Ui, pos2, vec2};
+use flotor_drawing::camera::{Camera, View};
 use std::path::{Path, PathBuf};
 
 /// How a picture is to be made.

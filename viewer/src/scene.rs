@@ -1,15 +1,15 @@
 //! The 3D scene: bodies at the pose of the handle, on a ground, with what the hand feels as arrows.
 
-use crate::camera::Camera;
-use crate::geometry::{
-    Body, Color, Curve, Detail, Ground, LocalStrain, MM_PER_M, Mesh, Section, Shadow, Strain,
-    append_primitive, append_surface, append_tube, contact_strain, force_arrow, plate, torque_arrow,
-};
 use crate::history::Sample;
-use crate::light;
 use crate::palette::{Palette, strain_color};
 use crate::placing::{Placing, round_below};
 use crate::shape::{Posed, Rest, Shape};
+use flotor_drawing::camera::Camera;
+use flotor_drawing::geometry::{
+    Body, Color, Curve, Detail, Ground, LocalStrain, MM_PER_M, Mesh, Section, Shadow, Strain,
+    append_primitive, append_surface, append_tube, contact_strain, force_arrow, plate, torque_arrow,
+};
+use flotor_drawing::light;
 use flotor_hal::{DVec3, Part, Pose, ScalarField, Wrench};
 
 /// Lengths of arrows.

@@ -4,8 +4,8 @@
 //! `flotor.centerline/1` and `flotor.shape/1`). The servo never computes a shape, and a recording holds none: 65 sections at 60 Hz would
 //! double it, and nothing but the recorded parameters could be shown (docs/src/adr/0008-viewer-process.md).
 
-use crate::geometry::{Body, Curve, Strain};
 use flotor_core::mapping::Mapping;
+use flotor_drawing::geometry::{Body, Curve, Strain};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting, read_metadata};
 use flotor_hal::{DVec3, Form, Input, Pose};

@@ -43,6 +43,8 @@ enum Role {
     Statistics,
     /// Draws, and knows nothing of what.
     Plot,
+    /// Triangles and pictures of them, without a window.
+    Drawing,
     /// What the programs share: options, output, errors.
     Command,
     /// Judges models and devices.
@@ -63,9 +65,9 @@ enum Role {
 }
 
 use Role::{
-    Calibration, Command, Compat, Contract, Core, DropIn, Emulator, Fixture, Guard, Host, Judge, Lab, Live,
-    OfDevices, OfEmulators, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
-    StudyProgram, Sync, Tests, Viewer,
+    Calibration, Command, Compat, Contract, Core, Drawing, DropIn, Emulator, Fixture, Guard, Host, Judge,
+    Lab, Live, OfDevices, OfEmulators, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics,
+    Study, StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -103,7 +105,8 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ),
     // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
     ("host", Host, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command, Plugin]),
-    ("viewer", Viewer, &[Contract, Sync, Core, Record, Live, Plot, Study]),
+    ("viewer/drawing", Drawing, &[Contract]),
+    ("viewer", Viewer, &[Contract, Sync, Core, Record, Live, Plot, Drawing, Study]),
     (
         "tests",
         Tests,
@@ -128,6 +131,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
             Plugin,
             Emulator,
             Host,
+            Drawing,
             Viewer,
             Fixture,
             DropIn,

@@ -2,7 +2,6 @@
 
 use super::source::{Parts, connect};
 use super::{Audience, Heading, Source, Viewer, Wanted};
-use crate::camera::Camera;
 use crate::devices::Devices;
 use crate::feed::{Arrivals, FeedState, STALE_AFTER};
 use crate::history::{History, Keep};
@@ -11,6 +10,7 @@ use crate::player::Player;
 use crate::scene::SceneBuilder;
 use egui::Context;
 use flotor_core::trace::Events;
+use flotor_drawing::camera::Camera;
 use flotor_live::{ChangeMessage, Outcome, Subject};
 use std::time::{Duration, Instant};
 

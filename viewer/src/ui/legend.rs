@@ -1,11 +1,11 @@
 //! What the colours of the 3D view mean.
 
-use crate::camera::Camera;
 use crate::palette::{Palette, strain_color};
 use crate::placing::round_below;
 use crate::scene::{ArrowKey, ColorScale, SceneFacts, field_color};
 use crate::ui::style::{BODY_PT, SMALL_PT};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, vec2};
+use flotor_drawing::camera::Camera;
 use flotor_hal::DVec3;
 
 /// Size of the scale of strain, points.
@@ -103,7 +103,7 @@ fn significant(number: f64) -> String {
 
 /// A colour of the scene as one of the interface.
 #[must_use]
-pub fn opaque([r, g, b, _]: crate::geometry::Color) -> Color32 {
+pub fn opaque([r, g, b, _]: flotor_drawing::geometry::Color) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 

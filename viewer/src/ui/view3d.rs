@@ -1,12 +1,12 @@
 //! The 3D view and what a person does with it: orbit, zoom, incline, reset.
 
-use crate::camera::Camera;
 use crate::canvas::Canvas;
 use crate::history::Sample;
 use crate::palette::{Look, Palette};
 use crate::scene::{ArrowScale, SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2};
+use flotor_drawing::camera::Camera;
 use flotor_hal::Pose;
 
 /// Turn for a drag over a point of the screen, rad.

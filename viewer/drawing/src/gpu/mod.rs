@@ -8,7 +8,7 @@ mod target;
 
 use crate::camera::Camera;
 use crate::geometry::Mesh;
-use crate::raster::solid::Backdrop;
+use crate::raster::Backdrop;
 use bytemuck::{Pod, Zeroable};
 use pipeline::{Pipelines, pipelines};
 use target::Target;
