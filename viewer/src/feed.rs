@@ -160,9 +160,17 @@ impl Waiting {
                 }
             }
             Ok(Some(Event::Change(change))) => {
-                // The newest says what is in force.
-                if changes.len() == MOST_ARRIVALS {
-                    changes.remove(0);
+                // The newest of a parameter says what is in force: one of each is kept, however many there are.
+                let is_same = |earlier: &ChangeMessage| {
+                    earlier.plugin == change.plugin
+                        && earlier.subject == change.subject
+                        && earlier.parameter == change.parameter
+                        && earlier.outcome == change.outcome
+                };
+                if changes.len() >= MOST_ARRIVALS
+                    && let Some(earliest) = changes.iter().position(is_same)
+                {
+                    changes.remove(earliest);
                 }
                 changes.push(change);
             }

@@ -5,8 +5,8 @@
 //!  Serve::serve         <-                           its reader thread <- socket <- watcher
 //! ```
 //!
-//! Nothing here makes the caller wait: an outbox that is full drops what is new and counts it. While nobody watches, a tick
-//! costs one look at a number. Not real-time.
+//! Nothing here makes the caller wait: an outbox that is full drops what is new and counts it, but keeps the newest change of
+//! each parameter. While nobody watches, a tick costs one look at a number. Not real-time.
 
 mod outbox;
 mod watcher;
@@ -18,7 +18,7 @@ use crate::{
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_record::RunDescription;
-use outbox::Outbox;
+use outbox::{Changed, Outbox};
 use std::io::{self, ErrorKind};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
@@ -127,7 +127,9 @@ impl Publication {
         self.shared.greeting().keep(&message);
         let Ok(payload) = serde_json::to_vec(&message) else { return };
         let bytes = frame(Kind::Change, &payload);
-        self.shared.watchers().iter().for_each(|watcher| watcher.outbox.push(bytes.clone()));
+        for watcher in self.shared.watchers().iter() {
+            watcher.outbox.change(Changed::from(&message), bytes.clone());
+        }
     }
 
     /// Notifies all clients of the end of the run and its outcome; no client can connect afterwards.

@@ -1,13 +1,14 @@
 //! What waits to be sent to one watcher: a queue of fixed length that drops and counts.
 
-use crate::{Kind, frame, ticks_to_payload};
+use crate::{ChangeMessage, Kind, Outcome, Subject, frame, ticks_to_payload};
 use flotor_core::trace::{Events, TickRecord};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Ticks that wait at most: four seconds at 1 kHz.
 const MOST_TICKS: usize = 4096;
-/// Everything else that waits at most. A watcher who asks this often and reads nothing gets no answer.
+/// Everything else that waits at most, but for the newest change of each parameter. A watcher who asks this often and reads nothing gets
+/// no answer.
 const MOST_FRAMES: usize = 256;
 
 #[derive(Default)]
@@ -20,8 +21,30 @@ pub(super) struct Outbox {
 #[allow(clippy::large_enum_variant)] // nearly all are ticks: a box for each would be an allocation a tick
 enum Waiting {
     Tick(TickRecord),
+    Change(Changed, Vec<u8>),
     /// A frame of any other kind.
     Frame(Vec<u8>),
+}
+
+/// What a change is of: where there is no room for two, the later one says what is in force.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Changed {
+    plugin: String,
+    subject: Subject,
+    parameter: String,
+    /// A value that was refused says nothing of the one in force.
+    outcome: Outcome,
+}
+
+impl From<&ChangeMessage> for Changed {
+    fn from(message: &ChangeMessage) -> Self {
+        Self {
+            plugin: message.plugin.clone(),
+            subject: message.subject,
+            parameter: message.parameter.clone(),
+            outcome: message.outcome,
+        }
+    }
 }
 
 #[derive(Default)]
@@ -77,7 +100,28 @@ impl Outbox {
         self.changed.notify_one();
     }
 
-    /// A frame that is no tick, if there is room.
+    /// A change; without room, in the place of the earliest one of the same that waits. One of each is never dropped, so that a watcher
+    /// who reads nothing for a while knows afterwards what is in force.
+    pub(super) fn change(&self, of: Changed, frame: Vec<u8>) {
+        let mut state = self.lock();
+        if state.is_closed {
+            return;
+        }
+        if state.frames >= MOST_FRAMES {
+            let is_same =
+                |waiting: &Waiting| matches!(waiting, Waiting::Change(earlier, _) if *earlier == of);
+            if let Some(earliest) = state.waiting.iter().position(is_same) {
+                state.waiting.remove(earliest);
+                state.frames -= 1;
+            }
+        }
+        state.waiting.push_back(Waiting::Change(of, frame));
+        state.frames += 1;
+        drop(state);
+        self.changed.notify_one();
+    }
+
+    /// A frame that is neither tick nor change, if there is room.
     pub(super) fn push(&self, frame: Vec<u8>) {
         let mut state = self.lock();
         if state.frames < MOST_FRAMES && !state.is_closed {
@@ -126,7 +170,7 @@ impl Outbox {
         for waiting in all {
             match waiting {
                 Waiting::Tick(record) => batch.tick(record),
-                Waiting::Frame(frame) => batch.frame(&frame),
+                Waiting::Change(_, frame) | Waiting::Frame(frame) => batch.frame(&frame),
             }
         }
         Some(batch.finish())
@@ -228,13 +272,47 @@ mod tests {
         assert_eq!(seen, [(0, Events::NONE), (10, Events::BOUNDARY)]);
     }
 
+    fn changed(parameter: &str, outcome: Outcome) -> Changed {
+        Changed {
+            plugin: "spring".to_owned(),
+            subject: Subject::Parameter,
+            parameter: parameter.to_owned(),
+            outcome,
+        }
+    }
+
+    #[test]
+    fn the_newest_change_of_each_parameter_is_never_dropped() {
+        let outbox = Outbox::default();
+        let number = |number: u32| frame(Kind::Change, &number.to_le_bytes());
+        outbox.change(changed("turns", Outcome::Applied), number(1_000_000));
+        for value in 0..10_000 {
+            outbox.change(changed("gamma_n", Outcome::Applied), number(value));
+        }
+        outbox.change(changed("gamma_n", Outcome::Refused), number(2_000_000));
+        for _ in 0..1000 {
+            outbox.push(frame(Kind::Answer, b"{}"));
+        }
+        outbox.change(changed("wire_mm", Outcome::Applied), number(3_000_000));
+        let mut frames = Frames::default();
+        frames.push(&outbox.take().expect("something waits"));
+        let mut seen = Vec::new();
+        while let Some((kind, payload)) = frames.take().expect("frames of our own") {
+            assert_eq!(kind, Kind::Change, "there was no room for answers");
+            seen.push(u32::from_le_bytes(payload.try_into().expect("a number")));
+        }
+        assert_eq!(seen.first(), Some(&1_000_000), "the only change of its parameter");
+        assert_eq!(seen[seen.len() - 3..], [9_999, 2_000_000, 3_000_000]);
+        assert!(seen.len() <= MOST_FRAMES + 2, "{} frames wait", seen.len());
+    }
+
     #[test]
     fn a_change_stays_between_the_ticks_it_came_between() {
         let outbox = Outbox::default();
         outbox.want_ticks(1);
         outbox.tick(&record(0, Events::NONE));
         outbox.tick(&record(1, Events::NONE));
-        outbox.push(frame(Kind::Change, b"{}"));
+        outbox.change(changed("gamma_n", Outcome::Applied), frame(Kind::Change, b"{}"));
         outbox.tick(&record(2, Events::NONE));
         let mut frames = Frames::default();
         frames.push(&outbox.take().expect("something waits"));
