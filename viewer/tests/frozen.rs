@@ -6,15 +6,10 @@
 
 mod support;
 
-use egui::accesskit::Role;
-use egui::{Rect, vec2};
-use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable;
+use egui::Rect;
 use flotor_live::{
     Ask, ChangeMessage, Client, Directory, EndKind, Event, Greeting, LiveError, Outcome, Subject,
 };
-use flotor_viewer::app::{Start, Viewer, Wanted};
-use flotor_viewer::palette::Look;
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -22,7 +17,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use support::PATIENCE;
-use support::display::{Display, SIZE, alone, patient_scene, patiently};
+use support::display::{Display, SIZE, alone, patient_scene, patiently, place_of_slider};
 use support::process::Owned;
 use support::tools::{Tool, required};
 
@@ -80,7 +75,7 @@ impl Bench {
                 }
             }
         });
-        let slider = place_of_gamma(&directory);
+        let slider = place_of_slider(&directory, "gamma");
         let display = Display::start(folder.path());
         let mut window = alone("flotor-viewer", folder.path(), Some(&display));
         // What is exported by chance goes into the scratch folder.
@@ -136,21 +131,6 @@ impl Bench {
         let (x, y) = (self.slider.left() + part * self.slider.width(), self.slider.center().y);
         format!("mousemove {x:.0} {y:.0}\n")
     }
-}
-
-fn place_of_gamma(directory: &Directory) -> Rect {
-    let (size, directory) = (vec2(f32::from(SIZE[0]), f32::from(SIZE[1])), directory.clone());
-    let mut harness = Harness::builder().with_size(size).build_eframe(|creation| {
-        Viewer::new(&creation.egui_ctx, None, Start::Live(Wanted::newest(directory)), Look::Dark)
-    });
-    let until = Instant::now() + PATIENCE;
-    while harness.state().history().is_empty() {
-        assert!(Instant::now() < until, "no ticks come");
-        std::thread::sleep(Duration::from_millis(20));
-        harness.run_steps(1);
-    }
-    harness.run_steps(3);
-    harness.get_by_role_and_label(Role::Slider, "gamma").rect()
 }
 
 /// Frozen before, at and after every point of a drag, and woken when the pointer is far away: the applied value is never outside the

@@ -6,38 +6,15 @@
 
 mod support;
 
-use egui::accesskit::Role;
-use egui::{Rect, vec2};
-use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable;
 use flotor_live::{Ask, Client, Directory, Event};
-use flotor_viewer::app::{Start, Viewer, Wanted};
-use flotor_viewer::palette::Look;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use support::PATIENCE;
-use support::display::{Display, SIZE, alone, patient_scene, patiently};
+use support::display::{Display, SIZE, alone, patient_scene, patiently, place_of_slider};
 use support::process::Owned;
 use support::tools::{Tool, required};
-
-/// Where a slider lies in the window: the same interface without a display, on the same run.
-fn place_of_slider(directory: &Directory, name: &str) -> Rect {
-    let size = vec2(f32::from(SIZE[0]), f32::from(SIZE[1]));
-    let directory = directory.clone();
-    let mut harness = Harness::builder().with_size(size).build_eframe(|creation| {
-        Viewer::new(&creation.egui_ctx, None, Start::Live(Wanted::newest(directory)), Look::Dark)
-    });
-    let until = Instant::now() + PATIENCE;
-    while harness.state().history().is_empty() {
-        assert!(Instant::now() < until, "no ticks come");
-        std::thread::sleep(Duration::from_millis(20));
-        harness.run_steps(1);
-    }
-    harness.run_steps(3);
-    harness.get_by_role_and_label(Role::Slider, name).rect()
-}
 
 /// A recording of two seconds of the demo.
 fn recording(folder: &Path) -> PathBuf {

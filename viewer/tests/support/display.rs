@@ -2,6 +2,13 @@
 
 use super::PATIENCE;
 use super::process::Owned;
+use egui::accesskit::Role;
+use egui::{Rect, vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use flotor_live::Directory;
+use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::palette::Look;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -90,4 +97,21 @@ pub(crate) fn patiently<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -
         std::thread::sleep(Duration::from_millis(20));
     }
     panic!("{what}: not within {:?}", 3 * PATIENCE);
+}
+
+/// Where a slider lies in the window: the same interface without a display, on the same run.
+pub(crate) fn place_of_slider(directory: &Directory, name: &str) -> Rect {
+    let size = vec2(f32::from(SIZE[0]), f32::from(SIZE[1]));
+    let directory = directory.clone();
+    let mut harness = Harness::builder().with_size(size).build_eframe(|creation| {
+        Viewer::new(&creation.egui_ctx, None, Start::Live(Wanted::newest(directory)), Look::Dark)
+    });
+    let until = Instant::now() + PATIENCE;
+    while harness.state().history().is_empty() {
+        assert!(Instant::now() < until, "no ticks come");
+        std::thread::sleep(Duration::from_millis(20));
+        harness.run_steps(1);
+    }
+    harness.run_steps(3);
+    harness.get_by_role_and_label(Role::Slider, name).rect()
 }
