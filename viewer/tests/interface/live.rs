@@ -2,6 +2,7 @@
 //! loop took is what is shown.
 
 use super::window::{Window, live, until, until_fresh, window};
+use crate::support::FakeHost;
 use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::{NodeT, Queryable};
@@ -287,4 +288,99 @@ fn f1_lists_the_keys() {
     window.key_press(Key::Escape);
     window.run_steps(2);
     assert!(window.query_by_label("emergency stop; of a recording: play").is_none());
+}
+
+/// Requests up to the emergency stop. Pictures are not made meanwhile: what is not under way already never comes.
+fn up_to_the_stop(host: &mut FakeHost) {
+    while host.request(None) != Ask::EmergencyStop {}
+}
+
+/// Makes the one picture that takes these events in.
+fn one_picture(window: &mut Window<'_>, events: impl IntoIterator<Item = egui::Event>) {
+    let before = window.ctx.cumulative_frame_nr();
+    window.input_mut().events.extend(events);
+    window.step();
+    assert_eq!(window.ctx.cumulative_frame_nr(), before + 1);
+}
+
+fn space(pressed: bool) -> egui::Event {
+    let modifiers = egui::Modifiers::NONE;
+    egui::Event::Key { key: Key::Space, physical_key: None, pressed, repeat: false, modifiers }
+}
+
+fn button(pos: egui::Pos2, pressed: bool) -> egui::Event {
+    let (button, modifiers) = (egui::PointerButton::Primary, egui::Modifiers::NONE);
+    egui::Event::PointerButton { pos, button, pressed, modifiers }
+}
+
+/// Whatever was clicked, pulled, turned and typed before: the picture that sees the space bar or the button let go has sent the
+/// emergency stop.
+#[test]
+fn the_emergency_stop_is_on_its_way_within_one_picture_whatever_was_done_before() {
+    let (mut window, mut host, _folder) = live(&[]);
+    let stop = window.get_by_label("EMERGENCY STOP").rect().center();
+    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut random = |below: u16| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        u16::try_from(state % u64::from(below)).expect("it is below a u16")
+    };
+    let rounds = match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
+        Ok("full") => 500,
+        Ok("daily") => 20,
+        _ => 2,
+    };
+    for round in 0..rounds {
+        for _ in 0..20 {
+            // Sliders and fields, and the 3D view; not the traces, which would write files.
+            let is_side = random(2) == 0;
+            let (x, y) =
+                if is_side { (985 + random(290), 60 + random(690)) } else { (random(960), 60 + random(80)) };
+            let pos = egui::pos2(f32::from(x), f32::from(y));
+            let moved = egui::Event::PointerMoved(pos);
+            let events = match random(6) {
+                0 => vec![moved, button(pos, true), button(pos, false)],
+                1 | 2 => vec![moved, button(pos, true)],
+                3 => vec![moved, button(pos, false)],
+                4 => vec![
+                    moved,
+                    egui::Event::Text(["4", "8", ".", "a", "?"][usize::from(random(5))].to_owned()),
+                ],
+                _ => {
+                    const KEYS: [Key; 8] = [
+                        Key::Tab,
+                        Key::Escape,
+                        Key::F1,
+                        Key::P,
+                        Key::M,
+                        Key::Home,
+                        Key::ArrowUp,
+                        Key::Backspace,
+                    ];
+                    let modifiers = egui::Modifiers::NONE;
+                    let key = KEYS[usize::from(random(8))];
+                    let down = |pressed| egui::Event::Key {
+                        key,
+                        physical_key: None,
+                        pressed,
+                        repeat: false,
+                        modifiers,
+                    };
+                    vec![moved, down(true), down(false)]
+                }
+            };
+            one_picture(&mut window, events);
+        }
+        if round % 2 == 0 {
+            one_picture(&mut window, [space(true), space(false)]);
+        } else {
+            // Whatever the mouse had hold of, it lets go of first.
+            one_picture(&mut window, [egui::Event::PointerMoved(stop), button(stop, false)]);
+            one_picture(&mut window, [egui::Event::PointerMoved(stop)]);
+            one_picture(&mut window, [button(stop, true)]);
+            one_picture(&mut window, [button(stop, false)]);
+        }
+        up_to_the_stop(&mut host);
+    }
 }
