@@ -24,8 +24,7 @@ impl Devices {
     #[must_use]
     pub fn new(histories: Vec<History>) -> Self {
         let seen = |history: History| {
-            let device = history.run().devices().nth(usize::from(history.device()));
-            let name = device.map_or_else(String::new, |device| device.name.clone());
+            let name = history.device_name().to_owned();
             Seen { name, tally: Tally::of(history.samples()), history }
         };
         let mut seen: Vec<Seen> = histories.into_iter().map(seen).collect();

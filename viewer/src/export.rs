@@ -3,12 +3,10 @@
 use crate::derived::ForcePosition;
 use crate::history::History;
 use crate::palette::{Look, Palette};
-use crate::picture::{draw_without_window, write_png};
+use crate::picture::{PictureError, draw_without_window, write_png};
 use crate::quantity::Quantity;
-use crate::trace::Trace;
 use crate::ui::force_position::said;
-use crate::ui::plot_stack::{ExportFormat, PlotStack};
-use crate::ui::plots::{Maximise, PlotView, plot};
+use crate::ui::plot_stack::{ExportFormat, PlotStack, TooLow};
 use crate::ui::readout::{subtitle_of, title_of};
 use crate::ui::view3d::pixels;
 use egui::{UiBuilder, vec2};
@@ -18,11 +16,20 @@ use std::path::{Path, PathBuf};
 
 /// Why there is no file.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write `{}`: {cause}; start the viewer in a folder you may write to", path.display())]
-pub struct ExportError {
-    path: PathBuf,
-    #[source]
-    cause: std::io::Error,
+#[non_exhaustive]
+pub enum ExportError {
+    /// The system says no.
+    #[error("cannot write `{}`: {cause}; choose a folder you may write to", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        cause: std::io::Error,
+    },
+    /// There is no room for the traces.
+    #[error(transparent)]
+    TooLow(#[from] TooLow),
 }
 
 /// How pictures of traces are made.
@@ -71,6 +78,8 @@ impl ExportOptions {
 
 /// Pixels a point of a picture of pixels.
 const SCALE: f32 = 2.0;
+/// Height of what is beside the traces: title and margins, points.
+const TITLE_PT: f32 = 66.0;
 
 /// Writes what is shown of a device, with its name where there are several, into the working folder, under a name that is not taken.
 ///
@@ -88,30 +97,42 @@ pub fn export(
         ExportFormat::Png => "png",
     };
     let path = free_name(ending);
-    write(history, device, plots, format, &path)
-        .map_err(|cause| ExportError { path: path.clone(), cause })?;
+    write(history, device, plots, format, &path)?;
     Ok(path)
 }
 
 /// Writes what is shown into a file.
 ///
 /// # Errors
-/// What the system says.
+/// [`ExportError`].
 pub fn write(
     history: &History,
     device: Option<&str>,
     plots: &PlotStack,
     format: ExportFormat,
     path: &Path,
-) -> std::io::Result<()> {
-    match format {
+) -> Result<(), ExportError> {
+    if format != ExportFormat::Csv {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
+        let [height_px, least_px] =
+            [plots.export.size_px[1], least_height_px(plots)].map(|length| length as usize);
+        plots.has_room(height_px, least_px)?;
+    }
+    let written = match format {
         ExportFormat::Csv => std::fs::write(path, csv(history, plots)),
         ExportFormat::Svg => std::fs::write(path, svg(history, device, plots)),
-        ExportFormat::Png => {
-            let image = png(history, device, plots);
-            write_png(path, &image).map_err(std::io::Error::other)
-        }
-    }
+        ExportFormat::Png => write_png(path, &png(history, device, plots)).map_err(|error| match error {
+            PictureError::Write { cause, .. } => cause,
+            other => std::io::Error::other(other),
+        }),
+    };
+    written.map_err(|cause| ExportError::Write { path: path.to_owned(), cause })
+}
+
+/// The height with which every trace of a picture can be read, pixels.
+#[must_use]
+pub fn least_height_px(plots: &PlotStack) -> f64 {
+    f64::from((SCALE * (plots.least_height_pt() + TITLE_PT)).ceil())
 }
 
 /// Every sample of the time shown, a column for each component, with its unit.
@@ -193,7 +214,6 @@ fn png(history: &History, device: Option<&str>, plots: &PlotStack) -> egui::Colo
     let (look, size_px) = (plots.export.look, plots.export.size_px);
     let palette = Palette::of(look);
     let mut plots = plots.clone();
-    let span_s = plots.span_s(history);
     #[allow(clippy::cast_possible_truncation)] // pixels
     let size = vec2(size_px[0] as f32, size_px[1] as f32);
     let title = plots.export.title(history, device);
@@ -202,35 +222,7 @@ fn png(history: &History, device: Option<&str>, plots: &PlotStack) -> egui::Colo
         let mut ui = ui.new_child(UiBuilder::new().max_rect(inside));
         ui.heading(&title);
         ui.weak(subtitle_of(history.run()));
-        let mut all = ui.available_rect_before_wrap();
-        if plots.force_position.axis.is_some() {
-            let beside = all.with_min_x(all.right() - 0.36 * all.width());
-            all = all.with_max_x(beside.left() - 16.0);
-            let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
-            plots.force_position.show(&mut right, (history, f64::NAN), span_s, plots.units, &palette);
-        }
-        // The last time of an axis stands half beside it.
-        let mut ui = ui.new_child(UiBuilder::new().max_rect(all.with_max_x(all.right() - 16.0)));
-        let in_sight = plots.in_sight();
-        let count = in_sight.len().max(1) as f32;
-        let height = (ui.available_height() - 29.0 * count - 16.0) / count;
-        for (index, quantity) in in_sight.iter().enumerate() {
-            let time_axis = index + 1 == in_sight.len();
-            let height = height + if time_axis { 14.0 } else { 0.0 };
-            let (_, per_si) = quantity.unit(plots.units);
-            let values = plots.values_of(*quantity).map(|values| values.map(|value| value * per_si));
-            let view = PlotView {
-                device: None,
-                span_s,
-                cursor_s: f64::NAN,
-                units: plots.units,
-                height,
-                time_axis,
-                values,
-                maximise: Maximise::No,
-            };
-            plot(&mut ui, history, &mut Trace::of(*quantity), view, &palette);
-        }
+        plots.still(&mut ui, (history, None), f64::NAN, &palette);
     })
 }
 

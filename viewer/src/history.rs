@@ -172,6 +172,12 @@ impl History {
         self.device
     }
 
+    /// The device's name in the scene; empty where the run has no such device.
+    #[must_use]
+    pub fn device_name(&self) -> &str {
+        self.run.devices().nth(usize::from(self.device)).map_or("", |device| device.name.as_str())
+    }
+
     /// Adds a tick of its device, and of no other; the oldest makes room where only so many are kept.
     pub fn push(&mut self, record: &TickRecord) {
         if record.device != self.device {

@@ -6,7 +6,8 @@
 //! - [`history`]: what has been seen of a run; [`feed`] reads it from a running host, [`player`] says which moment is shown,
 //!   [`tally`] counts what happened, [`panel`] is what can be set.
 //! - [`devices`]: the devices of a run, one of which is looked at.
-//! - [`derived`]: stiffness felt, force over position. [`quantity`]: what can be plotted, [`decimate`] with how few points, [`trace`] from picture to picture, [`export`] as files.
+//! - [`derived`]: stiffness felt, force over position. [`quantity`]: what can be plotted, [`decimate`] with how few points, [`trace`] from picture to picture, [`export`] as files,
+//!   [`chosen`] on a command line.
 //! - [`shape`]: where the bodies of the models are; [`scene`] makes triangles of them with `flotor-drawing`, [`placing`] says where devices stand.
 //! - [`canvas`]: the 3D view in the interface, drawn on a GPU or the processor; [`picture`] a whole picture without a window, whose
 //!   interface [`flat`] draws.
@@ -19,6 +20,7 @@
 
 pub mod app;
 pub mod canvas;
+pub mod chosen;
 pub mod cost;
 pub mod decimate;
 pub mod derived;

@@ -6,13 +6,16 @@ use flotor_drawing::camera::View;
 use flotor_live::Directory;
 use flotor_study::screen::{Screen, Told};
 use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::chosen::Chosen;
 use flotor_viewer::devices::Devices;
 use flotor_viewer::experiment::wire::at_standard_streams;
 use flotor_viewer::experiment::{Prompt, StopKey};
-use flotor_viewer::export;
+use flotor_viewer::export::{self, ExportError};
 use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
-use flotor_viewer::picture::{PictureOptions, draw_without_window, number_of, picture, write_png};
+use flotor_viewer::picture::{
+    PictureError, PictureOptions, draw_without_window, has_moment, number_of, picture, write_png,
+};
 use flotor_viewer::quantity::Quantity;
 use flotor_viewer::shape::shapes_of;
 use flotor_viewer::ui::plot_stack::{ExportFormat, PlotStack, Window};
@@ -55,21 +58,27 @@ struct Arguments {
         allow_hyphen_values = true
     )]
     view: Option<View>,
-    /// In files: device that numbers and traces are of, where there are several (default: the first)
+    /// Device that numbers and traces are of, where there are several (default: the first)
     #[arg(long, value_name = "NAME", requires = "recording")]
     device: Option<String>,
     /// The moment to show, s (default: that of the largest force)
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", requires = "recording")]
     at: Option<f64>,
     /// Write the traces of the recording instead of opening a window: numbers (.csv), lines (.svg) or pixels (.png); --look light
     /// unless another is named
     #[arg(long, value_name = "OUT", requires = "recording", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
-    /// Traces of the picture (default: force,position)
-    #[arg(long, value_name = "LIST", value_delimiter = ',', hide_possible_values = true)]
+    /// Traces shown (default: force,position; a window: as the last time)
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        hide_possible_values = true,
+        conflicts_with = "sitting"
+    )]
     traces: Vec<Quantity>,
-    /// In files: force over position along this axis, beside the traces
-    #[arg(long, value_name = "x|y|z", value_parser = axis)]
+    /// Force over position along this axis, beside the traces
+    #[arg(long, value_name = "x|y|z", value_parser = axis, conflicts_with = "sitting")]
     force_position: Option<usize>,
     /// Title of the file of traces (default: that of the run)
     #[arg(long, value_name = "TEXT", requires = "export")]
@@ -133,22 +142,32 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
             out.display()
         )));
     }
+    let chosen = chosen(arguments, history.as_deref().unwrap_or_default()).map_err(Failure::usage)?;
     match (history, &arguments.screenshot) {
-        (Some(history), None) if arguments.export.is_some() => traces(arguments, history),
+        (Some(history), None) if arguments.export.is_some() => traces(arguments, history, &chosen),
         (Some(history), Some(out)) if arguments.window || arguments.screen.is_some() => {
-            whole_window(arguments, history, out)
+            whole_window(arguments, history, &chosen, out)
         }
-        (Some(history), Some(out)) => screenshot(arguments, history, out),
+        (Some(history), Some(out)) => screenshot(arguments, history, chosen, out),
         (history, _) => {
             let start = match history {
                 Some(history) => Start::Recording(history, arguments.at, arguments.plugins.clone()),
                 None => live(arguments)?,
             };
-            let cost = open(start, arguments.request)?;
+            let cost = open(start, chosen, arguments.request)?;
             cost.iter().for_each(|cost| println!("{cost}"));
             Ok(())
         }
     }
+}
+
+/// What is shown, as far as the command line says; the recording has to have it.
+fn chosen(arguments: &Arguments, histories: &[History]) -> Result<Chosen, PictureError> {
+    if let Some(at_s) = arguments.at {
+        has_moment(histories, at_s)?;
+    }
+    let device = arguments.device.as_ref().map(|name| number_of(histories, name)).transpose()?;
+    Ok(Chosen::new(device.unwrap_or(0), arguments.traces.clone(), arguments.force_position))
 }
 
 /// A running host: for an experimenter, or in front of a person in a sitting.
@@ -163,14 +182,16 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
 }
 
 /// The window as it would open on the recording, drawn on the processor.
-fn whole_window(arguments: &Arguments, history: Vec<History>, out: &Path) -> Result<(), Failure> {
+fn whole_window(
+    arguments: &Arguments,
+    history: Vec<History>,
+    chosen: &Chosen,
+    out: &Path,
+) -> Result<(), Failure> {
     let (look, size, scale) = of_picture(arguments.request);
     let start = Start::Recording(history, arguments.at, arguments.plugins.clone());
     let mut viewer = Viewer::new(&egui::Context::default(), None, start, look);
-    if let Some(name) = &arguments.device {
-        viewer.look_at_named(name).map_err(Failure::usage)?;
-    }
-    choose(arguments, viewer.plots_mut());
+    viewer.choose(chosen);
     // The experiment's end of the way to the screen stays open while it is drawn.
     let ((teller, told), (said, _hears)) = (channel(), channel());
     if let Some(screen) = &arguments.screen {
@@ -181,33 +202,25 @@ fn whole_window(arguments: &Arguments, history: Vec<History>, out: &Path) -> Res
     write_png(out, &image).map_err(Failure::file)
 }
 
-/// The traces, as the command line wants them.
-fn choose(arguments: &Arguments, plots: &mut PlotStack) {
-    if !arguments.traces.is_empty() {
-        plots.shown.clone_from(&arguments.traces);
-        plots.shown.sort();
-        plots.shown.dedup();
-    }
-    plots.force_position.axis = arguments.force_position;
-}
-
 /// A file of the traces.
-fn traces(arguments: &Arguments, histories: Vec<History>) -> Result<(), Failure> {
+fn traces(arguments: &Arguments, histories: Vec<History>, chosen: &Chosen) -> Result<(), Failure> {
     let Some(out) = &arguments.export else { return Ok(()) };
     let mut devices = Devices::new(histories);
-    if let Some(name) = &arguments.device {
-        devices.choose(number_of(&devices, name).map_err(Failure::usage)?);
-    }
+    devices.choose(chosen.device);
     let mut plots = PlotStack::new(Window::Whole);
-    choose(arguments, &mut plots);
+    plots.choose(chosen);
     plots.export.look = arguments.request.look.unwrap_or(Look::Light);
     if let Some(size) = arguments.request.size {
         plots.export.size_px = size.map(|length| length as f64);
+    } else {
+        plots.export.size_px[1] = plots.export.size_px[1].max(export::least_height_px(&plots));
     }
     plots.export.title = arguments.title.clone().unwrap_or_default();
     let format = ExportFormat::of_file(out).map_err(Failure::usage)?;
-    export::write(devices.history(), devices.name(), &plots, format, out)
-        .map_err(|cause| Failure::file(format!("cannot write `{}`: {cause}", out.display())))
+    export::write(devices.history(), devices.name(), &plots, format, out).map_err(|error| match error {
+        ExportError::TooLow(_) => Failure::usage(error),
+        error => Failure::file(error),
+    })
 }
 
 /// Look, size and scale of a picture: the same for everybody.
@@ -215,21 +228,19 @@ fn of_picture(request: WindowOptions) -> (Look, [usize; 2], f32) {
     (request.look.unwrap_or_default(), request.size.unwrap_or([1280, 800]), request.scale.unwrap_or(1.0))
 }
 
-fn screenshot(arguments: &Arguments, history: Vec<History>, out: &Path) -> Result<(), Failure> {
+fn screenshot(
+    arguments: &Arguments,
+    history: Vec<History>,
+    chosen: Chosen,
+    out: &Path,
+) -> Result<(), Failure> {
     let (look, size_px, scale) = of_picture(arguments.request);
     let (mut shapes, missing) =
         history.first().map(|first| shapes_of(first.run(), &arguments.plugins)).unwrap_or_default();
     for reason in missing {
         eprintln!("note: {reason}");
     }
-    let options = PictureOptions {
-        size_px,
-        scale,
-        look,
-        view: arguments.view,
-        device: arguments.device.clone(),
-        at_s: arguments.at,
-    };
+    let options = PictureOptions { size_px, scale, look, view: arguments.view, chosen, at_s: arguments.at };
     let image = picture(history, &mut shapes, &options).map_err(Failure::usage)?;
     write_png(out, &image).map_err(Failure::file)
 }

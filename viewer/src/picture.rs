@@ -1,15 +1,15 @@
 //! A picture of a moment of a run, without a window, a display or a GPU.
 
 use crate::canvas::Canvas;
+use crate::chosen::Chosen;
 use crate::devices::Devices;
 use crate::flat::FlatRasterizer;
 use crate::history::History;
 use crate::palette::{Look, Palette};
-use crate::quantity::{Quantity, Units};
+use crate::quantity::Units;
 use crate::scene::SceneBuilder;
 use crate::shape::Shape;
-use crate::trace::Trace;
-use crate::ui::plots::{Maximise, PlotView, plot};
+use crate::ui::plot_stack::{PlotStack, TooLow, Window};
 use crate::ui::view3d::{Subject, View3d};
 use crate::ui::{legend, readout, style};
 use egui::{ColorImage, Context, RawInput, Rect, Ui, pos2, vec2};
@@ -27,8 +27,8 @@ pub struct PictureOptions {
     pub look: Look,
     /// From where; without one, the experimenter's view.
     pub view: Option<View>,
-    /// Name of the device that numbers and traces are of; without one, the first.
-    pub device: Option<String>,
+    /// Device and traces.
+    pub chosen: Chosen,
     /// The moment, s; without one, that of the largest force.
     pub at_s: Option<f64>,
 }
@@ -48,6 +48,17 @@ pub enum PictureError {
         /// Names of those there are.
         known: Vec<String>,
     },
+    /// There is no such moment.
+    #[error("{at_s} s is outside the recording, which is from {:.3} to {:.3} s", span_s[0], span_s[1])]
+    Moment {
+        /// What was requested, s.
+        at_s: f64,
+        /// First and last time there are, s.
+        span_s: [f64; 2],
+    },
+    /// There is no room for the traces.
+    #[error(transparent)]
+    TooLow(#[from] TooLow),
     /// The file could not be written.
     #[error("cannot write the picture `{}`: {cause}; name a file in a folder you may write to", path.display())]
     Write {
@@ -61,25 +72,41 @@ pub enum PictureError {
 
 /// Part of the height that the 3D view gets.
 const VIEW_PART: f32 = 0.60;
+/// Above and below the traces, points.
+const BESIDE_PLOTS_PT: f32 = 12.0;
 /// Samples a pixel and direction of the 3D view.
 const SAMPLES: usize = 3;
-/// What stands beneath the 3D view.
-const PLOTS: [Quantity; 2] = [Quantity::Force, Quantity::Position];
 
-/// Number of the device of this name.
+/// Number of the device of this name among those of a recording.
 ///
 /// # Errors
 /// [`PictureError::Device`].
-pub fn number_of(devices: &Devices, name: &str) -> Result<usize, PictureError> {
-    let known = || devices.names().map(str::to_owned).collect::<Vec<_>>();
-    let number = devices.names().position(|known| known == name);
-    number.ok_or_else(|| PictureError::Device { name: name.to_owned(), known: known() })
+pub fn number_of(histories: &[History], name: &str) -> Result<usize, PictureError> {
+    let known = || histories.iter().map(History::device_name);
+    let number = known().position(|known| known == name);
+    number.ok_or_else(|| PictureError::Device {
+        name: name.to_owned(),
+        known: known().map(str::to_owned).collect(),
+    })
+}
+
+/// Whether a recording has this moment, s.
+///
+/// # Errors
+/// [`PictureError::Moment`].
+pub fn has_moment(histories: &[History], at_s: f64) -> Result<(), PictureError> {
+    let Some(first) = histories.first().filter(|first| !first.is_empty()) else { return Ok(()) };
+    let span_s = first.span_s();
+    // A run of ten seconds has no tick at its end, and is asked for it.
+    let period_s = 1.0 / first.run().rate_hz.max(1.0);
+    let is_inside = at_s >= span_s[0] - period_s && at_s <= span_s[1] + 1.5 * period_s;
+    if is_inside { Ok(()) } else { Err(PictureError::Moment { at_s, span_s }) }
 }
 
 /// Draws a moment of a run: 3D view, numbers, traces.
 ///
 /// # Errors
-/// [`PictureError::Empty`].
+/// [`PictureError::Empty`], [`PictureError::TooLow`].
 pub fn picture(
     histories: Vec<History>,
     shapes: &mut [Shape],
@@ -87,8 +114,13 @@ pub fn picture(
 ) -> Result<ColorImage, PictureError> {
     let palette = Palette::of(options.look);
     let mut devices = Devices::new(histories);
-    if let Some(name) = &options.device {
-        devices.choose(number_of(&devices, name)?);
+    devices.choose(options.chosen.device);
+    let mut plots = PlotStack::new(Window::Whole);
+    plots.choose(&options.chosen);
+    if options.chosen.traces().is_some() {
+        let least_pt = (plots.least_height_pt() + BESIDE_PLOTS_PT) / (1.0 - VIEW_PART);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
+        plots.has_room(options.size_px[1], (least_pt * options.scale).ceil() as usize)?;
     }
     let history = devices.history();
     let sample = match options.at_s {
@@ -112,23 +144,9 @@ pub fn picture(
         legend::axes(ui.painter(), view, &facts, &view3d.camera, &palette);
         let names = (devices.names(), devices.chosen());
         legend::names(ui.painter(), view, &facts, &view3d.camera, names, &palette);
-        let below = Rect::from_min_max(view.left_bottom() + vec2(14.0, 8.0), area.max - vec2(20.0, 4.0));
+        let below = Rect::from_min_max(view.left_bottom() + vec2(14.0, 8.0), area.max - vec2(4.0, 4.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below));
-        let height = (below.height() - 2.0 * 26.0 - 12.0) / 2.0;
-        for (index, quantity) in PLOTS.into_iter().enumerate() {
-            let time_axis = index + 1 == PLOTS.len();
-            let view = PlotView {
-                device: devices.name(),
-                values: None,
-                maximise: Maximise::No,
-                span_s: history.span_s(),
-                cursor_s: sample.time_s(),
-                units: Units::default(),
-                height: if time_axis { height + 14.0 } else { height - 14.0 },
-                time_axis,
-            };
-            plot(&mut ui, history, &mut Trace::of(quantity), view, &palette);
-        }
+        plots.still(&mut ui, (history, devices.name()), sample.time_s(), &palette);
     }))
 }
 

@@ -1,6 +1,7 @@
 //! A real window: display, device, and what is said where there is none.
 
 use crate::app::{Start, Viewer};
+use crate::chosen::Chosen;
 use crate::cost::{self, Cost};
 use crate::palette::{Look, Palette};
 use crate::pointer_order::PointerOrder;
@@ -79,8 +80,16 @@ fn scale(text: &str) -> Result<f32, String> {
 }
 
 /// What is kept of a window: its choices, but those that a command line made and nobody has changed since.
-fn for_the_next_time(mut now: Remembered, before: &Remembered, request: WindowOptions) -> Remembered {
+fn for_the_next_time(
+    mut now: Remembered,
+    before: &Remembered,
+    request: WindowOptions,
+    chosen: &Chosen,
+) -> Remembered {
     let zoom = now.zoom;
+    if chosen.traces() == Some(&now.traces[..]) {
+        now.traces.clone_from(&before.traces);
+    }
     if request.look == Some(now.look) {
         now.look = before.look;
     }
@@ -97,11 +106,11 @@ fn for_the_next_time(mut now: Remembered, before: &Remembered, request: WindowOp
     now
 }
 
-/// Opens a window and stays until it is closed; gives what it cost, if that was requested.
+/// Opens a window that shows what is chosen, and stays until it is closed; gives what it cost, if that was requested.
 ///
 /// # Errors
 /// [`WindowError`].
-pub fn open(start: Start, request: WindowOptions) -> Result<Option<Cost>, WindowError> {
+pub fn open(start: Start, chosen: Chosen, request: WindowOptions) -> Result<Option<Cost>, WindowError> {
     // A sitting looks the same for everybody.
     let file = if matches!(start, Start::Sitting(..)) { None } else { Remembered::file() };
     let mut remembered = file.as_deref().map(Remembered::load).unwrap_or_default();
@@ -129,12 +138,14 @@ pub fn open(start: Start, request: WindowOptions) -> Result<Option<Cost>, Window
                 let device = creation.wgpu_render_state.as_ref();
                 let mut viewer = Viewer::new(&creation.egui_ctx, device, start, remembered.look);
                 viewer.recall(&creation.egui_ctx, &remembered);
+                viewer.choose(&chosen);
                 Ok(Box::new(Kept {
                     viewer,
                     file,
                     kept: remembered,
                     before,
                     request,
+                    chosen,
                     pointer: PointerOrder::default(),
                     measure: request.measure.map(|duration| (duration, tells)),
                 }))
@@ -186,6 +197,7 @@ struct Kept {
     /// What was chosen the last time, and what the command line said instead, for this time only.
     before: Remembered,
     request: WindowOptions,
+    chosen: Chosen,
     pointer: PointerOrder,
     /// What is still to be watched, and who wants to know.
     measure: Option<(Duration, Sender<Cost>)>,
@@ -204,7 +216,7 @@ impl eframe::App for Kept {
             zoom: ui.ctx().zoom_factor(),
             ..self.viewer.remembered()
         };
-        let now = for_the_next_time(now, &self.before, self.request);
+        let now = for_the_next_time(now, &self.before, self.request, &self.chosen);
         // Not with every picture while something is pulled.
         if now != self.kept && !ui.input(|input| input.pointer.any_down()) {
             let _ = now.save(file); // a full disk costs the choices of the next time, and nothing now
@@ -239,6 +251,7 @@ fn one_line(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::quantity::Quantity;
 
     #[test]
     fn what_a_command_line_says_is_for_this_time_only() {
@@ -251,12 +264,17 @@ mod tests {
         };
         let as_requested =
             Remembered { look: Look::Light, zoom: 2.0, size_pt: [320.0, 200.0], ..Remembered::default() };
-        assert_eq!(for_the_next_time(as_requested.clone(), &before, WindowOptions::default()), as_requested);
+        let nothing = Chosen::default();
+        let as_it_is = for_the_next_time(as_requested.clone(), &before, WindowOptions::default(), &nothing);
+        assert_eq!(as_it_is, as_requested);
         let pulled = Remembered { zoom: 1.5, size_pt: [900.0, 700.0], ..as_requested.clone() };
-        let kept = for_the_next_time(pulled.clone(), &before, request);
+        let kept = for_the_next_time(pulled.clone(), &before, request, &nothing);
         assert_eq!(kept, Remembered { look: before.look, ..pulled }, "what was changed since is kept");
-        let kept = for_the_next_time(as_requested, &before, request);
+        let kept = for_the_next_time(as_requested.clone(), &before, request, &nothing);
         assert_eq!(kept, before);
+        let chosen = Chosen::new(0, vec![Quantity::Energy], None);
+        let energy = Remembered { traces: vec![Quantity::Energy], ..as_requested };
+        assert_eq!(for_the_next_time(energy, &before, request, &chosen), before);
     }
 
     /// One test: the hook that is told of panics is one for all threads.

@@ -37,10 +37,10 @@ pub(crate) struct ViewArguments {
     /// Write the traces of the recording as numbers (.csv), lines (.svg) or pixels (.png), light unless --look says dark
     #[arg(long, value_name = "OUT", requires = "file", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
-    /// With --export or --screenshot --window: traces shown, by name, such as force,stiffness (default: force,position)
+    /// Traces shown, by name, such as force,stiffness (default: force,position; a window: as the last time)
     #[arg(long, value_name = "LIST")]
     traces: Option<String>,
-    /// With --export or --screenshot --window: force over position along this axis beside the traces
+    /// Force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z")]
     force_position: Option<String>,
     /// With --export: title (default: that of the scene)
@@ -49,11 +49,11 @@ pub(crate) struct ViewArguments {
     /// With --screenshot: draw a screen of a sitting, as `flotor study --screen json` writes it
     #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view"])]
     screen: Option<String>,
-    /// With --screenshot or --export: device whose numbers and traces are shown, where there are several (default: the first)
+    /// Device of the recording whose numbers and traces are shown, where there are several (default: the first)
     #[arg(long, value_name = "NAME", requires = "file")]
     device: Option<String>,
-    /// Moment to show, s (default: that of the largest force)
-    #[arg(long, value_name = "SECONDS")]
+    /// Moment of the recording to show, s (default: that of the largest force)
+    #[arg(long, value_name = "SECONDS", requires = "file")]
     at: Option<String>,
     /// Colours: dark or light
     #[arg(long, value_name = "dark|light")]
@@ -87,11 +87,12 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     let mut add = |name: &str, value: OsString| for_viewer.extend([name.into(), value]);
     let remote = arguments.file.as_deref().filter(|file| is_remote(file.as_os_str()));
     let file = if remote.is_some() { None } else { arguments.file.as_ref() };
-    if remote.is_some() && arguments.screenshot.is_some() {
-        return Err(CommandError::Usage(
-            "a picture of a moment needs a recording: `flotor record zenoh/NAME --out FILE.mcap` makes one"
-                .to_owned(),
-        ));
+    if remote.is_some()
+        && let Some(what) = of_recordings_only(arguments)
+    {
+        return Err(CommandError::Usage(format!(
+            "{what} needs a recording: `flotor record zenoh/NAME --out FILE.mcap` makes one"
+        )));
     }
     if let Some(file) = file {
         // Opened here as well: an error in the file is reported before another program starts.
@@ -99,8 +100,10 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         plugin_files(&recording, &arguments.plugin_path.registry())
             .into_iter()
             .for_each(|plugin| add("--plugin", plugin.into()));
-        if arguments.screenshot.is_some() {
-            tell_damage(file, recording);
+        let written =
+            [(&arguments.screenshot, "the picture shows"), (&arguments.export, "the traces are of")];
+        if let Some((_, what)) = written.iter().find(|(out, _)| out.is_some()) {
+            tell_damage(file, recording, what);
         }
     }
     let options = [
@@ -153,15 +156,26 @@ fn view_remote(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result
     std::process::exit(shown.code().unwrap_or(1));
 }
 
-/// A picture shows a moment; whether the file is whole does not show in it.
-fn tell_damage(file: &Path, mut recording: Recording) {
+/// What a running session cannot be asked for.
+fn of_recordings_only(arguments: &ViewArguments) -> Option<&'static str> {
+    let all = [
+        (arguments.screenshot.is_some(), "a picture of a moment"),
+        (arguments.export.is_some(), "a file of traces"),
+        (arguments.device.is_some(), "`--device`"),
+        (arguments.at.is_some(), "`--at`"),
+    ];
+    all.into_iter().find_map(|(is_wanted, what)| is_wanted.then_some(what))
+}
+
+/// Neither in a picture of a moment nor in a file of traces can it be seen whether the recording is whole.
+fn tell_damage(file: &Path, mut recording: Recording, what: &str) {
     let broken = recording.by_ref().find_map(Result::err);
     let damage = match (broken, recording.ending()) {
         (Some(error), _) => error.to_string(),
         (None, Ending::CutOff) => format!("{}: its end is missing", file.display()),
         (None, _) => return,
     };
-    note(format_args!("{damage}; the picture shows what can be read"));
+    note(format_args!("{damage}; {what} what can be read"));
 }
 
 /// Files of the plugins of a recording that were found; the viewer reports the missing ones.

@@ -487,7 +487,27 @@ fn a_run_elsewhere_is_viewed_through_a_bridge_that_ends_with_the_viewer() {
     assert_eq!(told("viewer").trim(), format!("--look light --run {process}"));
     assert!(!Path::new("/proc").join(process).exists(), "the bridge ends with the viewer");
 
-    let picture = Flotor::with(["view", "zenoh/lab", "--screenshot", "run.png"]).run();
-    assert_eq!(picture.code, Some(exit_code::CONFIGURATION));
-    assert!(picture.error().contains("flotor record zenoh/NAME"), "{picture:?}");
+    for [option, value] in
+        [["--screenshot", "run.png"], ["--export", "run.csv"], ["--device", "left"], ["--at", "1"]]
+    {
+        let refused = Flotor::with(["view", "zenoh/lab", option, value]).run();
+        assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{option}");
+        assert!(refused.error().contains("flotor record zenoh/NAME"), "{refused:?}");
+    }
+}
+
+#[test]
+fn files_made_of_a_recording_without_its_end_come_with_a_note() {
+    let scratch = Scratch::default();
+    let run = Flotor::with(["run", "--clock", "virtual", "--duration", "0.5s", "--record", "whole.mcap"]);
+    assert_eq!(run.inside(scratch.path()).run().code, Some(0));
+    let whole = std::fs::read(scratch.path().join("whole.mcap")).expect("it was recorded");
+    let _ = scratch.file("cut.mcap", &whole[..whole.len() / 2]);
+    for [option, out] in [["--export", "cut.csv"], ["--screenshot", "cut.png"]] {
+        // The viewer itself may not have been built.
+        let said = Flotor::with(["view", option, out, "cut.mcap"]).inside(scratch.path()).run();
+        assert!(said.stderr.contains("what can be read"), "{option}: {said:?}");
+        let said = Flotor::with(["view", option, out, "whole.mcap"]).inside(scratch.path()).run();
+        assert!(!said.stderr.contains("what can be read"), "{option}: {said:?}");
+    }
 }

@@ -13,12 +13,12 @@ mod words;
 pub use source::{Pace, Source, Wanted, connect};
 
 use crate::canvas::Canvas;
+use crate::chosen::Chosen;
 use crate::devices::Devices;
 use crate::experiment::Prompt;
 use crate::history::{History, Sample};
 use crate::palette::{Look, Palette};
 use crate::panel::Panel;
-use crate::picture::{PictureError, number_of};
 use crate::player::{Motion, Player};
 use crate::remembered::Remembered;
 use crate::scene::{SceneBuilder, SceneFacts};
@@ -180,13 +180,10 @@ impl Viewer {
         self.devices.history()
     }
 
-    /// Numbers and traces are of the device of this name from now on.
-    ///
-    /// # Errors
-    /// [`PictureError::Device`].
-    pub fn look_at_named(&mut self, name: &str) -> Result<(), PictureError> {
-        self.look_at(number_of(&self.devices, name)?);
-        Ok(())
+    /// Shows what a command line says.
+    pub fn choose(&mut self, chosen: &Chosen) {
+        self.look_at(chosen.device);
+        self.plots.choose(chosen);
     }
 
     /// The devices.

@@ -4,9 +4,9 @@ use crate::derived::ForcePosition;
 use crate::history::History;
 use crate::palette::Palette;
 use crate::quantity::{Quantity, Units};
-use crate::ui::plots::{marks, short};
-use egui::{Color32, Rangef, RichText, Ui};
-use egui_plot::{AxisHints, HPlacement, Line, Plot, PlotPoints, Points};
+use crate::ui::plots::{marks, plain, short, y_axis};
+use egui::{Color32, RichText, Ui};
+use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 
 /// Points drawn at most.
 const MOST_POINTS: usize = 2000;
@@ -71,39 +71,22 @@ impl ForcePositionPlot {
         let said = said(curve, units);
         ui.weak(&said);
         let points: Vec<[f64; 2]> = curve.thinned(MOST_POINTS).map(|[x, force]| [x * per_m, force]).collect();
-        let y_axis = AxisHints::new_y()
-            .placement(HPlacement::Left)
-            .min_thickness(44.0)
-            .label_spacing(Rangef::new(11.0, 30.0))
-            .formatter(|mark, _| short(mark.value))
-            .label("N");
         let name = Quantity::Position.components()[axis];
         let x_axis =
             AxisHints::new_x().formatter(|mark, _| short(mark.value)).label(format!("{name}, {length}"));
-        let shown = Plot::new(("force over position", axis))
+        let plot = Plot::new(("force over position", axis))
             .custom_x_axes(vec![x_axis])
-            .custom_y_axes(vec![y_axis])
-            .allow_drag(false)
-            .allow_zoom(false)
-            .allow_scroll(false)
-            .allow_boxed_zoom(false)
-            .show_background(false)
-            .show_crosshair(false)
-            .grid_color(palette.grid)
-            .x_grid_spacer(|grid| marks(grid.bounds))
-            .y_grid_spacer(|grid| marks(grid.bounds))
-            .grid_spacing(Rangef::new(8.0, 60.0))
-            .label_formatter(|_| None)
-            .show(ui, |plot| {
-                let line = Line::new("curve", PlotPoints::from(points)).allow_band(false);
-                plot.line(line.color(palette.components[axis]).width(1.4));
-                if let Some(sample) = history.seen_at(cursor_s) {
-                    let at =
-                        [Quantity::Position, Quantity::Force].map(|quantity| quantity.value(sample, axis));
-                    let dot = Points::new("moment", vec![[at[0] * per_m, at[1]]]).radius(4.0);
-                    plot.points(dot.color(palette.cursor));
-                }
-            });
+            .custom_y_axes(vec![y_axis(44.0).label("N")])
+            .x_grid_spacer(|grid| marks(grid.bounds));
+        let shown = plain(plot, palette).show(ui, |plot| {
+            let line = Line::new("curve", PlotPoints::from(points)).allow_band(false);
+            plot.line(line.color(palette.components[axis]).width(1.4));
+            if let Some(sample) = history.seen_at(cursor_s) {
+                let at = [Quantity::Position, Quantity::Force].map(|quantity| quantity.value(sample, axis));
+                let dot = Points::new("moment", vec![[at[0] * per_m, at[1]]]).radius(4.0);
+                plot.points(dot.color(palette.cursor));
+            }
+        });
         let label = format!("Force over position, N and {length}: {said}");
         shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &label));
     }

@@ -1,5 +1,6 @@
 //! Traces one above the other over one time, and what a person chooses about them.
 
+use crate::chosen::Chosen;
 use crate::export::ExportOptions;
 use crate::history::History;
 use crate::palette::Palette;
@@ -12,7 +13,9 @@ use crate::ui::plots::{Maximise, PlotView, plot};
 use crate::ui::style::SMALL_PT;
 use crate::ui::zoom::ZoomRequest;
 use egui::containers::menu::{MenuButton, MenuConfig};
-use egui::{Color32, ComboBox, PopupCloseBehavior, RichText, Role, ScrollArea, Ui, UiBuilder, WidgetInfo};
+use egui::{
+    Color32, ComboBox, PopupCloseBehavior, Rect, RichText, Role, ScrollArea, Ui, UiBuilder, WidgetInfo,
+};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -29,9 +32,13 @@ const ROOM_FOR_ONE_ROW_PT: f32 = 720.0;
 const ROOM_FOR_TABS_PT: f32 = 230.0;
 /// No trace is lower than this, points: three marks of an axis are still apart. What finds no room is scrolled to.
 const LEAST_TRACE_PT: f32 = 48.0;
+/// The same of a picture, which nobody can scroll: the marks of the axis have their numbers.
+const LEAST_TRACE_OF_PICTURE_PT: f32 = 58.0;
 /// Height of what stands above a trace, and of the times below the last one, points.
 const HEADING_PT: f32 = 29.0;
 const TIMES_PT: f32 = 22.0;
+/// Height of what stands above a trace, with the gaps around it, points.
+const HEADING_AND_GAPS_PT: f32 = 32.0;
 /// Shortest time that can be shown, s: a few ticks.
 const LEAST_TIME_S: f64 = 5.0e-3;
 
@@ -81,6 +88,20 @@ impl ExportFormat {
     }
 }
 
+/// Why traces cannot be drawn into a picture of a given height.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the picture is {height_px} pixels high, and for {count} traces that can be read it has to be {least_px}; make it higher, or choose fewer traces"
+)]
+pub struct TooLow {
+    /// How many they are.
+    pub count: usize,
+    /// Height the picture has to have, pixels.
+    pub least_px: usize,
+    /// Height it has, pixels.
+    pub height_px: usize,
+}
+
 /// The traces shown.
 #[derive(Clone, Debug)]
 pub struct PlotStack {
@@ -128,6 +149,72 @@ impl PlotStack {
             end_s: f64::INFINITY,
             hover_s: None,
         }
+    }
+
+    /// Shows what a command line says.
+    pub fn choose(&mut self, chosen: &Chosen) {
+        if let Some(traces) = chosen.traces() {
+            self.shown = traces.to_vec();
+        }
+        self.force_position.axis = chosen.force_position;
+    }
+
+    /// The height with which every trace of a picture can be read, points.
+    #[must_use]
+    pub fn least_height_pt(&self) -> f32 {
+        (HEADING_AND_GAPS_PT + LEAST_TRACE_OF_PICTURE_PT) * self.in_sight().len().max(1) as f32 + TIMES_PT
+    }
+
+    /// Whether every trace can be read in a picture of one height, if that takes another, pixels.
+    ///
+    /// # Errors
+    /// [`TooLow`].
+    pub fn has_room(&self, height_px: usize, least_px: usize) -> Result<(), TooLow> {
+        let count = self.in_sight().len();
+        if height_px >= least_px { Ok(()) } else { Err(TooLow { count, least_px, height_px }) }
+    }
+
+    /// Draws the traces, and force over position, into all of the room there is: a picture, in which nothing can be pressed.
+    pub fn still(
+        &mut self,
+        ui: &mut Ui,
+        (history, device): (&History, Option<&str>),
+        cursor_s: f64,
+        palette: &Palette,
+    ) {
+        let span_s = self.span_s(history);
+        let mut left = ui.available_rect_before_wrap();
+        if self.force_position.axis.is_some() {
+            let beside;
+            (left, beside) = split_for_force_position(left, 16.0);
+            let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
+            self.force_position.show(&mut right, (history, f64::NAN), span_s, self.units, palette);
+        }
+        // The last time of an axis stands half beside it.
+        let mut ui = ui.new_child(UiBuilder::new().max_rect(left.with_max_x(left.right() - 16.0)));
+        let in_sight = self.in_sight();
+        let count = in_sight.len().max(1) as f32;
+        let height = (ui.available_height() - HEADING_AND_GAPS_PT * count - 16.0) / count;
+        for (index, quantity) in in_sight.iter().enumerate() {
+            let time_axis = index + 1 == in_sight.len();
+            let view = PlotView {
+                device,
+                span_s,
+                cursor_s,
+                units: self.units,
+                height: height + if time_axis { 14.0 } else { 0.0 },
+                time_axis,
+                values: self.shown_values_of(*quantity),
+                maximise: Maximise::No,
+            };
+            plot(&mut ui, history, &mut Trace::of(*quantity), view, palette);
+        }
+    }
+
+    /// Values shown of a trace that is zoomed, in the units shown.
+    fn shown_values_of(&self, quantity: Quantity) -> Option<[f64; 2]> {
+        let (_, per_si) = quantity.unit(self.units);
+        self.values_of(quantity).map(|values| values.map(|value| value * per_si))
     }
 
     /// Another run is shown from now on.
@@ -246,15 +333,11 @@ impl PlotStack {
             });
         }
         if self.force_position.axis.is_some() {
-            /// Part of the width that force over position gets.
-            const PART: f32 = 0.36;
-            let all = ui.available_rect_before_wrap();
-            let beside = all.with_min_x(all.right() - (PART * all.width()).round());
+            let (left, beside) = split_for_force_position(ui.available_rect_before_wrap(), 12.0);
             let span_s = self.span_s(seen.0);
             let cursor_s = self.hover_s.unwrap_or(now_s);
             let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
             self.force_position.show(&mut right, (seen.0, cursor_s), span_s, self.units, palette);
-            let left = all.with_max_x(beside.left() - 12.0);
             let mut left = ui.new_child(UiBuilder::new().max_rect(left).id_salt("over time"));
             self.over_time(&mut left, seen, now_s, palette, &mut requests);
         } else {
@@ -303,8 +386,7 @@ impl PlotStack {
         for (index, quantity) in shown.iter().copied().enumerate() {
             let time_axis = index + 1 == shown.len();
             let height = if time_axis { height + 14.0 } else { height };
-            let (_, per_si) = quantity.unit(self.units);
-            let values = self.values_of(quantity).map(|values| values.map(|value| value * per_si));
+            let values = self.shown_values_of(quantity);
             let view =
                 PlotView { device, span_s, cursor_s, units: self.units, height, time_axis, values, maximise };
             let trace = self.traces.entry(quantity).or_insert_with(|| Trace::of(quantity));
@@ -420,4 +502,12 @@ impl PlotStack {
             Units::Si => Units::Handy,
         };
     }
+}
+
+/// The room of the traces, and of force over position to the right of them.
+fn split_for_force_position(all: Rect, gap_pt: f32) -> (Rect, Rect) {
+    /// Part of the width that force over position gets.
+    const PART: f32 = 0.36;
+    let beside = all.with_min_x(all.right() - (PART * all.width()).round());
+    (all.with_max_x(beside.left() - gap_pt), beside)
 }

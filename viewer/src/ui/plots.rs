@@ -73,11 +73,7 @@ pub fn plot(
     let buckets = ui.available_width().max(50.0) as usize;
     let traces = trace.points(history, span_s, buckets, per_si);
 
-    let y_axis = AxisHints::new_y()
-        .placement(HPlacement::Left)
-        .min_thickness(52.0)
-        .label_spacing(egui::Rangef::new(11.0, 30.0))
-        .formatter(|mark, _| short(mark.value));
+    let y_axis = y_axis(52.0);
     let x_axis = AxisHints::new_x().formatter(|mark, _| format!("{} s", short(mark.value)));
     // Bounds once set stay with a plot: one that shows all values is another than one that is zoomed.
     let plot = Plot::new(("plot", quantity.name(), values.is_some()))
@@ -85,19 +81,10 @@ pub fn plot(
         .show_axes([time_axis, true])
         .custom_x_axes(vec![x_axis])
         .custom_y_axes(vec![y_axis])
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_scroll(false)
-        .allow_boxed_zoom(false)
-        .show_background(false)
-        .show_crosshair(false)
         .set_margin_fraction(egui::vec2(0.0, 0.08))
-        .grid_color(palette.grid)
-        .y_grid_spacer(move |grid| marks(grid.bounds))
-        .grid_spacing(egui::Rangef::new(8.0, 60.0))
         .include_x(span_s[0])
-        .include_x(span_s[1])
-        .label_formatter(|_| None);
+        .include_x(span_s[1]);
+    let plot = plain(plot, palette);
     // Zero is in sight unless somebody chose other values.
     let plot = if values.is_none() { plot.include_y(0.0) } else { plot };
     let shown = plot.show(ui, |plot| {
@@ -131,6 +118,29 @@ pub fn plot(
         switches_maximised,
         frame: *shown.transform.frame(),
     }
+}
+
+/// A plot that only shows: what the mouse does is read from it, and nothing is drawn but lines and grid.
+pub(super) fn plain<'a>(plot: Plot<'a>, palette: &Palette) -> Plot<'a> {
+    plot.allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .show_background(false)
+        .show_crosshair(false)
+        .grid_color(palette.grid)
+        .y_grid_spacer(|grid| marks(grid.bounds))
+        .grid_spacing(egui::Rangef::new(8.0, 60.0))
+        .label_formatter(|_| None)
+}
+
+/// The axis of values, to the left, at least so wide.
+pub(super) fn y_axis<'a>(least_pt: f32) -> AxisHints<'a> {
+    AxisHints::new_y()
+        .placement(HPlacement::Left)
+        .min_thickness(least_pt)
+        .label_spacing(egui::Rangef::new(11.0, 30.0))
+        .formatter(|mark, _| short(mark.value))
 }
 
 /// Name, unit and values at the cursor; whether the button for the room of all was pressed.

@@ -4,7 +4,12 @@ use super::window::{Window, recorded, recording, window};
 use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
+use flotor_viewer::app::Start;
+use flotor_viewer::chosen::Chosen;
+use flotor_viewer::palette::Look;
+use flotor_viewer::picture::{PictureError, PictureOptions, has_moment, picture};
 use flotor_viewer::player::Motion;
+use flotor_viewer::quantity::Quantity;
 use flotor_viewer::ui::plot_stack::ExportFormat;
 
 #[test]
@@ -139,4 +144,60 @@ fn the_stiffness_felt_is_a_trace() {
     window.get_by_label("Stiffness over time, N/mm");
     let felt = window.state().history().at(0.25).expect("a sample").stiffness_n_per_m;
     assert!((felt - 700.0).abs() < 1.0, "{felt}");
+}
+
+/// The traces of a command line are those of the window, of the picture of a moment and of a file.
+#[test]
+fn what_a_command_line_chooses_holds_in_a_window_and_in_a_picture() {
+    let chosen = Chosen::new(0, vec![Quantity::Energy, Quantity::Force, Quantity::Energy], Some(2));
+    let mut window = recording();
+    window.state_mut().choose(&chosen);
+    window.run_steps(3);
+    window.get_by_label("Energy over time, mJ");
+    window.get_by_label_contains("Force over position, N and mm");
+    assert!(window.query_by_label("Position over time, mm").is_none());
+
+    let drawn = |chosen, size_px| {
+        let Start::Recording(histories, ..) = recorded(1000, None) else { panic!("it is a recording") };
+        let (scale, look) = (1.0, Look::Dark);
+        picture(histories, &mut [], &PictureOptions { size_px, scale, look, view: None, chosen, at_s: None })
+    };
+    let usual = drawn(Chosen::default(), [640, 600]).expect("a picture");
+    assert_ne!(drawn(chosen, [640, 600]).expect("a picture"), usual);
+    let explicit = Chosen::new(0, vec![Quantity::Force, Quantity::Position], None);
+    assert_eq!(drawn(explicit, [640, 600]).expect("a picture"), usual);
+    let all = Chosen::new(0, Quantity::ALL.to_vec(), None);
+    assert!(matches!(drawn(all, [640, 600]), Err(PictureError::TooLow(_))));
+}
+
+#[test]
+fn a_moment_outside_the_recording_is_refused_with_its_ends() {
+    let Start::Recording(histories, ..) = recorded(1000, None) else { panic!("it is a recording") };
+    assert!(has_moment(&histories, 0.5).is_ok() && has_moment(&histories, 1.0).is_ok());
+    for at_s in [99.0, -1.0, f64::NAN] {
+        let said = has_moment(&histories, at_s).expect_err("it is outside").to_string();
+        assert!(said.contains("0.000 to 0.999 s"), "{said}");
+    }
+}
+
+/// A picture of many traces says how high it has to be, instead of drawing lines nobody can read.
+#[test]
+fn a_file_too_low_for_its_traces_is_refused_and_the_least_height_is_enough() {
+    let mut window = recording();
+    window.state_mut().choose(&Chosen::new(0, Quantity::ALL.to_vec(), None));
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let mut plots = window.state().plots().clone();
+    let written = |plots: &_, format| {
+        let path = folder.path().join("traces");
+        flotor_viewer::export::write(window.state().history(), None, plots, format, &path)
+    };
+    for format in [ExportFormat::Svg, ExportFormat::Png] {
+        plots.export.size_px = [1800.0, 1000.0];
+        let said = written(&plots, format).expect_err("nine traces do not fit").to_string();
+        assert!(said.contains("9 traces") && said.contains("higher"), "{said}");
+        plots.export.size_px[1] = flotor_viewer::export::least_height_px(&plots);
+        written(&plots, format).expect("they fit");
+    }
+    plots.export.size_px = [1800.0, 100.0];
+    written(&plots, ExportFormat::Csv).expect("numbers need no height");
 }
