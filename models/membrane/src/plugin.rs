@@ -5,8 +5,8 @@ use crate::network::{Network, State, Surroundings};
 use crate::touch::Touch;
 use flotor_hal::{
     DQuat, DVec3, ForceModel, Input, LinearField, LinearFieldModel, Memory, ModelInfo, OutOfRange, Output,
-    Parameter, Part, Pose, Primitive, Refusal, ScalarField, Settings, Shape, ShapeModel, Sides, StepStatus,
-    Surface, SurfaceVertex, Wrench, choices, read_text,
+    Parameter, Part, Pose, Primitive, Refusal, ScalarField, Settings, Shape, ShapeModel, Sides, SoftRange,
+    SoftRangeModel, StepStatus, Surface, SurfaceVertex, Wrench, choices, read_text,
 };
 use std::path::Path;
 
@@ -238,4 +238,23 @@ impl LinearFieldModel for Membrane {
 /// Steps until a sheet has come to rest under gravity, before it is taken as it is.
 const MOST_SETTLING_STEPS: usize = 20_000;
 
-flotor_hal::export_model!(Membrane, linear_field, shape);
+impl SoftRangeModel for Membrane {
+    /// Below, the sheet swings on for seconds after a touch and pushes the hand about; above, it hardly follows the hand any more.
+    const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("damping_per_s", 5.0, 500.0, 5.0)];
+}
+
+flotor_hal::export_model!(Membrane, linear_field, shape, soft_range);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn soft_ranges_are_of_live_parameters_and_legal() {
+        for range in Membrane::SOFT_RANGES {
+            let parameter = SCHEMA.iter().find(|one| one.id() == range.id()).expect("one of ours");
+            let legal = range.within(parameter).expect("a range of numbers");
+            assert_eq!((legal.min(), legal.max()), (range.min(), range.max()));
+        }
+    }
+}
