@@ -89,7 +89,7 @@ impl Quantity {
             }
             Self::Energy => ("Energy", &["stored"], "J", ("mJ", 1.0e3)),
             Self::Stiffness => ("Stiffness", &["-dF/dx"], "N/m", ("N/mm", 1.0e-3)),
-            Self::Lateness => ("Lateness", &["start", "compute"], "s", ("µs", 1.0e6)),
+            Self::Lateness => ("Lateness", &["late start", "computing"], "s", ("µs", 1.0e6)),
         }
     }
 

@@ -56,7 +56,7 @@ impl EmergencySource {
             Self::Key => "key",
             Self::Signal => "signal",
             Self::Latch => "pressed at another run or on the network",
-            Self::Watcher => "a program that watches",
+            Self::Watcher => "the viewer's window or another client",
             Self::Button => "button of the device",
             Self::Device => "the device's own",
         }

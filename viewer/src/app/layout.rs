@@ -4,11 +4,14 @@ use super::{Audience, Source, VIEW_PARTS, Viewer};
 use crate::export::export;
 use crate::history::Sample;
 use crate::palette::Palette;
+use crate::scene::SceneBuilder;
 use crate::ui::plot_stack::PlotRequest;
+use crate::ui::style::SMALL_PT;
 use crate::ui::top_bar::{PanelSwitch, TopBar, TopBarRequest};
 use crate::ui::view3d::Subject;
 use crate::ui::{legend, parameters, readout, standing, style, warnings};
-use egui::{CursorIcon, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
+use egui::{Button, CursorIcon, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
+use flotor_drawing::camera::Camera;
 use flotor_live::{Ask, SetValue};
 use std::time::Instant;
 
@@ -182,6 +185,17 @@ impl Viewer {
     pub(super) fn scene(&mut self, ui: &mut Ui, area: Rect, samples: &[Sample]) {
         let (shapes, version, scale) = (&mut self.shapes, self.shape_version, self.devices.scale());
         self.facts = self.view.show(ui, area, self.look, Subject { shapes, version, samples, scale });
+        let height_mm = SceneBuilder::framing_mm(&self.shapes, self.devices.count());
+        let experimenter = Camera::experimenter(height_mm);
+        let has_room = area.height() > 200.0 && area.width() > 200.0;
+        if has_room && self.view.camera != experimenter && self.audience == Audience::Experimenter {
+            // Above the axes, which it puts back.
+            let place = Rect::from_center_size(area.right_bottom() - vec2(53.0, 106.0), vec2(78.0, 22.0));
+            let button = Button::new(RichText::new("Reset view").size(SMALL_PT));
+            if ui.put(place, button).on_hover_text("The experimenter's view (R)").clicked() {
+                self.view.camera = experimenter;
+            }
+        }
     }
 
     /// There is nothing to show: what to do.

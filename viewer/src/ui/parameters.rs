@@ -76,6 +76,26 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
     changed
 }
 
+/// The symbol that papers have for a parameter of this name, if there is one.
+fn symbol(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "alpha" => "α",
+        "beta" => "β",
+        "gamma" => "γ",
+        "youngs modulus" => "E",
+        "shear modulus" => "G",
+        "poisson ratio" => "ν",
+        "friction" | "seat friction" => "µ",
+        _ => return None,
+    })
+}
+
+fn show_symbol(ui: &mut Ui, name: &str, palette: &Palette) {
+    if let Some(symbol) = symbol(name) {
+        ui.label(RichText::new(symbol).color(palette.faint));
+    }
+}
+
 fn heading(ui: &mut Ui, text: &str, palette: &Palette) {
     ui.add_space(4.0);
     ui.label(RichText::new(text).size(SMALL_PT).color(palette.faint));
@@ -95,6 +115,7 @@ fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> Option<Edit> {
                 let shown =
                     ui.label(RichText::new(&name).color(if is_free { palette.text } else { palette.faint }));
                 label = Some(shown.on_hover_text(&help).id);
+                show_symbol(ui, &name, palette);
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     ui.label(RichText::new(format!("{unit:<4}")).size(SMALL_PT).color(palette.faint));
                     let field = DragValue::new(number)
@@ -165,6 +186,7 @@ fn fact(ui: &mut Ui, knob: &Knob, palette: &Palette) {
     };
     ui.horizontal(|ui| {
         ui.label(RichText::new(&knob.name).color(palette.faint)).on_hover_text(help(knob));
+        show_symbol(ui, &knob.name, palette);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.add(egui::Label::new(if typed.is_empty() { "–" } else { &typed }).truncate());
         });

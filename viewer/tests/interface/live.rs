@@ -33,7 +33,7 @@ fn the_emergency_stop_is_always_in_sight_and_on_the_largest_key() {
     window.key_press(Key::Space);
     window.run_steps(2);
     assert_eq!(host.request(None), Ask::EmergencyStop);
-    host.end("emergency stop (a program that watches); the device is stopped");
+    host.end("emergency stop (the viewer's window or another client); the device is stopped");
     until(&mut window, |window| window.query_by_label_contains("emergency stop (").is_some());
     assert!(window.query_by_label("EMERGENCY STOP").is_none());
     assert!(window.state().panels()[1].knobs.iter().all(|knob| knob.standing == Standing::Fixed));

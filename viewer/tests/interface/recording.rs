@@ -201,3 +201,18 @@ fn a_file_too_low_for_its_traces_is_refused_and_the_least_height_is_enough() {
     plots.export.size_px = [1800.0, 100.0];
     written(&plots, ExportFormat::Csv).expect("numbers need no height");
 }
+
+/// Whoever has turned the view sees the way back.
+#[test]
+fn a_view_that_was_turned_has_a_button_that_resets_it() {
+    let mut window = recording();
+    assert!(window.query_by_label("Reset view").is_none());
+    let camera = window.state().view().camera;
+    window.key_press(Key::D);
+    window.run_steps(2);
+    assert_ne!(window.state().view().camera, camera);
+    window.get_by_label("Reset view").click();
+    window.run_steps(2);
+    assert_eq!(window.state().view().camera, camera);
+    assert!(window.query_by_label("Reset view").is_none());
+}
