@@ -80,6 +80,9 @@ struct Arguments {
     /// Force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z", value_parser = axis, conflicts_with = "sitting")]
     force_position: Option<usize>,
+    /// Force that the arrows are scaled for, N, so that pictures can be compared (default: the largest of the run)
+    #[arg(long, value_name = "NEWTONS", value_parser = arrow_force, conflicts_with_all = ["sitting", "export"])]
+    arrow_force: Option<f64>,
     /// Title of the file of traces (default: that of the run)
     #[arg(long, value_name = "TEXT", requires = "export")]
     title: Option<String>,
@@ -88,6 +91,12 @@ struct Arguments {
     screen: Option<Screen>,
     #[command(flatten)]
     request: WindowOptions,
+}
+
+/// `20`
+fn arrow_force(text: &str) -> Result<f64, String> {
+    let force_n = text.parse().ok().filter(|force_n| (0.001..=10_000.0).contains(force_n));
+    force_n.ok_or_else(|| format!("`{text}` is no force of an arrow; it must be 0.001 to 10000 N"))
 }
 
 /// `z`
@@ -167,7 +176,8 @@ fn chosen(arguments: &Arguments, histories: &[History]) -> Result<Chosen, Pictur
         has_moment(histories, at_s)?;
     }
     let device = arguments.device.as_ref().map(|name| number_of(histories, name)).transpose()?;
-    Ok(Chosen::new(device.unwrap_or(0), arguments.traces.clone(), arguments.force_position))
+    let chosen = Chosen::new(device.unwrap_or(0), arguments.traces.clone(), arguments.force_position);
+    Ok(chosen.with_arrow_force(arguments.arrow_force))
 }
 
 /// A running host: for an experimenter, or in front of a person in a sitting.

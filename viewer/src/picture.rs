@@ -129,7 +129,8 @@ pub fn picture(
     };
     let sample = *sample.ok_or(PictureError::Empty)?;
     let samples = devices.at(sample.time_s()).ok_or(PictureError::Empty)?;
-    let (scale, height_mm) = (devices.scale(), SceneBuilder::framing_mm(shapes, devices.count()));
+    let scale = devices.scale().with_chosen(options.chosen.arrow_force_n);
+    let height_mm = SceneBuilder::framing_mm(shapes, devices.count());
     let mut view3d = View3d::new(Canvas::on_processor(SAMPLES), height_mm);
     view3d.camera = Camera::of(options.view, height_mm);
     Ok(draw_without_window(options.size_px, options.scale, options.look, |ui| {

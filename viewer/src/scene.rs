@@ -39,6 +39,12 @@ impl ArrowScale {
         }
     }
 
+    /// Scaled for this largest force, N, if it is chosen: arrows of several pictures can then be compared.
+    #[must_use]
+    pub fn with_chosen(self, force_n: Option<f64>) -> Self {
+        Self { force_n: force_n.map_or(self.force_n, |force_n| FULL_FORCE * force_n), ..self }
+    }
+
     /// So that both fit.
     #[must_use]
     pub fn larger(self, other: Self) -> Self {

@@ -82,7 +82,7 @@ enum Command {
     /// Re-evaluate the models on a recorded trajectory: bit-exact, or with changed parameters
     Replay(Separate),
     /// Show a running session or a recording: the model in 3D, and plots over time
-    View(view::ViewArguments),
+    View(Box<view::ViewArguments>),
     /// Evaluate a force model at poses from a CSV file
     Eval(Separate),
     /// List the installed plugins, without running any of them

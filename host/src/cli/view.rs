@@ -43,6 +43,9 @@ pub(crate) struct ViewArguments {
     /// Force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z")]
     force_position: Option<String>,
+    /// Force that the arrows are scaled for, N, so that pictures can be compared (default: the largest of the run)
+    #[arg(long, value_name = "NEWTONS", conflicts_with = "export")]
+    arrow_force: Option<String>,
     /// With --export: title (default: that of the scene)
     #[arg(long, value_name = "TEXT", requires = "export")]
     title: Option<String>,
@@ -111,6 +114,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         ("--device", &arguments.device),
         ("--traces", &arguments.traces),
         ("--force-position", &arguments.force_position),
+        ("--arrow-force", &arguments.arrow_force),
         ("--title", &arguments.title),
         ("--screen", &arguments.screen),
         ("--look", &arguments.look),

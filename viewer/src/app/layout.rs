@@ -183,7 +183,8 @@ impl Viewer {
 
     /// The 3D view at a moment.
     pub(super) fn scene(&mut self, ui: &mut Ui, area: Rect, samples: &[Sample]) {
-        let (shapes, version, scale) = (&mut self.shapes, self.shape_version, self.devices.scale());
+        let (shapes, version, scale) =
+            (&mut self.shapes, self.shape_version, self.devices.scale().with_chosen(self.arrow_force_n));
         self.facts = self.view.show(ui, area, self.look, Subject { shapes, version, samples, scale });
         let height_mm = SceneBuilder::framing_mm(&self.shapes, self.devices.count());
         let experimenter = Camera::experimenter(height_mm);

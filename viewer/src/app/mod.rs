@@ -65,6 +65,8 @@ pub struct Viewer {
     missing: Vec<String>,
     player: Player,
     view: View3d,
+    /// Force that arrows are scaled for, N, if somebody chose it.
+    arrow_force_n: Option<f64>,
     facts: SceneFacts,
     plots: PlotStack,
     look: Look,
@@ -150,6 +152,7 @@ impl Viewer {
             missing: parts.missing,
             player,
             view: View3d::new(Canvas::new(device), height_mm),
+            arrow_force_n: None,
             facts: SceneFacts::default(),
             plots: PlotStack::new(window),
             look,
@@ -183,6 +186,7 @@ impl Viewer {
     /// Shows what a command line says.
     pub fn choose(&mut self, chosen: &Chosen) {
         self.look_at(chosen.device);
+        self.arrow_force_n = chosen.arrow_force_n;
         self.plots.choose(chosen);
     }
 

@@ -216,3 +216,19 @@ fn a_view_that_was_turned_has_a_button_that_resets_it() {
     assert_eq!(window.state().view().camera, camera);
     assert!(window.query_by_label("Reset view").is_none());
 }
+
+/// Without a choice the largest force of a run fills its arrow, however small it is; with one the same force has the same arrow everywhere.
+#[test]
+fn arrows_of_a_chosen_force_are_equally_long_in_every_run() {
+    let of_run = |ticks, arrow_force_n| {
+        let Start::Recording(histories, ..) = recorded(ticks, None) else { panic!("it is a recording") };
+        let chosen = Chosen::default().with_arrow_force(arrow_force_n);
+        let (size_px, scale, look, at_s) = ([320, 400], 1.0, Look::Dark, Some(0.1));
+        let image =
+            picture(histories, &mut [], &PictureOptions { size_px, scale, look, view: None, chosen, at_s });
+        // The 3D view without legend, title and numbers.
+        image.expect("a picture").region_by_pixels([100, 0], [60, 180])
+    };
+    assert_ne!(of_run(150, None), of_run(600, None), "both fill theirs");
+    assert_eq!(of_run(150, Some(3.0)), of_run(600, Some(3.0)));
+}
