@@ -375,7 +375,7 @@ fn the_emergency_stop_is_on_its_way_within_one_picture_whatever_was_done_before(
         if round % 2 == 0 {
             one_picture(&mut window, [space(true), space(false)]);
         } else {
-            // Whatever the mouse had hold of, it lets go of first.
+            // Whatever the mouse holds is released first.
             one_picture(&mut window, [egui::Event::PointerMoved(stop), button(stop, false)]);
             one_picture(&mut window, [egui::Event::PointerMoved(stop)]);
             one_picture(&mut window, [button(stop, true)]);
