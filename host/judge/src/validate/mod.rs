@@ -197,7 +197,7 @@ const PREPARATION: u32 = 6;
 /// Most instances that a rule creates one after the other: where nothing can be kept, each takes as long as the first.
 const INSTANCES: u32 = 4;
 
-/// The patience of the rules after the first instance, which ran for so long: what was asked for, unless the instances that a rule
+/// The patience of the rules after the first instance, which ran for so long: what was requested, unless the instances that a rule
 /// creates would use up much of it.
 fn with_preparations(patience: Duration, first_instance: Duration) -> Duration {
     let preparations = first_instance * INSTANCES;
