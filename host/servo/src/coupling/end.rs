@@ -11,6 +11,12 @@ use flotor_hal::{DVec3, DeviceState, Pose, Twist, Wrench, rotation_vector};
 /// than expected does not take the tank below zero.
 const SURPRISE_J: f64 = 2.0e-5;
 
+/// Part of what the tank can spare that a tick may take: a force that drains it falls within ten ticks or more, and not in one.
+const DRAWN: f64 = 0.1;
+/// Time in which a force that was held back for want of energy comes back as a whole, s. At once it would draw more than there is
+/// in the next tick again, and go on and off from tick to tick: a hand feels that as a rattle.
+const RETURN_S: f64 = 0.1;
+
 /// One end.
 pub struct End {
     config: CouplingConfig,
@@ -21,6 +27,8 @@ pub struct End {
     tank: Tank,
     bounce: Bounce,
     partner: Option<PeerState>,
+    /// Part of the wrench that is asked for, 0 to 1: below one while the tank has been too low for it.
+    part: f64,
 }
 
 impl End {
@@ -45,6 +53,7 @@ impl End {
             tank: Tank::default(),
             bounce: Bounce::default(),
             partner: None,
+            part: 1.0,
         }
     }
 
@@ -144,16 +153,23 @@ impl End {
                 + config.stiffness_nm_per_rad * turned.length_squared());
         self.tank.limit(stored_j + config.reserve_j + self.bounce_j());
         let scale = self.mapping.energy_scale();
-        let less = match config.passivity {
-            PassivityMode::Observe => None,
-            PassivityMode::Control => {
-                let available_j = (self.tank.level_j() - SURPRISE_J) * scale;
-                let change = wrench - self.bounce.asked;
-                let expected = self.calm.expected_with(&change);
-                self.controller.keep_within(available_j, &wrench, &state.twist, expected)
-            }
+        let given = match config.passivity {
+            PassivityMode::Observe => wrench,
+            PassivityMode::Control => self.affordable(&wrench, state),
         };
-        Pull { wrench: less.unwrap_or(wrench), energy_j: 0.5 * stored_j * scale, is_damped: less.is_some() }
+        Pull { wrench: given, energy_j: 0.5 * stored_j * scale, is_damped: given != wrench }
+    }
+
+    /// As much of a wrench as the tank has the energy for, and no more than has come back of it yet.
+    #[inline]
+    fn affordable(&mut self, whole: &Wrench, state: &DeviceState) -> Wrench {
+        let part = (self.part + self.controller.period_s / RETURN_S).min(1.0);
+        let asked = *whole * part;
+        let available_j = DRAWN * (self.tank.level_j() - SURPRISE_J) * self.mapping.energy_scale();
+        let expected = self.calm.expected_with(&(asked - self.bounce.asked));
+        let less = self.controller.keep_within(available_j, &asked, &state.twist, expected);
+        self.part = less.map_or(part, |less| part * part_along(&less, &asked));
+        less.unwrap_or(asked)
     }
 
     /// What stands in walls, J, in the shared frame.
@@ -167,6 +183,16 @@ impl End {
     pub fn tank(&self) -> &Tank {
         &self.tank
     }
+}
+
+/// The part of a wrench that another one is along it, 0 to 1, by force or torque, whichever is less.
+#[inline]
+fn part_along(less: &Wrench, whole: &Wrench) -> f64 {
+    let of = |less: DVec3, whole: DVec3| {
+        let square = whole.length_squared();
+        if square > 0.0 { (less.dot(whole) / square).clamp(0.0, 1.0) } else { 1.0 }
+    };
+    of(less.force(), whole.force()).min(of(less.torque(), whole.torque()))
 }
 
 /// What stands in springs that are not the coupling's: the walls at the boundary. It will come out at this end, and is not to be
