@@ -141,8 +141,13 @@ impl ExclusionRules {
                 return Err(format!("exclusion.{rule}: a number above 0"));
             }
         }
-        if self.response_time_s.is_some_and(|[shortest, longest]| !(0.0 <= shortest && shortest < longest)) {
-            return Err("exclusion.response_time_s: the shortest and the longest time, s".to_owned());
+        // A log is JSON, which has no infinity: a longest time without end would make it unreadable.
+        let are_times =
+            |[shortest, longest]: [f64; 2]| 0.0 <= shortest && shortest < longest && longest.is_finite();
+        if self.response_time_s.is_some_and(|times| !are_times(times)) {
+            return Err(
+                "exclusion.response_time_s: the shortest and the longest time, s, both finite".to_owned()
+            );
         }
         let has_trial_rule = self.least_movement_mm.is_some() || self.response_time_s.is_some();
         if self.most_excluded_trials.is_some() && !has_trial_rule {

@@ -132,6 +132,11 @@ fn rules_that_cannot_be_are_refused_with_their_name() {
     for (protocol, rules, name) in [
         (jnd(), ExclusionRules { most_dont_know: Some(1.5), ..none.clone() }, "most_dont_know"),
         (jnd(), ExclusionRules { response_time_s: Some([3.0, 2.0]), ..none.clone() }, "response_time_s"),
+        (
+            jnd(),
+            ExclusionRules { response_time_s: Some([0.2, f64::INFINITY]), ..none.clone() },
+            "response_time_s",
+        ),
         (jnd(), ExclusionRules { least_movement_mm: Some(f64::NAN), ..none.clone() }, "least_movement_mm"),
         (jnd(), ExclusionRules { most_excluded_trials: Some(0.5), ..none.clone() }, "most_excluded_trials"),
         (magnitude.clone(), ExclusionRules { most_false_alarms: Some(0.5), ..none.clone() }, "catch_trials"),

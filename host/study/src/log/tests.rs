@@ -75,6 +75,27 @@ fn what_is_written_is_read() {
     assert!(LogWriter::create(&path).is_err(), "an existing log is not overwritten");
 }
 
+/// Whatever rules a study file may have, the log that follows it is read again.
+#[test]
+fn every_rule_of_a_study_file_is_read_again() {
+    let folder = Folder::new("rules");
+    let path = folder.file("log.jsonl");
+    let exclusion = ExclusionRules {
+        most_false_alarms: Some(0.5),
+        least_agreement: Some(0.0),
+        most_retest_deviation: Some(f64::MAX),
+        most_dont_know: Some(1.0),
+        most_missed_ticks: Some(1.0e-300),
+        least_movement_mm: Some(f64::MAX),
+        response_time_s: Some([0.0, f64::MAX]),
+        most_excluded_trials: Some(0.1),
+    };
+    let plan = Plan { file: "a.study.toml".to_owned(), sha256: digest("a"), text: "a".to_owned(), exclusion };
+    let begin = Begin { plan: Some(plan), ..begin() };
+    LogWriter::create(&path).unwrap().write(&Event::Begin(Box::new(begin.clone()))).unwrap();
+    assert_eq!(SittingLog::read(&path).unwrap().begin, begin);
+}
+
 /// Every single byte of the file matters: changed, it is refused, with the line it stands in or, for a line end, the
 /// line whose text it spoils.
 #[test]
