@@ -193,6 +193,41 @@ fn an_effect_that_scaling_removed_is_not_tested() {
 }
 
 /// Holm (1979), as `p.adjust(p, "holm")` of R: the example of its help, and what is no probability.
+/// One factor within subjects, one row for each.
+fn within(rows: &[[f64; 3]]) -> Effect {
+    let rows: Vec<Vec<f64>> = rows.iter().map(|row| row.to_vec()).collect();
+    let level = WithinFactor { name: "level".to_owned(), levels: 3 };
+    let design = Design::new(Vec::new(), vec![level], &rows).unwrap();
+    analyse(&design, SumOfSquares::Three).remove(0)
+}
+
+/// A single degree of freedom of the residuals says nothing of how contrasts vary: the degrees of freedom are scaled by the least
+/// value, whatever rounding makes of the formula.
+#[test]
+fn two_subjects_have_the_least_epsilon() {
+    for step in 0..200 {
+        let at = f64::from(step) * 0.37;
+        let effect = within(&[[1.0 + at, 2.0, 4.5 + at.sin()], [1.5, 3.1 + at.cos(), 5.9]]);
+        let sphericity = effect.sphericity.unwrap();
+        let least = fisher_above(effect.f, 1.0, 1.0);
+        assert_eq!((sphericity.epsilon_hf, sphericity.p_hf), (0.5, least), "{effect:?}");
+    }
+}
+
+/// Errors that vary equally in all directions there are need no correction, and rounding makes none.
+#[test]
+fn equal_variation_is_not_corrected() {
+    for scale in [0.1, 0.3, 1.0 / 3.0, 0.7, 1.0, 1.1] {
+        let mut rows = [[0.0, 1.7, 2.9].map(|level| level * scale); 3];
+        for (own, row) in rows.iter_mut().enumerate() {
+            row[own] += scale;
+        }
+        let effect = within(&rows);
+        let sphericity = effect.sphericity.unwrap();
+        assert!(sphericity.epsilon_hf > 1.0 && sphericity.p_hf == effect.p, "{effect:?}");
+    }
+}
+
 #[test]
 fn several_tests_are_corrected_by_holm() {
     use flotor_statistics::multiple::holm;

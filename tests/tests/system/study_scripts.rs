@@ -12,11 +12,14 @@ use std::process::Command;
 
 /// Not the thesis's bases and stimuli, so that nothing stands beside the numbers.
 const JND: &[&str] = &["jnd", "--bases", "18,26,35", "--replications", "2"];
-const STUDIES: [&[&str]; 4] = [
+const STUDIES: [&[&str]; 6] = [
     JND,
     // Groups of another size, a single base, catch trials that do not count.
     &["jnd", "--bases", "26.5", "--replications", "2", "--subjects", "5", "--catch-trials", "1"],
     &["jnd", "--bases", "20,30", "--replications", "2", "--subjects", "4", "--first", "vh"],
+    // A single degree of freedom is left to the residuals.
+    &["jnd", "--bases", "18,26,35", "--replications", "2", "--subjects", "2"],
+    &["jnd", "--bases", "18,26,35", "--replications", "2", "--subjects", "3"],
     &["magnitude", "--stimuli", "5", "--replications", "2", "--subjects", "5", "--repeat-checks", "1"],
 ];
 

@@ -71,6 +71,9 @@ impl Effect {
 /// none, and neither is an error.
 const ROUNDING: f64 = 1.0e-20;
 
+/// Least degrees of freedom that are left of those of the residuals: fewer are rounding errors.
+const LEAST_LEFT: f64 = 1.0e-9;
+
 /// How unequally the contrasts of an effect vary, and p-values that include it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sphericity {
@@ -78,7 +81,8 @@ pub struct Sphericity {
     pub epsilon_gg: f64,
     /// p-value with degrees of freedom scaled by it.
     pub p_gg: f64,
-    /// Huynh and Feldt's epsilon, which may exceed 1.
+    /// Huynh and Feldt's epsilon, which may exceed 1; its least value, one over the contrasts, where a single degree of freedom
+    /// is left to the residuals.
     pub epsilon_hf: f64,
     /// p-value with degrees of freedom scaled by it, at most by 1.
     pub p_hf: f64,
@@ -168,8 +172,14 @@ fn test(
 fn sphericity(error: &Matrix, f: f64, df: f64, error_df: f64, residual_df: f64) -> Sphericity {
     let contrasts = count(error.columns());
     let epsilon_gg = error.trace() * error.trace() / (contrasts * error.trace_of_square());
-    let epsilon_hf = ((residual_df + 1.0) * contrasts * epsilon_gg - 2.0)
-        / (contrasts * (residual_df - contrasts * epsilon_gg));
+    let epsilon_hf = if residual_df > 1.0 {
+        // What is left is 0 where all the error there can be varies equally: rounding must not turn its sign.
+        let left = (residual_df - contrasts * epsilon_gg).max(LEAST_LEFT);
+        ((residual_df + 1.0) * contrasts * epsilon_gg - 2.0) / (contrasts * left)
+    } else {
+        // A single degree of freedom has a single direction of error: nothing is known of how contrasts vary, and the formula is 0 / 0.
+        1.0 / contrasts
+    };
     let scaled = |epsilon: f64| {
         // Below its least possible value the estimate is rounding or too small a sample.
         let epsilon = epsilon.clamp(1.0 / contrasts, 1.0);

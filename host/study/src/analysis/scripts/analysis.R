@@ -84,7 +84,9 @@ anova_of <- function(values, factors, counts, groups) {
         gg <- sum(diag(products))^2 / (df * sum(products^2))
         # Huynh and Feldt's correction, with Lecoutre's of it.
         freedom <- nrow(values) - ncol(full)
-        epsilon <- ((freedom + 1) * df * gg - 2) / (df * (freedom - df * gg))
+        epsilon <- ((freedom + 1) * df * gg - 2) / (df * max(freedom - df * gg, 1e-9))
+        # Of a single degree of freedom nothing is known: the least value.
+        if (freedom == 1) epsilon <- 1 / df
         effect <- list(f = (squares / df) / (error / error_df), df = df, error_df = error_df, epsilon = epsilon)
       }
       found[[paste(parts, collapse = ":")]] <- effect

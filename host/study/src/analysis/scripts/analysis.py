@@ -107,7 +107,9 @@ def anova(values, factors, groups):
                 gg = np.trace(products) ** 2 / (df * np.sum(products**2))
                 # Huynh and Feldt's correction, with Lecoutre's of it.
                 freedom = len(values) - full.shape[1]
-                epsilon = ((freedom + 1) * df * gg - 2) / (df * (freedom - df * gg))
+                epsilon = ((freedom + 1) * df * gg - 2) / (df * max(freedom - df * gg, 1e-9))
+                # Of a single degree of freedom nothing is known: the least value.
+                epsilon = epsilon if freedom > 1 else 1.0 / df
             yield ":".join(parts), ((squares / df) / (error / error_df), df, error_df, epsilon)
 
 
