@@ -5,6 +5,8 @@
 //! the differences after it follow from its answer; only an estimate from all answers (`--estimator map`) can do without
 //! that trial alone.
 
+mod check;
+
 use crate::analysis::{Estimator, SubjectChecks, SubjectRecord};
 use crate::log::TrialEvent;
 use crate::protocol::{Protocol, SubjectNumber};
@@ -42,6 +44,9 @@ pub struct ExclusionRules {
     pub most_excluded_trials: Option<f64>,
 }
 
+/// No rule of the file: the rules about trials have left nothing of a subject in some condition.
+pub const EMPTY_CONDITION: &str = "empty_condition";
+
 /// What is excluded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -61,7 +66,7 @@ pub struct Exclusion {
     pub subject: SubjectNumber,
     /// What.
     pub scope: Scope,
-    /// By which rule, as the study file has it.
+    /// By which rule, as the study file has it, or [`EMPTY_CONDITION`].
     pub rule: &'static str,
     /// What was found.
     pub found: String,
@@ -116,77 +121,6 @@ impl ExclusionRules {
         *self == Self::default()
     }
 
-    /// Whether the rules make sense for this experiment.
-    ///
-    /// # Errors
-    /// The first that does not, in words.
-    pub fn check(&self, protocol: &Protocol) -> Result<(), String> {
-        let shares = [
-            ("most_false_alarms", self.most_false_alarms),
-            ("least_agreement", self.least_agreement),
-            ("most_dont_know", self.most_dont_know),
-            ("most_missed_ticks", self.most_missed_ticks),
-            ("most_excluded_trials", self.most_excluded_trials),
-        ];
-        for (rule, share) in shares {
-            if share.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
-                return Err(format!("exclusion.{rule}: a share from 0 to 1"));
-            }
-        }
-        for (rule, value) in [
-            ("most_retest_deviation", self.most_retest_deviation),
-            ("least_movement_mm", self.least_movement_mm),
-        ] {
-            if value.is_some_and(|value| !(value > 0.0 && value.is_finite())) {
-                return Err(format!("exclusion.{rule}: a number above 0"));
-            }
-        }
-        // A log is JSON, which has no infinity: a longest time without end would make it unreadable.
-        let are_times =
-            |[shortest, longest]: [f64; 2]| 0.0 <= shortest && shortest < longest && longest.is_finite();
-        if self.response_time_s.is_some_and(|times| !are_times(times)) {
-            return Err(
-                "exclusion.response_time_s: the shortest and the longest time, s, both finite".to_owned()
-            );
-        }
-        let has_trial_rule = self.least_movement_mm.is_some() || self.response_time_s.is_some();
-        if self.most_excluded_trials.is_some() && !has_trial_rule {
-            return Err(
-                "exclusion.most_excluded_trials needs response_time_s or least_movement_mm".to_owned()
-            );
-        }
-        let (catch, repeats, is_jnd) = match protocol {
-            Protocol::Jnd(jnd) => (jnd.checks.catch, jnd.checks.repeats, true),
-            Protocol::Magnitude(magnitude) => (0, magnitude.repeat_checks, false),
-        };
-        for (rule, is_said, is_had, needs) in [
-            (
-                "most_false_alarms",
-                self.most_false_alarms,
-                catch > 0,
-                "catch_trials of a difference experiment",
-            ),
-            (
-                "least_agreement",
-                self.least_agreement,
-                is_jnd && repeats > 0,
-                "repeat_checks of a difference experiment",
-            ),
-            (
-                "most_retest_deviation",
-                self.most_retest_deviation,
-                !is_jnd && repeats > 0,
-                "repeat_checks of an experiment with ratings",
-            ),
-            ("most_dont_know", self.most_dont_know, is_jnd, "a difference experiment"),
-        ] {
-            if is_said.is_some() && !is_had {
-                return Err(format!("exclusion.{rule} needs {needs}"));
-            }
-        }
-        Ok(())
-    }
-
     /// Applies the rules to complete sittings; `rate_hz` is the rate of the servo, if there was one.
     #[must_use]
     pub fn apply(
@@ -207,17 +141,15 @@ impl ExclusionRules {
                 applied.excluded.push(whole.clone());
                 continue;
             }
-            let kept = without(record, &new);
-            let missing = missing_condition(protocol, &kept);
-            let subject = kept.subject;
+            let kept = without(&record, &new);
             applied.excluded.extend(new);
-            match missing {
+            match emptied(protocol, estimator, &record, &kept) {
                 // Nothing to compare with would be left: the whole sitting goes.
-                Some((modality, level)) => applied.excluded.push(Exclusion {
-                    subject,
+                Some(found) => applied.excluded.push(Exclusion {
+                    subject: record.subject,
                     scope: Scope::Sitting,
-                    rule: "nothing left",
-                    found: format!("{} at {level}", modality.word()),
+                    rule: EMPTY_CONDITION,
+                    found,
                 }),
                 None => applied.kept.push(kept),
             }
@@ -359,28 +291,43 @@ fn missed_share(counted: &[&TrialEvent], rate_hz: Option<f64>) -> Option<f64> {
     (ticks > 0.0).then(|| missed as f64 / ticks)
 }
 
-fn without(mut record: SubjectRecord, excluded: &[Exclusion]) -> SubjectRecord {
-    let subject = record.subject;
-    record.trials.retain(|event| !excluded.iter().any(|exclusion| exclusion.covers(subject, &event.trial)));
-    record
-        .tracks
+fn without(record: &SubjectRecord, excluded: &[Exclusion]) -> SubjectRecord {
+    let mut kept = record.clone();
+    kept.trials
+        .retain(|event| !excluded.iter().any(|exclusion| exclusion.covers(record.subject, &event.trial)));
+    kept.tracks
         .retain(|track| !excluded.iter().any(|exclusion| exclusion.scope == Scope::Track(track.track)));
-    record
+    kept
 }
 
-/// A condition of which nothing is left.
-fn missing_condition(protocol: &Protocol, record: &SubjectRecord) -> Option<(Modality, f64)> {
+/// A condition of which the rules left nothing to compute a result from, where there was something, in words.
+fn emptied(
+    protocol: &Protocol,
+    estimator: Estimator,
+    before: &SubjectRecord,
+    kept: &SubjectRecord,
+) -> Option<String> {
     let level = |event: &TrialEvent| match event.trial.presented {
         Presented::Pair(pair) => pair.base,
         Presented::One { value } => value,
     };
-    let all = Modality::ALL
+    // A track without a threshold has answers, and no result.
+    let by_tracks = matches!((protocol, estimator), (Protocol::Jnd(_), Estimator::Procedure));
+    let has_result = |record: &SubjectRecord, (modality, at): (Modality, f64)| {
+        if by_tracks {
+            let mut tracks = record.tracks.iter().filter(|track| track.threshold.is_some());
+            tracks.any(|track| track.modality == modality && track.base == at)
+        } else {
+            record.counted().any(|event| event.trial.modality == modality && level(event) == at)
+        }
+    };
+    let mut all = Modality::ALL
         .into_iter()
         .flat_map(|modality| protocol.levels().iter().map(move |at| (modality, *at)));
-    let is_there = |(modality, at): (Modality, f64)| {
-        record.counted().any(|event| event.trial.modality == modality && level(event) == at)
-    };
-    all.into_iter().find(|condition| !is_there(*condition))
+    let (modality, at) =
+        all.find(|condition| has_result(before, *condition) && !has_result(kept, *condition))?;
+    let what = if by_tracks { "track with a threshold" } else { "answer" };
+    Some(format!("{} at {at}: no {what} is left", modality.word()))
 }
 
 #[cfg(test)]

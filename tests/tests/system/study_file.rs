@@ -72,6 +72,21 @@ fn checks_and_exclusion_rules_of_a_study_file_reach_the_analysis() {
     assert!(ran.stdout.contains("! excluded: sitting, most_false_alarms = 0.25 (0."), "{ran:?}");
 }
 
+/// Where the rules leave too little, the analysis says how much is left and what took the rest.
+#[test]
+fn rules_that_leave_nothing_say_what_they_took() {
+    let scratch = Scratch::default();
+    let rules = "[exclusion]\nmost_dont_know = 0\n";
+    let _ = scratch.file("a.study.toml", format!("{FILE}{rules}"));
+    assert_eq!(flotor(scratch.path(), &["study", "run"]).code, Some(exit_code::OK));
+    let ran = flotor(scratch.path(), &["analyse", "data"]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.error().contains("sittings that are left to analyse: 0; "), "{ran:?}");
+    let lines =
+        ran.stderr.lines().filter(|line| line.starts_with("  sub-0") && line.contains("most_dont_know = 0"));
+    assert_eq!(lines.count(), 6, "{ran:?}");
+}
+
 /// A rule that cannot be applied is refused before the first trial.
 #[test]
 fn a_rule_without_what_it_needs_is_refused() {

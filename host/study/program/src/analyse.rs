@@ -121,8 +121,13 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
             "the exclusion rules of the study file leave {kept} sittings ({excluded} exclusions)"
         ));
     }
-    let analysis = Analysis::of(protocol, subjects, &options)
-        .map_err(|error| CommandError::Usage(format!("{}: {error}", arguments.data.display())))?;
+    let analysis = Analysis::of(protocol, subjects, &options).map_err(|error| {
+        // What the rules took may be why; whoever must not know conditions does not see it.
+        if !rules.are_none() && !arguments.blind {
+            note(format_args!("what the rules of the study file took:\n{}", applied.to_text(&rules)));
+        }
+        CommandError::Usage(format!("{}: {error}", arguments.data.display()))
+    })?;
     if arguments.blind {
         let codes = Codes::new(protocol, first.begin.seed);
         return tell_blinded(arguments, &BlindedAnalysis::of(&analysis, &codes));

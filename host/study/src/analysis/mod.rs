@@ -96,9 +96,9 @@ pub struct AnalysisOptions {
 #[non_exhaustive]
 pub enum AnalysisError {
     /// Too few complete sittings.
-    #[error("{complete} complete sittings; an analysis needs 2 or more")]
+    #[error("complete sittings that are left to analyse: {complete}; an analysis needs 2 or more")]
     TooFewSubjects {
-        /// How many there are.
+        /// How many there are, without those that rules excluded.
         complete: usize,
     },
     /// A subject without a threshold in some condition.

@@ -122,7 +122,31 @@ fn each_rule_excludes_what_it_names_and_nothing_else() {
     let movement = ExclusionRules { least_movement_mm: Some(30.0), ..ExclusionRules::default() };
     let applied = excluded(&movement, Estimator::Procedure);
     assert_eq!(applied.kept.len(), 0, "nobody moved 30 mm");
-    assert!(applied.excluded.iter().any(|exclusion| exclusion.rule == "nothing left"));
+    assert!(applied.excluded.iter().any(|exclusion| exclusion.rule == EMPTY_CONDITION));
+}
+
+/// A sitting is compared by its thresholds: tracks without one do not make up for the track that a rule takes. What never had a
+/// threshold is not the rules' doing.
+#[test]
+fn a_condition_without_a_threshold_left_takes_the_sitting() {
+    let protocol = jnd();
+    let mut records = all(&protocol);
+    let of_track = |record: &SubjectRecord| {
+        record.tracks.iter().find(|track| track.track == 2).map(|track| track.modality)
+    };
+    let modality = of_track(&records[3]).unwrap();
+    let others = records[3].tracks.iter_mut().filter(|track| track.track != 2 && track.modality == modality);
+    others.for_each(|track| track.threshold = None);
+    records[0].tracks.iter_mut().for_each(|track| track.threshold = None);
+    let times = ExclusionRules { response_time_s: Some([0.2, 20.0]), ..ExclusionRules::default() };
+    let applied = times.apply(&protocol, records.clone(), Estimator::Procedure, None);
+    let [_, Exclusion { subject, scope: Scope::Sitting, rule, found }] = applied.excluded.as_slice() else {
+        panic!("{:?}", applied.excluded)
+    };
+    assert_eq!((subject.get(), *rule, applied.kept.len()), (4, EMPTY_CONDITION, 3));
+    assert_eq!(*found, format!("{} at 26: no track with a threshold is left", modality.word()));
+    let applied = times.apply(&protocol, records, Estimator::Map, None);
+    assert_eq!(applied.kept.len(), 4, "all answers of the other track: {:?}", applied.excluded);
 }
 
 #[test]

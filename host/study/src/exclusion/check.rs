@@ -1,0 +1,77 @@
+//! Whether rules make sense for an experiment.
+
+use super::ExclusionRules;
+use crate::protocol::Protocol;
+
+impl ExclusionRules {
+    /// Whether the rules make sense for this experiment.
+    ///
+    /// # Errors
+    /// The first that does not, in words.
+    pub fn check(&self, protocol: &Protocol) -> Result<(), String> {
+        let shares = [
+            ("most_false_alarms", self.most_false_alarms),
+            ("least_agreement", self.least_agreement),
+            ("most_dont_know", self.most_dont_know),
+            ("most_missed_ticks", self.most_missed_ticks),
+            ("most_excluded_trials", self.most_excluded_trials),
+        ];
+        for (rule, share) in shares {
+            if share.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
+                return Err(format!("exclusion.{rule}: a share from 0 to 1"));
+            }
+        }
+        for (rule, value) in [
+            ("most_retest_deviation", self.most_retest_deviation),
+            ("least_movement_mm", self.least_movement_mm),
+        ] {
+            if value.is_some_and(|value| !(value > 0.0 && value.is_finite())) {
+                return Err(format!("exclusion.{rule}: a number above 0"));
+            }
+        }
+        // A log is JSON, which has no infinity: a longest time without end would make it unreadable.
+        let are_times =
+            |[shortest, longest]: [f64; 2]| 0.0 <= shortest && shortest < longest && longest.is_finite();
+        if self.response_time_s.is_some_and(|times| !are_times(times)) {
+            return Err(
+                "exclusion.response_time_s: the shortest and the longest time, s, both finite".to_owned()
+            );
+        }
+        let has_trial_rule = self.least_movement_mm.is_some() || self.response_time_s.is_some();
+        if self.most_excluded_trials.is_some() && !has_trial_rule {
+            return Err(
+                "exclusion.most_excluded_trials needs response_time_s or least_movement_mm".to_owned()
+            );
+        }
+        let (catch, repeats, is_jnd) = match protocol {
+            Protocol::Jnd(jnd) => (jnd.checks.catch, jnd.checks.repeats, true),
+            Protocol::Magnitude(magnitude) => (0, magnitude.repeat_checks, false),
+        };
+        for (rule, is_said, is_had, needs) in [
+            (
+                "most_false_alarms",
+                self.most_false_alarms,
+                catch > 0,
+                "catch_trials of a difference experiment",
+            ),
+            (
+                "least_agreement",
+                self.least_agreement,
+                is_jnd && repeats > 0,
+                "repeat_checks of a difference experiment",
+            ),
+            (
+                "most_retest_deviation",
+                self.most_retest_deviation,
+                !is_jnd && repeats > 0,
+                "repeat_checks of an experiment with ratings",
+            ),
+            ("most_dont_know", self.most_dont_know, is_jnd, "a difference experiment"),
+        ] {
+            if is_said.is_some() && !is_had {
+                return Err(format!("exclusion.{rule} needs {needs}"));
+            }
+        }
+        Ok(())
+    }
+}
