@@ -33,7 +33,7 @@ pub struct ExclusionRules {
     /// Sitting: largest share of missed ticks while stimuli were felt.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_missed_ticks: Option<f64>,
-    /// Trial: least way of the handle with each stimulus, up and down together, mm.
+    /// Trial: least way of the handle with each stimulus, up and down together and as often as it was felt, mm.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub least_movement_mm: Option<f64>,
     /// Trial: shortest and longest time to the answer, s.
@@ -197,8 +197,13 @@ impl ExclusionRules {
         if exploration.kinematics.is_empty() {
             applied.not_known.push("least_movement_mm: no movement was stored".to_owned());
         }
-        let ways_mm =
-            exploration.kinematics.iter().map(|one| 1.0e3 * one.mean_speed_m_per_s * one.duration_s);
+        // Who felt a trial again has entries for each stimulus several times: their ways are added up.
+        let (felt, stimuli) = (&exploration.kinematics, event.trial.presented.values().len().max(1));
+        let way_mm = |stimulus: usize| {
+            let here = felt.iter().skip(stimulus).step_by(stimuli);
+            here.map(|one| 1.0e3 * one.mean_speed_m_per_s * one.duration_s).sum::<f64>()
+        };
+        let ways_mm = (0..stimuli.min(felt.len())).map(way_mm);
         let least = ways_mm.fold(f64::INFINITY, f64::min);
         (least < least_mm).then(|| ("least_movement_mm", format!("{least:.1} mm")))
     }

@@ -199,7 +199,8 @@ pub struct Exploration {
     /// From the end of the presentation to the answer, s; unknown for simulated observers.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub response_time_s: Option<f64>,
-    /// One entry per stimulus, where a device was there to measure.
+    /// One entry per stimulus in the order of presentation, where a device was there to measure; all of them once more for each time
+    /// the trial was felt again.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub kinematics: Vec<StimulusKinematics>,
     /// Ticks the servo missed.

@@ -125,6 +125,28 @@ fn each_rule_excludes_what_it_names_and_nothing_else() {
     assert!(applied.excluded.iter().any(|exclusion| exclusion.rule == EMPTY_CONDITION));
 }
 
+/// Who feels a pair again, and then for a short time only, has moved as far with each as both times together.
+#[test]
+fn feeling_again_adds_to_the_way() {
+    let protocol = jnd();
+    let rules = ExclusionRules { least_movement_mm: Some(15.0), ..ExclusionRules::default() };
+    for (speeds, is_kept) in [
+        (&[0.02, 0.02][..], true),
+        (&[0.02, 0.01], false),
+        (&[0.02, 0.01, 0.001, 0.008], true),
+        (&[0.02, 0.01, 0.02, 0.001], false),
+    ] {
+        let mut record = all(&protocol).remove(0);
+        for event in &mut record.trials {
+            let one = event.exploration.kinematics.remove(0);
+            let at = |speed: &f64| StimulusKinematics { mean_speed_m_per_s: *speed, ..one.clone() };
+            event.exploration.kinematics = speeds.iter().map(at).collect();
+        }
+        let applied = rules.apply(&protocol, vec![record], Estimator::Procedure, None);
+        assert_eq!(applied.excluded.is_empty(), is_kept, "{speeds:?}: {:?}", applied.excluded);
+    }
+}
+
 /// A sitting is compared by its thresholds: tracks without one do not make up for the track that a rule takes. What never had a
 /// threshold is not the rules' doing.
 #[test]
