@@ -89,17 +89,22 @@ impl Begin {
     /// What makes this a sitting of another study than an earlier one, as text; the subject and the version may differ.
     #[must_use]
     pub fn differs(&self, earlier: &Self) -> Option<String> {
-        let parts = [
-            (
-                Plan::differs(self.plan.as_ref(), earlier.plan.as_ref()).unwrap_or_default(),
-                self.plan == earlier.plan,
-            ),
-            (another("protocol", &earlier.protocol, &self.protocol), self.protocol == earlier.protocol),
-            (format!("--seed {}, not {}", earlier.seed, self.seed), self.seed == earlier.seed),
-            (another("observer", &earlier.observer, &self.observer), self.observer == earlier.observer),
-            (another("apparatus", &earlier.apparatus, &self.apparatus), self.apparatus == earlier.apparatus),
-        ];
-        parts.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("begun with {what}"))
+        let own = |what: String, is_same: bool| (!is_same).then_some(what);
+        let what = Plan::differs(self.plan.as_ref(), earlier.plan.as_ref())
+            .or_else(|| {
+                own(another("protocol", &earlier.protocol, &self.protocol), self.protocol == earlier.protocol)
+            })
+            .or_else(|| own(format!("--seed {}, not {}", earlier.seed, self.seed), self.seed == earlier.seed))
+            .or_else(|| {
+                own(another("observer", &earlier.observer, &self.observer), self.observer == earlier.observer)
+            })
+            .or_else(|| {
+                own(
+                    another("apparatus", &earlier.apparatus, &self.apparatus),
+                    self.apparatus == earlier.apparatus,
+                )
+            });
+        what.map(|what| format!("begun with {what}"))
     }
 
     /// Whether a person sits, and times of day mean something.
@@ -146,27 +151,33 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// How the file that is followed now differs from the earlier one, in words.
+    /// How the file that is followed now differs from the earlier one, in words; an equal digest is an equal text, whatever its name.
     fn differs(now: Option<&Self>, earlier: Option<&Self>) -> Option<String> {
         match (earlier, now) {
             (None, None) => None,
             (Some(earlier), None) => Some(format!("the study file {}, and there is none now", earlier.file)),
             (None, Some(now)) => Some(format!("no study file, and there is {} now", now.file)),
-            (Some(earlier), Some(now)) if earlier.text == now.text => {
-                Some(format!("the study file {}, not {}", earlier.file, now.file))
-            }
+            (Some(earlier), Some(now)) if earlier.sha256 == now.sha256 => None,
             (Some(earlier), Some(now)) => {
-                Some(format!("another version of {}{}", now.file, changed(earlier, now)))
+                Some(format!("another version of {}{}", now.file, changed(&earlier.text, &now.text)))
             }
         }
     }
 }
 
-/// The lines that changed from one version of a file to the next.
-fn changed(earlier: &Plan, now: &Plan) -> String {
-    let [before, after] = [earlier, now].map(|plan| plan.text.lines().map(str::trim).collect::<Vec<_>>());
-    let pairs = || before.iter().zip(&after);
-    let same = pairs().take_while(|(one, other)| one == other).count();
+/// The lines that changed from one version of a text to the next; nothing of an early log, which has the digest alone.
+fn changed(before: &str, after: &str) -> String {
+    if before.is_empty() {
+        return String::new();
+    }
+    let without_blanks = |text: &str| text.split_whitespace().collect::<String>();
+    if without_blanks(before) == without_blanks(after) {
+        let lines = before.split('\n').zip(after.split('\n'));
+        let same = lines.take_while(|(one, other)| one == other).count();
+        return format!(": line {} on, in blanks or line ends only", same + 1);
+    }
+    let [before, after] = [before, after].map(|text| text.lines().collect::<Vec<_>>());
+    let same = before.iter().zip(&after).take_while(|(one, other)| one == other).count();
     let rest = before.len().min(after.len()) - same;
     let backwards = before.iter().rev().zip(after.iter().rev()).take(rest);
     let same_end = backwards.take_while(|(one, other)| one == other).count();
@@ -174,9 +185,6 @@ fn changed(earlier: &Plan, now: &Plan) -> String {
         let lines = lines.get(same..lines.len() - same_end).unwrap_or_default().join("; ");
         if lines.is_empty() { "nothing".to_owned() } else { format!("`{lines}`") }
     };
-    if earlier.text.is_empty() {
-        return String::new(); // an early log has the digest alone
-    }
     format!(": line {} on had {}, and has {} now", same + 1, middle(&before), middle(&after))
 }
 

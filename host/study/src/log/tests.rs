@@ -246,11 +246,27 @@ fn a_sitting_of_another_study_says_where_it_differs() {
         ),
         ("x\ny", "x\nseed = 2\ny", "line 2 on had nothing, and has `seed = 2` now"),
         ("x\ny\nz", "x\nz", "line 2 on had `y`, and has nothing now"),
+        ("x\n  y\nz", "x\n  z\nz", "line 2 on had `  y`, and has `  z` now"),
+        ("x\n\n y", "x\nz\n y", "line 2 on had nothing, and has `z` now"),
     ] {
         let (one, other) = (Begin { plan: plan(before), ..begin() }, Begin { plan: plan(after), ..begin() });
         let said = other.differs(&one).expect("another file");
         assert_eq!(said, format!("begun with another version of a.study.toml: {expected}"));
     }
+    for after in ["x\n y = 1\n", "x\n\ny = 1\n", "x\ny = 1", "x\ny=1\n", "x\ny = 1\r\n"] {
+        let (one, other) =
+            (Begin { plan: plan("x\ny = 1\n"), ..begin() }, Begin { plan: plan(after), ..begin() });
+        let said = other.differs(&one).expect("another file");
+        let line = if after.ends_with('1') { 3 } else { 2 };
+        let expected =
+            format!("another version of a.study.toml: line {line} on, in blanks or line ends only");
+        assert_eq!(said, format!("begun with {expected}"), "{after:?}");
+    }
+    // Logs of early versions have the digest alone; another name is not another file.
+    let mut early = one.clone();
+    early.plan = plan("a").map(|plan| Plan { text: String::new(), file: "b.study.toml".to_owned(), ..plan });
+    assert_eq!((one.differs(&early), early.differs(&one)), (None, None));
+    assert_eq!(other.differs(&early), Some("begun with another version of a.study.toml".to_owned()));
     let said = begin().differs(&other).expect("none now");
     assert_eq!(said, "begun with the study file a.study.toml, and there is none now");
     assert!(!serde_json::to_string(&begin()).unwrap().contains("plan"), "logs without one are as before");
