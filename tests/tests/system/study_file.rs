@@ -94,7 +94,7 @@ fn a_rule_without_what_it_needs_is_refused() {
     for (rules, reason) in [
         ("most_retest_deviation = 0.5", "repeat_checks of an experiment with ratings"),
         ("most_dont_know = 20", "a share from 0 to 1"),
-        ("most_unsure = 0.2", "unknown field `most_unsure`"),
+        ("most_unsure = 0.2", "a.study.toml:11: unknown field `most_unsure`"),
     ] {
         let _ = scratch.file("a.study.toml", format!("{FILE}[exclusion]\n{rules}\n"));
         let ran = flotor(scratch.path(), &["study", "run", "a.study.toml"]);

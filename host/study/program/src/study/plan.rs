@@ -25,7 +25,7 @@ const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
 #[command(
     after_help = "A study file has the task, what was decided beforehand, and options of that task by name:\n  \
     task = \"jnd\"\n  \
-      analysis = \"mixed ANOVA of the Weber fractions, Holm's correction\"\n  \
+    analysis = \"mixed ANOVA of the Weber fractions, Holm's correction\"\n  \
     [options]\n  \
     out = \"data\"\n  \
     bases = [17, 26, 35]\n  \
@@ -133,7 +133,8 @@ fn words(
     further: Vec<OsString>,
 ) -> Result<(Vec<OsString>, ExclusionRules), CommandError> {
     let study: StudyFile = toml::from_str(text).map_err(|error| {
-        let line = error.span().map_or(0, |span| text[..span.start].lines().count().max(1));
+        let start = error.span().map_or(0, |span| span.start);
+        let line = 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
         let message = error.message().replace('\n', " ");
         CommandError::Usage(format!("{}:{line}: {message}", file.display()))
     })?;
@@ -321,6 +322,15 @@ mod tests {
             let error = words(Path::new("a.study.toml"), wrong, Vec::new()).expect_err("it is none");
             assert!(error.to_string().starts_with("a.study.toml:"), "{error}");
             assert!(!error.to_string().contains(['|', '^', '\n']), "{error}");
+        }
+        for (wrong, line) in [
+            ("task = \"jnd\"\n[exclusion]\nmost = 1", 3),
+            ("task = \"jnd\"\n\nmost = 1\n[exclusion]\n", 3),
+            ("task = \"nothing\"", 1),
+            ("task = \"jnd\"\r\n[exclusion]\r\n\r\n  most = 1\r\n", 4),
+        ] {
+            let error = words(Path::new("a.study.toml"), wrong, Vec::new()).expect_err("it is none");
+            assert!(error.to_string().starts_with(&format!("a.study.toml:{line}: ")), "{wrong:?}: {error}");
         }
     }
 }
