@@ -70,6 +70,9 @@ pub(crate) fn magnitude_order(
 
 /// The checks of a track, each with the number of trials of the track before it, in order: as many as there are, at
 /// random places after the first trial, all before a track can be over.
+///
+/// A repeat check has another pair than the one it repeats before it, and a trial that counts between it and another repeat check,
+/// as far as the track has places for that.
 pub(crate) fn track_checks(
     protocol: &JndProtocol,
     seed: u64,
@@ -81,14 +84,25 @@ pub(crate) fn track_checks(
     let kinds =
         std::iter::repeat_n(Phase::Catch, catch).chain(std::iter::repeat_n(Phase::RepeatCheck, repeats));
     let places = (1..protocol.procedure.trials_least()).collect::<Vec<_>>();
-    let place = |kind| (places.get(stream.below(places.len())).copied().unwrap_or(1), kind);
-    let mut checks: Vec<(u32, Phase)> = kinds.map(place).collect();
+    let mut of_repeats: Vec<u32> = places.iter().copied().skip(1).collect();
+    let mut checks: Vec<(u32, Phase)> = Vec::new();
+    for kind in kinds {
+        let drawn = places.get(stream.below(places.len())).copied().unwrap_or(1);
+        let place = if kind == Phase::RepeatCheck { taken(&mut of_repeats, &drawn) } else { None };
+        checks.push((place.unwrap_or(drawn), kind));
+    }
     checks.sort_by_key(|(place, _)| *place);
     checks
 }
 
+/// Takes from what is left, in order, the one that was drawn, or the next one, or after the last the first; none is left at the end.
+fn taken<T: PartialOrd>(left: &mut Vec<T>, drawn: &T) -> Option<T> {
+    let next = left.iter().position(|one| one >= drawn).unwrap_or(0);
+    (!left.is_empty()).then(|| left.remove(next))
+}
+
 /// One replication of a magnitude experiment with its checks: each presents one of its stimuli once more, with another one or
-/// several between the two.
+/// several between the two, and none twice at one place unless there are more checks than places.
 pub(crate) fn with_repeat_checks(
     protocol: &MagnitudeProtocol,
     seed: u64,
@@ -98,16 +112,20 @@ pub(crate) fn with_repeat_checks(
 ) -> Vec<(Phase, f64)> {
     let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), replication);
     let count = order.len();
-    let mut check = || {
+    // Which stimulus, and before which one: after at least one more of the others.
+    let mut left: Vec<(usize, usize)> = (0..count.saturating_sub(2))
+        .flat_map(|which| (which + 2..=count).map(move |place| (which, place)))
+        .collect();
+    let mut checks: Vec<(usize, f64)> = Vec::new();
+    for _ in 0..protocol.repeat_checks {
         let which = stream.below(count.saturating_sub(2));
-        // After at least one more of the others.
-        let place = which + 2 + stream.below(count.saturating_sub(which + 1));
-        (place, order.get(which).copied())
-    };
-    let checks: Vec<_> = (0..protocol.repeat_checks).map(|_| check()).collect();
+        let drawn = (which, which + 2 + stream.below(count.saturating_sub(which + 1)));
+        let (which, place) = taken(&mut left, &drawn).unwrap_or(drawn);
+        checks.extend(order.get(which).map(|value| (place, *value)));
+    }
     let before = |place: usize| {
         let here = checks.iter().filter(move |(at, _)| *at == place);
-        here.filter_map(|(_, value)| Some((Phase::RepeatCheck, (*value)?)))
+        here.map(|(_, value)| (Phase::RepeatCheck, *value))
     };
     let mut all: Vec<(Phase, f64)> = Vec::new();
     for (place, value) in order.iter().enumerate() {
@@ -141,6 +159,7 @@ pub(crate) fn magnitude_demo(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::protocol::Checks;
 
     fn subjects() -> impl Iterator<Item = SubjectNumber> {
         (1..=60).filter_map(SubjectNumber::new)
@@ -164,6 +183,35 @@ mod tests {
             first_orders.insert(orders[0].clone());
         }
         assert_eq!(first_orders.len(), 6, "all six permutations occur");
+    }
+
+    /// Nothing is presented twice in a row, with as many checks as there are stimuli.
+    #[test]
+    fn checks_never_follow_what_they_repeat() {
+        for repeat_checks in 1..=12 {
+            let protocol = MagnitudeProtocol { repeat_checks, ..MagnitudeProtocol::default() };
+            for (subject, replication) in subjects().zip((1..=6).cycle()) {
+                let order = magnitude_order(&protocol, 7, subject, replication);
+                let all = with_repeat_checks(&protocol, 7, subject, replication, &order);
+                assert_eq!(all.len(), 12 + repeat_checks as usize);
+                assert!(all.windows(2).all(|two| two[0].1 != two[1].1), "{all:?}");
+            }
+        }
+        for repeats in 1..=6 {
+            let checks = Checks { catch: 1, repeats };
+            let protocol = JndProtocol { checks, ..JndProtocol::default() };
+            for (subject, track) in subjects().zip((1..=12).cycle()) {
+                let checks = track_checks(&protocol, 7, subject, track);
+                let mut places: Vec<u32> = checks
+                    .iter()
+                    .filter(|check| check.1 == Phase::RepeatCheck)
+                    .map(|check| check.0)
+                    .collect();
+                assert!(places[0] > 1 && places.len() == repeats as usize, "{checks:?}");
+                places.dedup();
+                assert_eq!(places.len(), repeats as usize, "{checks:?}");
+            }
+        }
     }
 
     #[test]

@@ -231,8 +231,10 @@ impl Sitting {
             Some(Phase::RepeatCheck) => {
                 // Not the last one, where there are others: two equal pairs in a row would be noticed.
                 let earlier = running.pairs.len().saturating_sub(1).max(1);
+                // A check that comes again presents the same pair.
+                let name = number - self.repeat;
                 let which =
-                    Stream::new(self.seed, Purpose::CheckTrial, self.subject.get(), number).below(earlier);
+                    Stream::new(self.seed, Purpose::CheckTrial, self.subject.get(), name).below(earlier);
                 let pair = running.pairs.get(which).copied();
                 (Phase::RepeatCheck, pair.unwrap_or_else(|| self.pair(base, 0.0, number)))
             }

@@ -162,6 +162,27 @@ fn checks_are_placed_by_the_seed_and_do_not_count() {
     assert_eq!(deltas(&trials), deltas(&sit(&with(Checks::default()), 5).0));
 }
 
+/// A repeat check whose handle left its range comes again with the pair that it was to repeat.
+#[test]
+fn a_repeat_check_comes_again_with_its_pair() {
+    let checks = crate::protocol::Checks { catch: 0, repeats: 3 };
+    let mut jnd = JndProtocol { checks, ..JndProtocol::default() };
+    jnd.demo.shown = false;
+    let mut sitting = Sitting::new(&Protocol::Jnd(jnd), 3, subject(5));
+    let (mut before, mut again): (Option<Trial>, u32) = (None, 0);
+    while let Some(trial) = sitting.next() {
+        let is_check = trial.phase == Phase::RepeatCheck;
+        if let Some(before) = before.filter(|_| is_check && trial.repeat > 0) {
+            assert_eq!(trial.presented, before.presented, "{trial:?}");
+            again += 1;
+        }
+        let exploration = Exploration { boundary_hit: is_check, ..Exploration::default() };
+        sitting.answer(unsure_below(&trial, 0.1), &exploration).unwrap();
+        before = Some(trial);
+    }
+    assert_eq!(again, 12 * 3 * 3, "each of them comes again as often as a trial may");
+}
+
 /// Right where the difference is large, else "I don't know".
 fn unsure_below(trial: &Trial, least: f64) -> Response {
     match trial.presented {
