@@ -92,8 +92,26 @@ pub struct Applied {
     pub kept: Vec<SubjectRecord>,
     /// What was excluded.
     pub excluded: Vec<Exclusion>,
-    /// Rules that could not be applied, with whom and why.
-    pub not_known: Vec<String>,
+    /// Rules that could not be applied.
+    pub not_applied: Vec<NotApplied>,
+}
+
+/// A rule that could not be applied to some subjects.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NotApplied {
+    /// As the study file has it.
+    pub rule: &'static str,
+    /// What is not known.
+    pub why: &'static str,
+    /// Of whom.
+    pub subjects: Vec<SubjectNumber>,
+}
+
+impl std::fmt::Display for NotApplied {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let subjects: Vec<String> = self.subjects.iter().map(SubjectNumber::to_string).collect();
+        write!(f, "{}: {} ({})", self.rule, self.why, subjects.join(", "))
+    }
 }
 
 impl Exclusion {
@@ -154,8 +172,6 @@ impl ExclusionRules {
                 None => applied.kept.push(kept),
             }
         }
-        applied.not_known.sort_unstable();
-        applied.not_known.dedup();
         applied
     }
 
@@ -163,7 +179,7 @@ impl ExclusionRules {
     fn trials(&self, record: &SubjectRecord, estimator: Estimator, applied: &mut Applied) -> BTreeSet<u32> {
         let mut numbers = BTreeSet::new();
         for event in record.counted() {
-            let Some((rule, found)) = self.of_trial(event, applied) else { continue };
+            let Some((rule, found)) = self.of_trial(record.subject, event, applied) else { continue };
             let Trial { number, track, .. } = event.trial;
             numbers.insert(number);
             let (scope, found) = match estimator {
@@ -180,7 +196,12 @@ impl ExclusionRules {
         numbers
     }
 
-    fn of_trial(&self, event: &TrialEvent, applied: &mut Applied) -> Option<(&'static str, String)> {
+    fn of_trial(
+        &self,
+        subject: SubjectNumber,
+        event: &TrialEvent,
+        applied: &mut Applied,
+    ) -> Option<(&'static str, String)> {
         let exploration = &event.exploration;
         if let Some([shortest, longest]) = self.response_time_s {
             match exploration.response_time_s {
@@ -188,14 +209,12 @@ impl ExclusionRules {
                     return Some(("response_time_s", format!("{time_s:.2} s")));
                 }
                 Some(_) => {}
-                None => {
-                    applied.not_known.push("response_time_s: not known of simulated observers".to_owned())
-                }
+                None => applied.cannot("response_time_s", "not known of simulated observers", subject),
             }
         }
         let least_mm = self.least_movement_mm?;
         if exploration.kinematics.is_empty() {
-            applied.not_known.push("least_movement_mm: no movement was stored".to_owned());
+            applied.cannot("least_movement_mm", "no movement was stored", subject);
         }
         // Who felt a trial again has entries for each stimulus several times: their ways are added up.
         let (felt, stimuli) = (&exploration.kinematics, event.trial.presented.values().len().max(1));
@@ -221,7 +240,7 @@ impl ExclusionRules {
         let unsure = counted.iter().filter(|event| event.response == Response::DontKnow).count();
         let missed = missed_share(&counted, rate_hz);
         if self.most_missed_ticks.is_some() && missed.is_none() {
-            applied.not_known.push("most_missed_ticks: no movement was stored".to_owned());
+            applied.cannot("most_missed_ticks", "no movement was stored", record.subject);
         }
         let above = |most: Option<f64>, found: Option<f64>| {
             Some((most?, found?)).filter(|(most, found)| found > most)
@@ -262,6 +281,14 @@ impl ExclusionRules {
 }
 
 impl Applied {
+    fn cannot(&mut self, rule: &'static str, why: &'static str, subject: SubjectNumber) {
+        match self.not_applied.iter_mut().find(|known| (known.rule, known.why) == (rule, why)) {
+            Some(known) if known.subjects.contains(&subject) => {}
+            Some(known) => known.subjects.push(subject),
+            None => self.not_applied.push(NotApplied { rule, why, subjects: vec![subject] }),
+        }
+    }
+
     /// What was excluded by which rule, for people.
     #[must_use]
     pub fn to_text(&self, rules: &ExclusionRules) -> String {
@@ -272,7 +299,7 @@ impl Applied {
             lines.push(format!("  {:<30}{:<46}{found}", format!("{subject} {scope}"), rules.text_of(rule)));
         }
         for rule in rules.names() {
-            let unknown = self.not_known.iter().find(|text| text.starts_with(&rule));
+            let unknown = self.not_applied.iter().find(|one| one.rule == rule);
             let took = self.excluded.iter().any(|exclusion| exclusion.rule == rule);
             match unknown {
                 Some(why) => lines.push(format!("  not applied                   {why}")),

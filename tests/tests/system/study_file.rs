@@ -58,8 +58,14 @@ fn checks_and_exclusion_rules_of_a_study_file_reach_the_analysis() {
     assert_eq!((excluded.len(), alarms.len()), (out.len(), 6), "{excluded:?}");
     assert!(excluded.iter().all(|one| one["rule"] == "most_false_alarms" && one["scope"] == "sitting"));
     assert_eq!(result["subjects"].as_u64(), Some(6 - out.len() as u64));
+    let unknown = &result["not_applied"][0];
+    assert_eq!(
+        (unknown["rule"].as_str(), unknown["subjects"][5].as_u64()),
+        (Some("response_time_s"), Some(6))
+    );
 
     let page = std::fs::read_to_string(folder.join("page.html")).unwrap();
+    assert!(page.contains("<p>Not applied: response_time_s: not known of simulated observers (sub-01, "));
     assert!(page.contains("<h2>Exclusions</h2>") && page.contains("<td>most_false_alarms = 0.25</td>"));
 
     let table = std::fs::read_to_string(folder.join("trials.csv")).unwrap();

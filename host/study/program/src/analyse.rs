@@ -12,7 +12,7 @@ use flotor_study::analysis::{SCRIPT_PYTHON, SCRIPT_R};
 use flotor_study::apparatus::page::html;
 use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, trials_csv};
-use flotor_study::exclusion::Exclusion;
+use flotor_study::exclusion::{Applied, Exclusion, NotApplied};
 use flotor_study::log::{Incident, SittingLog};
 use flotor_study::protocol::RatingScale;
 use serde::Serialize;
@@ -139,9 +139,10 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         let checked = (!checks.is_empty()).then(|| checks_text(&checks));
         [Some(analysed), checked, excluded].into_iter().flatten().collect::<Vec<_>>().join("\n\n")
     };
-    let report = Report { analysis: &analysis, checks: &checks, excluded: &applied.excluded };
+    let Applied { excluded, not_applied, .. } = &applied;
+    let report = Report { analysis: &analysis, checks: &checks, excluded, not_applied };
     print_result(arguments.json.file(), &report, text)?;
-    write_text(arguments.html.as_deref(), || html(&first.begin, subjects, &analysis, &applied.excluded))?;
+    write_text(arguments.html.as_deref(), || html(&first.begin, subjects, &analysis, &applied))?;
     write_text(arguments.csv.as_deref(), || to_csv([], analysis.responses()))?;
     let Some(path) = &arguments.trials else { return Ok(()) };
     if path.extension().is_none_or(|extension| extension != "csv") {
@@ -163,6 +164,8 @@ struct Report<'a> {
     checks: &'a [SubjectChecks],
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     excluded: &'a [Exclusion],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    not_applied: &'a [NotApplied],
 }
 
 fn checks_text(checks: &[SubjectChecks]) -> String {

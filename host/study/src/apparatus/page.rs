@@ -7,7 +7,7 @@ use crate::analysis::{
     Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, effect_text,
     p_text, published,
 };
-use crate::exclusion::{Exclusion, ExclusionRules};
+use crate::exclusion::{Applied, Exclusion, ExclusionRules};
 use crate::log::Begin;
 use crate::protocol::{Protocol, Stimulus};
 use flotor_statistics::anova::Effect;
@@ -16,14 +16,10 @@ use std::fmt::Write;
 
 /// The page.
 ///
-/// `begin` is the first line of any log of the study; `subjects` are the sittings that were analysed.
+/// `begin` is the first line of any log of the study; `subjects` are the sittings that were analysed, `applied` what the
+/// rules of the study file left and took.
 #[must_use]
-pub fn html(
-    begin: &Begin,
-    subjects: &[SubjectRecord],
-    analysis: &Analysis,
-    excluded: &[Exclusion],
-) -> String {
+pub fn html(begin: &Begin, subjects: &[SubjectRecord], analysis: &Analysis, applied: &Applied) -> String {
     let stimulus = begin.protocol.stimulus();
     let levels = begin.protocol.levels();
     let mut page = Page::default();
@@ -37,7 +33,7 @@ pub fn html(
             format!("Perceived magnitude of {stimulus}")
         }
     };
-    exclusions(&mut page, &begin.exclusion(), excluded);
+    exclusions(&mut page, &begin.exclusion(), applied);
     provenance(&mut page, begin);
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
@@ -48,8 +44,8 @@ pub fn html(
     )
 }
 
-/// What the rules of the study file took; nothing where there are no rules.
-fn exclusions(page: &mut Page, rules: &ExclusionRules, excluded: &[Exclusion]) {
+/// What the rules of the study file took, and those that could not be applied; nothing where there are no rules.
+fn exclusions(page: &mut Page, rules: &ExclusionRules, applied: &Applied) {
     if rules.are_none() {
         return;
     }
@@ -57,13 +53,16 @@ fn exclusions(page: &mut Page, rules: &ExclusionRules, excluded: &[Exclusion]) {
     let names: Vec<String> = rules.names().iter().map(|rule| rules.text_of(rule)).collect();
     page.paragraph(&format!("Rules of the study file: {}. They took:", names.join("; ")));
     page.table(&["Subject", "What", "Rule", "Found"], |rows| {
-        if excluded.is_empty() {
+        if applied.excluded.is_empty() {
             rows.row(&["nothing".to_owned(), String::new(), String::new(), String::new()]);
         }
-        for Exclusion { subject, scope, rule, found } in excluded {
+        for Exclusion { subject, scope, rule, found } in &applied.excluded {
             rows.row(&[subject.to_string(), scope.to_string(), rules.text_of(rule), found.clone()]);
         }
     });
+    for rule in &applied.not_applied {
+        page.paragraph(&format!("Not applied: {rule}."));
+    }
 }
 
 fn jnd_page(

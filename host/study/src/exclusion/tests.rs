@@ -125,6 +125,21 @@ fn each_rule_excludes_what_it_names_and_nothing_else() {
     assert!(applied.excluded.iter().any(|exclusion| exclusion.rule == EMPTY_CONDITION));
 }
 
+/// A rule that could not be applied names those of whom something is not known, also where it took others.
+#[test]
+fn a_rule_that_is_not_applied_names_the_subjects() {
+    let protocol = jnd();
+    let mut records = all(&protocol);
+    for record in &mut records[..2] {
+        record.trials.iter_mut().for_each(|event| event.exploration.response_time_s = None);
+    }
+    let rules = ExclusionRules { response_time_s: Some([0.2, 20.0]), ..ExclusionRules::default() };
+    let applied = rules.apply(&protocol, records, Estimator::Procedure, None);
+    let [one] = applied.not_applied.as_slice() else { panic!("{:?}", applied.not_applied) };
+    assert_eq!(one.to_string(), "response_time_s: not known of simulated observers (sub-01, sub-02)");
+    assert!(applied.to_text(&rules).contains(&one.to_string()) && applied.excluded.len() == 1);
+}
+
 /// Who feels a pair again, and then for a short time only, has moved as far with each as both times together.
 #[test]
 fn feeling_again_adds_to_the_way() {
