@@ -23,6 +23,11 @@ const STUDIES: [&[&str]; 6] = [
     &["magnitude", "--stimuli", "5", "--replications", "2", "--subjects", "5", "--repeat-checks", "1"],
 ];
 
+/// Rules that take whole sittings and single tracks.
+const WITH_RULES: &str = "task = \"jnd\"\n[options]\nout = \"ruled\"\nsubjects = 5\nbases = [26.5]\nreplications = 4\n\
+                          feel = \"20ms\"\nno_demo = true\ncatch_trials = 1\n[exclusion]\nmost_false_alarms = 0.3\n\
+                          least_movement_mm = 0.03\n";
+
 /// The lines of a text that have a number, with single spaces.
 fn numbers(text: &str) -> Vec<String> {
     let plain = text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "));
@@ -44,12 +49,54 @@ fn studies(folder: &Path) -> Vec<Vec<String>> {
         words.extend(["--out", &out]);
         let ran = Flotor::with(words).inside(folder).run();
         assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-        let ran = Flotor::with(["analyse", &out, "--trials", &table]).inside(folder).run();
-        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-        // The checks stand after the tables.
-        numbers(ran.stdout.split("\n  Checks").next().unwrap())
+        numbers_of(folder, &out, &table)
     };
-    STUDIES.iter().enumerate().map(analyse).collect()
+    let all = STUDIES.iter().enumerate().map(analyse);
+    all.chain([study_with_rules(folder, &format!("trials{}.csv", STUDIES.len()))]).collect()
+}
+
+/// The numbers that `analyse` prints, with a table of the trials.
+fn numbers_of(folder: &Path, data: &str, table: &str) -> Vec<String> {
+    let ran = Flotor::with(["analyse", data, "--trials", table]).inside(folder).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(!ran.stderr.contains("the scripts beside"), "{ran:?}");
+    // The checks stand after the tables.
+    numbers(ran.stdout.split("\n  Checks").next().unwrap())
+}
+
+/// A study whose rules took sittings and tracks, which the table marks.
+fn study_with_rules(folder: &Path, table: &str) -> Vec<String> {
+    std::fs::write(folder.join("ruled.study.toml"), WITH_RULES).unwrap();
+    let ran = Flotor::with(["study", "run", "ruled.study.toml"]).inside(folder).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let numbers = numbers_of(folder, "ruled", table);
+    let trials = std::fs::read_to_string(folder.join(table)).unwrap();
+    let marked = |rule: &str| trials.lines().filter(|line| line.ends_with(rule)).count();
+    assert!(marked(",most_false_alarms") > 0 && marked(",least_movement_mm") > 0, "{trials}");
+    numbers
+}
+
+/// The scripts know the defaults alone: with anything else, `analyse` says that their tables differ.
+#[test]
+fn other_options_are_said_not_to_be_those_of_the_scripts() {
+    let scratch = Scratch::default();
+    for (study, options) in [
+        (
+            &["jnd", "--bases", "26", "--replications", "2"][..],
+            &[("--type", "II"), ("--estimator", "map")][..],
+        ),
+        (&["magnitude", "--stimuli", "3", "--replications", "1"], &[("--ratings", "raw"), ("--type", "II")]),
+    ] {
+        let words = study.iter().chain(&["--subjects", "3", "--apparatus", "none", "--out", study[0]]);
+        let ran = Flotor::with(["study"].iter().chain(words)).inside(scratch.path()).run();
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        for (option, value) in options {
+            let words = ["analyse", study[0], "--trials", "t.csv", option, value];
+            let ran = Flotor::with(words).inside(scratch.path()).run();
+            assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+            assert!(ran.stderr.contains("note: the scripts beside t.csv know the defaults of "), "{ran:?}");
+        }
+    }
 }
 
 fn repeats_every_line(program: &str, extension: &str) {

@@ -14,7 +14,7 @@ use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, trials_csv};
 use flotor_study::exclusion::{Applied, Exclusion, NotApplied};
 use flotor_study::log::{Incident, SittingLog};
-use flotor_study::protocol::RatingScale;
+use flotor_study::protocol::{Protocol, RatingScale};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -40,7 +40,7 @@ pub(crate) struct AnalyseArguments {
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
     /// Write one row for each trial of the complete sittings, and beside it a script in R and one in Python that repeat
-    /// the tables
+    /// the tables, as they are with the defaults of --estimator, --type and --ratings
     #[arg(long, value_name = "FILE.csv", conflicts_with = "blind")]
     trials: Option<PathBuf>,
     /// Every subject by themselves, also those who have not finished: tracks, psychometric functions, what is suspicious
@@ -148,6 +148,17 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     if path.extension().is_none_or(|extension| extension != "csv") {
         let path = path.display();
         return Err(CommandError::Usage(format!("--trials {path}: name a file that ends in .csv")));
+    }
+    let usual = AnalysisOptions::default();
+    let of_this_task = match protocol {
+        Protocol::Jnd(_) => AnalysisOptions { rating_scale: usual.rating_scale, ..options },
+        Protocol::Magnitude(_) => AnalysisOptions { estimator: usual.estimator, ..options },
+    };
+    if of_this_task != usual {
+        note(format_args!(
+            "the scripts beside {} know the defaults of --estimator, --type and --ratings: their tables differ from these",
+            path.display()
+        ));
     }
     let complete: Vec<SittingLog> = logs.into_iter().filter(|log| log.complete).collect();
     write_text(Some(path), || trials_csv(&complete, &applied.excluded))?;
