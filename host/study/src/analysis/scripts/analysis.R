@@ -103,12 +103,20 @@ effect_text <- function(effect) {
   if (effect$df > 1) sprintf("%s (HF %s)", text, p_text(upper(epsilon))) else text
 }
 
-solve_for <- function(of, low, high) uniroot(of, c(low, high), tol = 1e-12)$root
+# Where a falling function is 0; an end, where it is there not yet or no more.
+solve_for <- function(of, low, high) {
+  if (of(low) <= 0) return(low)
+  if (of(high) >= 0) return(high)
+  uniroot(of, c(low, high), tol = 1e-12)$root
+}
 
 partial_eta_squared <- function(effect) {
   end <- function(below) {
-    at <- function(shift) pf(effect$f, effect$df, effect$error_df, ncp = shift) - below
-    if (pf(effect$f, effect$df, effect$error_df) <= below) 0 else solve_for(at, 0, 10 + 4 * effect$f * effect$df)
+    at <- function(shift) suppressWarnings(pf(effect$f, effect$df, effect$error_df, ncp = shift)) - below
+    if (pf(effect$f, effect$df, effect$error_df) <= below) return(0)
+    # 1400 is as far as `flotor analyse` looks; mostly the end is much nearer.
+    near <- min(10 + 4 * effect$f * effect$df, 1400)
+    solve_for(at, 0, if (at(near) < 0) near else 1400)
   }
   share <- function(shift) shift / (shift + effect$df + effect$error_df + 1)
   explained <- effect$f * effect$df

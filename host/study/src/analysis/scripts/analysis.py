@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy import optimize, stats
+from scipy import integrate, optimize, stats
 
 path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".csv")
 trials = pd.read_csv(path, na_values="n/a")
@@ -124,12 +124,24 @@ def effect_text(effect):
     return text
 
 
+def solve(of, low, high):
+    """Where a falling function is 0; an end, where it is there not yet or no more."""
+    if of(low) <= 0.0:
+        return low
+    return high if of(high) >= 0.0 else optimize.brentq(of, low, high, xtol=1e-12)
+
+
 def noncentral_f(f, df, error_df, below):
     """The noncentrality at which an F is as small as this with a probability."""
     if stats.f.cdf(f, df, error_df) <= below:
         return 0.0
-    most = 10.0 + 4.0 * f * df
-    return optimize.brentq(lambda shift: stats.ncf.cdf(f, df, error_df, shift) - below, 1e-12, most, xtol=1e-12)
+
+    def at(shift):
+        return stats.ncf.cdf(f, df, error_df, shift) - below
+
+    # 1400 is as far as `flotor analyse` looks; mostly the end is much nearer.
+    near = min(10.0 + 4.0 * f * df, 1400.0)
+    return solve(at, 1e-12, near if at(near) < 0.0 else 1400.0)
 
 
 def partial_eta_squared(effect):
@@ -138,9 +150,19 @@ def partial_eta_squared(effect):
     return (f * df / (f * df + error_df), *(end / (end + df + error_df + 1.0) for end in ends))
 
 
+def noncentral_t_below(t, df, shift):
+    below = stats.nct.cdf(t, df, shift)
+    if np.isfinite(below):
+        return below
+    # scipy has no value far from the middle: a normal number over the deviation of others, integrated over that deviation.
+    most = np.sqrt(df) + 12.0
+    spread = np.linspace(0.0, most, 20001)
+    return integrate.trapezoid(stats.norm.cdf(t * spread / np.sqrt(df) - shift) * stats.chi.pdf(spread, df), spread)
+
+
 def cohen_d(t, df):
     root = np.sqrt(df + 1.0)
-    ends = [optimize.brentq(lambda d: stats.nct.cdf(t, df, d) - below, -37.0, 37.0, xtol=1e-12) for below in (0.975, 0.025)]
+    ends = [solve(lambda d: noncentral_t_below(t, df, d) - below, -37.0, 37.0) for below in (0.975, 0.025)]
     return t / root, ends[0] / root, ends[1] / root
 
 
