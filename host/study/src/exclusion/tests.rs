@@ -154,7 +154,7 @@ fn feeling_again_adds_to_the_way() {
         let mut record = all(&protocol).remove(0);
         for event in &mut record.trials {
             let one = event.exploration.kinematics.remove(0);
-            let at = |speed: &f64| StimulusKinematics { mean_speed_m_per_s: *speed, ..one.clone() };
+            let at = |speed: &f64| StimulusKinematics { mean_speed_m_per_s: *speed, ..one };
             event.exploration.kinematics = speeds.iter().map(at).collect();
         }
         let applied = rules.apply(&protocol, vec![record], Estimator::Procedure, None);
