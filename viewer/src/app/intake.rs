@@ -83,16 +83,10 @@ impl Viewer {
                 self.bell.ring();
             }
         }
-        let mut drawn: Vec<&ChangeMessage> = Vec::new();
         for change in &arrivals.changes {
             self.panels.iter_mut().for_each(|panel| panel.take_in(change));
-            // A number on its way changes with every tick; the last one is what is drawn.
-            drawn.retain(|earlier| {
-                (&earlier.plugin, &earlier.parameter) != (&change.plugin, &change.parameter)
-            });
-            drawn.push(change);
         }
-        drawn.into_iter().for_each(|change| self.follow(change));
+        to_draw(&arrivals.changes).into_iter().for_each(|change| self.follow(change));
         for answer in arrivals.answers {
             if let Some(reason) = answer.refused {
                 self.panels.iter_mut().for_each(Panel::take_back);
@@ -101,11 +95,8 @@ impl Viewer {
         }
     }
 
-    /// A parameter changed in the loop: the drawn instance follows, and what depends on it.
+    /// A parameter has a new value in the loop: the drawn instance follows, and what depends on it.
     fn follow(&mut self, change: &ChangeMessage) {
-        if change.outcome != Outcome::Applied || change.subject != Subject::Parameter {
-            return;
-        }
         if self.audience == Audience::Subject {
             return; // what a subject sees does not change with what is felt
         }
@@ -116,5 +107,52 @@ impl Viewer {
                 panel.follow(shape);
             }
         }
+    }
+}
+
+/// The changes that the drawn instances follow. A number on its way changes with every tick; the last one in force is what is drawn.
+fn to_draw(changes: &[ChangeMessage]) -> Vec<&ChangeMessage> {
+    let is_in_force =
+        |change: &&ChangeMessage| change.outcome == Outcome::Applied && change.subject == Subject::Parameter;
+    let mut drawn: Vec<&ChangeMessage> = Vec::new();
+    for change in changes.iter().filter(is_in_force) {
+        drawn.retain(|earlier| (&earlier.plugin, &earlier.parameter) != (&change.plugin, &change.parameter));
+        drawn.push(change);
+    }
+    drawn
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn change(subject: Subject, parameter: &str, number: f64, outcome: Outcome) -> ChangeMessage {
+        ChangeMessage {
+            tick: 0,
+            time_ns: 0,
+            plugin: "spring".to_owned(),
+            subject,
+            parameter: parameter.to_owned(),
+            value: number.to_string(),
+            number,
+            outcome,
+            settings: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_last_value_in_force_is_drawn_whatever_was_refused_after_it() {
+        let applied = |parameter, number| change(Subject::Parameter, parameter, number, Outcome::Applied);
+        let changes = [
+            applied("gamma_n", 3.0),
+            applied("turns", 7.0),
+            applied("gamma_n", 5.0),
+            change(Subject::Weight, "gamma_n", 0.5, Outcome::Applied),
+            change(Subject::Parameter, "gamma_n", 9.0, Outcome::Refused),
+            change(Subject::Parameter, "gamma_n", 11.0, Outcome::Broke),
+        ];
+        let drawn: Vec<_> =
+            to_draw(&changes).into_iter().map(|change| (change.parameter.as_str(), change.number)).collect();
+        assert_eq!(drawn, [("turns", 7.0), ("gamma_n", 5.0)]);
     }
 }
