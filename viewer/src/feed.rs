@@ -161,14 +161,8 @@ impl Waiting {
             }
             Ok(Some(Event::Change(change))) => {
                 // The newest of a parameter says what is in force: one of each is kept, however many there are.
-                let is_same = |earlier: &ChangeMessage| {
-                    earlier.plugin == change.plugin
-                        && earlier.subject == change.subject
-                        && earlier.parameter == change.parameter
-                        && earlier.outcome == change.outcome
-                };
                 if changes.len() >= MOST_ARRIVALS
-                    && let Some(earliest) = changes.iter().position(is_same)
+                    && let Some(earliest) = changes.iter().position(|earlier| earlier.is_of_the_same(&change))
                 {
                     changes.remove(earliest);
                 }

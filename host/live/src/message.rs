@@ -351,6 +351,16 @@ pub struct ChangeMessage {
     pub settings: Vec<(String, String)>,
 }
 
+impl ChangeMessage {
+    /// True if both are of the same parameter and had the same outcome, whatever the values: of two such messages the later one
+    /// says what is in force. A value that was refused says nothing of the one in force.
+    #[must_use]
+    pub fn is_of_the_same(&self, other: &Self) -> bool {
+        let of = |message: &Self| (message.subject, message.outcome);
+        of(self) == of(other) && self.parameter == other.parameter && self.plugin == other.plugin
+    }
+}
+
 /// What of a plugin changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -455,5 +465,36 @@ mod tests {
         assert!(known.is_ok(), "{known:?}");
         let stop = read(r#"{"number":1,"ask":"emergency-stop","why":"later"}"#).unwrap();
         assert_eq!(stop.ask, Ask::EmergencyStop, "a stop too many is safe");
+    }
+
+    #[test]
+    fn two_changes_are_of_the_same_whatever_their_values() {
+        let change = ChangeMessage {
+            tick: 1,
+            time_ns: 1_000_000,
+            plugin: "spring".to_owned(),
+            subject: Subject::Parameter,
+            parameter: "gamma_n".to_owned(),
+            value: "9".to_owned(),
+            number: 9.0,
+            outcome: Outcome::Applied,
+            settings: Vec::new(),
+        };
+        let later = ChangeMessage {
+            tick: 2,
+            time_ns: 2_000_000,
+            value: "5".to_owned(),
+            number: 5.0,
+            ..change.clone()
+        };
+        assert!(change.is_of_the_same(&later) && later.is_of_the_same(&change));
+        for other in [
+            ChangeMessage { plugin: "load".to_owned(), ..change.clone() },
+            ChangeMessage { subject: Subject::Weight, ..change.clone() },
+            ChangeMessage { parameter: "turns".to_owned(), ..change.clone() },
+            ChangeMessage { outcome: Outcome::Refused, ..change.clone() },
+        ] {
+            assert!(!change.is_of_the_same(&other), "{other:?}");
+        }
     }
 }

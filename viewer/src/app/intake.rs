@@ -116,7 +116,7 @@ fn to_draw(changes: &[ChangeMessage]) -> Vec<&ChangeMessage> {
         |change: &&ChangeMessage| change.outcome == Outcome::Applied && change.subject == Subject::Parameter;
     let mut drawn: Vec<&ChangeMessage> = Vec::new();
     for change in changes.iter().filter(is_in_force) {
-        drawn.retain(|earlier| (&earlier.plugin, &earlier.parameter) != (&change.plugin, &change.parameter));
+        drawn.retain(|earlier| !earlier.is_of_the_same(change));
         drawn.push(change);
     }
     drawn

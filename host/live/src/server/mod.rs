@@ -18,7 +18,7 @@ use crate::{
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_record::RunDescription;
-use outbox::{Changed, Outbox};
+use outbox::Outbox;
 use std::io::{self, ErrorKind};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
@@ -126,9 +126,9 @@ impl Publication {
         let message = ChangeMessage::from(change);
         self.shared.greeting().keep(&message);
         let Ok(payload) = serde_json::to_vec(&message) else { return };
-        let bytes = frame(Kind::Change, &payload);
+        let (message, bytes) = (Arc::new(message), frame(Kind::Change, &payload));
         for watcher in self.shared.watchers().iter() {
-            watcher.outbox.change(Changed::from(&message), bytes.clone());
+            watcher.outbox.change(Arc::clone(&message), bytes.clone());
         }
     }
 

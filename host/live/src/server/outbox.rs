@@ -1,9 +1,9 @@
 //! What waits to be sent to one watcher: a queue of fixed length that drops and counts.
 
-use crate::{ChangeMessage, Kind, Outcome, Subject, frame, ticks_to_payload};
+use crate::{ChangeMessage, Kind, frame, ticks_to_payload};
 use flotor_core::trace::{Events, TickRecord};
 use std::collections::VecDeque;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Ticks that wait at most: four seconds at 1 kHz.
 const MOST_TICKS: usize = 4096;
@@ -21,30 +21,9 @@ pub(super) struct Outbox {
 #[allow(clippy::large_enum_variant)] // nearly all are ticks: a box for each would be an allocation a tick
 enum Waiting {
     Tick(TickRecord),
-    Change(Changed, Vec<u8>),
+    Change(Arc<ChangeMessage>, Vec<u8>),
     /// A frame of any other kind.
     Frame(Vec<u8>),
-}
-
-/// What a change is of: where there is no room for two, the later one says what is in force.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Changed {
-    plugin: String,
-    subject: Subject,
-    parameter: String,
-    /// A value that was refused says nothing of the one in force.
-    outcome: Outcome,
-}
-
-impl From<&ChangeMessage> for Changed {
-    fn from(message: &ChangeMessage) -> Self {
-        Self {
-            plugin: message.plugin.clone(),
-            subject: message.subject,
-            parameter: message.parameter.clone(),
-            outcome: message.outcome,
-        }
-    }
 }
 
 #[derive(Default)]
@@ -102,20 +81,19 @@ impl Outbox {
 
     /// A change; without room, in the place of the earliest one of the same that waits. One of each is never dropped, so that a watcher
     /// who reads nothing for a while knows afterwards what is in force.
-    pub(super) fn change(&self, of: Changed, frame: Vec<u8>) {
+    pub(super) fn change(&self, message: Arc<ChangeMessage>, frame: Vec<u8>) {
         let mut state = self.lock();
         if state.is_closed {
             return;
         }
         if state.frames >= MOST_FRAMES {
-            let is_same =
-                |waiting: &Waiting| matches!(waiting, Waiting::Change(earlier, _) if *earlier == of);
+            let is_same = |waiting: &Waiting| matches!(waiting, Waiting::Change(earlier, _) if earlier.is_of_the_same(&message));
             if let Some(earliest) = state.waiting.iter().position(is_same) {
                 state.waiting.remove(earliest);
                 state.frames -= 1;
             }
         }
-        state.waiting.push_back(Waiting::Change(of, frame));
+        state.waiting.push_back(Waiting::Change(message, frame));
         state.frames += 1;
         drop(state);
         self.changed.notify_one();
@@ -221,7 +199,7 @@ impl Batch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Frames, ticks_from_payload};
+    use crate::{Frames, Outcome, Subject, ticks_from_payload};
     use flotor_core::trace::RECORD_WORDS;
     use flotor_sync::Words;
 
@@ -272,13 +250,18 @@ mod tests {
         assert_eq!(seen, [(0, Events::NONE), (10, Events::BOUNDARY)]);
     }
 
-    fn changed(parameter: &str, outcome: Outcome) -> Changed {
-        Changed {
+    fn changed(parameter: &str, outcome: Outcome) -> Arc<ChangeMessage> {
+        Arc::new(ChangeMessage {
+            tick: 0,
+            time_ns: 0,
             plugin: "spring".to_owned(),
             subject: Subject::Parameter,
             parameter: parameter.to_owned(),
+            value: String::new(),
+            number: 0.0,
             outcome,
-        }
+            settings: Vec::new(),
+        })
     }
 
     #[test]
