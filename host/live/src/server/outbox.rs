@@ -17,21 +17,22 @@ pub(super) struct Outbox {
     changed: Condvar,
 }
 
-/// One thing to be sent.
-#[allow(clippy::large_enum_variant)] // nearly all are ticks: a box for each would be an allocation a tick
-enum Waiting {
-    Tick(TickRecord),
-    Change(Arc<ChangeMessage>, Vec<u8>),
-    /// A frame of any other kind.
-    Frame(Vec<u8>),
+/// A frame that waits among the ticks.
+struct WaitingFrame {
+    /// How many of the ticks that wait go out before it.
+    ticks_before: usize,
+    /// What it says, if it is a change.
+    change: Option<Arc<ChangeMessage>>,
+    bytes: Vec<u8>,
 }
 
 #[derive(Default)]
 struct State {
-    /// In the order in which it came: a change goes out before the tick that saw it first, and after the one before.
-    waiting: VecDeque<Waiting>,
-    ticks: usize,
-    frames: usize,
+    /// In order.
+    ticks: Vec<TickRecord>,
+    /// In the order in which they came: a change goes out before the tick that saw it first, and after the one before. Apart from the
+    /// ticks, which are many, so that the earlier change of the same is found without looking through them.
+    frames: VecDeque<WaitingFrame>,
     dropped: u64,
     /// What goes out after everything else.
     last: Option<Vec<u8>>,
@@ -40,6 +41,14 @@ struct State {
     /// What happened in the ticks between.
     passed: Events,
     is_closed: bool,
+}
+
+impl State {
+    /// A frame after all that waits.
+    fn append(&mut self, change: Option<Arc<ChangeMessage>>, bytes: Vec<u8>) {
+        let ticks_before = self.ticks.len();
+        self.frames.push_back(WaitingFrame { ticks_before, change, bytes });
+    }
 }
 
 impl Outbox {
@@ -51,7 +60,7 @@ impl Outbox {
     pub(super) fn want_ticks(&self, every: u32) {
         let mut state = self.lock();
         state.every = every;
-        state.waiting.reserve_exact(if every == 0 { 0 } else { MOST_TICKS });
+        state.ticks.reserve_exact(if every == 0 { 0 } else { MOST_TICKS });
     }
 
     pub(super) fn wants_ticks(&self) -> bool {
@@ -68,13 +77,12 @@ impl Outbox {
         if !record.tick.is_multiple_of(u64::from(state.every)) {
             return;
         }
-        if state.ticks >= MOST_TICKS {
+        if state.ticks.len() >= MOST_TICKS {
             state.dropped += 1;
             return;
         }
         let events = std::mem::take(&mut state.passed);
-        state.waiting.push_back(Waiting::Tick(TickRecord { events, ..*record }));
-        state.ticks += 1;
+        state.ticks.push(TickRecord { events, ..*record });
         drop(state);
         self.changed.notify_one();
     }
@@ -86,15 +94,15 @@ impl Outbox {
         if state.is_closed {
             return;
         }
-        if state.frames >= MOST_FRAMES {
-            let is_same = |waiting: &Waiting| matches!(waiting, Waiting::Change(earlier, _) if earlier.is_of_the_same(&message));
-            if let Some(earliest) = state.waiting.iter().position(is_same) {
-                state.waiting.remove(earliest);
-                state.frames -= 1;
+        if state.frames.len() >= MOST_FRAMES {
+            let is_same = |waiting: &WaitingFrame| {
+                waiting.change.as_ref().is_some_and(|earlier| earlier.is_of_the_same(&message))
+            };
+            if let Some(earliest) = state.frames.iter().position(is_same) {
+                state.frames.remove(earliest);
             }
         }
-        state.waiting.push_back(Waiting::Change(message, frame));
-        state.frames += 1;
+        state.append(Some(message), frame);
         drop(state);
         self.changed.notify_one();
     }
@@ -102,9 +110,8 @@ impl Outbox {
     /// A frame that is neither tick nor change, if there is room.
     pub(super) fn push(&self, frame: Vec<u8>) {
         let mut state = self.lock();
-        if state.frames < MOST_FRAMES && !state.is_closed {
-            state.waiting.push_back(Waiting::Frame(frame));
-            state.frames += 1;
+        if state.frames.len() < MOST_FRAMES && !state.is_closed {
+            state.append(None, frame);
         }
         drop(state);
         self.changed.notify_one();
@@ -134,23 +141,26 @@ impl Outbox {
     /// Waits for something to send, and takes all of it; `None` when closed and empty.
     pub(super) fn take(&self) -> Option<Vec<u8>> {
         let mut state = self.lock();
-        while state.waiting.is_empty() {
+        while state.ticks.is_empty() && state.frames.is_empty() {
             if state.is_closed {
                 return state.last.take();
             }
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         let mut batch = Batch::new(state.dropped);
-        let all: Vec<Waiting> = state.waiting.drain(..).collect();
-        (state.ticks, state.frames) = (0, 0);
+        // The room for ticks stays where it is.
+        let ticks: Vec<TickRecord> = state.ticks.drain(..).collect();
+        let frames = std::mem::take(&mut state.frames);
         // Whoever brings the next tick does not wait for this one to be written down.
         drop(state);
-        for waiting in all {
-            match waiting {
-                Waiting::Tick(record) => batch.tick(record),
-                Waiting::Change(_, frame) | Waiting::Frame(frame) => batch.frame(&frame),
-            }
+        let mut ticks = ticks.into_iter();
+        let mut sent = 0;
+        for WaitingFrame { ticks_before, bytes, .. } in frames {
+            ticks.by_ref().take(ticks_before - sent).for_each(|record| batch.tick(record));
+            sent = ticks_before;
+            batch.frame(&bytes);
         }
+        ticks.for_each(|record| batch.tick(record));
         Some(batch.finish())
     }
 }
@@ -202,6 +212,7 @@ mod tests {
     use crate::{Frames, Outcome, Subject, ticks_from_payload};
     use flotor_core::trace::RECORD_WORDS;
     use flotor_sync::Words;
+    use std::time::Instant;
 
     fn record(tick: u64, events: Events) -> TickRecord {
         TickRecord { tick, events, ..TickRecord::from_words(&[0; RECORD_WORDS]) }
@@ -305,5 +316,45 @@ mod tests {
             seen.push((kind, ticks));
         }
         assert_eq!(seen, [(Kind::Ticks, 2), (Kind::Change, 0), (Kind::Ticks, 1)]);
+    }
+
+    #[test]
+    fn the_newest_change_stays_after_the_tick_before_it() {
+        let outbox = Outbox::default();
+        outbox.want_ticks(1);
+        for tick in 0..1000 {
+            outbox.change(changed("gamma_n", Outcome::Applied), frame(Kind::Change, b"{}"));
+            outbox.tick(&record(tick, Events::NONE));
+        }
+        let mut frames = Frames::default();
+        frames.push(&outbox.take().expect("something waits"));
+        let mut seen = Vec::new();
+        while let Some((kind, payload)) = frames.take().expect("frames of our own") {
+            seen.push(if kind == Kind::Ticks { ticks_from_payload(payload).1.len() } else { 0 });
+        }
+        let newest = MOST_FRAMES;
+        assert_eq!(seen.first(), Some(&(1000 - newest)), "ticks of the changes that found no room");
+        assert_eq!(seen[1..], [0, 1].repeat(newest));
+    }
+
+    /// What a full outbox costs is the shortest of a few rounds, beside what it costs without ticks.
+    #[test]
+    fn a_change_without_room_costs_the_same_whatever_ticks_wait() {
+        let shortest = |every: u32| {
+            let rounds = (0..5).map(|_| {
+                let outbox = Outbox::default();
+                outbox.want_ticks(every);
+                (0..MOST_TICKS as u64).for_each(|tick| outbox.tick(&record(tick, Events::NONE)));
+                let message = changed("gamma_n", Outcome::Applied);
+                let since = Instant::now();
+                for _ in 0..1000 {
+                    outbox.change(Arc::clone(&message), Vec::new());
+                }
+                since.elapsed()
+            });
+            rounds.min().expect("there are rounds")
+        };
+        let (with_ticks, without) = (shortest(1), shortest(0));
+        assert!(with_ticks < 10 * without, "{with_ticks:?}, without ticks {without:?}");
     }
 }
