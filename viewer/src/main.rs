@@ -14,7 +14,8 @@ use flotor_viewer::export::{self, ExportError};
 use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{
-    PictureError, PictureOptions, draw_without_window, has_moment, number_of, picture, write_png,
+    PictureError, PictureOptions, draw_without_window, has_moment, least_height_px, number_of, picture,
+    write_png,
 };
 use flotor_viewer::quantity::Quantity;
 use flotor_viewer::shape::shapes_of;
@@ -62,7 +63,7 @@ struct Arguments {
     #[arg(long, value_name = "NAME", requires = "recording")]
     device: Option<String>,
     /// The moment to show, s (default: that of the largest force)
-    #[arg(long, value_name = "SECONDS", requires = "recording")]
+    #[arg(long, value_name = "SECONDS", requires = "recording", conflicts_with = "export")]
     at: Option<f64>,
     /// Write the traces of the recording instead of opening a window: numbers (.csv), lines (.svg) or pixels (.png); --look light
     /// unless another is named
@@ -87,7 +88,7 @@ struct Arguments {
     #[arg(long, value_name = "TEXT", requires = "export")]
     title: Option<String>,
     /// The picture is what a person in a sitting sees on a screen, as `flotor study --screen json` writes it
-    #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view"], value_parser = screen)]
+    #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"], value_parser = screen)]
     screen: Option<Screen>,
     #[command(flatten)]
     request: WindowOptions,
@@ -141,8 +142,6 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let read = |path: &PathBuf| History::read(path).map_err(Failure::usage);
-    let history = arguments.recording.as_ref().map(read).transpose()?;
     if let Some(out) =
         arguments.screenshot.as_ref().filter(|out| out.extension().is_none_or(|is| is != "png"))
     {
@@ -151,6 +150,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
             out.display()
         )));
     }
+    fits_file(arguments).map_err(Failure::usage)?;
+    let read = |path: &PathBuf| History::read(path).map_err(Failure::usage);
+    let history = arguments.recording.as_ref().map(read).transpose()?;
     let chosen = chosen(arguments, history.as_deref().unwrap_or_default()).map_err(Failure::usage)?;
     match (history, &arguments.screenshot) {
         (Some(history), None) if arguments.export.is_some() => traces(arguments, history, &chosen),
@@ -167,6 +169,25 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
             cost.iter().for_each(|cost| println!("{cost}"));
             Ok(())
         }
+    }
+}
+
+/// Whether a file of traces can be written, and has what its options are about.
+fn fits_file(arguments: &Arguments) -> Result<(), String> {
+    let Some(out) = &arguments.export else { return Ok(()) };
+    let of_picture = [
+        (arguments.force_position.is_some(), "--force-position"),
+        (arguments.request.size.is_some(), "--size"),
+        (arguments.request.look.is_some(), "--look"),
+        (arguments.title.is_some(), "--title"),
+    ];
+    let idle = of_picture.into_iter().find_map(|(is_there, name)| is_there.then_some(name));
+    match (ExportFormat::of_file(out)?, idle) {
+        (ExportFormat::Csv, Some(name)) => Err(format!(
+            "`{}` holds numbers, and `{name}` is for a picture of traces: leave it out, or write .svg or .png",
+            out.display()
+        )),
+        _ => Ok(()),
     }
 }
 
@@ -244,7 +265,10 @@ fn screenshot(
     chosen: Chosen,
     out: &Path,
 ) -> Result<(), Failure> {
-    let (look, size_px, scale) = of_picture(arguments.request);
+    let (look, mut size_px, scale) = of_picture(arguments.request);
+    if arguments.request.size.is_none() {
+        size_px[1] = size_px[1].max(least_height_px(&chosen, scale));
+    }
     let (mut shapes, missing) =
         history.first().map(|first| shapes_of(first.run(), &arguments.plugins)).unwrap_or_default();
     for reason in missing {
@@ -253,4 +277,42 @@ fn screenshot(
     let options = PictureOptions { size_px, scale, look, view: arguments.view, chosen, at_s: arguments.at };
     let image = picture(history, &mut shapes, &options).map_err(Failure::usage)?;
     write_png(out, &image).map_err(Failure::file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(options: &[&str]) -> Result<Arguments, clap::Error> {
+        Arguments::try_parse_from(["flotor-viewer", "missing.mcap"].iter().chain(options))
+    }
+
+    /// Nobody is left to believe that an option did something.
+    #[test]
+    fn an_option_that_would_do_nothing_is_refused() {
+        let screen = ["--screenshot", "run.png", "--screen", r#"{"screen":"over"}"#];
+        let traces = ["--export", "run.svg"];
+        for (options, idle) in [
+            (&traces[..], &["--at=1", "--scale=2", "--measure=5", "--arrow-force=20"][..]),
+            (&screen, &["--traces=force", "--force-position=z", "--device=left", "--arrow-force=20"]),
+        ] {
+            assert!(parsed(options).is_ok(), "{options:?}");
+            for idle in idle {
+                let refused = parsed(&[options, &[*idle]].concat()).err().expect(idle);
+                assert_eq!(refused.kind(), clap::error::ErrorKind::ArgumentConflict, "{refused}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_have_nothing_that_a_picture_has() {
+        for idle in ["--force-position=z", "--size=800x600", "--look=dark", "--title=Wall"] {
+            let run = |out| run(&parsed(&["--export", out, idle]).expect("both can be named"));
+            let Err(Failure(text, code)) = run("run.csv") else { panic!("{idle} is ignored") };
+            let (name, _) = idle.split_once('=').expect("with its value");
+            assert!(code == 2 && text.contains(name) && text.contains(".svg"), "{text}");
+            let Err(Failure(text, _)) = run("run.svg") else { panic!("there is no recording") };
+            assert!(text.contains("missing.mcap"), "{text}");
+        }
+    }
 }

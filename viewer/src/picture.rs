@@ -103,6 +103,20 @@ pub fn has_moment(histories: &[History], at_s: f64) -> Result<(), PictureError> 
     if is_inside { Ok(()) } else { Err(PictureError::Moment { at_s, span_s }) }
 }
 
+/// The height with which every trace of a picture can be read, pixels, at a scale.
+#[must_use]
+pub fn least_height_px(chosen: &Chosen, scale: f32) -> usize {
+    let mut plots = PlotStack::new(Window::Whole);
+    plots.choose(chosen);
+    least_height_of_px(&plots, scale)
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
+fn least_height_of_px(plots: &PlotStack, scale: f32) -> usize {
+    let least_pt = (plots.least_height_pt() + BESIDE_PLOTS_PT) / (1.0 - VIEW_PART);
+    (least_pt * scale).ceil() as usize
+}
+
 /// Draws a moment of a run: 3D view, numbers, traces.
 ///
 /// # Errors
@@ -117,11 +131,7 @@ pub fn picture(
     devices.choose(options.chosen.device);
     let mut plots = PlotStack::new(Window::Whole);
     plots.choose(&options.chosen);
-    if options.chosen.traces().is_some() {
-        let least_pt = (plots.least_height_pt() + BESIDE_PLOTS_PT) / (1.0 - VIEW_PART);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
-        plots.has_room(options.size_px[1], (least_pt * options.scale).ceil() as usize)?;
-    }
+    plots.has_room(options.size_px[1], least_height_of_px(&plots, options.scale))?;
     let history = devices.history();
     let sample = match options.at_s {
         Some(at_s) => history.at(at_s),

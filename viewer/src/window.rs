@@ -48,11 +48,11 @@ pub struct WindowOptions {
     #[arg(long, value_parser = size, value_name = "WxH")]
     pub size: Option<[usize; 2]>,
     /// Size of text and lines, 1 to 3 (default: 1; a window: as the last time)
-    #[arg(long, value_parser = scale, value_name = "FACTOR")]
+    #[arg(long, value_parser = scale, value_name = "FACTOR", conflicts_with = "export")]
     pub scale: Option<f32>,
     /// Say what the window costs over so many seconds, 1 to 3600, once it has opened, which may take up to half a minute more, and
     /// close it then
-    #[arg(long, value_parser = seconds, value_name = "SECONDS", conflicts_with_all = ["screenshot", "sitting"])]
+    #[arg(long, value_parser = seconds, value_name = "SECONDS", conflicts_with_all = ["screenshot", "export", "sitting"])]
     pub measure: Option<Duration>,
 }
 

@@ -50,13 +50,13 @@ pub(crate) struct ViewArguments {
     #[arg(long, value_name = "TEXT", requires = "export")]
     title: Option<String>,
     /// With --screenshot: draw a screen of a sitting, as `flotor study --screen json` writes it
-    #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view"])]
+    #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"])]
     screen: Option<String>,
     /// Device of the recording whose numbers and traces are shown, where there are several (default: the first)
     #[arg(long, value_name = "NAME", requires = "file")]
     device: Option<String>,
     /// Moment of the recording to show, s (default: that of the largest force)
-    #[arg(long, value_name = "SECONDS", requires = "file")]
+    #[arg(long, value_name = "SECONDS", requires = "file", conflicts_with = "export")]
     at: Option<String>,
     /// Colours: dark or light
     #[arg(long, value_name = "dark|light")]
@@ -65,7 +65,7 @@ pub(crate) struct ViewArguments {
     #[arg(long, value_name = "WxH")]
     size: Option<String>,
     /// Size of text and lines, 1 to 3 (default: 1)
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", conflicts_with = "export")]
     scale: Option<String>,
     /// With --screenshot: seen from so many degrees to the right, above the horizon, and nearer by ZOOM (default: 31.5,13.8)
     #[arg(
@@ -77,7 +77,7 @@ pub(crate) struct ViewArguments {
     )]
     view: Option<String>,
     /// Measure the processor time of the window for this time, then close it
-    #[arg(long, value_name = "SECONDS", conflicts_with = "screenshot")]
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["screenshot", "export"])]
     measure: Option<String>,
     #[command(flatten)]
     plugin_path: PluginPathOption,

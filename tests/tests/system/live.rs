@@ -497,6 +497,23 @@ fn a_run_elsewhere_is_viewed_through_a_bridge_that_ends_with_the_viewer() {
 }
 
 #[test]
+fn an_option_of_view_that_would_do_nothing_is_refused_before_the_viewer_starts() {
+    let screen = ["--screenshot", "run.png", "--screen", "{}"];
+    let traces = ["--export", "run.svg"];
+    for (options, idle) in [
+        (&traces[..], &["--at=1", "--scale=2", "--measure=5", "--arrow-force=20"][..]),
+        (&screen, &["--traces=force", "--force-position=z", "--device=left", "--arrow-force=20"]),
+    ] {
+        for idle in idle {
+            let words = [&["view", "missing.mcap", *idle], options].concat();
+            let refused = Flotor::with(words).run();
+            assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{idle}: {refused:?}");
+            assert!(refused.stderr.contains("cannot be used with"), "{idle}: {refused:?}");
+        }
+    }
+}
+
+#[test]
 fn files_made_of_a_recording_without_its_end_come_with_a_note() {
     let scratch = Scratch::default();
     let run = Flotor::with(["run", "--clock", "virtual", "--duration", "0.5s", "--record", "whole.mcap"]);

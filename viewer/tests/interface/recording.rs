@@ -7,7 +7,7 @@ use egui_kittest::kittest::Queryable;
 use flotor_viewer::app::Start;
 use flotor_viewer::chosen::Chosen;
 use flotor_viewer::palette::Look;
-use flotor_viewer::picture::{PictureError, PictureOptions, has_moment, picture};
+use flotor_viewer::picture::{PictureError, PictureOptions, has_moment, least_height_px, picture};
 use flotor_viewer::player::Motion;
 use flotor_viewer::quantity::Quantity;
 use flotor_viewer::ui::plot_stack::ExportFormat;
@@ -168,6 +168,10 @@ fn what_a_command_line_chooses_holds_in_a_window_and_in_a_picture() {
     assert_eq!(drawn(explicit, [640, 600]).expect("a picture"), usual);
     let all = Chosen::new(0, Quantity::ALL.to_vec(), None);
     assert!(matches!(drawn(all, [640, 600]), Err(PictureError::TooLow(_))));
+    // Whether the traces were chosen or not.
+    let least_px = least_height_px(&Chosen::default(), 1.0);
+    drawn(Chosen::default(), [640, least_px]).expect("they fit");
+    assert!(matches!(drawn(Chosen::default(), [640, least_px - 1]), Err(PictureError::TooLow(_))));
 }
 
 #[test]
@@ -223,11 +227,11 @@ fn arrows_of_a_chosen_force_are_equally_long_in_every_run() {
     let of_run = |ticks, arrow_force_n| {
         let Start::Recording(histories, ..) = recorded(ticks, None) else { panic!("it is a recording") };
         let chosen = Chosen::default().with_arrow_force(arrow_force_n);
-        let (size_px, scale, look, at_s) = ([320, 400], 1.0, Look::Dark, Some(0.1));
+        let (size_px, scale, look, at_s) = ([320, 540], 1.0, Look::Dark, Some(0.1));
         let image =
             picture(histories, &mut [], &PictureOptions { size_px, scale, look, view: None, chosen, at_s });
         // The 3D view without legend, title and numbers.
-        image.expect("a picture").region_by_pixels([100, 0], [60, 180])
+        image.expect("a picture").region_by_pixels([100, 0], [60, 240])
     };
     assert_ne!(of_run(150, None), of_run(600, None), "both fill theirs");
     assert_eq!(of_run(150, Some(3.0)), of_run(600, Some(3.0)));
