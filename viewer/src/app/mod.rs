@@ -214,11 +214,6 @@ impl Viewer {
         &self.plots
     }
 
-    /// The traces, to choose others.
-    pub fn plots_mut(&mut self) -> &mut PlotStack {
-        &mut self.plots
-    }
-
     /// Shows the screens of a sitting over what it shows, as the person would see them.
     pub fn rehearse(&mut self, prompt: Prompt) {
         (self.sitting, self.audience) = (Some(prompt), Audience::Subject);
