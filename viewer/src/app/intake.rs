@@ -10,7 +10,6 @@ use crate::player::Player;
 use crate::scene::SceneBuilder;
 use egui::Context;
 use flotor_core::trace::Events;
-use flotor_drawing::camera::Camera;
 use flotor_live::{ChangeMessage, Outcome, Subject};
 use std::time::{Duration, Instant};
 
@@ -69,8 +68,7 @@ impl Viewer {
         self.limits = feed.greeting().limits;
         self.player = Player::live();
         self.plots.start_over();
-        self.view.camera =
-            Camera::experimenter(SceneBuilder::framing_mm(&parts.shapes, self.devices.count()));
+        self.view.reset(SceneBuilder::framing_mm(&parts.shapes, self.devices.count()));
         (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);
         self.shape_version += 1;
         self.source = Source::Live { feed: Box::new(feed), wanted: wanted.clone() };

@@ -11,7 +11,6 @@ use crate::ui::top_bar::{PanelSwitch, TopBar, TopBarRequest};
 use crate::ui::view3d::Subject;
 use crate::ui::{legend, parameters, readout, standing, style, warnings};
 use egui::{Button, CursorIcon, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
-use flotor_drawing::camera::Camera;
 use flotor_live::{Ask, SetValue};
 use std::time::Instant;
 
@@ -186,15 +185,13 @@ impl Viewer {
         let (shapes, version, scale) =
             (&mut self.shapes, self.shape_version, self.devices.scale().with_chosen(self.arrow_force_n));
         self.facts = self.view.show(ui, area, self.look, Subject { shapes, version, samples, scale });
-        let height_mm = SceneBuilder::framing_mm(&self.shapes, self.devices.count());
-        let experimenter = Camera::experimenter(height_mm);
         let has_room = area.height() > 200.0 && area.width() > 200.0;
-        if has_room && self.view.camera != experimenter && self.audience == Audience::Experimenter {
+        if has_room && self.view.is_turned() && self.audience == Audience::Experimenter {
             // Above the axes, which it puts back.
             let place = Rect::from_center_size(area.right_bottom() - vec2(53.0, 106.0), vec2(78.0, 22.0));
             let button = Button::new(RichText::new("Reset view").size(SMALL_PT));
             if ui.put(place, button).on_hover_text("The experimenter's view (R)").clicked() {
-                self.view.camera = experimenter;
+                self.view.reset(SceneBuilder::framing_mm(&self.shapes, self.devices.count()));
             }
         }
     }

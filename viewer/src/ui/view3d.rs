@@ -35,6 +35,8 @@ pub struct Subject<'a> {
 pub struct View3d {
     /// From where.
     pub camera: Camera,
+    /// From where without anybody's turning: it stays where it was put when a body grows.
+    first: Camera,
     /// Whether force and torque are drawn.
     pub shows_arrows: bool,
     canvas: Canvas,
@@ -58,13 +60,27 @@ impl View3d {
     /// The experimenter's view of a body so high.
     #[must_use]
     pub fn new(canvas: Canvas, height_mm: f64) -> Self {
+        let first = Camera::experimenter(height_mm);
         Self {
-            camera: Camera::experimenter(height_mm),
+            camera: first,
+            first,
             shows_arrows: true,
             canvas,
             builder: SceneBuilder::default(),
             drawn: None,
         }
+    }
+
+    /// The experimenter's view of a body so high.
+    pub fn reset(&mut self, height_mm: f64) {
+        self.first = Camera::experimenter(height_mm);
+        self.camera = self.first;
+    }
+
+    /// Whether the camera is elsewhere than where it was put last.
+    #[must_use]
+    pub fn is_turned(&self) -> bool {
+        self.camera != self.first
     }
 
     /// Corners of triangles put together so far: none for a picture in which nothing has moved.
@@ -87,7 +103,7 @@ impl View3d {
             self.camera.zoom(ZOOM_PER_POINT.powf(f64::from(scroll)) * f64::from(pinch), height_mm);
         }
         if response.double_clicked() {
-            self.camera = Camera::experimenter(height_mm);
+            self.reset(height_mm);
         }
         let (texture, facts) = self.picture(ui, area.size(), look, subject);
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
@@ -115,7 +131,7 @@ impl View3d {
                 self.camera.zoom(ZOOM_PER_KEY.powf(nearer), height_mm);
             }
             if input.key_pressed(Key::R) {
-                self.camera = Camera::experimenter(height_mm);
+                self.reset(height_mm);
             }
         });
     }

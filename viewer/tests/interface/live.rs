@@ -100,6 +100,29 @@ fn a_slider_reaches_the_host_and_follows_what_the_loop_says() {
     assert_eq!(number_of(&window, "gamma_n"), 30.0);
 }
 
+/// A body that grows is none whose view was turned; the way back to the first view shows all of it.
+#[test]
+fn a_body_that_grows_brings_up_no_reset_of_the_view() {
+    let (mut window, mut host, _folder) = live(&[]);
+    until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
+    let before = window.state().view().camera;
+    let value = |text: &str| flotor_live::SetValue {
+        plugin: "spring".to_owned(),
+        parameter: "free_length_mm".to_owned(),
+        value: text.to_owned(),
+    };
+    host.changed(&value("40"), Outcome::Applied);
+    until(&mut window, |window| number_of(window, "free_length_mm") == 40.0);
+    window.run_steps(2);
+    assert!(window.query_by_label("Reset view").is_none(), "nobody has turned it");
+    window.key_press(Key::D);
+    window.run_steps(2);
+    window.get_by_label("Reset view").click();
+    window.run_steps(2);
+    assert!(window.state().view().camera.distance_mm > 1.2 * before.distance_mm);
+    assert!(window.query_by_label("Reset view").is_none());
+}
+
 /// Typed key by key, `100` was 1, 10 and 100 N at the hand.
 #[test]
 fn a_typed_number_is_sent_when_enter_is_pressed_and_not_before() {
