@@ -87,7 +87,8 @@ fn other_options_are_said_not_to_be_those_of_the_scripts() {
         ),
         (&["magnitude", "--stimuli", "3", "--replications", "1"], &[("--ratings", "raw"), ("--type", "II")]),
     ] {
-        let words = study.iter().chain(&["--subjects", "3", "--apparatus", "none", "--out", study[0]]);
+        let others = ["--subjects", "3", "--apparatus", "none", "--out", study[0]];
+        let words = study.iter().chain(&others);
         let ran = Flotor::with(["study"].iter().chain(words)).inside(scratch.path()).run();
         assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
         for (option, value) in options {
