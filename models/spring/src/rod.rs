@@ -15,6 +15,8 @@
 //! - `curve`: where the sections are, for drawing.
 //! - `matrix`: solves, and counts unstable directions; `predictor`, `equilibrium`: follow the minimum in
 //!   time; `start`: where to begin without a past.
+//! - `descent`: the equilibrium of a pose without a past, fast, from the straight `column`; `search_energy`: the energy
+//!   it asks for.
 //!
 //! Shear, stretch and twist follow in closed form from the directions of the sections, two numbers each. So
 //! ten polynomials leave an error below a micronewton before buckling, twenty-eight leave rounding, and the
@@ -34,12 +36,15 @@ use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
 use crate::validity::Validity;
+use descent::Descent;
 pub use equilibrium::Work;
 use equilibrium::{Effort, Equilibrium, Outcome, Reading};
 use functional::Ratios;
 use plate::Plate;
+use search_energy::{BUBBLES, COEFFICIENTS, STATIONS};
 
 pub(crate) mod basis;
+mod column;
 pub(crate) mod contact;
 mod curve;
 mod descent;
@@ -48,6 +53,7 @@ mod functional;
 pub(crate) mod matrix;
 mod plate;
 mod predictor;
+mod search_energy;
 mod section;
 mod start;
 
@@ -135,6 +141,8 @@ pub struct Rod {
 
 #[derive(Clone, Debug, PartialEq)]
 enum Solver {
+    /// The servo's polynomials, summed at whole fours of stations: four are added at a time, so two more cost less.
+    Blend(Box<Equilibrium<BUBBLES, COEFFICIENTS, STATIONS>>, Box<Descent>),
     Servo(Box<Equilibrium<10, 20, 14>>),
     Tight(Box<Equilibrium<28, 56, 30>>),
 }
@@ -143,6 +151,7 @@ enum Solver {
 macro_rules! either {
     ($solver:expr, $equilibrium:ident => $body:expr) => {
         match $solver {
+            Solver::Blend($equilibrium, _) => $body,
             Solver::Servo($equilibrium) => $body,
             Solver::Tight($equilibrium) => $body,
         }
@@ -177,12 +186,20 @@ impl Rod {
     }
 
     /// The rod at rest with the servo's polynomials and each equilibrium to rounding, so that nothing of the past is left
-    /// in an answer: for laws that do something with its energy, mix it ([`crate::rod_blend`]) or minimise it
-    /// ([`crate::seat`]). Not real-time: allocates.
+    /// in an answer: for laws that minimise its energy ([`crate::seat`]). Not real-time: allocates.
     #[must_use]
     pub fn to_rounding(spring: &Spring, coils: Coils) -> Self {
         let equilibrium = Equilibrium::new(Ratios::new(spring, coils), TO_ROUNDING.with(coils));
         Self::solved_by(Solver::Servo(Box::new(equilibrium)), spring, coils)
+    }
+
+    /// The rod at rest for a law that mixes its energy with another ([`crate::rod_blend`]) and finds it anew at each pose: each
+    /// equilibrium to rounding where it is followed, to 1e-10 of the angles where it is found. Not real-time:
+    /// allocates.
+    #[must_use]
+    pub(crate) fn for_a_blend(spring: &Spring) -> Self {
+        let equilibrium = Equilibrium::new(Ratios::new(spring, Coils::Pass), TO_ROUNDING);
+        Self::solved_by(Solver::Blend(Box::new(equilibrium), Box::new(Descent::new())), spring, Coils::Pass)
     }
 
     fn solved_by(solver: Solver, spring: &Spring, coils: Coils) -> Self {
@@ -271,7 +288,14 @@ impl Rod {
         self.last = Response::none(Validity::NotConverged);
         self.answer(
             pose,
-            |solver, plate| either!(solver, equilibrium => equilibrium.find(spring, pose, plate, demand)),
+            |solver, plate| {
+                if let Solver::Blend(equilibrium, descent) = solver
+                    && let Some(found) = descent.find(equilibrium.ratios(), plate)
+                {
+                    return equilibrium.settle(plate, &found);
+                }
+                either!(solver, equilibrium => equilibrium.find(spring, pose, plate, demand))
+            },
             demand,
         )
     }

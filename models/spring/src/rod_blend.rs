@@ -24,7 +24,7 @@ use crate::held::HeldSpring;
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
-use crate::rod::{Coils, Rod, State};
+use crate::rod::{Rod, State};
 use crate::rod_share::{Share, ShareOfRod};
 use crate::validity::Validity;
 
@@ -56,7 +56,7 @@ impl RodBlend {
     pub fn new(spring: &Spring) -> Self {
         Self {
             energy: EnergyForm::new(spring),
-            rod: Rod::to_rounding(spring, Coils::Pass),
+            rod: Rod::for_a_blend(spring),
             shares: ShareOfRod::new(spring),
             spring: *spring,
             share: 0.0,

@@ -13,7 +13,7 @@ use flotor_hal::glam::{DVec2, DVec3};
 
 use super::contact::Touching;
 use super::curve::Curve;
-use super::descent::{Descent, Found};
+use super::descent::Found;
 use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value, joined};
 use super::matrix::{Factored, added, dot, length, product};
 use super::plate::{Plate, or_zero};
@@ -122,7 +122,6 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     history: History<N>,
     marked: (Plate, Shape<N>),
     matrix: KeptMatrix<N>,
-    descent: Descent<N>,
     damping: f64,
     stride: Stride,
     unstable_directions: usize,
@@ -207,7 +206,6 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             history: History::new(Plate::HOME, [0.0; N]),
             marked: (Plate::HOME, [0.0; N]),
             matrix: KeptMatrix::none(),
-            descent: Descent::new(),
             damping: LEAST_DAMPING,
             stride: Stride::FELT,
             unstable_directions: 0,
@@ -285,17 +283,24 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         outcome
     }
 
+    /// The rod it follows. Real-time: bounded, no allocation.
+    pub(crate) fn ratios(&self) -> &Ratios {
+        &self.functional.ratios
+    }
+
+    /// Goes on from an equilibrium that was found elsewhere. Real-time: bounded, no allocation.
+    pub(crate) fn settle(&mut self, plate: &Plate, found: &Found<N>) -> Outcome {
+        self.work = Work { evaluations: found.energies, ..Work::default() };
+        self.history.restart(plate, &found.shape);
+        self.shape = found.shape;
+        (self.matrix.steps_left, self.damping, self.unstable_directions) = (0, LEAST_DAMPING, 0);
+        Outcome::Settled(found.reading)
+    }
+
     /// The equilibrium at a pose, whatever was before: from the straight column where that has not buckled, else from
     /// the shape of the linear column, in one go. What happens on the way is not felt, so it may go faster. Real-time:
     /// bounded, no allocation.
     pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, plate: &Plate, demand: Demand) -> Outcome {
-        if let Some(Found { shape, reading, energies }) = self.descent.find(&self.functional, plate) {
-            self.work = Work { evaluations: energies, ..Work::default() };
-            self.history.restart(plate, &shape);
-            self.shape = shape;
-            (self.matrix.steps_left, self.damping, self.unstable_directions) = (0, LEAST_DAMPING, 0);
-            return Outcome::Settled(reading);
-        }
         self.reset();
         self.stride = Stride::UNFELT;
         if let Some(start) = start::linear(self.functional.basis(), spring, pose) {

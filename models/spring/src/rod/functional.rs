@@ -159,7 +159,10 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         let [by_lean, by_rate] = slopes;
         let slope =
             joined(&self.projected(&by_lean[0], &by_rate[0]), &self.projected(&by_lean[1], &by_rate[1]));
-        let by_end = [0, 1].map(|c| dot(&self.basis.station, &by_lean[c]) + by_rate[c].iter().sum::<f64>());
+        let mut by_end = [0.0; 2];
+        for (by_end, (by_lean, by_rate)) in by_end.iter_mut().zip(by_lean.iter().zip(&by_rate)) {
+            *by_end = dot(&self.basis.station, by_lean) + by_rate.iter().sum::<f64>();
+        }
         Value {
             energy: integrals.bending + 0.5 * load.torsion * twist_rad + stretching,
             slope,
@@ -301,7 +304,7 @@ pub(super) fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K])
 
 /// Solves a definite 3x3 system by cofactors.
 #[inline(always)]
-fn solve_symmetric(matrix: &DMat3, right: DVec3) -> DVec3 {
+pub(super) fn solve_symmetric(matrix: &DMat3, right: DVec3) -> DVec3 {
     let (a, b, c) = (matrix.x_axis, matrix.y_axis, matrix.z_axis);
     // The rows of the inverse are the cross products of the columns over the determinant.
     let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));

@@ -131,23 +131,6 @@ pub(crate) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     sum
 }
 
-/// The same in four lanes: other bits, and half the time for one product that waits for another.
-#[inline(always)]
-pub(crate) fn dot_in_four<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    let mut lanes = [0.0; 4];
-    let (fours_a, rest_a) = a.as_chunks::<4>();
-    let (fours_b, rest_b) = b.as_chunks::<4>();
-    for (a, b) in fours_a.iter().zip(fours_b) {
-        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
-            *lane += a * b;
-        }
-    }
-    for ((lane, a), b) in lanes.iter_mut().zip(rest_a).zip(rest_b) {
-        *lane += a * b;
-    }
-    (lanes[0] + lanes[2]) + (lanes[1] + lanes[3])
-}
-
 /// Euclidean length.
 #[inline(always)]
 pub(crate) fn length<const N: usize>(vector: &[f64; N]) -> f64 {
