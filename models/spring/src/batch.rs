@@ -13,8 +13,8 @@ use pulp::{Arch, Simd, WithSimd, bytemuck};
 
 use crate::contract;
 use crate::pose::Coordinates;
-use crate::real::{Pair, Real, Vector, Wide};
 use crate::response::{Answer, Demand, Law, Response};
+use flotor_lanes::{Pair, Real, Vector, Wide};
 
 /// Lanes of two of the widest registers, a multiple of those of the others.
 const MOST_LANES: usize = 16;

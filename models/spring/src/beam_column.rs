@@ -11,9 +11,9 @@
 //! `z = (q L)² / 4`, with the thesis's buckling factor `q` (equation 19).
 
 use crate::entire::EntireFunctions;
-use crate::real::Real;
 use crate::rigidity::Rigidities;
 use flotor_hal::math;
+use flotor_lanes::Real;
 
 /// Quotients of entire functions at one argument, with `x = sqrt z`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -18,9 +18,9 @@
 use crate::angle::SquaredAngle;
 use crate::beam_column::StabilityFunctions;
 use crate::quartic::{Quartic, QuarticEnergy};
-use crate::real::Real;
 use crate::rigidity::Spring;
 use crate::saturation::{Saturated, saturate_above};
+use flotor_lanes::Real;
 
 /// Argument `z` from which on it saturates below the pole at 9.87, where the column buckles. Here
 /// `G0 = 0.062` and the bow stiffness is -16 times that of the unloaded rod.

@@ -21,9 +21,9 @@ use crate::arctangent;
 use crate::beam_column::Column;
 use crate::pose::{Coordinates, Pose, Span};
 use crate::precision::{Binary32, Binary64, Precision, Storage};
-use crate::real::{Pair, Real, Vector};
 use crate::response::{Answer, Demand, Law, Response};
 use crate::rigidity::Spring;
+use flotor_lanes::{Pair, Real, Vector};
 
 /// Which closed form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -33,9 +33,9 @@
 use crate::angle::{TRUSTED_VERSINE, measures};
 use crate::bending::{Bending, BendingEnergy};
 use crate::pose::{Coordinates, Pose, Span};
-use crate::real::{Real, Vector};
 use crate::response::{Answer, Demand, Law, Response};
 use crate::rigidity::Spring;
+use flotor_lanes::{Real, Vector};
 
 /// Smallest `1 + k.t`. The twist has no meaning for a plate turned upside down; this is 177.4 degrees.
 const LEAST_OVERTURN: f64 = 1e-3;

@@ -18,7 +18,7 @@
 //!
 //! Evaluation: power series of `G1` and `G2` at `z / 16`, recurrences for the rest, then two angle doublings.
 
-use crate::real::Real;
+use flotor_lanes::Real;
 
 /// Terms of the power series: at `z / 16 = -3.75` the first one left out is below 1e-17 of the sum.
 const TERMS: usize = 12;

@@ -3,7 +3,7 @@
 //! One idea a module, from the wire to the wrench:
 //! - [`rigidity`]: wire and coil become the rigidities of an equivalent rod; [`preset`]: springs with names.
 //! - [`pose`]: where the upper plate is; [`response`], [`validity`]: what a law answers.
-//! - [`real`]: formulas written once, for one pose and for several side by side; [`batch`] runs them over many.
+//! - [`flotor_lanes`]: formulas written once, for one pose and for several side by side; [`batch`] runs them over many.
 //! - [`entire`] and [`beam_column`]: the functions of the compressed rod, without branches or poles of their own.
 //! - [`thesis`]: the thesis's printed code with every branch, window and jump, for comparison.
 //! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`arctangent`] gives
@@ -39,7 +39,6 @@ pub mod precision;
 mod prepared;
 pub mod preset;
 pub mod quartic;
-pub mod real;
 pub mod response;
 pub mod rigidity;
 pub mod rod;

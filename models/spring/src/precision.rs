@@ -4,7 +4,7 @@
 //! expression is evaluated in double and rounded to binary32 where it is *stored*. `Binary32` repeats that, to
 //! measure what it costs; `Binary64` is for everything else.
 
-use crate::real::Real;
+use flotor_lanes::Real;
 
 /// What a scene asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -3,8 +3,8 @@
 use flotor_hal::glam::DVec3;
 
 use crate::pose::{Coordinates, Pose};
-use crate::real::{Real, Vector};
 use crate::validity::Validity;
+use flotor_lanes::{Real, Vector};
 
 /// Outputs the caller needs; each level includes those before it. What is not demanded is not computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

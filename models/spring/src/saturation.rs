@@ -3,7 +3,7 @@
 //! Near buckling, formulas run into poles. A hard limit would put a kink into the energy and a step into the
 //! stiffness; saturation keeps it twice differentiable, so force *and* stiffness stay continuous.
 
-use crate::real::Real;
+use flotor_lanes::Real;
 
 /// A quantity after saturation.
 #[derive(Clone, Copy, Debug, PartialEq)]

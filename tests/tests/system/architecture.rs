@@ -19,6 +19,8 @@ enum Role {
     Plugin,
     /// What several device plugins share.
     OfDevices,
+    /// What formulas of model plugins are written in.
+    OfModels,
     /// The other end of a device's link, without hardware.
     Emulator,
     /// What several emulators share.
@@ -66,8 +68,8 @@ enum Role {
 
 use Role::{
     Calibration, Command, Compat, Contract, Core, Drawing, DropIn, Emulator, Fixture, Guard, Host, Judge,
-    Lab, Live, OfDevices, OfEmulators, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics,
-    Study, StudyProgram, Sync, Tests, Viewer,
+    Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record, SceneTest, Service, Servo, Session,
+    Statistics, Study, StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -75,6 +77,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("hal", Contract, &[]),
     ("devices/force-switch", OfDevices, &[Contract]),
     ("devices/vendor-sdk", OfDevices, &[Contract]),
+    ("models/lanes", OfModels, &[]),
     ("devices/usbip", OfEmulators, &[]),
     ("devices/emulation", OfEmulators, &[]),
     ("host/sync", Sync, &[]),
@@ -155,7 +158,7 @@ impl Role {
     /// The roles a crate of this role may depend on.
     fn may_use(self) -> &'static [Role] {
         match self {
-            Plugin => &[Contract, OfDevices],
+            Plugin => &[Contract, OfDevices, OfModels],
             Fixture => &[Contract],
             Emulator => &[Contract, Plugin, OfEmulators],
             _ => CRATES.iter().find(|(_, role, _)| *role == self).map_or(&[], |(.., used)| used),

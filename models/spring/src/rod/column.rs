@@ -19,7 +19,7 @@ use pulp::Simd;
 use super::functional::Ratios;
 use super::plate::Plate;
 use super::search_energy::{FOURS, Four, Fours, dot, four};
-use crate::real::{Real, Wide};
+use flotor_lanes::{Real, Wide};
 
 /// Least curvature assumed, of that of a rod without load: close to buckling the angles themselves stiffen it.
 const LEAST_CURVATURE: f64 = 0.2;

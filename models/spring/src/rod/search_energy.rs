@@ -13,7 +13,7 @@ use super::equilibrium::Reading;
 use super::functional::{Ratios, Shape, solve_symmetric};
 use super::plate::Plate;
 use super::section::Load;
-use crate::real::{Real, Wide};
+use flotor_lanes::{Real, Wide};
 
 /// Bubbles in each component, coefficients, and stations.
 pub(crate) const BUBBLES: usize = 10;

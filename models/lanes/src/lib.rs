@@ -1,6 +1,6 @@
 //! One formula for one pose and for several side by side.
 //!
-//! The laws of this crate are written once, over any [`Real`]: `f64` for the servo's one pose, [`Wide`] for a batch, several
+//! The laws of a model are written once, over any [`Real`]: `f64` for the servo's one pose, [`Wide`] for a batch, several
 //! poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order written, and no product is
 //! fused with a sum, so a lane of a batch holds *the same bits* as the scalar law, on every machine.
 //!
@@ -372,7 +372,8 @@ impl<R: Real> Real for Pair<R> {
 /// A polynomial, by powers from the constant on, and its derivative: four terms or more, an even number. Even and odd powers
 /// apart: short dependency chains. Real-time: bounded, no allocation, no branch.
 #[inline(always)]
-pub(crate) fn polynomial<R: Real, const TERMS: usize>(x: R, powers: &[f64; TERMS]) -> [R; 2] {
+#[must_use]
+pub fn polynomial<R: Real, const TERMS: usize>(x: R, powers: &[f64; TERMS]) -> [R; 2] {
     // Horner in x² for even and odd powers at once, value and derivative.
     let square = x * x;
     let (mut even_slope, mut odd_slope) = (x.like(powers[TERMS - 2]), x.like(powers[TERMS - 1]));
