@@ -77,7 +77,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("hal", Contract, &[]),
     ("devices/force-switch", OfDevices, &[Contract]),
     ("devices/vendor-sdk", OfDevices, &[Contract]),
-    ("models/lanes", OfModels, &[]),
+    ("models/lanes", OfModels, &[Contract]),
     ("devices/usbip", OfEmulators, &[]),
     ("devices/emulation", OfEmulators, &[]),
     ("host/sync", Sync, &[]),
