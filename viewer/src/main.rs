@@ -81,7 +81,7 @@ struct Arguments {
     /// Force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z", value_parser = axis, conflicts_with = "sitting")]
     force_position: Option<usize>,
-    /// Force that the arrows are scaled for, N, so that pictures can be compared (default: the largest of the run)
+    /// Force that an arrow of full length stands for, N, so that pictures can be compared (default: the largest of the run)
     #[arg(long, value_name = "NEWTONS", value_parser = arrow_force, conflicts_with_all = ["sitting", "export"])]
     arrow_force: Option<f64>,
     /// Title of the file of traces (default: that of the run)

@@ -43,7 +43,7 @@ pub(crate) struct ViewArguments {
     /// Force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z")]
     force_position: Option<String>,
-    /// Force that the arrows are scaled for, N, so that pictures can be compared (default: the largest of the run)
+    /// Force that an arrow of full length stands for, N, so that pictures can be compared (default: the largest of the run)
     #[arg(long, value_name = "NEWTONS", conflicts_with = "export")]
     arrow_force: Option<String>,
     /// With --export: title (default: that of the scene)

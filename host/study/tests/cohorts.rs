@@ -214,7 +214,7 @@ fn a_preference_is_rarely_said_of_those_who_have_none() {
     }
     let (yes, all) = tally.held["a preference"];
     let bound = LEVEL + 3.0 * (LEVEL * (1.0 - LEVEL) / all as f64).sqrt();
-    eprintln!("a preference is said of {yes} of {all} who have none");
+    eprintln!("a preference is reported for {yes} of {all} subjects without one");
     assert!(yes as f64 / all as f64 <= bound, "{yes} of {all}");
 }
 

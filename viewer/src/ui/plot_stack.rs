@@ -32,7 +32,7 @@ const ROOM_FOR_ONE_ROW_PT: f32 = 720.0;
 const ROOM_FOR_TABS_PT: f32 = 230.0;
 /// No trace is lower than this, points: three marks of an axis are still apart. What finds no room is scrolled to.
 const LEAST_TRACE_PT: f32 = 48.0;
-/// The same of a picture, which nobody can scroll: the marks of the axis have their numbers.
+/// No trace of a picture is lower than this, points: nobody can scroll there, and the marks of the axis need their numbers.
 const LEAST_TRACE_OF_PICTURE_PT: f32 = 58.0;
 /// Height of what stands above a trace, and of the times below the last one, points.
 const HEADING_PT: f32 = 29.0;

@@ -41,7 +41,7 @@ pub(super) fn numbers<S: Simd>(four: Wide<S>) -> Four {
     cast(four.lanes())
 }
 
-/// Rows as columns.
+/// Transposes four rows of four numbers.
 #[inline(always)]
 fn turned<S: Simd>(simd: S, rows: [Wide<S>; 4]) -> [Wide<S>; 4] {
     let [a, b, c, d] = [numbers(rows[0]), numbers(rows[1]), numbers(rows[2]), numbers(rows[3])];
@@ -217,7 +217,7 @@ impl SearchEnergy {
         [self.group(simd, &in_memory, plate.lean, 0), self.group(simd, &in_memory, plate.lean, 1)]
     }
 
-    /// The best stretch, shear and twist for them. Real-time: bounded, no allocation.
+    /// Stretch, shear and twist of least energy for these sections. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn shared<S: Simd>(
         &self,
