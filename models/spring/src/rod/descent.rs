@@ -18,8 +18,9 @@ use super::search_energy::{COEFFICIENTS, FOURS, Four, Fours, SearchEnergy, dot, 
 
 /// Energies per search at most. A search that needs more is one for Newton's method.
 const MOST_ENERGIES: usize = 24;
-/// The last step: what it leaves is a twentieth of it, a force to a hundredth of a micronewton in all.
-const LAST_STEP: f64 = 2e-9;
+/// What the last step may leave, a force to a hundredth of a micronewton in all. A step leaves about that part of itself that it is
+/// of the one before.
+const LEFT: f64 = 1.5e-10;
 /// Longest step, as the root mean square slope of `p`.
 const LONGEST_STEP: f64 = 0.8;
 
@@ -93,10 +94,12 @@ impl Descent {
         let mut slope = self.slope(simd, ratios, &shape, plate);
         // A whole step is `-down`.
         let mut down = column.solve(&slope);
-        let mut known = 0;
+        let (mut known, mut square_before) = (0, 0.0);
         for energies in (2..).take(MOST_ENERGIES) {
             let square = dot(&down, &down);
-            if square <= LAST_STEP * LAST_STEP {
+            let is_last = square * square <= LEFT * LEFT * square_before;
+            square_before = square;
+            if is_last {
                 let shape = added(&shape, -1.0, &down);
                 let sections = self.energy.sections(simd, &shape, plate);
                 let shared = self.energy.shared(simd, ratios, &sections, plate);
