@@ -4,6 +4,7 @@ mod bias;
 mod choices;
 mod explore;
 mod front;
+mod noise;
 mod person;
 mod plan;
 mod power;

@@ -11,7 +11,6 @@
 
 pub mod attend;
 mod figures;
-pub mod noise;
 pub mod page;
 pub mod real_time_rig;
 pub mod rig;

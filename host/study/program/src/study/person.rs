@@ -1,13 +1,13 @@
 //! `--observer human`: one person, one sitting, in real time.
 
 use super::front::{JsonLines, ScreenOption, Terminal, Window, lines_of};
+use super::noise::WhiteNoise;
 use super::{Common, NoiseOption};
 use crate::of_dataset;
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note};
 use flotor_study::apparatus::attend::{FrontEnd, Least, attend};
-use flotor_study::apparatus::noise::WhiteNoise;
 use flotor_study::apparatus::real_time_rig::RealTimeRig;
 use flotor_study::apparatus::rig::TrialFiles;
 use flotor_study::apparatus::{Apparatus, Kinematics};

@@ -20,7 +20,7 @@ const PLAYERS: [(&str, &[&str]); 3] = [
 ];
 
 /// Noise, for as long as it lives.
-pub struct WhiteNoise {
+pub(super) struct WhiteNoise {
     player: Child,
     /// Ends when the player does.
     feeder: Option<JoinHandle<()>>,
@@ -30,7 +30,7 @@ pub struct WhiteNoise {
 impl WhiteNoise {
     /// Starts the first player there is; none if this machine has no player or no sound.
     #[must_use]
-    pub fn start() -> Option<Self> {
+    pub(super) fn start() -> Option<Self> {
         PLAYERS.iter().find_map(|(name, arguments)| {
             let mut player = Command::new(name);
             player.args(*arguments).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
@@ -49,7 +49,7 @@ impl WhiteNoise {
 
     /// The player's name.
     #[must_use]
-    pub fn player(&self) -> &'static str {
+    pub(super) fn player(&self) -> &'static str {
         self.name
     }
 
