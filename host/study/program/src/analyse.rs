@@ -1,5 +1,6 @@
 //! `flotor analyse`: thresholds, effects and tests from the data of a study.
 
+use crate::page::html;
 use clap::{Args, ValueEnum};
 use flotor_command::options::JsonOption;
 use flotor_command::tables::to_csv;
@@ -9,7 +10,6 @@ use flotor_study::analysis::{
     Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectChecks, SubjectQuality, SubjectRecord,
 };
 use flotor_study::analysis::{SCRIPT_PYTHON, SCRIPT_R};
-use flotor_study::apparatus::page::html;
 use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, trials_csv};
 use flotor_study::exclusion::{Applied, Exclusion, NotApplied};

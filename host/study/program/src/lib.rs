@@ -1,6 +1,7 @@
 //! The commands of experiments: the program `flotor-study`, which `flotor` starts.
 
 mod analyse;
+mod page;
 mod study;
 
 use clap::{CommandFactory, Parser, Subcommand};

@@ -4,14 +4,10 @@
 //! - [`rig`]: presents to simulated observers in virtual time; [`real_time_rig`]: to people, in real time.
 //! - [`watch`]: the record of a presentation.
 //! - [`attend`]: a person's sitting through a front end.
-//! - [`noise`]: white noise on headphones, where there is a player.
-//! - [`page`]: the page of the results.
 //!
 //! Nothing here is real-time: the loop is the servo's.
 
 pub mod attend;
-mod figures;
-pub mod page;
 pub mod real_time_rig;
 pub mod rig;
 pub mod setup;

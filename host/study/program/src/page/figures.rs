@@ -1,15 +1,15 @@
 //! The figures of a study: 17 and 18 of CMU-RI-TR-07-21 with this study's data, what lies behind them, and how people
 //! moved.
 
-use crate::analysis::{
-    JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, ThresholdCell, published,
-};
-use crate::log::TrialEvent;
-use crate::protocol::Stimulus;
-use crate::sitting::Verdict;
-use crate::trial::{Modality, Presented};
 use flotor_plot::{Axis, Bin, Figure, Panel, Series};
 use flotor_statistics::describe::MeanInterval;
+use flotor_study::analysis::{
+    JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, ThresholdCell, published,
+};
+use flotor_study::log::TrialEvent;
+use flotor_study::protocol::Stimulus;
+use flotor_study::sitting::Verdict;
+use flotor_study::trial::{Modality, Presented};
 
 /// Height of a figure of one panel, px.
 const HEIGHT_PX: f64 = 340.0;

@@ -1,17 +1,18 @@
 //! A study on one page: figures 17 or 18 of CMU-RI-TR-07-21 with this study's data, and every number next to the
 //! thesis's. One HTML file that needs no other.
 
-use super::figures;
-use crate::analysis::published::Beside;
-use crate::analysis::{
+mod figures;
+
+use flotor_statistics::anova::Effect;
+use flotor_statistics::describe::MeanInterval;
+use flotor_study::analysis::published::Beside;
+use flotor_study::analysis::{
     Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, effect_text,
     p_text, published,
 };
-use crate::exclusion::{Applied, Exclusion, ExclusionRules};
-use crate::log::Begin;
-use crate::protocol::{Protocol, Stimulus};
-use flotor_statistics::anova::Effect;
-use flotor_statistics::describe::MeanInterval;
+use flotor_study::exclusion::{Applied, Exclusion, ExclusionRules};
+use flotor_study::log::Begin;
+use flotor_study::protocol::{Protocol, Stimulus};
 use std::fmt::Write;
 
 /// The page.
@@ -19,7 +20,12 @@ use std::fmt::Write;
 /// `begin` is the first line of any log of the study; `subjects` are the sittings that were analysed, `applied` what the
 /// rules of the study file left and took.
 #[must_use]
-pub fn html(begin: &Begin, subjects: &[SubjectRecord], analysis: &Analysis, applied: &Applied) -> String {
+pub(crate) fn html(
+    begin: &Begin,
+    subjects: &[SubjectRecord],
+    analysis: &Analysis,
+    applied: &Applied,
+) -> String {
     let stimulus = begin.protocol.stimulus();
     let levels = begin.protocol.levels();
     let mut page = Page::default();
