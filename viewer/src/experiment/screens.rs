@@ -4,7 +4,7 @@ use super::{Prompt, StudyKey};
 use crate::palette::Palette;
 use egui::{Align, Color32, Key, Layout, Rect, RichText, Ui, UiBuilder};
 use flotor_study::protocol::Quality;
-use flotor_study::screen::{Pause, Question, Screen, TrialView};
+use flotor_study::screen::{May, Pause, Question, Screen, TrialView};
 use flotor_study::trial::{Phase, Position};
 
 /// Sizes of text, points: read from an arm's length and more.
@@ -17,7 +17,7 @@ const TYPED_PT: f32 = 54.0;
 struct Words {
     headline: &'static str,
     text: String,
-    keys: &'static str,
+    keys: String,
 }
 
 /// Shows the screen of a moment over an area; the scene, if it may be seen, lies beneath.
@@ -43,7 +43,7 @@ pub fn show(ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
             if prompt.typed().is_empty() { ("–", palette.faint) } else { (prompt.typed(), palette.text) };
         inner.label(RichText::new(typed).size(TYPED_PT).monospace().color(color));
     }
-    below(ui, area, prompt, keys, palette);
+    below(ui, area, prompt, &keys, palette);
 }
 
 /// A text of the experimenter, from the top; a long one is scrolled by the wheel.
@@ -100,11 +100,11 @@ fn words(screen: &Screen) -> Words {
         Screen::Feel { trial, position } => feel(trial, *position),
         Screen::Ask { trial, question } => ask(trial, *question),
         // Shown by itself.
-        Screen::Read { .. } => Words { headline: "", text: String::new(), keys: "" },
+        Screen::Read { .. } => Words { headline: "", text: String::new(), keys: String::new() },
         Screen::Over => Words {
             headline: "Thank you",
             text: "That was all. Please let go of the handle.".to_owned(),
-            keys: "Enter closes the window",
+            keys: "Enter closes the window".to_owned(),
         },
     }
 }
@@ -135,7 +135,23 @@ fn pause(reason: Pause, next: &TrialView) -> Words {
             "Enter to go on",
         ),
     };
-    Words { headline, text, keys }
+    Words { headline, text, keys: keys.to_owned() + &others(next) }
+}
+
+/// The keys for what a person may do but need not.
+fn others(trial: &TrialView) -> String {
+    let key = |may: &May| match (may, trial.stimuli) {
+        (May::Again { left }, stimuli) => {
+            let what = if stimuli == 1 { "it" } else { "them" };
+            let most = match left {
+                None => String::new(),
+                Some(1) => ", once more at most".to_owned(),
+                Some(left) => format!(", {left} times more at most"),
+            };
+            format!("          A  feel {what} again{most}")
+        }
+    };
+    trial.may.iter().map(key).collect()
 }
 
 fn task(trial: &TrialView) -> &'static str {
@@ -176,7 +192,7 @@ fn feel(trial: &TrialView, position: Option<Position>) -> Words {
     };
     let practice = if trial.phase == Phase::Practice { "To get used to it. " } else { "" };
     let text = format!("{practice}Press the handle down and let it come up.");
-    Words { headline, text, keys: "Enter when you have felt it" }
+    Words { headline, text, keys: "Enter when you have felt it".to_owned() + &others(trial) }
 }
 
 fn ask(trial: &TrialView, question: Question) -> Words {
@@ -185,7 +201,7 @@ fn ask(trial: &TrialView, question: Question) -> Words {
         (Question::WhichIsMore, quality) => (
             if quality == Quality::Stiffness { "Which one was stiffer?" } else { "Which one was stronger?" },
             if is_practice { "To practise: this answer does not count" } else { "" },
-            "1  the first          2  the second          0  I don't know          A  feel them again",
+            "1  the first          2  the second          0  I don't know",
         ),
         (Question::HowMuch, quality) => (
             if quality == Quality::Stiffness { "How stiff was it?" } else { "How strong was it?" },
@@ -194,10 +210,10 @@ fn ask(trial: &TrialView, question: Question) -> Words {
             } else {
                 "Type a number above 0"
             },
-            "Enter when it is right          Backspace corrects          A  feel it again",
+            "Enter when it is right          Backspace corrects",
         ),
     };
-    Words { headline, text: text.to_owned(), keys }
+    Words { headline, text: text.to_owned(), keys: keys.to_owned() + &others(trial) }
 }
 
 /// The keys pressed in this picture that mean something here.

@@ -9,7 +9,9 @@ use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
 use flotor_live::Ask;
 use flotor_study::protocol::{MagnitudeProtocol, Protocol, Quality, SubjectNumber};
-use flotor_study::screen::{Attended, Pause, Question, Said, Screen, Told, TrialView, Warning, WindowState};
+use flotor_study::screen::{
+    Attended, May, Pause, Question, Said, Screen, Told, TrialView, Warning, WindowState,
+};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::{Phase, Position};
 use flotor_viewer::app::{Start, Viewer, Wanted};
@@ -96,7 +98,8 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
 }
 
 fn trial(quality: Quality, stimuli: usize, object_is_shown: bool) -> TrialView {
-    TrialView { number: 3, of_about: 12, phase: Phase::Main, object_is_shown, repeat: 0, stimuli, quality }
+    let (number, of_about, phase, repeat, may) = (3, 12, Phase::Main, 0, Vec::new());
+    TrialView { number, of_about, phase, object_is_shown, repeat, stimuli, quality, may }
 }
 
 /// Every screen there is: its headline and the keys that mean something, in sight, apart from each other, in a small window too.
@@ -105,7 +108,11 @@ fn every_screen_of_a_sitting_says_what_to_do_and_which_keys_do_it() {
     use Quality::{Force, Stiffness};
     let ready = |reason, next| Screen::Ready { reason, next };
     let feel = |position, trial| Screen::Feel { trial, position };
-    let ask = |question, trial| Screen::Ask { trial, question };
+    let ask_with = |left, question, trial| {
+        let may = vec![May::Again { left }];
+        Screen::Ask { trial: TrialView { may, ..trial }, question }
+    };
+    let ask = |question, trial| ask_with(None, question, trial);
     let [one, two] = [1, 2].map(|stimuli| trial(Stiffness, stimuli, false));
     let [strong, stronger] = [1, 2].map(|stimuli| trial(Force, stimuli, false));
     let seen = trial(Stiffness, 1, true);
@@ -130,6 +137,11 @@ fn every_screen_of_a_sitting_says_what_to_do_and_which_keys_do_it() {
         (ask(Question::HowMuch, practice), "How stiff was it?", "A  feel it again"),
         (ask(Question::HowMuch, one), "How stiff was it?", "Backspace corrects"),
         (ask(Question::HowMuch, strong), "How strong was it?", "Enter when it is right"),
+        (
+            ask_with(Some(12), Question::WhichIsMore, two.clone()),
+            "Which one was stiffer?",
+            "A  feel them again, 12 times more",
+        ),
         (ask(Question::WhichIsMore, two), "Which one was stiffer?", "0  I don't know"),
         (ask(Question::WhichIsMore, stronger), "Which one was stronger?", "1  the first"),
         (Screen::Over, "Thank you", "Enter closes the window"),

@@ -158,6 +158,9 @@ struct Common {
     /// Least way of the handle while a stimulus is felt, up and down together, mm (human)
     #[arg(long, default_value_t = 2.0, value_parser = real, allow_hyphen_values = true, value_name = "MM")]
     least_movement_mm: f64,
+    /// How often a person may feel a trial again at most (human; default: no limit)
+    #[arg(long, value_parser = count(0..=1000_u32), value_name = "N")]
+    feel_again: Option<u32>,
     /// White noise on headphones (human)
     #[arg(long, value_enum, default_value_t)]
     noise: NoiseOption,

@@ -1,6 +1,6 @@
 //! The state machine behind the screens: which comes after which, and what an input does to a sitting.
 
-use super::{Input, Pause, Question, Screen, TrialView};
+use super::{Input, May, Pause, Question, Screen, TrialView};
 use crate::kinematics::StimulusKinematics;
 use crate::log::TrialEvent;
 use crate::protocol::{Protocol, Quality};
@@ -71,6 +71,10 @@ pub struct Attended {
     of_about: u64,
     rest_every: u32,
     since_rest: u32,
+    /// How often a trial may be felt again; none: without limit.
+    again_most: Option<u32>,
+    /// How often this one was.
+    again: u32,
 }
 
 impl Attended {
@@ -86,6 +90,8 @@ impl Attended {
             of_about: protocol.presentations_about(),
             rest_every,
             since_rest: 0,
+            again_most: None,
+            again: 0,
         }
     }
 
@@ -93,6 +99,12 @@ impl Attended {
     #[must_use]
     pub fn after_reading(self, texts: impl IntoIterator<Item = String>) -> Self {
         Self { texts: texts.into_iter().collect(), ..self }
+    }
+
+    /// The same, where a trial may be felt again so many times at most.
+    #[must_use]
+    pub fn with_again_at_most(self, times: u32) -> Self {
+        Self { again_most: Some(times), ..self }
     }
 
     /// What is shown now; the same however often it is asked.
@@ -159,7 +171,13 @@ impl Attended {
                 let last = index + 1 >= trial.presented.values().len();
                 self.go_to(if last { Stage::Ask } else { Stage::Feel(index + 1) })
             }
-            (Stage::Ask, Input::Again) => self.go_to(Stage::Feel(0)),
+            (Stage::Ask, Input::Again) if self.again_left() == Some(0) => {
+                Err(InputError::NotNow("it has been felt again as often as it may be; answer"))
+            }
+            (Stage::Ask, Input::Again) => {
+                self.again += 1;
+                self.go_to(Stage::Feel(0))
+            }
             (Stage::Ask, Input::Answer { response: Response::Rating(rating) }) if rating <= 0.0 => {
                 Err(InputError::NotAbove0)
             }
@@ -194,6 +212,7 @@ impl Attended {
         let verdict = self.sitting.answer(response, &self.exploration)?;
         let exploration = std::mem::take(&mut self.exploration);
         self.since_rest += 1;
+        self.again = 0;
         self.stage = self.next_stage(trial, verdict);
         Ok(Step::Answered(Box::new(TrialEvent { trial: *trial, response, verdict, exploration })))
     }
@@ -218,6 +237,18 @@ impl Attended {
         pause.map_or(Stage::Feel(0), Stage::Ready)
     }
 
+    /// How often the trial may still be felt again; none: without limit.
+    fn again_left(&self) -> Option<u32> {
+        self.again_most.map(|most| most.saturating_sub(self.again))
+    }
+
+    fn may(&self) -> Vec<May> {
+        match (self.stage, self.again_left()) {
+            (Stage::Ask, left) if left != Some(0) => vec![May::Again { left }],
+            _ => Vec::new(),
+        }
+    }
+
     fn view(&self, trial: &Trial) -> TrialView {
         TrialView {
             number: trial.number,
@@ -227,6 +258,7 @@ impl Attended {
             repeat: trial.repeat,
             stimuli: trial.presented.values().len(),
             quality: self.quality,
+            may: self.may(),
         }
     }
 }

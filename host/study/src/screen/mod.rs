@@ -98,6 +98,20 @@ pub struct TrialView {
     pub stimuli: usize,
     /// What is judged.
     pub quality: Quality,
+    /// What the person may do now besides going on and answering.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub may: Vec<May>,
+}
+
+/// Something that a person may do, but need not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum May {
+    /// Feel the trial once more: [`Input::Again`].
+    Again {
+        /// So many more times; none: without limit.
+        left: Option<u32>,
+    },
 }
 
 /// What a person does.

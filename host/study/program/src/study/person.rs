@@ -74,6 +74,11 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     log.write(&Event::Note { text }).map_err(failed)?;
 
     let mut attended = Attended::new(sitting, protocol, common.rest_every).after_reading(texts);
+    if let Some(times) = common.feel_again {
+        log.write(&Event::Note { text: format!("felt again {times} times a trial at most") })
+            .map_err(failed)?;
+        attended = attended.with_again_at_most(times);
+    }
     let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), least, &mut |_| ());
     // What is in the log is in the tables, however the sitting ended.
     let tables = dataset.write_tables();

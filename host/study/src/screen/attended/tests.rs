@@ -144,3 +144,36 @@ fn texts_are_read_before_the_first_trial() {
     let mut person = start();
     assert_eq!((person.input(Input::Stop, 0.0), person.presented()), (Ok(Step::Stopped), 0));
 }
+
+/// A limit on feeling again holds for each trial, is known before it is reached, and is not counted over trials.
+#[test]
+fn a_trial_is_felt_again_no_more_often_than_the_study_allows() {
+    let mut jnd = JndProtocol::default();
+    jnd.demo.shown = false;
+    let mut person = attended(&Protocol::Jnd(jnd.clone()), 0).with_again_at_most(2);
+    let feel = |person: &mut Attended| {
+        person.input(Input::Continue, 0.0).unwrap();
+        person.input(Input::Continue, 0.0).unwrap();
+    };
+    let may = |person: &Attended| match person.screen() {
+        Screen::Ask { trial, .. } => trial.may,
+        other => panic!("{other:?}"),
+    };
+    person.input(Input::Continue, 0.0).unwrap();
+    for _ in 0..2 {
+        for left in [2, 1] {
+            feel(&mut person);
+            assert_eq!(may(&person), [May::Again { left: Some(left) }]);
+            person.input(Input::Again, 0.0).unwrap();
+        }
+        feel(&mut person);
+        assert_eq!(may(&person), []);
+        assert!(matches!(person.input(Input::Again, 0.0), Err(InputError::NotNow(_))));
+        let answer = Input::Answer { response: Response::First };
+        assert!(matches!(person.input(answer, 0.0), Ok(Step::Answered(_))));
+    }
+    let mut person = attended(&Protocol::Jnd(jnd), 0);
+    person.input(Input::Continue, 0.0).unwrap();
+    feel(&mut person);
+    assert_eq!(may(&person), [May::Again { left: None }]);
+}

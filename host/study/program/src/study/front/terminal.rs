@@ -6,7 +6,7 @@ use flotor_command::style;
 use flotor_study::apparatus::attend::{FrontEnd, Heard};
 use flotor_study::conduct::OutsideError;
 use flotor_study::protocol::Quality;
-use flotor_study::screen::{Input, Pause, Question, Screen, TrialView};
+use flotor_study::screen::{Input, May, Pause, Question, Screen, TrialView};
 use flotor_study::trial::{Phase, Position, Response};
 use std::io::{BufReader, IsTerminal};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -89,16 +89,22 @@ fn words(screen: &Screen) -> String {
                 Quality::Stiffness => ("stiffer", "stiff"),
                 Quality::Force => ("stronger", "strong"),
             };
-            match question {
+            let question = match question {
                 Question::WhichIsMore => {
-                    format!("  Which was {more}?  1 first, 2 second, 0 I don't know; a repeats them")
+                    format!("  Which was {more}?  1 first, 2 second, 0 I don't know")
                 }
-                Question::HowMuch => {
-                    format!("  How {how}? Any number of your own, larger for {more}; a repeats it")
-                }
-            }
+                Question::HowMuch => format!("  How {how}? Any number of your own, larger for {more}"),
+            };
+            question + &trial.may.iter().map(may).collect::<String>()
         }
         Screen::Over => format!("\n{}\n  Everything is on disk. Thank you.", style::title("Done")),
+    }
+}
+
+fn may(what: &May) -> String {
+    match what {
+        May::Again { left: None } => "; a repeats it".to_owned(),
+        May::Again { left: Some(left) } => format!("; a repeats it, {left} more times at most"),
     }
 }
 
@@ -160,6 +166,7 @@ mod tests {
             repeat: 0,
             stimuli: 2,
             quality: Quality::Stiffness,
+            may: Vec::new(),
         };
         Screen::Ask { trial, question }
     }
