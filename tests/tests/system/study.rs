@@ -453,6 +453,42 @@ fn screens_travel_as_json_lines() {
     assert_eq!(SittingLog::read(&log_of(&out, 1)).unwrap().trials.len(), 1);
 }
 
+/// A mistyped answer is taken back once, before the next pair is felt; log, resume and analysis go on without it.
+#[test]
+fn an_answer_is_taken_back_in_a_sitting() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let go = r#"{"input":"continue"}"#;
+    let back = r#"{"input":"withdraw"}"#;
+    let answer = |word: &str| format!(r#"{{"input":"answer","response":"{word}"}}"#);
+    let [first, second] = ["first", "second"].map(answer);
+    let lines = [go, go, go, &first, back, back, &second, back, r#"{"input":"stop"}"#].join("\n") + "\n";
+    let arguments = ["--no-demo", "--subject", "1"];
+    let ran = person("json", &lines, &arguments, &out);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let screens: Vec<serde_json::Value> =
+        ran.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let names: Vec<&str> = screens.iter().filter_map(|screen| screen["screen"].as_str()).collect();
+    assert_eq!(names, ["ready", "feel", "feel", "ask", "feel", "ask", "feel"]);
+    assert_eq!(
+        screens.iter().filter(|line| line["refused"].is_string()).count(),
+        2,
+        "once, and then no more"
+    );
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    let [trial] = log.trials.as_slice() else { panic!("{:?}", log.trials) };
+    assert_eq!((trial.event.response, log.withdrawn[0].response), (Response::Second, Response::First));
+    let ran = Flotor::with(["analyse", out.to_str().unwrap(), "--each"]).run();
+    assert!(ran.stdout.contains("1 answers taken back and given anew"), "{ran:?}");
+    let again: Vec<&str> = arguments.into_iter().chain(["--resume"]).collect();
+    let ran = person("json", &([go, go, go, &first].join("\n") + "\n"), &again, &out);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert_eq!(SittingLog::read(&log_of(&out, 1)).unwrap().trials.len(), 2);
+}
+
 /// Whoever presses the emergency stop in a sitting: what was felt ends at once, the log says so with the time of day, the exit code
 /// is that of a stopped device, and what was recorded of the trial stays when the sitting goes on.
 #[test]

@@ -9,7 +9,7 @@ pub mod screens;
 pub mod wire;
 
 use egui::Context;
-use flotor_study::screen::{Input, Question, Said, Screen, Told, WindowState};
+use flotor_study::screen::{Input, May, Question, Said, Screen, Told, WindowState};
 use flotor_study::trial::Response;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::sync::{Arc, OnceLock};
@@ -22,6 +22,8 @@ pub enum StudyKey {
     Enter,
     /// Feel it again.
     Again,
+    /// Take the last answer back.
+    Withdraw,
     /// A digit of a rating, or the answer of this number.
     Digit(u8),
     /// The decimal point of a rating.
@@ -205,8 +207,10 @@ impl Prompt {
             Screen::Over => return,
             Screen::Ready { .. } | Screen::Feel { .. } | Screen::Read { .. } => None,
         };
+        let may = |what| screen.trial().is_some_and(|trial| trial.may.contains(&what));
         let input = match (question, key) {
             (None, StudyKey::Enter) => Some(Input::Continue),
+            (None, StudyKey::Withdraw) => may(May::Withdraw).then_some(Input::Withdraw),
             (Some(_), StudyKey::Again) => Some(Input::Again),
             (Some(Question::WhichIsMore), StudyKey::Digit(1)) => answer(Response::First),
             (Some(Question::WhichIsMore), StudyKey::Digit(2)) => answer(Response::Second),

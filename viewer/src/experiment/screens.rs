@@ -76,7 +76,7 @@ fn below(ui: &mut Ui, area: Rect, prompt: &Prompt, keys: &str, palette: &Palette
         RichText::new(if prompt.is_persons_turn() { keys } else { "One moment" }).size(KEYS_PT).color(color),
     );
     inner.add_space(6.0);
-    if let Some(trial) = prompt.screen().and_then(trial) {
+    if let Some(trial) = prompt.screen().and_then(Screen::trial) {
         let text = format!("{} of about {}", trial.number, trial.of_about);
         inner.label(RichText::new(text).small().color(palette.faint));
     }
@@ -84,14 +84,6 @@ fn below(ui: &mut Ui, area: Rect, prompt: &Prompt, keys: &str, palette: &Palette
 
 fn accent(palette: &Palette) -> Color32 {
     palette.components[2]
-}
-
-fn trial(screen: &Screen) -> Option<&TrialView> {
-    match screen {
-        Screen::Ready { next, .. } => Some(next),
-        Screen::Feel { trial, .. } | Screen::Ask { trial, .. } => Some(trial),
-        Screen::Over | Screen::Read { .. } => None,
-    }
 }
 
 fn words(screen: &Screen) -> Words {
@@ -150,6 +142,7 @@ fn others(trial: &TrialView) -> String {
             };
             format!("          A  feel {what} again{most}")
         }
+        (May::Withdraw, _) => "          U  take the last answer back".to_owned(),
     };
     trial.may.iter().map(key).collect()
 }
@@ -229,6 +222,7 @@ pub fn keys(ui: &Ui) -> Vec<StudyKey> {
             (Key::Backspace, StudyKey::Back),
             (Key::Enter, StudyKey::Enter),
             (Key::A, StudyKey::Again),
+            (Key::U, StudyKey::Withdraw),
         ];
         keys.extend(others.into_iter().filter(|(key, _)| input.key_pressed(*key)).map(|(_, means)| means));
         keys

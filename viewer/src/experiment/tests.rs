@@ -100,6 +100,22 @@ fn a_pair_is_felt_one_after_the_other_again_if_wanted_and_answered_by_number() {
     }
 }
 
+/// U takes the last answer back while the next stimulus was not felt, and means nothing where it may not be done.
+#[test]
+fn an_answer_is_taken_back_by_a_key() {
+    let mut jnd = JndProtocol::default();
+    jnd.demo.shown = false;
+    let mut both = Both::new(&Protocol::Jnd(jnd), 2);
+    assert!(!both.press(StudyKey::Withdraw) && both.press(StudyKey::Enter));
+    assert!(both.press(StudyKey::Enter) && both.press(StudyKey::Enter));
+    assert!(!both.press(StudyKey::Withdraw) && both.press(StudyKey::Digit(1)));
+    assert!(both.press(StudyKey::Withdraw), "{:?}", both.prompt.screen());
+    assert!(matches!(both.prompt.screen(), Some(Screen::Ask { trial, .. }) if trial.number == 1));
+    assert!(!both.press(StudyKey::Withdraw) && both.press(StudyKey::Digit(2)));
+    assert!(!both.press(StudyKey::Withdraw), "once");
+    assert_eq!(both.answers, [Response::First, Response::Second]);
+}
+
 #[test]
 fn warnings_and_refusals_leave_the_screen_and_a_lost_experiment_is_noticed() {
     let mut both = Both::new(&Protocol::Jnd(JndProtocol::default()), 1);

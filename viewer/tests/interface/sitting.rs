@@ -134,6 +134,11 @@ fn every_screen_of_a_sitting_says_what_to_do_and_which_keys_do_it() {
         (feel(Some(Position::First), two.clone()), "First spring", "Enter when you have felt it"),
         (feel(Some(Position::Second), two.clone()), "Second spring", "Enter when you have felt it"),
         (feel(Some(Position::First), stronger.clone()), "First force", "Enter when you have felt it"),
+        (
+            feel(Some(Position::First), TrialView { may: vec![May::Withdraw], ..two.clone() }),
+            "First spring",
+            "U  take the last answer back",
+        ),
         (ask(Question::HowMuch, practice), "How stiff was it?", "A  feel it again"),
         (ask(Question::HowMuch, one), "How stiff was it?", "Backspace corrects"),
         (ask(Question::HowMuch, strong), "How strong was it?", "Enter when it is right"),

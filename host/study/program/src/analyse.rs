@@ -190,6 +190,10 @@ fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), Co
         let (protocol, record) = (&log.begin.protocol, SubjectRecord::of_log(log));
         let incidents: Vec<Incident> = log.incidents.iter().map(|(.., incident)| incident.clone()).collect();
         let mut quality = SubjectQuality::of(protocol, &record, &incidents);
+        let withdrawn = log.withdrawn.len();
+        quality
+            .flags
+            .extend((withdrawn > 0).then(|| format!("{withdrawn} answers taken back and given anew")));
         if log.complete {
             let rules = log.begin.exclusion();
             let applied = rules.apply(protocol, vec![record], arguments.estimator, log.begin.rate_hz());

@@ -28,7 +28,7 @@ pub struct Least {
 }
 
 impl Least {
-    /// Half a second, and twice a millimetre.
+    /// Half a second, and twice a millimetre. From then on the answer before it is no longer taken back.
     pub const USUAL: Least = Least { time_s: 0.5, way_m: 2.0e-3 };
 
     /// Why a stimulus was not felt long or far enough, if so.
@@ -127,8 +127,16 @@ fn sit(
             if input == Input::Stop {
                 log.write(&Event::Incident(Incident::Stopped))?;
             }
+            let felt_for_s = shown.elapsed().as_secs_f64();
+            if felt.is_some()
+                && input == Input::Withdraw
+                && Least::USUAL.is_missed(felt_for_s, rig.way_m()).is_none()
+            {
+                front.refuse("the next one has been felt; the answer before it stays")?;
+                continue;
+            }
             if felt.is_some() && input == Input::Continue {
-                if let Some(why) = least.is_missed(shown.elapsed().as_secs_f64(), rig.way_m()) {
+                if let Some(why) = least.is_missed(felt_for_s, rig.way_m()) {
                     front.refuse(why)?;
                     continue;
                 }
@@ -148,10 +156,16 @@ fn sit(
             Step::Answered(event) => {
                 // The answer before the movement: it is small, and cannot be had again.
                 log.write(&Event::Trial(event.clone()))?;
-                if let Err(error) = rig.close_recording() {
-                    log.write(&Event::Incident(Incident::NotRecorded { reason: error.to_string() }))?;
-                }
+                close_recording(rig, log)?;
                 watch(&event);
+            }
+            Step::Withdrawn(trial) => {
+                log.write(&Event::Withdrawn { trial })?;
+                // What had just begun comes again after the answer; of the one to be answered nothing more is felt now.
+                if felt.is_some() {
+                    rig.end()?;
+                    close_recording(rig, log)?;
+                }
             }
             Step::Read(text) => {
                 let title = text.lines().next().unwrap_or_default();
@@ -162,6 +176,14 @@ fn sit(
             Step::Shown | Step::Note(_) => {}
         }
     }
+}
+
+/// Closes the recording of a trial; that it failed is noted, and the sitting goes on.
+fn close_recording(rig: &mut RealTimeRig<'_>, log: &mut LogWriter) -> Result<(), OutsideError> {
+    if let Err(error) = rig.close_recording() {
+        log.write(&Event::Incident(Incident::NotRecorded { reason: error.to_string() }))?;
+    }
+    Ok(())
 }
 
 /// The next input, or what stops the sitting. Warns once for each time the handle leaves its range, and notes it.

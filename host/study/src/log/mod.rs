@@ -28,8 +28,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// Revision of the format: 2 has times of day and incidents.
-pub const FORMAT: u32 = 2;
+/// Revision of the format: 2 has times of day and incidents, 3 has answers that were taken back.
+pub const FORMAT: u32 = 3;
 
 /// What a line says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,6 +39,11 @@ pub enum Event {
     Begin(Box<Begin>),
     /// A trial was presented and answered.
     Trial(Box<TrialEvent>),
+    /// The answer to the last trial was taken back; the trial is open again, and what followed from the answer is void.
+    Withdrawn {
+        /// The trial.
+        trial: u32,
+    },
     /// The sitting was taken up again.
     Resume {
         /// Trials found and replayed.

@@ -98,6 +98,8 @@ pub struct SittingLog {
     pub begin: Begin,
     /// Trials in order.
     pub trials: Vec<TrialRecord>,
+    /// Answers that were taken back: no longer among the trials.
+    pub withdrawn: Vec<TrialEvent>,
     /// Notes of the experimenter, each with the trials before it.
     pub notes: Vec<(u32, String)>,
     /// Interruptions and disturbances, each with the trials before it.
@@ -166,6 +168,7 @@ impl SittingLog {
         Self {
             begin,
             trials: Vec::new(),
+            withdrawn: Vec::new(),
             notes: Vec::new(),
             incidents: Vec::new(),
             began: None,
@@ -185,6 +188,7 @@ impl SittingLog {
         match event {
             Event::Begin(_) => Err(LogProblem::Order("a second `begin`")),
             Event::Trial(event) => self.replay(*event),
+            Event::Withdrawn { trial } => self.withdraw(trial),
             Event::Resume { trials, .. } if trials != self.sitting.presented() => {
                 Err(LogProblem::Order("`resume` after another number of trials than there are"))
             }
@@ -224,6 +228,21 @@ impl SittingLog {
         }
         let track = self.sitting.results().get(before).copied();
         self.trials.push(TrialRecord { event, track });
+        Ok(())
+    }
+
+    /// Goes back to where the sitting stood before its last trial: through all answers before it, anew.
+    fn withdraw(&mut self, number: u32) -> Result<(), LogProblem> {
+        const ONCE: &str = "`withdrawn` of another trial than the last, or for the second time";
+        let is_new = self.withdrawn.last().is_none_or(|before| before.trial.number < number);
+        let is_last = self.trials.last().is_some_and(|last| last.event.trial.number == number);
+        let last = self.trials.pop().filter(|_| is_new && is_last).ok_or(LogProblem::Order(ONCE))?;
+        self.withdrawn.push(last.event);
+        self.sitting = Sitting::new(&self.begin.protocol, self.begin.seed, self.begin.subject);
+        for TrialRecord { event, .. } in &self.trials {
+            let answered = self.sitting.answer(event.response, &event.exploration);
+            answered.map_err(|cause| LogProblem::Answer { number: event.trial.number, cause })?;
+        }
         Ok(())
     }
 

@@ -5,6 +5,7 @@ use crate::conduct::{Ending, Nothing, conduct};
 use crate::observer::{Population, SimulatedSubject};
 use crate::protocol::JndProtocol;
 use crate::sitting::Sitting;
+use crate::trial::{Exploration, Response};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -270,4 +271,53 @@ fn a_sitting_of_another_study_says_where_it_differs() {
     let said = begin().differs(&other).expect("none now");
     assert_eq!(said, "begun with the study file a.study.toml, and there is none now");
     assert!(!serde_json::to_string(&begin()).unwrap().contains("plan"), "logs without one are as before");
+}
+
+/// An answer that was taken back is a line of its own, and the sitting goes on from the log as it would without both.
+#[test]
+fn an_answer_taken_back_is_told_and_counts_for_nothing() {
+    let folder = Folder::new("withdrawn");
+    let path = folder.file("log.jsonl");
+    let begin = begin();
+    let start = || Sitting::new(&begin.protocol, begin.seed, begin.subject);
+    let answer = |sitting: &mut Sitting, response: Response| {
+        let (trial, exploration) = (sitting.next().unwrap(), Exploration::default());
+        let verdict = sitting.answer(response, &exploration).unwrap();
+        Event::Trial(Box::new(TrialEvent { trial, response, verdict, exploration }))
+    };
+    // Trials of which every second answer is taken back, up to the one that ends the track.
+    let (mut sitting, mut writer) = (start(), LogWriter::create(&path).unwrap());
+    writer.write(&Event::Begin(Box::new(begin.clone()))).unwrap();
+    let (mut withdrawn, mut count) = (0, 0_usize);
+    while let Some(trial) = sitting.next() {
+        if trial.number % 2 == 0 {
+            writer.write(&answer(&mut sitting.clone(), Response::DontKnow)).unwrap();
+            writer.write(&Event::Withdrawn { trial: trial.number }).unwrap();
+            withdrawn += 1;
+        }
+        let response = if trial.number % 3 == 0 { Response::First } else { Response::Second };
+        let event = answer(&mut sitting, response);
+        writer.write(&event).unwrap();
+        count += 1;
+        let log = SittingLog::read(&path).unwrap();
+        assert_eq!((log.trials.len(), log.withdrawn.len()), (count, withdrawn));
+        assert_eq!(log.tracks(), sitting.results());
+        let copy = folder.file("copy.jsonl");
+        std::fs::copy(&path, &copy).unwrap();
+        let (resumed, _) = SittingLog::read(&copy).unwrap().resume("0.0.0").unwrap();
+        assert_eq!(resumed.next(), sitting.next(), "it goes on with the trial that is open");
+    }
+    drop(writer);
+    let bytes = std::fs::read(&path).unwrap();
+    let log = SittingLog::read(&path).unwrap();
+    let last = log.trials.last().unwrap().event.trial.number;
+    let with = |event: &Event| {
+        std::fs::write(&path, &bytes).unwrap();
+        SittingLog::read(&path).unwrap().resume("0.0.0").unwrap().1.write(event).unwrap();
+        SittingLog::read(&path)
+    };
+    for trial in [0, 1, last - 1, last + 1] {
+        let error = with(&Event::Withdrawn { trial }).err().expect("refused");
+        assert!(matches!(error.problem, LogProblem::Order(_)), "{trial}: {error}");
+    }
 }

@@ -16,6 +16,8 @@ pub enum Step {
     Shown,
     /// A trial was answered: to be logged before the next screen is shown.
     Answered(Box<TrialEvent>),
+    /// The answer to this trial was taken back: to be logged before the question is shown again.
+    Withdrawn(u32),
     /// A text was read: to be logged before the next screen is shown.
     Read(String),
     /// To be logged; the screen stays.
@@ -59,6 +61,26 @@ enum Stage {
     Ask,
 }
 
+/// What a person may still take back.
+#[derive(Clone, Debug)]
+enum Undo {
+    /// The last answer: where everything stood before it.
+    Possible(Box<Before>),
+    /// Nothing: the trial that is open now was answered once before.
+    Used,
+    /// Nothing.
+    Impossible,
+}
+
+/// Where a sitting stood before an answer.
+#[derive(Clone, Debug)]
+struct Before {
+    sitting: Sitting,
+    exploration: Exploration,
+    since_rest: u32,
+    again: u32,
+}
+
 /// A person's sitting.
 #[derive(Clone, Debug)]
 pub struct Attended {
@@ -75,6 +97,7 @@ pub struct Attended {
     again_most: Option<u32>,
     /// How often this one was.
     again: u32,
+    undo: Undo,
 }
 
 impl Attended {
@@ -92,6 +115,7 @@ impl Attended {
             since_rest: 0,
             again_most: None,
             again: 0,
+            undo: Undo::Impossible,
         }
     }
 
@@ -160,14 +184,21 @@ impl Attended {
                 Input::Note { text } => Ok(Step::Note(text)),
                 Input::Stop => Ok(Step::Stopped),
                 Input::Continue => Ok(Step::Read(self.texts.pop_front().unwrap_or_default())),
-                Input::Again | Input::Answer { .. } => Err(InputError::NotNow("no question is open yet")),
+                Input::Again | Input::Withdraw | Input::Answer { .. } => {
+                    Err(InputError::NotNow("no question is open yet"))
+                }
             };
         }
         match (self.stage, input) {
             (_, Input::Note { text }) => Ok(Step::Note(text)),
             (_, Input::Stop) => Ok(Step::Stopped),
+            (_, Input::Withdraw) => self.withdraw(time_s),
             (Stage::Ready(_), Input::Continue) => self.go_to(Stage::Feel(0)),
             (Stage::Feel(index), Input::Continue) => {
+                // The next one was felt: from now on the answer to the one before may depend on it.
+                if matches!(self.undo, Undo::Possible(_)) {
+                    self.undo = Undo::Impossible;
+                }
                 let last = index + 1 >= trial.presented.values().len();
                 self.go_to(if last { Stage::Ask } else { Stage::Feel(index + 1) })
             }
@@ -176,6 +207,7 @@ impl Attended {
             }
             (Stage::Ask, Input::Again) => {
                 self.again += 1;
+                self.exploration.response_time_s = None;
                 self.go_to(Stage::Feel(0))
             }
             (Stage::Ask, Input::Answer { response: Response::Rating(rating) }) if rating <= 0.0 => {
@@ -208,13 +240,42 @@ impl Attended {
     }
 
     fn answer(&mut self, trial: &Trial, response: Response, time_s: f64) -> Result<Step, InputError> {
-        self.exploration.response_time_s = Some(time_s);
-        let verdict = self.sitting.answer(response, &self.exploration)?;
-        let exploration = std::mem::take(&mut self.exploration);
+        let mut exploration = self.exploration.clone();
+        // Of an answer that replaces another, from the end of the presentation, too.
+        exploration.response_time_s = Some(exploration.response_time_s.unwrap_or(0.0) + time_s);
+        let before = self.sitting.clone();
+        let verdict = self.sitting.answer(response, &exploration)?;
+        self.undo = match self.undo {
+            Undo::Used => Undo::Impossible,
+            Undo::Possible(_) | Undo::Impossible => Undo::Possible(Box::new(Before {
+                sitting: before,
+                exploration: exploration.clone(),
+                since_rest: self.since_rest,
+                again: self.again,
+            })),
+        };
+        self.exploration = Exploration::default();
         self.since_rest += 1;
         self.again = 0;
         self.stage = self.next_stage(trial, verdict);
         Ok(Step::Answered(Box::new(TrialEvent { trial: *trial, response, verdict, exploration })))
+    }
+
+    fn withdraw(&mut self, time_s: f64) -> Result<Step, InputError> {
+        match (self.stage, std::mem::replace(&mut self.undo, Undo::Used)) {
+            (Stage::Ready(_) | Stage::Feel(0), Undo::Possible(before)) => {
+                let Before { sitting, exploration, since_rest, again } = *before;
+                (self.sitting, self.exploration) = (sitting, exploration);
+                (self.since_rest, self.again) = (since_rest, again);
+                self.exploration.response_time_s = self.exploration.response_time_s.map(|s| s + time_s);
+                self.stage = Stage::Ask;
+                Ok(Step::Withdrawn(self.sitting.presented() + 1))
+            }
+            (_, undo) => {
+                self.undo = undo;
+                Err(InputError::NotNow("there is no answer to be taken back now"))
+            }
+        }
     }
 
     /// Straight to the next stimulus, unless there is something to say first.
@@ -243,10 +304,15 @@ impl Attended {
     }
 
     fn may(&self) -> Vec<May> {
-        match (self.stage, self.again_left()) {
-            (Stage::Ask, left) if left != Some(0) => vec![May::Again { left }],
-            _ => Vec::new(),
-        }
+        let again = match (self.stage, self.again_left()) {
+            (Stage::Ask, left) if left != Some(0) => Some(May::Again { left }),
+            _ => None,
+        };
+        let withdraw = match (self.stage, &self.undo) {
+            (Stage::Ready(_) | Stage::Feel(0), Undo::Possible(_)) => Some(May::Withdraw),
+            _ => None,
+        };
+        again.into_iter().chain(withdraw).collect()
     }
 
     fn view(&self, trial: &Trial) -> TrialView {

@@ -9,6 +9,7 @@
 //! Ready -> Feel (first) -> Feel (second) -> Ask -> Ready or Feel of the next trial ... -> Over
 //!            ^                               |
 //!            +------------ again ------------+
+//!                    Ready or Feel (first) -- withdraw --> Ask of the trial before
 //! ```
 
 mod attended;
@@ -53,6 +54,19 @@ pub enum Screen {
     },
     /// Everything was presented.
     Over,
+}
+
+impl Screen {
+    /// The trial that it is about, if it is about one.
+    #[must_use]
+    pub fn trial(&self) -> Option<&TrialView> {
+        match self {
+            Self::Ready { next: trial, .. } | Self::Feel { trial, .. } | Self::Ask { trial, .. } => {
+                Some(trial)
+            }
+            Self::Over | Self::Read { .. } => None,
+        }
+    }
 }
 
 /// Why nothing is felt just now.
@@ -112,6 +126,8 @@ pub enum May {
         /// So many more times; none: without limit.
         left: Option<u32>,
     },
+    /// Take the last answer back: [`Input::Withdraw`].
+    Withdraw,
 }
 
 /// What a person does.
@@ -127,6 +143,8 @@ pub enum Input {
         /// The answer.
         response: Response,
     },
+    /// Takes the last answer back, once for each trial and before the next stimulus was felt: its question is open again.
+    Withdraw,
     /// A note of the experimenter; the screen stays.
     Note {
         /// In their words.

@@ -177,3 +177,46 @@ fn a_trial_is_felt_again_no_more_often_than_the_study_allows() {
     feel(&mut person);
     assert_eq!(may(&person), [May::Again { left: None }]);
 }
+
+/// A mistyped answer is taken back once, as long as the next stimulus was not felt: the sitting stands where it would stand without
+/// it, and the time to the answer runs on.
+#[test]
+fn an_answer_is_taken_back_once_and_before_the_next_stimulus() {
+    let mut jnd = JndProtocol::default();
+    jnd.demo.shown = false;
+    let protocol = Protocol::Jnd(jnd);
+    let mut person = attended(&protocol, 0);
+    let mut bare = Sitting::new(&protocol, 4, SubjectNumber::new(1).unwrap());
+    let answer = |response| Input::Answer { response };
+    let feel = |person: &mut Attended| {
+        person.input(Input::Continue, 0.0).unwrap();
+        person.felt(Felt { kinematics: None, boundary_hit: false, missed_ticks: 1 });
+        person.input(Input::Continue, 0.0).unwrap();
+    };
+    let refused = |person: &mut Attended| {
+        let before = person.screen();
+        assert!(matches!(person.input(Input::Withdraw, 1.0), Err(InputError::NotNow(_))));
+        assert_eq!(person.screen(), before);
+    };
+    refused(&mut person);
+    person.input(Input::Continue, 0.0).unwrap();
+    refused(&mut person);
+    feel(&mut person);
+    refused(&mut person);
+    let asked = person.screen();
+    assert!(matches!(person.input(answer(Response::First), 1.0), Ok(Step::Answered(_))));
+    let Screen::Feel { trial, .. } = person.screen() else { panic!("{:?}", person.screen()) };
+    assert_eq!(trial.may, [May::Withdraw]);
+    assert_eq!(person.input(Input::Withdraw, 0.5), Ok(Step::Withdrawn(1)));
+    assert_eq!((person.screen(), person.presented()), (asked, 0));
+    refused(&mut person);
+    let Ok(Step::Answered(event)) = person.input(answer(Response::Second), 2.0) else { panic!("not taken") };
+    assert_eq!((event.exploration.response_time_s, event.exploration.missed_ticks), (Some(3.5), 1));
+    assert_eq!(bare.answer(event.response, &event.exploration), Ok(event.verdict));
+    assert_eq!(person.stimulus().map(|(trial, _)| trial), bare.next(), "as if the first answer had not been");
+    refused(&mut person); // once
+    feel(&mut person);
+    assert!(matches!(person.input(answer(Response::First), 1.0), Ok(Step::Answered(_))));
+    person.input(Input::Continue, 0.0).unwrap();
+    refused(&mut person); // the first of the next pair was felt
+}

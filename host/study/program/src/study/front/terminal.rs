@@ -71,9 +71,10 @@ fn words(screen: &Screen) -> String {
         }
         Screen::Ready { reason, next } => {
             format!(
-                "\n{}\n{}\n  Enter continues, n TEXT adds a note, q stops",
+                "\n{}\n{}\n  Enter continues, n TEXT adds a note, q stops{}",
                 style::title(pause(*reason, next)),
-                place(next)
+                place(next),
+                others(next)
             )
         }
         Screen::Feel { trial, position } => {
@@ -82,7 +83,7 @@ fn words(screen: &Screen) -> String {
                 Some(Position::First) => "Feel the first",
                 Some(Position::Second) => "Feel the second",
             };
-            format!("\n{}\n  {which}; Enter when done", place(trial))
+            format!("\n{}\n  {which}; Enter when done{}", place(trial), others(trial))
         }
         Screen::Ask { question, trial } => {
             let (more, how) = match trial.quality {
@@ -95,17 +96,20 @@ fn words(screen: &Screen) -> String {
                 }
                 Question::HowMuch => format!("  How {how}? Any number of your own, larger for {more}"),
             };
-            question + &trial.may.iter().map(may).collect::<String>()
+            question + &others(trial)
         }
         Screen::Over => format!("\n{}\n  Everything is on disk. Thank you.", style::title("Done")),
     }
 }
 
-fn may(what: &May) -> String {
-    match what {
+/// The keys for what a person may do but need not.
+fn others(trial: &TrialView) -> String {
+    let key = |may: &May| match may {
+        May::Withdraw => "; u takes the last answer back".to_owned(),
         May::Again { left: None } => "; a repeats it".to_owned(),
         May::Again { left: Some(left) } => format!("; a repeats it, {left} more times at most"),
-    }
+    };
+    trial.may.iter().map(key).collect()
 }
 
 fn place(trial: &TrialView) -> String {
@@ -133,6 +137,7 @@ fn typed(line: &str, screen: &Screen) -> Result<Input, String> {
         "" => return Ok(Input::Continue),
         "q" => return Ok(Input::Stop),
         "a" => return Ok(Input::Again),
+        "u" => return Ok(Input::Withdraw),
         _ => {}
     }
     if let Some(text) = line.strip_prefix("n ") {
@@ -182,7 +187,9 @@ mod tests {
         assert_eq!(typed("7,5", &one), answer(Response::Rating(7.5)));
         assert!(typed("seven", &one).is_err());
         assert_eq!(typed("n 5 o'clock", &one), Ok(Input::Note { text: "5 o'clock".to_owned() }));
-        for (line, input) in [("", Input::Continue), ("a", Input::Again), ("q", Input::Stop)] {
+        for (line, input) in
+            [("", Input::Continue), ("a", Input::Again), ("u", Input::Withdraw), ("q", Input::Stop)]
+        {
             assert_eq!(typed(line, &one), Ok(input));
         }
     }
