@@ -163,6 +163,29 @@ impl Sitting {
         Some(Trial { number, phase, replication, track, modality, presented, repeat: self.repeat })
     }
 
+    /// What somebody who goes on after a break may practise with first, in the modality of the next trial: no part of the sitting.
+    /// Nothing while practice is what comes next, or where there is none.
+    #[must_use]
+    pub fn practice(&self) -> Vec<Trial> {
+        let Some(Trial { modality, .. }) = self.next().filter(|next| next.phase != Phase::Practice) else {
+            return Vec::new();
+        };
+        let (seed, subject) = (self.seed, self.subject);
+        let presented: Vec<Presented> = match &self.protocol {
+            Protocol::Jnd(jnd) => {
+                let demo = schedule::jnd_demo(jnd, seed, subject).into_iter();
+                demo.filter(|(of, _)| *of == modality).map(|(_, values)| practice_pair(values)).collect()
+            }
+            Protocol::Magnitude(magnitude) => {
+                let demo = schedule::magnitude_demo(magnitude, seed, subject, modality).into_iter();
+                demo.map(|value| Presented::One { value }).collect()
+            }
+        };
+        let (number, phase, replication, track, repeat) = (0, Phase::Practice, 0, 0, 0);
+        let trial = |presented| Trial { number, phase, replication, track, modality, presented, repeat };
+        presented.into_iter().map(trial).collect()
+    }
+
     /// Takes in what came of the trial [`Sitting::next`] named.
     ///
     /// # Errors
@@ -273,7 +296,11 @@ fn pair(base: f64, comparison: f64, comparison_at: Position, above: bool) -> Pai
     Pair { base, comparison, delta: (comparison - base).abs() / base, comparison_at, larger_at }
 }
 
-fn check_kind(trial: &Trial, response: Response) -> Result<(), AnswerError> {
+fn practice_pair([first, second]: [f64; 2]) -> Presented {
+    Presented::Pair(pair(first, second, Position::Second, second > first))
+}
+
+pub(crate) fn check_kind(trial: &Trial, response: Response) -> Result<(), AnswerError> {
     match (trial.phase, trial.presented, response) {
         (Phase::Practice, _, Response::Seen)
         | (_, Presented::Pair(_), Response::First | Response::Second | Response::DontKnow) => Ok(()),
@@ -294,8 +321,8 @@ fn judge(pair: &Pair, response: Response) -> Option<Judgement> {
 }
 
 fn jnd_items(jnd: &JndProtocol, seed: u64, subject: SubjectNumber) -> VecDeque<Item> {
-    let demo = schedule::jnd_demo(jnd, seed, subject).into_iter().map(|(modality, [first, second])| {
-        let presented = Presented::Pair(pair(first, second, Position::Second, second > first));
+    let demo = schedule::jnd_demo(jnd, seed, subject).into_iter().map(|(modality, values)| {
+        let presented = practice_pair(values);
         Item::Show { phase: Phase::Practice, replication: 0, modality, presented }
     });
     let first = jnd.first_modality.of(subject);

@@ -133,7 +133,7 @@ impl Presented {
 /// One presentation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
-    /// Count of presentations in the sitting, from 1.
+    /// Count of presentations in the sitting, from 1; 0: practice before a sitting goes on, which is no part of it.
     pub number: u32,
     /// Whether it counts.
     pub phase: Phase,

@@ -12,6 +12,7 @@ use flotor_study::apparatus::rig::{Rig, TrialFiles};
 use flotor_study::apparatus::{Apparatus, Kinematics};
 use flotor_study::log::{Incident, SittingLog};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, Stimulus, SubjectNumber};
+use flotor_study::screen::{Attended, Input, May, Screen};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::{Exploration, Modality, Phase, Presented, Response, Trial};
 use flotor_tests::TestSize;
@@ -487,6 +488,59 @@ fn an_answer_is_taken_back_in_a_sitting() {
     let ran = person("json", &([go, go, go, &first].join("\n") + "\n"), &again, &out);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     assert_eq!(SittingLog::read(&log_of(&out, 1)).unwrap().trials.len(), 2);
+}
+
+/// What a person types to have felt so many trials, practising first where that is offered; then enough for today.
+fn typed_until(log: &SittingLog, trials: u32) -> String {
+    let begin = &log.begin;
+    let mut sitting = Sitting::new(&begin.protocol, begin.seed, begin.subject);
+    for record in &log.trials {
+        sitting.answer(record.event.response, &record.event.exploration).unwrap();
+    }
+    let mut person = Attended::new(sitting, &begin.protocol, 40);
+    if !log.trials.is_empty() {
+        person = person.with_practice_offered();
+    }
+    let mut lines = String::new();
+    while person.presented() < trials {
+        let (line, input) = match person.screen() {
+            Screen::Ready { next, .. } if next.may.contains(&May::Practise) => ("p\n", Input::Practise),
+            Screen::Ask { .. } => ("1\n", Input::Answer { response: Response::First }),
+            _ => ("\n", Input::Continue),
+        };
+        lines += line;
+        person.input(input, 0.0).unwrap();
+    }
+    lines + "q\n"
+}
+
+/// Who goes on after a break is offered practice: what is felt then is told in the log, has no recording and no number, and the sitting
+/// goes on where it was.
+#[test]
+fn practice_is_offered_to_whoever_goes_on() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let log = || SittingLog::read(&log_of(&out, 1)).unwrap();
+    let first = person("terminal", "p\nq\n", &["--subject", "1"], &out);
+    assert_eq!(first.code, Some(exit_code::OK), "{first:?}");
+    assert!(
+        first.stdout.contains("practice is not offered now") && !first.stdout.contains("p practises"),
+        "{first:?}"
+    );
+    for (trials, practised) in [(7, 0), (8, 3)] {
+        let ran = person("terminal", &typed_until(&log(), trials), &["--subject", "1", "--resume"], &out);
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        assert_eq!(ran.stdout.contains("p practises first"), practised > 0, "{ran:?}");
+        let log = log();
+        let notes = log.notes.iter().filter(|(_, text)| text.starts_with("practice before going on"));
+        assert_eq!((notes.count(), log.trials.len()), (practised, trials as usize), "{:?}", log.notes);
+    }
+    let files = std::fs::read_dir(out.join("sourcedata/sub-01/motion")).unwrap();
+    let names = files.map(|file| file.unwrap().file_name().into_string().unwrap());
+    assert_eq!(names.filter(|name| name.contains("trial-0000")).count(), 0, "practice is not recorded");
 }
 
 /// Whoever presses the emergency stop in a sitting: what was felt ends at once, the log says so with the time of day, the exit code

@@ -22,6 +22,8 @@ pub enum StudyKey {
     Enter,
     /// Feel it again.
     Again,
+    /// Practise before the sitting goes on.
+    Practise,
     /// Take the last answer back.
     Withdraw,
     /// A digit of a rating, or the answer of this number.
@@ -210,6 +212,7 @@ impl Prompt {
         let may = |what| screen.trial().is_some_and(|trial| trial.may.contains(&what));
         let input = match (question, key) {
             (None, StudyKey::Enter) => Some(Input::Continue),
+            (None, StudyKey::Practise) => may(May::Practise).then_some(Input::Practise),
             (None, StudyKey::Withdraw) => may(May::Withdraw).then_some(Input::Withdraw),
             (Some(_), StudyKey::Again) => Some(Input::Again),
             (Some(Question::WhichIsMore), StudyKey::Digit(1)) => answer(Response::First),

@@ -142,6 +142,7 @@ fn others(trial: &TrialView) -> String {
             };
             format!("          A  feel {what} again{most}")
         }
+        (May::Practise, _) => "          P  practise first".to_owned(),
         (May::Withdraw, _) => "          U  take the last answer back".to_owned(),
     };
     trial.may.iter().map(key).collect()
@@ -223,6 +224,7 @@ pub fn keys(ui: &Ui) -> Vec<StudyKey> {
             (Key::Enter, StudyKey::Enter),
             (Key::A, StudyKey::Again),
             (Key::U, StudyKey::Withdraw),
+            (Key::P, StudyKey::Practise),
         ];
         keys.extend(others.into_iter().filter(|(key, _)| input.key_pressed(*key)).map(|(_, means)| means));
         keys

@@ -172,6 +172,7 @@ fn sit(
                 let text = format!("read and went on: {title} (SHA-256 {})", digest(&text));
                 log.write(&Event::Note { text })?;
             }
+            Step::Practised(text) => log.write(&Event::Note { text })?,
             Step::Stopped => return Ok(Ending::Stopped),
             Step::Shown | Step::Note(_) => {}
         }

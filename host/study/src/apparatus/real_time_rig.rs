@@ -132,7 +132,8 @@ impl<'a> RealTimeRig<'a> {
         if let Some(change) = watch.refused.take() {
             return Err(StimulusRefused(change).into());
         }
-        if let (Some(files), false) = (&self.files, watch.recording.is_on()) {
+        let is_of_sitting = trial.number > 0;
+        if let (Some(files), false, true) = (&self.files, watch.recording.is_on(), is_of_sitting) {
             let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);
             // What was recorded before a sitting broke off is kept.
             match Recorder::create(&files.next_of(trial), &run) {

@@ -4,7 +4,7 @@ use super::{Input, May, Pause, Question, Screen, TrialView};
 use crate::kinematics::StimulusKinematics;
 use crate::log::TrialEvent;
 use crate::protocol::{Protocol, Quality};
-use crate::sitting::{AnswerError, Sitting, Verdict};
+use crate::sitting::{AnswerError, Sitting, Verdict, check_kind};
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Exploration, Modality, Position, Presented, Response, Trial};
 use std::collections::VecDeque;
@@ -18,6 +18,8 @@ pub enum Step {
     Answered(Box<TrialEvent>),
     /// The answer to this trial was taken back: to be logged before the question is shown again.
     Withdrawn(u32),
+    /// Practised before the sitting goes on, in words: to be logged before the next screen is shown.
+    Practised(String),
     /// A text was read: to be logged before the next screen is shown.
     Read(String),
     /// To be logged; the screen stays.
@@ -98,6 +100,10 @@ pub struct Attended {
     /// How often this one was.
     again: u32,
     undo: Undo,
+    /// Practice that is offered before the sitting goes on.
+    offered: Vec<Trial>,
+    /// Practice under way, the next trial first.
+    practice: VecDeque<Trial>,
 }
 
 impl Attended {
@@ -116,6 +122,8 @@ impl Attended {
             again_most: None,
             again: 0,
             undo: Undo::Impossible,
+            offered: Vec::new(),
+            practice: VecDeque::new(),
         }
     }
 
@@ -131,10 +139,21 @@ impl Attended {
         Self { again_most: Some(times), ..self }
     }
 
+    /// The same, with practice offered before it goes on.
+    #[must_use]
+    pub fn with_practice_offered(self) -> Self {
+        Self { offered: self.sitting.practice(), ..self }
+    }
+
+    /// The trial that is open.
+    fn trial(&self) -> Option<Trial> {
+        self.practice.front().copied().or_else(|| self.sitting.next())
+    }
+
     /// What is shown now; the same however often it is asked.
     #[must_use]
     pub fn screen(&self) -> Screen {
-        let Some(trial) = self.sitting.next() else { return Screen::Over };
+        let Some(trial) = self.trial() else { return Screen::Over };
         if let Some(text) = self.texts.front() {
             return Screen::Read { text: text.clone() };
         }
@@ -149,7 +168,7 @@ impl Attended {
     /// The stimulus to be felt now and the trial it belongs to: for the apparatus, not for eyes.
     #[must_use]
     pub fn stimulus(&self) -> Option<(Trial, f64)> {
-        let trial = self.sitting.next()?;
+        let trial = self.trial()?;
         match self.stage {
             Stage::Feel(index) => Some((trial, trial.presented.values().get(index).copied()?)),
             Stage::Ready(_) | Stage::Ask => None,
@@ -173,7 +192,7 @@ impl Attended {
     /// # Errors
     /// [`InputError`]; the screen stays as it is.
     pub fn input(&mut self, input: Input, time_s: f64) -> Result<Step, InputError> {
-        let Some(trial) = self.sitting.next() else {
+        let Some(trial) = self.trial() else {
             return match input {
                 Input::Note { text } => Ok(Step::Note(text)),
                 _ => Ok(Step::Stopped),
@@ -184,7 +203,7 @@ impl Attended {
                 Input::Note { text } => Ok(Step::Note(text)),
                 Input::Stop => Ok(Step::Stopped),
                 Input::Continue => Ok(Step::Read(self.texts.pop_front().unwrap_or_default())),
-                Input::Again | Input::Withdraw | Input::Answer { .. } => {
+                Input::Again | Input::Withdraw | Input::Practise | Input::Answer { .. } => {
                     Err(InputError::NotNow("no question is open yet"))
                 }
             };
@@ -192,6 +211,11 @@ impl Attended {
         match (self.stage, input) {
             (_, Input::Note { text }) => Ok(Step::Note(text)),
             (_, Input::Stop) => Ok(Step::Stopped),
+            (Stage::Ready(Pause::Welcome), Input::Practise) if !self.offered.is_empty() => {
+                self.practice = std::mem::take(&mut self.offered).into();
+                self.go_to(Stage::Ready(Pause::PhaseChanges))
+            }
+            (_, Input::Practise) => Err(InputError::NotNow("practice is not offered now")),
             (_, Input::Withdraw) => self.withdraw(time_s),
             (Stage::Ready(_), Input::Continue) => self.go_to(Stage::Feel(0)),
             (Stage::Feel(index), Input::Continue) => {
@@ -240,6 +264,9 @@ impl Attended {
     }
 
     fn answer(&mut self, trial: &Trial, response: Response, time_s: f64) -> Result<Step, InputError> {
+        if !self.practice.is_empty() {
+            return self.practised(trial, response);
+        }
         let mut exploration = self.exploration.clone();
         // Of an answer that replaces another, from the end of the presentation, too.
         exploration.response_time_s = Some(exploration.response_time_s.unwrap_or(0.0) + time_s);
@@ -261,6 +288,15 @@ impl Attended {
         Ok(Step::Answered(Box::new(TrialEvent { trial: *trial, response, verdict, exploration })))
     }
 
+    fn practised(&mut self, trial: &Trial, response: Response) -> Result<Step, InputError> {
+        check_kind(trial, response)?;
+        self.practice.pop_front();
+        (self.exploration, self.again) = (Exploration::default(), 0);
+        self.stage = self.next_stage(trial, Verdict::Taken);
+        let (values, word) = (trial.presented.values(), response.word());
+        Ok(Step::Practised(format!("practice before going on: presented {values:?}, answer {word}")))
+    }
+
     fn withdraw(&mut self, time_s: f64) -> Result<Step, InputError> {
         match (self.stage, std::mem::replace(&mut self.undo, Undo::Used)) {
             (Stage::Ready(_) | Stage::Feel(0), Undo::Possible(before)) => {
@@ -280,7 +316,7 @@ impl Attended {
 
     /// Straight to the next stimulus, unless there is something to say first.
     fn next_stage(&mut self, before: &Trial, verdict: Verdict) -> Stage {
-        let Some(next) = self.sitting.next() else { return Stage::Ask };
+        let Some(next) = self.trial() else { return Stage::Ask };
         let pause = if verdict == Verdict::Repeated {
             Some(Pause::OutOfRange)
         } else if next.phase.shown() != before.phase.shown() {
@@ -312,13 +348,16 @@ impl Attended {
             (Stage::Ready(_) | Stage::Feel(0), Undo::Possible(_)) => Some(May::Withdraw),
             _ => None,
         };
-        again.into_iter().chain(withdraw).collect()
+        let is_offered = self.stage == Stage::Ready(Pause::Welcome) && !self.offered.is_empty();
+        again.into_iter().chain(withdraw).chain(is_offered.then_some(May::Practise)).collect()
     }
 
     fn view(&self, trial: &Trial) -> TrialView {
+        // Practice before a sitting goes on is of the trial that it goes on with.
+        let number = if trial.number == 0 { self.presented() + 1 } else { trial.number };
         TrialView {
-            number: trial.number,
-            of_about: self.of_about.max(trial.number.into()),
+            number,
+            of_about: self.of_about.max(number.into()),
             phase: trial.phase.shown(),
             object_is_shown: trial.modality == Modality::Vh,
             repeat: trial.repeat,

@@ -128,6 +128,8 @@ pub enum May {
     },
     /// Take the last answer back: [`Input::Withdraw`].
     Withdraw,
+    /// Practise before the sitting goes on: [`Input::Practise`].
+    Practise,
 }
 
 /// What a person does.
@@ -145,6 +147,8 @@ pub enum Input {
     },
     /// Takes the last answer back, once for each trial and before the next stimulus was felt: its question is open again.
     Withdraw,
+    /// Practises before the sitting goes on; none of it counts.
+    Practise,
     /// A note of the experimenter; the screen stays.
     Note {
         /// In their words.

@@ -74,6 +74,9 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     log.write(&Event::Note { text }).map_err(failed)?;
 
     let mut attended = Attended::new(sitting, protocol, common.rest_every).after_reading(texts);
+    if has_begun {
+        attended = attended.with_practice_offered();
+    }
     if let Some(times) = common.feel_again {
         log.write(&Event::Note { text: format!("felt again {times} times a trial at most") })
             .map_err(failed)?;

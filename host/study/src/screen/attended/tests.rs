@@ -220,3 +220,66 @@ fn an_answer_is_taken_back_once_and_before_the_next_stimulus() {
     person.input(Input::Continue, 0.0).unwrap();
     refused(&mut person); // the first of the next pair was felt
 }
+
+/// Who goes on after a break may practise first, in the modality that comes next: told, and no part of the sitting.
+#[test]
+fn practice_is_offered_before_a_sitting_goes_on() {
+    for protocol in [Protocol::Jnd(JndProtocol::default()), Protocol::Magnitude(MagnitudeProtocol::default())]
+    {
+        let mut sitting = Sitting::new(&protocol, 4, SubjectNumber::new(1).unwrap());
+        assert_eq!(sitting.practice(), [], "practice comes next anyway");
+        let response = |trial: &Trial| match trial.presented {
+            Presented::One { .. } => Response::Rating(2.0),
+            Presented::Pair(_) => Response::First,
+        };
+        while sitting.next().unwrap().phase == Phase::Practice {
+            let trial = sitting.next().unwrap();
+            sitting.answer(response(&trial), &Exploration::default()).unwrap();
+        }
+        let next = sitting.next();
+        let mut person = Attended::new(sitting, &protocol, 0).with_practice_offered();
+        let before = person.presented();
+        let Screen::Ready { reason: Pause::Welcome, next: welcome } = person.screen() else {
+            panic!("ready")
+        };
+        assert_eq!(welcome.may, [May::Practise]);
+        person.input(Input::Practise, 0.0).unwrap();
+        assert!(matches!(person.input(Input::Practise, 0.0), Err(InputError::NotNow(_))));
+        let mut told = 0;
+        loop {
+            match person.screen() {
+                Screen::Ready { reason, next } => {
+                    assert_eq!(reason, Pause::PhaseChanges);
+                    if next.phase == Phase::Main {
+                        break;
+                    }
+                    person.input(Input::Continue, 0.0).unwrap();
+                }
+                Screen::Feel { trial, .. } => {
+                    assert_eq!(
+                        (trial.phase, trial.number, &trial.may),
+                        (Phase::Practice, before + 1, &vec![])
+                    );
+                    assert_eq!(trial.object_is_shown, welcome.object_is_shown);
+                    person.input(Input::Continue, 0.0).unwrap();
+                }
+                Screen::Ask { .. } => {
+                    let (wrong, right) = match protocol {
+                        Protocol::Jnd(_) => (Response::Rating(2.0), Response::First),
+                        Protocol::Magnitude(_) => (Response::First, Response::Rating(2.0)),
+                    };
+                    assert!(person.input(Input::Answer { response: wrong }, 0.0).is_err());
+                    let step = person.input(Input::Answer { response: right }, 0.0);
+                    assert!(
+                        matches!(&step, Ok(Step::Practised(text)) if text.contains("presented")),
+                        "{step:?}"
+                    );
+                    told += 1;
+                }
+                Screen::Over | Screen::Read { .. } => unreachable!("it goes on"),
+            }
+        }
+        assert_eq!(told, if matches!(protocol, Protocol::Jnd(_)) { 3 } else { 5 });
+        assert_eq!((person.presented(), person.sitting.next()), (before, next));
+    }
+}

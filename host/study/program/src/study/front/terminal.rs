@@ -105,6 +105,7 @@ fn words(screen: &Screen) -> String {
 /// The keys for what a person may do but need not.
 fn others(trial: &TrialView) -> String {
     let key = |may: &May| match may {
+        May::Practise => "; p practises first".to_owned(),
         May::Withdraw => "; u takes the last answer back".to_owned(),
         May::Again { left: None } => "; a repeats it".to_owned(),
         May::Again { left: Some(left) } => format!("; a repeats it, {left} more times at most"),
@@ -138,6 +139,7 @@ fn typed(line: &str, screen: &Screen) -> Result<Input, String> {
         "q" => return Ok(Input::Stop),
         "a" => return Ok(Input::Again),
         "u" => return Ok(Input::Withdraw),
+        "p" => return Ok(Input::Practise),
         _ => {}
     }
     if let Some(text) = line.strip_prefix("n ") {
