@@ -8,6 +8,7 @@ mod noise;
 mod person;
 mod plan;
 mod power;
+mod space;
 mod spring;
 
 use choices::{

@@ -284,6 +284,15 @@ impl Protocol {
         }
     }
 
+    /// Stimuli of one presentation.
+    #[must_use]
+    pub fn stimuli_in_a_trial(&self) -> f64 {
+        match self {
+            Self::Jnd(_) => 2.0,
+            Self::Magnitude(_) => 1.0,
+        }
+    }
+
     /// Whether it can be carried out at all.
     ///
     /// # Errors

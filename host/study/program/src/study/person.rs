@@ -2,6 +2,7 @@
 
 use super::front::{JsonLines, ScreenOption, Terminal, Window, lines_of};
 use super::noise::WhiteNoise;
+use super::space::{self, Need};
 use super::{Common, NoiseOption};
 use crate::of_dataset;
 use flotor_command::say;
@@ -49,9 +50,13 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let consent = common.consent.iter().filter(|_| !has_begun);
     let texts =
         consent.chain(&common.instructions).map(|path| text_of(path)).collect::<Result<Vec<_>, _>>()?;
+    let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
+    let presented = earlier.as_ref().map_or(0, |log| log.trials.len());
+    let trials = protocol.presentations_about().saturating_sub(presented as u64) as f64;
+    let bytes_per_s = if kinematics == Kinematics::Full { apparatus.recording_bytes_per_s() } else { 0.0 };
+    space::check(&common.out, Need { stimuli: trials * protocol.stimuli_in_a_trial(), bytes_per_s })?;
     let stop = stop_on_signals();
     let noise = noise(common)?;
-    let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
     let mut rig = RealTimeRig::start(apparatus, kinematics, &stop)
         .map_err(|error| super::outside(error.as_ref(), &error))?;
     let mut front = Front::open(common, &rig)?;
