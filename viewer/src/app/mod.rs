@@ -277,9 +277,9 @@ impl Viewer {
         let plain = |x: i8, y: i8| Frame::new().fill(palette.panel).inner_margin(Margin::symmetric(x, y));
         Edge::top("top").exact_size(48.0).frame(plain(16, 4)).show(ui, |ui| self.top(ui, &palette));
         if !self.devices.history().is_empty() {
-            let (span_s, is_live) = (self.devices.history().span_s(), self.source.is_running());
+            let is_live = self.source.is_running();
             Edge::bottom("playback").exact_size(44.0).frame(plain(16, 4)).show(ui, |ui| {
-                playback::playback(ui, &mut self.player, span_s, is_live, &palette);
+                playback::playback(ui, &mut self.player, self.devices.history(), is_live, &palette);
             });
             if self.is_panel_shown(ui.ctx()) {
                 let side = Edge::right("side")

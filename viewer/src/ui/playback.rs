@@ -1,12 +1,14 @@
 //! The bar beneath everything: where in time, going or standing, how fast.
 
+use crate::history::{History, Sample};
 use crate::palette::Palette;
 use crate::player::{Motion, Player, SPEEDS};
 use crate::ui::style::SMALL_PT;
 use egui::{Align, ComboBox, Layout, RichText, Role, Slider, Ui, WidgetInfo};
 
 /// Shows the bar of a recording or of a running host.
-pub fn playback(ui: &mut Ui, player: &mut Player, span_s: [f64; 2], is_live: bool, palette: &Palette) {
+pub fn playback(ui: &mut Ui, player: &mut Player, history: &History, is_live: bool, palette: &Palette) {
+    let span_s = history.span_s();
     ui.horizontal_centered(|ui| {
         let name = if player.motion == Motion::Pause { "▶" } else { "⏸" };
         let help = match (player.motion, is_live) {
@@ -19,7 +21,9 @@ pub fn playback(ui: &mut Ui, player: &mut Player, span_s: [f64; 2], is_live: boo
         if button.clicked() {
             player.toggle(is_live, span_s);
         }
-        ui.monospace(format!("{:>8.3} s", player.now_s));
+        // The time of the sample whose numbers are shown; in a gap there is none.
+        let shown_s = history.seen_at(player.now_s).map_or(player.now_s, Sample::time_s);
+        ui.monospace(format!("{shown_s:>8.3} s"));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if is_live {
                 let text = if player.motion == Motion::Follow { "follows the run" } else { "stands still" };

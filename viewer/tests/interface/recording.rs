@@ -39,6 +39,19 @@ fn a_recording_is_played_scrubbed_and_repeated() {
     assert!(!window.state().player().repeats);
 }
 
+/// The bar beneath and the numbers of the moment give one time, that of the sample, wherever between two samples somebody points.
+#[test]
+fn the_bar_has_the_time_of_the_sample_whose_numbers_stand_above_it() {
+    let mut window = recording();
+    for (pointed_s, shown) in [(1.2504, "   1.250 s"), (1.2596, "   1.259 s"), (2.0, "   2.000 s")] {
+        window.get_by_role_and_label(Role::Slider, "Time").set_value_accesskit(pointed_s);
+        window.run_steps(2);
+        window.get_by_label(shown);
+        let sample = window.state().history().at(pointed_s).expect("a sample");
+        assert_eq!(format!("{:>8.3} s", sample.time_s()), shown);
+    }
+}
+
 /// A window of time that is shorter than the run has the moment shown in it, wherever that is.
 #[test]
 fn traces_go_where_the_moment_is() {
