@@ -2,7 +2,7 @@
 //!
 //! Which parameter rules and which follows is the plugin's business (the spring's rigidity follows from its physical
 //! parameters, or the other way round, by its `mode`). The panel asks an instance of its own: a parameter that refuses
-//! the very value it has follows from others. It is shown, moves along, and cannot be pulled.
+//! the very value it has follows from others, or has no effect. It is shown, moves along, and cannot be pulled.
 
 use crate::shape::Shape;
 use flotor_live::{ChangeMessage, Outcome, PanelParameter, PanelPlugin, ParameterShape, SetValue, Subject};
@@ -23,7 +23,7 @@ pub enum Value {
 pub enum Standing {
     /// It can.
     Free,
-    /// It follows from others; the plugin's words for it.
+    /// It follows from others, or has no effect with them; the plugin's words for it.
     Follows(String),
     /// Only when the plugin is created, or: this is a recording.
     Fixed,

@@ -213,7 +213,7 @@ impl Shape {
         number.is_finite().then_some(number)
     }
 
-    /// Whether a parameter may be set: one that refuses the value it has follows from others.
+    /// Whether a parameter may be set: one that refuses the value it has follows from others, or has no effect.
     ///
     /// # Errors
     /// What the plugin says.

@@ -206,6 +206,11 @@ impl Choice {
             Mode::Physical => Stiffness::Physical,
         };
         let spring = Spring::new(geometry, material, stiffness).map_err(Refusal::parameter)?;
+        if seat == SeatChoice::Fixed && settings.number("seat_friction").is_some() {
+            return Err(Refusal::parameter(
+                "`seat_friction` has no say in a seat that is held; set `seat` to `free` as well",
+            ));
+        }
         let friction = Friction { coefficient: settings.number_or_default("seat_friction") };
         Ok(Self {
             spring,
@@ -245,9 +250,11 @@ impl Choice {
     /// The same with one live number changed, as a person would set it. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// The range that fits the other values; NaN to NaN for a number that follows from others in this mode.
+    /// The range that fits the other values; NaN to NaN for a number that follows from others in this mode, or has no effect.
     pub(crate) fn with(&self, index: usize, value: f64) -> Result<Self, OutOfRange> {
-        if SCHEMA.get(index).map(Parameter::id) == Some("seat_friction") {
+        let is_friction = SCHEMA.get(index).map(Parameter::id) == Some("seat_friction");
+        // Under a seat that is held it would change nothing: it is refused below.
+        if is_friction && self.seat == SeatChoice::Free {
             return Ok(Self { friction: Friction { coefficient: value }, ..*self });
         }
         let (mut geometry, mut material, mut stiffness) =

@@ -209,6 +209,10 @@ fn wrong_parameters_are_told_with_what_would_be_right() {
             "`alpha_n_mm2` has no say in mode `gamma`, where it follows from the others; set `mode` to `alpha`",
         ),
         (
+            &["seat_friction=0.2"],
+            "`seat_friction` has no say in a seat that is held; set `seat` to `free` as well",
+        ),
+        (
             &["mode=physical", "gamma_n=17"],
             "`gamma_n` has no say in mode `physical`, where it follows from the others; set `mode` to `gamma`",
         ),

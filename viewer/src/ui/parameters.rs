@@ -57,7 +57,7 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
             }
             let follow = of(panel, |standing| matches!(standing, Standing::Follows(_)));
             if !follow.is_empty() {
-                heading(ui, "Follow from these", palette);
+                heading(ui, "Follow from these, or have no effect", palette);
                 for index in follow {
                     let _ = row(ui, &mut panel.knobs[index], palette);
                 }
@@ -204,7 +204,9 @@ fn help(knob: &Knob) -> String {
     }
     match &knob.standing {
         Standing::Free => {}
-        Standing::Follows(reason) if reason.is_empty() => help += "\nFollows from other values",
+        Standing::Follows(reason) if reason.is_empty() => {
+            help += "\nFollows from other values, or has no effect with them"
+        }
         Standing::Follows(reason) => help += &format!("\n{reason}"),
         Standing::Fixed => help += "\nCannot change while the loop runs",
     }

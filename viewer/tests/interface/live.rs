@@ -220,7 +220,9 @@ fn physical_parameters_drive_the_rigidities_and_not_the_other_way_round() {
     };
     assert_eq!(standing(&window, "wire_diameter_mm"), Standing::Free);
     assert!(matches!(standing(&window, "gamma_n"), Standing::Follows(_)));
-    window.get_by_label("Follow from these");
+    window.get_by_label("Follow from these, or have no effect");
+    // Under a seat that is held, friction has no effect.
+    assert!(matches!(standing(&window, "seat_friction"), Standing::Follows(_)));
     assert!(window.get_by_role_and_label(Role::Slider, "gamma").accesskit_node().is_disabled());
     let before = number_of(&window, "gamma_n");
     window.get_by_role_and_label(Role::Slider, "wire diameter").set_value_accesskit(0.8);
@@ -232,6 +234,8 @@ fn physical_parameters_drive_the_rigidities_and_not_the_other_way_round() {
     let (window, _host, _folder) = live(&[("mode", "gamma")]);
     assert!(matches!(standing(&window, "wire_diameter_mm"), Standing::Follows(_)));
     assert_eq!(standing(&window, "gamma_n"), Standing::Free);
+    let (window, _host, _folder) = live(&[("seat", "free")]);
+    assert_eq!(standing(&window, "seat_friction"), Standing::Free);
 }
 
 fn number_of(window: &Window<'_>, parameter: &str) -> f64 {

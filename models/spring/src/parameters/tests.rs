@@ -67,6 +67,17 @@ fn derived_numbers_and_choices_are_refused() {
     }
 }
 
+/// A number of a seat that is held would change nothing: it is refused, as one that follows from others is.
+#[test]
+fn friction_is_refused_under_a_seat_that_is_held() {
+    let friction = index("seat_friction");
+    let held = choice(Preset::Thesis1, Mode::Gamma);
+    let refused = held.with(friction, held.in_force(friction)).err().unwrap();
+    assert!(refused.min.is_nan() && refused.max.is_nan() && refused.value == 10.0);
+    let free = Choice { seat: SeatChoice::Free, ..held };
+    assert_eq!(free.with(friction, 0.1).unwrap().in_force(friction), 0.1);
+}
+
 #[test]
 fn what_does_not_fit_is_refused_with_the_range_that_does() {
     let choice = choice(Preset::Thesis1, Mode::Physical);
