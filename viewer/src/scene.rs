@@ -77,6 +77,8 @@ pub struct SceneFacts {
     pub peak_part: f64,
     /// True where turns of a coil touch.
     pub touching: bool,
+    /// True if a body is off its seat.
+    pub lifted: bool,
     /// True if a model had no shape at this pose.
     pub no_shape: bool,
     /// Where the devices stand.
@@ -231,6 +233,9 @@ impl SceneBuilder {
                 }
                 (Rest::Solid(_), Posed::Slender { .. }) => 0.0,
             };
+            if let (Rest::Slender(body), Posed::Slender { curve, .. }) = (shape.rest(), posed) {
+                facts.lifted |= is_lifted(body, curve);
+            }
             facts.peak_part = facts.peak_part.max(part);
         }
         if posed.is_empty() {
@@ -243,6 +248,16 @@ impl SceneBuilder {
         for solid in solids() {
             let opacity = if solid.surface.triangles.is_empty() { u8::MAX } else { SEEN_THROUGH };
             self.primitives(solid, Part::Tool, with_opacity(palette.plates[0], opacity));
+        }
+        // Where a lifted body stood: its lower plate, seen through.
+        for (shape, posed) in drawn() {
+            if let (Rest::Slender(body), Posed::Slender { curve, .. }) = (shape.rest(), posed)
+                && is_lifted(body, curve)
+            {
+                let (seat, radius_m) = (body.rest.section(0.0), plate_radius_m(body));
+                let color = with_opacity(palette.plates[1], SEEN_THROUGH);
+                plate(&mut self.mesh, &seat, radius_m, PLATE_THICKNESS * radius_m, -1.0, color);
+            }
         }
         for solid in solids() {
             self.primitives(solid, Part::Body, with_opacity(palette.body, SEEN_THROUGH));
@@ -394,6 +409,18 @@ fn plate_radius_m(body: &Body) -> f64 {
     PLATE_OVERHANG * body.info.plate_radius_m
 }
 
+/// Whether the lower plate of a body hangs above where it stands at rest: no point of its rim reaches down to there.
+fn is_lifted(body: &Body, curve: &Curve) -> bool {
+    /// What is less is not seen, in radii.
+    const LEAST: f64 = 0.02;
+    let radius_m = body.info.plate_radius_m;
+    let (now, rest) = (curve.section(0.0), body.rest.section(0.0));
+    let up = rest.orientation * DVec3::Z;
+    let tilt = (now.orientation * DVec3::Z).dot(up).clamp(-1.0, 1.0);
+    let lowest_m = (now.center_m - rest.center_m).dot(up) - radius_m * (1.0 - tilt * tilt).sqrt();
+    radius_m > 0.0 && lowest_m > LEAST * radius_m
+}
+
 /// Adds a body with its plates; gives the largest part of the scale of strain in it.
 fn body_of(
     mesh: &mut Mesh,
@@ -462,6 +489,33 @@ mod tests {
                 assert!(x.abs() < 0.98 && y.abs() < 0.98, "{force_n}: {x}, {y}");
             }
         }
+    }
+
+    /// A plate that rolls on its rim or slides stands on its seat; one that hangs above it is lifted.
+    #[test]
+    fn a_plate_off_its_seat_is_lifted() {
+        use flotor_hal::extension::centerline::CenterlineInfo;
+        use flotor_hal::glam::DQuat;
+        let radius_m = 0.004;
+        let sections = |base_m: DVec3, tilt_rad: f64| {
+            let turn = DQuat::from_rotation_y(tilt_rad);
+            let section = |i: u8| Pose::new(base_m + turn * DVec3::Z * (0.001 * f64::from(i)), turn);
+            (0..25).map(section).collect::<Vec<_>>()
+        };
+        let seat_m = DVec3::new(0.0, 0.0, -0.025);
+        let info = CenterlineInfo::coil(0.0003, 0.003, 12.0, radius_m);
+        let body = Body::new(info, &sections(seat_m, 0.0)).expect("a spring");
+        let is_lifted = |base_m: DVec3, tilt_rad: f64| {
+            is_lifted(&body, &Curve::through(&sections(base_m, tilt_rad)).expect("a curve"))
+        };
+        let on_rim = seat_m + DVec3::Z * radius_m * 0.3_f64.sin();
+        assert!(!is_lifted(seat_m, 0.0) && !is_lifted(on_rim, 0.3) && !is_lifted(on_rim, -0.3));
+        assert!(!is_lifted(seat_m + DVec3::X * 0.01, 0.0), "it slid");
+        assert!(is_lifted(seat_m + DVec3::Z * 0.001, 0.0) && is_lifted(on_rim + DVec3::Z * 0.001, 0.3));
+        let free_end = CenterlineInfo::coil(0.0003, 0.003, 12.0, 0.0);
+        let tube = Body::new(free_end, &sections(seat_m, 0.0)).expect("a tube");
+        let above = Curve::through(&sections(DVec3::ZERO, 0.0)).expect("a curve");
+        assert!(!super::is_lifted(&tube, &above), "without a plate there is no seat");
     }
 
     /// A builder that has made pictures before makes the same one as a new builder.

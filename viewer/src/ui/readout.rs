@@ -112,6 +112,7 @@ pub fn happened(events: Events) -> impl Iterator<Item = &'static str> {
 /// What people should know about the bodies that are drawn.
 pub fn of_shapes(facts: &SceneFacts) -> impl Iterator<Item = &'static str> {
     let shape = [
+        (facts.lifted, "Off its seat: the lower plate hangs in the air, without load"),
         (facts.touching, "Coils touch: from here the spring is far stiffer than the model"),
         (facts.no_shape, "No shape at this pose: the model gives none"),
     ];
