@@ -12,7 +12,37 @@ pub struct EffectSize {
     pub value: f64,
     /// Lower and upper end.
     pub interval: [f64; 2],
+    /// How far the interval was searched for.
+    #[serde(skip_serializing_if = "Reach::is_whole")]
+    pub reach: Reach,
 }
+
+/// Whether both ends of an interval were found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reach {
+    /// They were.
+    Whole,
+    /// An end is where the search ends ([`MOST_OF_T`], [`MOST_OF_F`]), and the true one lies farther out.
+    OrWider,
+}
+
+impl Reach {
+    fn of(ends: [f64; 2], most: f64) -> Self {
+        // A bisection ends within an ulp.
+        if ends.iter().any(|end| end.abs() > most * (1.0 - 1.0e-12)) { Self::OrWider } else { Self::Whole }
+    }
+
+    #[allow(clippy::trivially_copy_pass_by_ref)] // as serde asks
+    fn is_whole(&self) -> bool {
+        *self == Self::Whole
+    }
+}
+
+/// Largest noncentrality of a t that is searched: beyond, the series underflows in doubles.
+pub const MOST_OF_T: f64 = 37.0;
+/// Largest noncentrality of an F that is searched, for the same reason.
+pub const MOST_OF_F: f64 = 1400.0;
 
 /// Tail of each side of an interval.
 const TAIL: f64 = 0.025;
@@ -25,22 +55,24 @@ const TERMS: u32 = 5000;
 #[must_use]
 pub fn of_pairs(t: &TTest) -> EffectSize {
     let root_n = (t.df + 1.0).sqrt();
-    let ends = [1.0 - TAIL, TAIL].map(|below| noncentrality_of_t(t.value, t.df, below) / root_n);
-    EffectSize { value: t.value / root_n, interval: ends }
+    let ends = [1.0 - TAIL, TAIL].map(|below| noncentrality_of_t(t.value, t.df, below));
+    let reach = Reach::of(ends, MOST_OF_T);
+    EffectSize { value: t.value / root_n, interval: ends.map(|end| end / root_n), reach }
 }
 
 /// Partial eta squared of an F.
 #[must_use]
 pub fn partial_eta_squared(f: f64, df: f64, error_df: f64) -> EffectSize {
     let share = |noncentrality: f64| noncentrality / (noncentrality + df + error_df + 1.0);
-    let ends = [1.0 - TAIL, TAIL].map(|below| share(noncentrality_of_f(f, df, error_df, below)));
-    EffectSize { value: f * df / (f * df + error_df), interval: ends }
+    let ends = [1.0 - TAIL, TAIL].map(|below| noncentrality_of_f(f, df, error_df, below));
+    let reach = Reach::of(ends, MOST_OF_F);
+    EffectSize { value: f * df / (f * df + error_df), interval: ends.map(share), reach }
 }
 
 /// The noncentrality at which a t is as small as this with a probability.
 fn noncentrality_of_t(t: f64, df: f64, below: f64) -> f64 {
-    // The distribution moves up with the noncentrality. In doubles its series holds to about 37.
-    bisect([-37.0, 37.0], |delta| noncentral_t_below(t, df, delta) > below)
+    // The distribution moves up with the noncentrality.
+    bisect([-MOST_OF_T, MOST_OF_T], |delta| noncentral_t_below(t, df, delta) > below)
 }
 
 /// The noncentrality at which an F is as small as this with a probability; 0 if it is never that large.
@@ -48,7 +80,7 @@ fn noncentrality_of_f(f: f64, df: f64, error_df: f64, below: f64) -> f64 {
     if noncentral_f_below(f, df, error_df, 0.0) <= below {
         return 0.0;
     }
-    bisect([0.0, 1400.0], |lambda| noncentral_f_below(f, df, error_df, lambda) > below)
+    bisect([0.0, MOST_OF_F], |lambda| noncentral_f_below(f, df, error_df, lambda) > below)
 }
 
 /// Where a condition that holds at the lower end begins to fail.

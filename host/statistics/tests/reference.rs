@@ -260,6 +260,26 @@ fn sizes_of_effects_have_the_intervals_of_the_noncentral_distributions() {
     }
 }
 
+/// An interval that ends where the search does says so, and no other.
+#[test]
+fn an_interval_that_was_not_found_to_its_end_says_so() {
+    use flotor_statistics::effect_size::{Reach, of_pairs, partial_eta_squared};
+    use flotor_statistics::t_test::TTest;
+    let t = |value| of_pairs(&TTest { df: 15.0, value, p: 0.0, difference: 0.0, interval: [0.0; 2] });
+    for (value, reach) in
+        [(3.3, Reach::Whole), (20.0, Reach::Whole), (30.0, Reach::OrWider), (-200.0, Reach::OrWider)]
+    {
+        assert_eq!(t(value).reach, reach, "t = {value}: {:?}", t(value));
+    }
+    for (f, reach) in [(11.94, Reach::Whole), (0.0, Reach::Whole), (2000.0, Reach::OrWider)] {
+        assert_eq!(partial_eta_squared(f, 1.0, 14.0).reach, reach, "F = {f}");
+    }
+    let json = serde_json::to_string(&t(3.3)).expect("JSON");
+    assert!(!json.contains("reach"), "{json}");
+    let json = serde_json::to_string(&t(200.0)).expect("JSON");
+    assert!(json.contains(r#""reach":"or-wider""#), "{json}");
+}
+
 const T_SIZES: [(f64, f64, [f64; 3]); 4] = [
     (3.3, 15.0, [0.825, 0.244_200_668_6, 1.385_636_383_7]),
     (0.4, 7.0, [0.141_421_356_2, -0.560_219_492_8, 0.833_282_324_2]),

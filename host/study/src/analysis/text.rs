@@ -6,7 +6,7 @@ use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PostHoc, published
 use crate::trial::Modality;
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
-use flotor_statistics::effect_size::{EffectSize, partial_eta_squared};
+use flotor_statistics::effect_size::{EffectSize, Reach, partial_eta_squared};
 
 pub(super) fn jnd(analysis: &JndAnalysis) -> String {
     let mut page = Page::beside(analysis.beside);
@@ -160,7 +160,8 @@ impl Page {
 
 fn size_text(size: &EffectSize) -> String {
     let [low, high] = size.interval;
-    format!("{:.2}  ({low:.2} to {high:.2})", size.value)
+    let wider = if size.reach == Reach::OrWider { ", or wider" } else { "" };
+    format!("{:.2}  ({low:.2} to {high:.2}{wider})", size.value)
 }
 
 fn interval_text(value: &MeanInterval) -> String {

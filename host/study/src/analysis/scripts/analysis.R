@@ -47,7 +47,7 @@ first <- sapply(subjects, function(subject) trials$first_modality[trials$subject
 number <- function(value) format(value, digits = 15, trim = TRUE)
 say <- function(...) cat(paste(...), "\n", sep = "")
 p_text <- function(p) if (p < 0.001) "p < 0.001" else sprintf("p = %.3f", p)
-size_text <- function(size) sprintf("%.2f (%.2f to %.2f)", size[1], size[2], size[3])
+size_text <- function(size) sprintf("%.2f (%.2f to %.2f%s)", size[1], size[2], size[3], if (size[4]) ", or wider" else "")
 se <- function(x) sd(x) / sqrt(length(x))
 
 contrasts_of <- function(count) qr.Q(qr(cbind(1, diag(count)[, -1, drop = FALSE])))[, -1, drop = FALSE]
@@ -120,12 +120,14 @@ partial_eta_squared <- function(effect) {
   }
   share <- function(shift) shift / (shift + effect$df + effect$error_df + 1)
   explained <- effect$f * effect$df
-  c(explained / (explained + effect$error_df), share(end(0.975)), share(end(0.025)))
+  ends <- c(end(0.975), end(0.025))
+  c(explained / (explained + effect$error_df), share(ends), any(ends >= 1400))
 }
 
 cohen_d <- function(t, df) {
   end <- function(below) solve_for(function(shift) suppressWarnings(pt(t, df, ncp = shift)) - below, -37, 37)
-  c(t, end(0.975), end(0.025)) / sqrt(df + 1)
+  ends <- c(end(0.975), end(0.025))
+  c(c(t, ends) / sqrt(df + 1), any(abs(ends) >= 37))
 }
 
 effects <- function(values, factors, counts, groups, sizes) {

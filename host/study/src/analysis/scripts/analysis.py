@@ -64,8 +64,9 @@ def p_text(p):
     return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
 
 
-def size_text(value, low, high):
-    return f"{value:.2f} ({low:.2f} to {high:.2f})"
+def size_text(value, low, high, is_cut):
+    wider = ", or wider" if is_cut else ""
+    return f"{value:.2f} ({low:.2f} to {high:.2f}{wider})"
 
 
 def contrasts(count):
@@ -147,7 +148,8 @@ def noncentral_f(f, df, error_df, below):
 def partial_eta_squared(effect):
     f, df, error_df, _ = effect
     ends = [noncentral_f(f, df, error_df, below) for below in (0.975, 0.025)]
-    return (f * df / (f * df + error_df), *(end / (end + df + error_df + 1.0) for end in ends))
+    shares = [end / (end + df + error_df + 1.0) for end in ends]
+    return f * df / (f * df + error_df), *shares, max(ends) >= 1400.0
 
 
 def noncentral_t_below(t, df, shift):
@@ -163,7 +165,7 @@ def noncentral_t_below(t, df, shift):
 def cohen_d(t, df):
     root = np.sqrt(df + 1.0)
     ends = [solve(lambda d: noncentral_t_below(t, df, d) - below, -37.0, 37.0) for below in (0.975, 0.025)]
-    return t / root, ends[0] / root, ends[1] / root
+    return t / root, ends[0] / root, ends[1] / root, max(map(abs, ends)) >= 37.0
 
 
 def effects(values, factors, groups, sizes):
