@@ -272,8 +272,9 @@ impl Network {
     /// Steps without drag until the masses rest against a ball, at most so often: whenever the kinetic energy has passed a peak,
     /// all velocities are taken away (Cundall 1976). Not real-time.
     pub fn relax(&mut self, ball: &Ball, most_steps: usize) {
-        /// It rests when nothing moves by more of a ball's radius in a step.
-        const STILL: f64 = 1.0e-5;
+        /// It rests when nothing moves by more of a ball's radius in a step: then a sheet is within some micrometres of where it
+        /// goes, a tenth of a pixel.
+        const STILL: f64 = 1.0e-4;
         // Without drag, contacts that come and go pump up what swings with three or four steps a period: not below eight.
         let step_s = 0.5 * self.longest_step_s;
         let drag_per_s = std::mem::take(&mut self.surroundings.damping_per_s);

@@ -69,6 +69,8 @@ pub struct Membrane {
     parameters: [f64; SCHEMA.len()],
     /// The masses of the last picture, at rest.
     pictured: State,
+    /// Centre of the ball in the last picture, m.
+    pictured_at_m: Option<DVec3>,
     untouched_m: Vec<DVec3>,
     drawn: Shape,
 }
@@ -162,6 +164,7 @@ impl ForceModel for Membrane {
         };
         Ok(Self {
             pictured,
+            pictured_at_m: None,
             untouched_m: mesh.positions_m,
             drawn: Shape { primitives: Vec::new(), surface },
             touch: Touch::new(network, radius_m, DVec3::Z * radius_m),
@@ -207,6 +210,11 @@ impl ShapeModel for Membrane {
     fn shape(&mut self, input: &Input) -> &Shape {
         let handle_m = Self::reached(input).map_or(DVec3::ZERO, |(handle_m, _)| handle_m);
         let centre_m = self.centre_m(handle_m);
+        // Nothing that may change in a run moves a sheet at rest but the ball.
+        if self.pictured_at_m == Some(centre_m) {
+            return &self.drawn;
+        }
+        self.pictured_at_m = Some(centre_m);
         self.touch.rest_under(centre_m, &mut self.pictured, MOST_STEPS_A_PICTURE);
         let Shape { primitives, surface } = &mut self.drawn;
         let positions_m = self.pictured.positions_m();

@@ -179,6 +179,8 @@ fn the_picture_is_the_sheet_at_rest_whatever_was_before() {
         lowest_m = lowest_m.min(a.z);
     }
     assert!(lowest_m < -0.003, "{lowest_m}");
+    // Turned in the hand of an observer, it is the same picture.
+    assert_eq!(picture(&mut roundabout, &here).surface.vertices, again.surface.vertices);
     let (mut seen, mut unseen) = (make(), make());
     let _ = picture(&mut seen, &there);
     for step in 0..20 {
