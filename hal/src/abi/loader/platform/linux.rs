@@ -126,3 +126,44 @@ fn end_of_section_headers(header: &FileHeader64<Endianness>) -> object::Result<u
     let size = u64::from(header.e_shnum(endian)) * u64::from(header.e_shentsize(endian));
     Ok(header.e_shoff(endian).saturating_add(size))
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::extension::independent_stop::means::Independence;
+    use crate::{IndependentStop, StoppedState};
+    use std::io::Read;
+    use std::os::fd::AsRawFd;
+
+    #[test]
+    fn a_message_and_a_handle_are_kept_beyond_the_plugins_own() {
+        let (mut reader, writer) = std::io::pipe().expect("a pipe");
+        let told = IndependentStop::by_message(writer.as_raw_fd(), b"stop", StoppedState::Zero, 0);
+        let means = Independence::of(&told).expect("it is right");
+        drop(writer);
+        let Independence::Message { handle, message, state } = means else { panic!("{means:?}") };
+        assert_eq!((message.as_slice(), state), (&b"stop"[..], StoppedState::Zero));
+        drop(handle);
+        assert_eq!(reader.read(&mut [0; 4]).expect("it ends"), 0, "nobody holds the other end any more");
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_refused() {
+        let (reader, _writer) = std::io::pipe().expect("a pipe");
+        let right = IndependentStop::by_message(reader.as_raw_fd(), b"stop", StoppedState::Zero, 0);
+        for (wrong, words) in [
+            (right, "cannot be written"),
+            (IndependentStop { descriptor: 1_000_000, ..right }, "names the descriptor 1000000"),
+            (IndependentStop { descriptor: -7, ..right }, "names the descriptor -7"),
+            (IndependentStop { length: 65, ..right }, "has 65 bytes"),
+            (IndependentStop { length: 0, ..right }, "has 0 bytes"),
+            (IndependentStop { state: 2, ..right }, "state 2"),
+            (IndependentStop { descriptor: -1, ..right }, "no descriptor"),
+        ] {
+            let refused = Independence::of(&wrong).expect_err("it is wrong").to_string();
+            assert!(refused.contains(words), "{refused}");
+        }
+        let own = IndependentStop::by_itself(StoppedState::Landed, 5);
+        let own = Independence::of(&own).expect("it is right");
+        assert!(matches!(own, Independence::Itself { within_ns: 5, state: StoppedState::Landed }));
+    }
+}
