@@ -13,6 +13,7 @@
 mod error;
 pub mod options;
 mod output;
+mod platform;
 mod progress;
 mod reference;
 pub mod separate;

@@ -324,7 +324,9 @@ mod tests {
     fn the_argument_after_json_is_not_overwritten() {
         assert_eq!(json_output("-"), Ok("-".into()));
         assert_eq!(json_output("run.json"), Ok("run.json".into()));
-        assert_eq!(json_output("/dev/full"), Ok("/dev/full".into()));
+        if Path::new("/dev/full").is_absolute() {
+            assert_eq!(json_output("/dev/full"), Ok("/dev/full".into()));
+        }
         for other in ["scene.toml", "spring", "libmy_model.so", "/tmp"] {
             let told = "the result is JSON; name it FILE.json, or write - for standard output";
             assert_eq!(json_output(other), Err(told.to_owned()), "{other}");

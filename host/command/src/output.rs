@@ -1,5 +1,6 @@
 //! What commands print, for people and for machines.
 
+use crate::platform::results_apart;
 use crate::{CommandError, style};
 use std::fs::File;
 use std::io::Write;
@@ -25,7 +26,7 @@ pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     };
     if flotor_session::is_left_behind() {
         let _ = std::io::stdout().flush();
-        signal_hook::low_level::exit(code.into());
+        flotor_servo::last_stop::leave_process(code.into());
     }
     ExitCode::from(code)
 }
@@ -40,9 +41,7 @@ static RESULTS: OnceLock<File> = OnceLock::new();
 /// What the system says.
 pub fn keep_results_apart() -> Result<(), CommandError> {
     let moved = || {
-        let own = rustix::io::fcntl_dupfd_cloexec(std::io::stdout(), 3)?;
-        rustix::stdio::dup2_stdout(std::io::stderr())?;
-        let _ = RESULTS.set(File::from(own));
+        let _ = RESULTS.set(results_apart()?);
         Ok(())
     };
     moved().map_err(|cause: std::io::Error| {

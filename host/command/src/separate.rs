@@ -4,9 +4,8 @@
 //! in their name, so two workspaces in one folder would overwrite each other's.
 
 use crate::CommandError;
-use rustix::process::{Pid, Signal, kill_process};
+use crate::platform::{ask_to_end, become_program};
 use std::ffi::OsString;
-use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 
@@ -82,7 +81,7 @@ impl SeparateProgram<'_> {
     /// # Errors
     /// If it is not there or cannot be started.
     pub fn become_with(&self, arguments: &[OsString]) -> Result<(), CommandError> {
-        let cause = self.command()?.args(arguments).exec();
+        let cause = become_program(self.command()?.args(arguments));
         Err(CommandError::file(self.program.as_ref(), "cannot be started", cause))
     }
 }
@@ -94,8 +93,7 @@ impl Drop for Running {
     fn drop(&mut self) {
         // The number of a process that has ended and been waited for may be another's by now.
         if self.0.try_wait().ok().flatten().is_none() {
-            let process = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw);
-            let _ = process.map(|process| kill_process(process, Signal::TERM));
+            ask_to_end(&mut self.0);
         }
         let _ = self.0.wait();
     }

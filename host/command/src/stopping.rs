@@ -3,35 +3,17 @@
 //! If an orderly end takes too long, the user repeats the signal: the second one is an emergency stop, the
 //! third ends the process, as does the second one some seconds later. Before anything is energised, the first does.
 //!
-//! The signals are blocked in every thread, and a thread of their own waits for them: a plugin that installs handlers or
-//! blocks signals takes none of them away.
+//! A thread of its own waits for what asks. On Linux these are signals, blocked in every other thread: a plugin that installs
+//! handlers or blocks signals takes none of them away. On Windows they are events of the console, and Ctrl-Break ends a run at once.
 
 use super::note;
-use flotor_servo::last_stop::{
-    block_signals, leave_process, leave_sent_signals_to_the_loop, stop_all, wait_for_signal, was_armed,
-};
+use crate::platform::{INTERRUPTED, KeyTerminal, Request, Requests, outlive_requests};
+use flotor_servo::last_stop::{leave_process, stop_all, was_armed};
 use flotor_servo::{EmergencySource, StopSwitch, enter_guard_priority};
-use rustix::process::getpgrp;
-use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
-use signal_hook::consts::{
-    SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
-    SIGXFSZ,
-};
-use signal_hook::flag;
 use std::io::{self, Read, stdin};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
-
-/// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as shells have it.
-const INTERRUPTED: i32 = 130;
-
-/// Signals that stop a run: the keys of a terminal (Ctrl-C, `Ctrl-\`, Ctrl-Z), its closing, and process managers.
-///
-/// By itself a terminal would end the process with the device unstopped, or, at Ctrl-Z, suspend the loop and its
-/// watchdog together, with the last force held.
-const ENDING: [i32; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP];
 
 /// Signals this close together are one request: `timeout` signals its child and then the group the child is in, a
 /// terminal that closes tells the shell, which tells its jobs. A person takes longer.
@@ -65,8 +47,7 @@ pub fn stop_run_on_signals() -> StopSwitch {
 
 /// Whatever asks this process to end does not: it ends by itself.
 pub fn outlive_signals() {
-    let signals = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGXFSZ];
-    if let Err(error) = block_signals(&[&ENDING[..], &signals].concat()) {
+    if let Err(error) = outlive_requests() {
         note(format_args!("cannot block signals: {error}"));
     }
 }
@@ -80,49 +61,26 @@ fn heard(first: First) -> StopSwitch {
 }
 
 fn register(first: First, stop: &StopSwitch) -> io::Result<()> {
-    // Started with `nohup`, a run is to outlive its terminal.
-    let heard: Vec<i32> = ENDING
-        .into_iter()
-        .filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP))
-        .chain([SIGUSR1])
-        .collect();
-    block_signals(&heard)?;
-    // This thread may wait for a processor while a plugin in the loop keeps it busy.
-    leave_sent_signals_to_the_loop()?;
-    // A thread that does not block them, because a library has unblocked them, does no harm when it takes one.
-    for signal in &heard {
-        let flag = if *signal == SIGUSR1 { stop.emergency_flag() } else { stop.stop_flag() };
-        flag::register(*signal, flag)?;
-    }
-    // Otherwise a file at its size limit would end the process, not the recording.
-    flag::register(SIGXFSZ, Arc::<AtomicBool>::default())?;
+    let requests = Requests::listen(stop)?;
     let stop = stop.clone();
     let thread = std::thread::Builder::new().name("flotor-signals".to_owned());
-    thread.spawn(move || attend(&heard, first, &stop))?;
+    thread.spawn(move || attend(&requests, first, &stop))?;
     Ok(())
 }
 
-/// Whether this process was started with a signal ignored.
-fn is_ignored(signal: i32) -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
-    (ignored >> (signal - 1)) & 1 == 1 // the lowest bit is signal 1
-}
-
 /// Waits for signals as long as the process lives.
-fn attend(signals: &[i32], first: First, stop: &StopSwitch) {
+fn attend(requests: &Requests, first: First, stop: &StopSwitch) {
     // Above a loop that hogs its core.
     enter_guard_priority();
     let mut insistence = Insistence::default();
     loop {
-        let Some(signal) = wait_for_signal(signals, LAST_PATIENCE) else {
+        let Some(request) = requests.next(LAST_PATIENCE) else {
             if insistence.is_out_of_patience(Instant::now()) {
                 leave();
             }
             continue;
         };
-        if signal == SIGUSR1 {
+        if request == Request::Emergency {
             stop.emergency_flag().store(true, Ordering::Relaxed);
             continue;
         }
@@ -185,22 +143,14 @@ impl Insistence {
 
 /// Keys without a line end, while it lives.
 pub struct Keys {
-    before: Termios,
+    _terminal: KeyTerminal,
 }
 
 impl Keys {
     /// Listens to the terminal: space is the emergency stop, `q` an orderly end. `None` where there is no terminal
     /// to listen to: in a pipe, in the background.
     pub fn listen(stop: &StopSwitch) -> Option<Self> {
-        let terminal = stdin();
-        // Changing the terminal from the background would suspend the process.
-        if !isatty(&terminal) || tcgetpgrp(&terminal).ok()? != getpgrp() {
-            return None;
-        }
-        let before = tcgetattr(&terminal).ok()?;
-        let mut keys = before.clone();
-        keys.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO);
-        tcsetattr(&terminal, OptionalActions::Now, &keys).ok()?;
+        let terminal = KeyTerminal::take()?;
         let stop = stop.clone();
         // Ends with the process: nothing can call it back from a read.
         let thread = std::thread::Builder::new().name("flotor-keys".to_owned());
@@ -213,14 +163,8 @@ impl Keys {
                 }
             }
         });
-        let keys = Self { before }; // dropped, and the terminal put right, if there is no thread
+        let keys = Self { _terminal: terminal }; // dropped, and the terminal put right, if there is no thread
         listening.ok().map(|_| keys)
-    }
-}
-
-impl Drop for Keys {
-    fn drop(&mut self) {
-        let _ = tcsetattr(stdin(), OptionalActions::Now, &self.before);
     }
 }
 
@@ -258,12 +202,6 @@ mod tests {
         assert!(!insistence.is_out_of_patience(later), "an orderly end may take its time");
         assert_eq!(insistence.answer(start), Answer::AtOnce);
         assert!(!insistence.is_out_of_patience(start) && insistence.is_out_of_patience(later));
-    }
-
-    #[test]
-    fn ignored_signals_are_known() {
-        assert!(!is_ignored(signal_hook::consts::SIGKILL), "no process can ignore it");
-        assert!(is_ignored(signal_hook::consts::SIGPIPE), "Rust starts every program so");
     }
 
     #[test]

@@ -10,6 +10,7 @@
 
 pub mod call_timer;
 pub mod plant;
+mod platform;
 pub mod sampling;
 pub mod stress;
 pub mod subject;

@@ -14,6 +14,7 @@ pub mod bench;
 pub mod cli;
 pub mod evaluate;
 pub mod jitter;
+mod platform;
 pub mod poses;
 pub mod replay;
 pub mod stability;

@@ -2,11 +2,11 @@
 
 use crate::frame::{Frames, Kind, LongFrame, frame, ticks_from_payload};
 use crate::message::{Answer, Ask, ChangeMessage, End, Greeting, Request};
+use crate::platform::{Stream, connect};
 use crate::{Directory, Found, PROTOCOL};
 use flotor_core::trace::TickRecord;
 use flotor_record::RunDescription;
 use std::io::{self, ErrorKind, Write};
-use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -76,7 +76,7 @@ pub enum Event {
 /// A run being watched.
 #[derive(Debug)]
 pub struct Client {
-    stream: UnixStream,
+    stream: Stream,
     frames: Frames,
     asker: Asker,
     greeting: Greeting,
@@ -86,7 +86,7 @@ pub struct Client {
 /// Asks a run for something, from any thread; clone it freely.
 #[derive(Clone, Debug)]
 pub struct Asker {
-    stream: Arc<Mutex<UnixStream>>,
+    stream: Arc<Mutex<Stream>>,
     number: Arc<AtomicU64>,
 }
 
@@ -132,7 +132,7 @@ impl Client {
     /// # Errors
     /// [`LiveError`].
     pub fn connect(path: &Path) -> Result<Self, LiveError> {
-        let mut stream = UnixStream::connect(path)?;
+        let mut stream = connect(path)?;
         let mut frames = Frames::default();
         let until = Instant::now() + GREETING_WAIT;
         let greeting = read_frame(&mut stream, &mut frames, until, |kind, payload| {
@@ -206,7 +206,7 @@ impl Asker {
 
 /// Reads until a frame is of use, or the time is over.
 fn read_frame<T>(
-    stream: &mut UnixStream,
+    stream: &mut Stream,
     frames: &mut Frames,
     until: Instant,
     mut use_of: impl FnMut(Kind, &[u8]) -> Option<T>,

@@ -1,19 +1,15 @@
 //! Where running hosts are found: one socket a run, in a folder that belongs to the user alone.
 
-use rustix::process::{Pid, getuid, test_kill_process};
+use crate::platform::{Listening, is_ours, is_ours_alone, make_folder, remove_if_over, run_folder};
 use std::ffi::OsStr;
-use std::fs::{DirBuilder, DirEntry, Metadata};
+use std::fs::DirEntry;
 use std::io;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt};
-use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::SystemTime;
 
 /// Ending of a socket's name.
 const SUFFIX: &str = "run";
-/// Nobody but the owner.
-const PRIVATE: u32 = 0o700;
 
 /// The folder of the sockets of running hosts.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,15 +50,11 @@ pub enum DirectoryError {
 }
 
 impl Directory {
-    /// `$XDG_RUNTIME_DIR/flotor`, else `/tmp/flotor-UID`.
+    /// `$XDG_RUNTIME_DIR/flotor`, else `/tmp/flotor-UID`; on Windows `%LOCALAPPDATA%\\flotor\\run`.
     #[must_use]
     pub fn of_this_user() -> Self {
         let runtime = std::env::var_os("XDG_RUNTIME_DIR").filter(|path| Path::new(path).is_dir());
-        let path = match runtime {
-            Some(runtime) => Path::new(&runtime).join("flotor"),
-            None => std::env::temp_dir().join(format!("flotor-{}", getuid().as_raw())),
-        };
-        Self { path }
+        Self { path: runtime.map_or_else(run_folder, |runtime| Path::new(&runtime).join("flotor")) }
     }
 
     /// Another folder.
@@ -80,7 +72,7 @@ impl Directory {
     /// Whether it is a folder of this user. Of another user's nothing is believed: in `/tmp` anybody can make one of this name.
     #[must_use]
     pub fn is_ours(&self) -> bool {
-        std::fs::symlink_metadata(&self.path).is_ok_and(|attributes| is_our_folder(&attributes))
+        std::fs::symlink_metadata(&self.path).is_ok_and(|attributes| is_ours(&attributes))
     }
 
     /// The files in it; none in a folder of another user.
@@ -97,8 +89,7 @@ impl Directory {
             .filter_map(|entry| {
                 let path = entry.path();
                 let process = process_of(&path)?;
-                if !lives(process) {
-                    let _ = std::fs::remove_file(&path); // somebody else may have been faster
+                if remove_if_over(&path, process) {
                     return None;
                 }
                 let since = entry.metadata().ok()?.modified().ok()?;
@@ -129,7 +120,7 @@ impl Directory {
         let path = self.path.join(format!("{}-{number}.{SUFFIX}", std::process::id()));
         // A process of this number may have died without cleaning up.
         let _ = std::fs::remove_file(&path);
-        let socket = UnixListener::bind(&path).map_err(unusable(&path))?;
+        let socket = Listening::bind(&path).map_err(unusable(&path))?;
         Ok(Listener { socket, path })
     }
 }
@@ -137,14 +128,14 @@ impl Directory {
 /// A socket that others can find; gone when dropped.
 #[derive(Debug)]
 pub struct Listener {
-    socket: UnixListener,
+    socket: Listening,
     path: PathBuf,
 }
 
 impl Listener {
     /// The socket.
     #[must_use]
-    pub fn socket(&self) -> &UnixListener {
+    pub(crate) fn socket(&self) -> &Listening {
         &self.socket
     }
 
@@ -163,17 +154,13 @@ impl Drop for Listener {
 
 /// Makes a folder that only its user may enter, if it is not there.
 pub(crate) fn private(path: &Path) -> Result<(), DirectoryError> {
-    DirBuilder::new().recursive(true).mode(PRIVATE).create(path).map_err(unusable(path))?;
+    make_folder(path).map_err(unusable(path))?;
     let attributes = std::fs::symlink_metadata(path).map_err(unusable(path))?;
-    if is_our_folder(&attributes) && attributes.mode() & 0o077 == 0 {
+    if is_ours_alone(&attributes) {
         Ok(())
     } else {
         Err(DirectoryError::NotPrivate { path: path.to_path_buf() })
     }
-}
-
-fn is_our_folder(attributes: &Metadata) -> bool {
-    attributes.is_dir() && attributes.uid() == getuid().as_raw()
 }
 
 pub(crate) fn unusable(path: &Path) -> impl FnOnce(io::Error) -> DirectoryError {
@@ -188,16 +175,9 @@ fn process_of(path: &Path) -> Option<u32> {
     (path.extension() == Some(OsStr::new(SUFFIX))).then(|| process.parse().ok())?
 }
 
-/// Whether a process exists; one of somebody else's counts.
-pub(crate) fn lives(process: u32) -> bool {
-    let Some(process) = i32::try_from(process).ok().and_then(Pid::from_raw) else { return false };
-    test_kill_process(process) != Err(rustix::io::Errno::SRCH)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::fs::PermissionsExt;
 
     #[test]
     fn a_run_is_found_while_it_lives() {
@@ -210,53 +190,5 @@ mod tests {
         assert_eq!(found, [first.path(), second.path()]);
         drop(first);
         assert_eq!(directory.runs().len(), 1);
-    }
-
-    #[test]
-    fn what_the_dead_left_behind_is_removed_and_nothing_else() {
-        let scratch = tempfile::tempdir().unwrap();
-        let directory = Directory::at(scratch.path());
-        let mut child = std::process::Command::new("true").spawn().unwrap();
-        child.wait().unwrap();
-        let stale = scratch.path().join(format!("{}-0.run", child.id()));
-        let other = scratch.path().join("notes.txt");
-        std::fs::write(&stale, "").unwrap();
-        std::fs::write(&other, "").unwrap();
-        assert_eq!(directory.runs(), []);
-        assert!(!stale.exists() && other.exists());
-    }
-
-    #[test]
-    fn a_folder_that_others_may_enter_is_refused() {
-        let scratch = tempfile::tempdir().unwrap();
-        std::fs::set_permissions(scratch.path(), std::fs::Permissions::from_mode(0o755)).unwrap();
-        let refused = Directory::at(scratch.path()).listen();
-        assert!(matches!(refused, Err(DirectoryError::NotPrivate { .. })), "{refused:?}");
-    }
-
-    /// Who made the folder first wrote what this user's runs obeyed, and showed runs of its own.
-    #[test]
-    fn of_a_folder_of_another_user_nothing_is_believed() {
-        let scratch = tempfile::tempdir().unwrap();
-        let directory = Directory::at(scratch.path().join("flotor"));
-        let run = directory.listen().unwrap();
-        let peer = scratch.path().join(format!("flotor/{}-pair.peer", std::process::id()));
-        std::fs::write(peer, "").unwrap();
-        directory.latch().press("a stranger").unwrap();
-        let seen = |directory: &Directory| {
-            let pressed = directory.latch().state().pressed.is_some();
-            (directory.runs().len(), directory.couplings().len(), pressed)
-        };
-        assert_eq!(seen(&directory), (1, 1, true));
-        // Only root can give it away; by a link to it nobody gets further.
-        if getuid().is_root() {
-            std::os::unix::fs::chown(directory.path(), Some(65534), None).unwrap();
-            assert_eq!(seen(&directory), (0, 0, false));
-            std::os::unix::fs::chown(directory.path(), Some(0), None).unwrap();
-        }
-        let link = Directory::at(scratch.path().join("link"));
-        std::os::unix::fs::symlink(directory.path(), link.path()).unwrap();
-        assert_eq!(seen(&link), (0, 0, false));
-        drop(run);
     }
 }

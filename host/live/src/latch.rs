@@ -6,10 +6,10 @@
 
 use crate::Directory;
 use crate::directory::{DirectoryError, unusable};
+use crate::platform::private_file;
 use serde::{Deserialize, Serialize};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -131,7 +131,7 @@ impl Latch {
         self.directory.make()?;
         // Neither word nor number of it fails to become JSON.
         let line = serde_json::to_string(entry).unwrap_or_default() + "\n";
-        let file = OpenOptions::new().append(true).create(true).mode(0o600).open(&self.path);
+        let file = private_file(OpenOptions::new().append(true).create(true)).open(&self.path);
         file.and_then(|mut file| file.write_all(line.as_bytes())).map_err(unusable(&self.path))
     }
 }

@@ -60,6 +60,7 @@ mod frame;
 mod latch;
 mod message;
 mod peer_socket;
+mod platform;
 mod server;
 
 pub use client::{Asker, Client, Event, LiveError};

@@ -9,10 +9,10 @@
 //! joined tells so again every [`CALL_PERIOD`]; a host forgets who has not for a while. Not real-time.
 
 use crate::Directory;
-use crate::directory::{DirectoryError, lives, private};
+use crate::directory::{DirectoryError, private};
+use crate::platform::{Datagrams, remove_if_over};
 use flotor_core::peer::{Dispatch, InvalidDispatch};
 use std::io::{self, ErrorKind};
-use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -43,7 +43,7 @@ pub struct FoundCoupling {
 /// One end of the local way; its file is gone when dropped.
 #[derive(Debug)]
 pub struct PeerSocket {
-    socket: UnixDatagram,
+    socket: Datagrams,
     path: PathBuf,
     peers: Vec<Peer>,
 }
@@ -66,8 +66,7 @@ impl Directory {
                 let ending = path.extension()?.to_str()?;
                 let (process, name) = path.file_stem()?.to_str()?.split_once('-')?;
                 let (process, name) = (process.parse().ok()?, name.to_owned());
-                if [HOST, JOINED].contains(&ending) && !lives(process) {
-                    let _ = std::fs::remove_file(&path); // somebody else may have been faster
+                if [HOST, JOINED].contains(&ending) && remove_if_over(&path, process) {
                     return None;
                 }
                 (ending == HOST).then_some(FoundCoupling { name, process, path })
@@ -107,10 +106,7 @@ impl PeerSocket {
     fn bind(path: PathBuf) -> Result<Self, (PathBuf, io::Error)> {
         // A process of this number may have died without cleaning up.
         let _ = std::fs::remove_file(&path);
-        // Without waiting, both ways: the system's time-outs are some milliseconds long, whatever is asked for.
-        let bound =
-            UnixDatagram::bind(&path).and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
-        match bound {
+        match Datagrams::bind(&path) {
             Ok(socket) => Ok(Self { socket, path, peers: Vec::new() }),
             Err(cause) => Err((path, cause)),
         }
@@ -241,7 +237,7 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let directory = Directory::at(scratch.path().join("runs"));
         let mut host = PeerSocket::listen(&directory, "pair").unwrap();
-        let stranger = UnixDatagram::unbound().unwrap();
+        let stranger = Datagrams::bind(&scratch.path().join("stranger")).unwrap();
         for length in [1, 168, 175, 177, 5000] {
             stranger.send_to(&vec![7; length], host.path()).unwrap();
             assert!(matches!(host.hear(), Err(InvalidDispatch::Length { .. })), "{length} bytes");

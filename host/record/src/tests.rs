@@ -378,8 +378,11 @@ fn other_files_are_refused_with_name_reason_and_remedy() {
     let holds =
         |text: &str, parts: &[&str]| parts.iter().for_each(|part| assert!(text.contains(part), "{text}"));
 
-    holds(&refusal(Path::new("/nowhere/run.mcap")), &["/nowhere/run.mcap", "No such file"]);
-    holds(&refusal(&std::env::temp_dir()), &["directory"]);
+    let nowhere = Path::new("/nowhere/run.mcap");
+    for path in [nowhere, &std::env::temp_dir()] {
+        let said = std::fs::read(path).unwrap_err().to_string();
+        holds(&refusal(path), &[&path.display().to_string(), &said]);
+    }
     let text = TestFile::with("text", b"time,force\n0,1\n");
     holds(&refusal(&text.0), &["flotor-record", "not an MCAP file", "--record"]);
     let empty = TestFile::with("empty", b"");
@@ -409,9 +412,14 @@ fn other_files_are_refused_with_name_reason_and_remedy() {
 
 #[test]
 fn a_full_disk_is_told_with_the_name_of_the_file() {
-    let Err(error) = Recorder::create(Path::new("/dev/full"), &run()) else { panic!("the disk is full") };
-    let text = error.to_string();
-    assert!(text.contains("`/dev/full`") && text.contains("No space left"), "{text}");
+    let full = Path::new("/dev/full");
+    if full.is_absolute() {
+        let Err(error) = Recorder::create(full, &run()) else { panic!("the disk is full") };
+        let text = error.to_string();
+        assert!(text.contains("`/dev/full`") && text.contains("No space left"), "{text}");
+    } else {
+        println!("skipped: a disk that is full (Linux)"); // such a path begins with a drive elsewhere
+    }
     let Err(error) = Recorder::create(Path::new("/nowhere/run.mcap"), &run()) else {
         panic!("no such folder")
     };

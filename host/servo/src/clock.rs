@@ -3,10 +3,9 @@
 //! The schedule is the same for both: tick `k` belongs to time `k T`, and a tick whose whole period has
 //! passed is missed, counted and skipped, never caught up in a burst.
 
+pub use crate::platform::clock::{monotonic_ns, sleep_until};
 pub use flotor_core::Clock;
 use flotor_hal::{SampleWait, Tick};
-use rustix::thread::{ClockId, clock_nanosleep_absolute};
-use rustix::time::{Timespec, clock_gettime};
 
 /// The final stretch before a deadline, which is spun and not slept: a sleeping thread wakes late.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,15 +38,6 @@ impl SpinWindow {
         let spin_ns = (usual_ns + usual_ns / 4).clamp(narrowest, widest).min(period_ns / 2);
         Self { spin_ns }
     }
-}
-
-/// Nanoseconds of the monotonic clock. Real-time: bounded, no allocation (a vDSO call).
-#[inline]
-#[must_use]
-#[allow(clippy::cast_sign_loss)] // the monotonic clock starts at boot
-pub fn monotonic_ns() -> u64 {
-    let now = clock_gettime(ClockId::Monotonic);
-    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
 }
 
 /// Gives one tick after the other, each when it is due.
@@ -221,17 +211,6 @@ impl Schedule {
     pub fn next_time_ns(&self) -> u64 {
         self.slot * self.period_ns
     }
-}
-
-/// Sleeps until a time of the monotonic clock. Real-time: one system call.
-#[allow(clippy::cast_possible_wrap)] // seconds since boot
-pub fn sleep_until(deadline_ns: u64) {
-    let request = Timespec {
-        tv_sec: (deadline_ns / 1_000_000_000) as i64,
-        tv_nsec: (deadline_ns % 1_000_000_000) as i64,
-    };
-    // An interrupted sleep is as good as a short one: the spin afterwards looks at the clock.
-    let _ = clock_nanosleep_absolute(ClockId::Monotonic, &request);
 }
 
 #[cfg(test)]

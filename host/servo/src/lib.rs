@@ -21,6 +21,7 @@ pub mod last_stop;
 mod models;
 mod parameters;
 mod passivity;
+pub mod platform;
 mod plausibility;
 pub mod port_energy;
 mod queue;
@@ -52,6 +53,7 @@ pub use parameters::{
     ChangeReport, ChangeSender, PLUGIN, Pace, ParameterChange, ParameterQueue, ReportReceiver,
     ScheduledChange, WEIGHT,
 };
+pub use platform::PRIORITY_NAME;
 pub use plausibility::{Implausible, ImplausibleSamples, PlausibilityCheck, Trust};
 pub use queue::{drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};

@@ -6,7 +6,7 @@
 
 use super::clock::{monotonic_ns, sleep_until};
 use super::last_stop::{SignalGuard, TakenSignals, end_dying, is_dying, take_sent};
-use super::realtime::{WATCHDOG_PRIORITY, enter_priority};
+use super::realtime::enter_guard_priority;
 use super::stop::StopSwitch;
 use flotor_core::MOST_DEVICES;
 use flotor_hal::abi::loader::Stopper;
@@ -213,7 +213,7 @@ pub fn start(
     let thread = std::thread::Builder::new().name("flotor-watchdog".to_owned());
     thread.spawn(move || {
         // Above the loop, which may be what hogs the core. Without the right to it, best effort.
-        let _ = enter_priority(WATCHDOG_PRIORITY);
+        enter_guard_priority();
         take_sent();
         let look_ns = (limit_ns / LOOKS).min(LONGEST_LOOK_NS);
         let mut last = heart.beat();

@@ -4,7 +4,7 @@
 //! needs the result waits no longer than a limit, and then leaves the thread behind and names the plugin. In the
 //! loop the watchdog does the same. Not real-time.
 
-use crate::machine::MachineState;
+use crate::platform::MachineState;
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::{enter_call, leave_call};
 use std::fmt;

@@ -18,7 +18,7 @@ mod calls;
 mod estimates;
 mod feel;
 pub mod headless;
-mod machine;
+mod platform;
 pub mod program;
 pub mod registry;
 pub mod run_description;

@@ -3,9 +3,8 @@
 //! What the servo loop does not need is carried out by separate programs beside this one: a first build stays short.
 
 mod bridge;
-mod doctor;
+pub(crate) mod doctor;
 mod emulate;
-mod lend;
 mod new;
 mod plugins;
 mod record;
@@ -16,6 +15,7 @@ mod view;
 mod watchdog;
 mod worker;
 
+use crate::platform::lend;
 use bridge::BRIDGE;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use flotor_command::separate::{Built, SeparateProgram};

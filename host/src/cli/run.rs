@@ -1,5 +1,6 @@
 //! `flotor run`: a scene in the servo loop, with its observers.
 
+use crate::platform::{end_with_parent, most_open_files};
 use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_command::options::{
@@ -27,7 +28,6 @@ use flotor_session::{
     Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session, stop_waits_with,
 };
 use indicatif::ProgressBar;
-use rustix::process::{Resource, Signal, getrlimit, set_parent_process_death_signal};
 use std::path::{Path, PathBuf};
 
 /// Run a scene in the servo loop.
@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     }
     if arguments.ml_api.is_some() {
         // `flotor lend` started this: nobody else would end it. Without it, this one would only go on for longer.
-        let _ = set_parent_process_death_signal(Some(Signal::TERM));
+        end_with_parent();
     }
     let scene = scene(&arguments)?;
     if matches!(arguments.clock, ClockOption::Real) {
@@ -263,7 +263,7 @@ const OPEN_FILES: u64 = 64;
 
 /// A run that finds no descriptor has no signal handlers, no recording or no socket, while a hand is at the device.
 fn enough_files() -> Result<(), CommandError> {
-    match getrlimit(Resource::Nofile).current {
+    match most_open_files() {
         Some(most) if most < OPEN_FILES => Err(CommandError::Usage(format!(
             "only {most} files may be open, and a run in real time needs {OPEN_FILES}; `ulimit -n {OPEN_FILES}` allows them"
         ))),

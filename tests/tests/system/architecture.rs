@@ -399,14 +399,20 @@ const UNSAFE: &[(&str, &str)] = &[
         "host/python/src/rows.rs",
         "NumPy records that are the contract's structs: the layout promise, and arrays used where they lie",
     ),
+    ("host/command/src/platform/windows.rs", "modes of the console, and the function that it calls"),
     (
-        "host/servo/src/engine/process/memory.rs",
+        "host/servo/src/platform/linux/last_stop.rs",
+        "handlers of deadly signals on a stack of their own, a hook in `exit`, signals that are waited for",
+    ),
+    (
+        "host/servo/src/platform/linux/shared_memory.rs",
         "memory that a model in a process of its own shares with the loop: a mapping",
     ),
     (
-        "host/servo/src/last_stop/system.rs",
-        "handlers of deadly signals on a stack of their own, a hook in `exit`, signals that are waited for",
+        "host/servo/src/platform/windows/last_stop.rs",
+        "a filter for exceptions that nobody handles, and a callback at the end of the process",
     ),
+    ("host/servo/src/platform/windows/scheduling.rs", "priority and cores of the calling thread"),
     ("tests/tests/realtime.rs", "an allocator that counts, to see that a tick does not allocate"),
 ];
 

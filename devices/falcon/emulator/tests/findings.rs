@@ -1,4 +1,4 @@
-//! What `flotor doctor --device falcon` finds, but for what the machine's files say of the bus (`host/src/cli/doctor/usb.rs`): one
+//! What `flotor doctor --device falcon` finds, but for what the machine's files say of the bus (`host/src/platform/linux/usb.rs`): one
 //! test for each finding, as the plugin tells it when it is opened.
 
 use super::contract::{CONFIG, open, serve};

@@ -10,15 +10,11 @@ use super::{
     Setup, StressOptions, closed_loop, continuity, cost, determinism, energy, part_of, search, stiffness,
     symmetry, totality,
 };
+use crate::platform::{anonymous_file, end_at_once, ending_signal, standard_input};
 use crate::{Progress, watch};
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
-use rustix::fs::{MemfdFlags, memfd_create};
-use rustix::process::{Signal, getpid, kill_process};
 use serde::{Deserialize, Serialize};
-use std::fs::File;
 use std::io::{self, Read, Seek, Write};
-use std::os::fd::AsFd;
-use std::os::unix::process::ExitStatusExt;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -161,8 +157,7 @@ enum Delivery {
 
 impl Delivery {
     fn write(&self) -> io::Result<()> {
-        let mut file = File::from(io::stdin().as_fd().try_clone_to_owned()?);
-        file.write_all(&serde_json::to_vec(self)?)
+        standard_input()?.write_all(&serde_json::to_vec(self)?)
     }
 }
 
@@ -182,7 +177,7 @@ pub fn deliver(
     watch::start(patience, |pose| {
         // Whether or not that can be told: nothing else ends a call that does not return.
         Delivery::Stuck(PoseRecord::from(pose)).write().ok();
-        kill_process(getpid(), Signal::KILL).ok();
+        end_at_once();
     });
     let measured = plugin.create_model(settings).and_then(|model| {
         let part_of_full = part_of(options.size, model.memory());
@@ -229,12 +224,12 @@ pub fn score_in_processes(
 
 /// What the process of a part says, or how it ended without a word.
 fn in_own_process(mut command: Command) -> io::Result<Result<Delivery, String>> {
-    let mut told = File::from(memfd_create("flotor-stress", MemfdFlags::CLOEXEC)?);
+    let mut told = anonymous_file("flotor-stress")?;
     let end = command.stdin(told.try_clone()?).stdout(Stdio::null()).status()?;
     let mut text = Vec::new();
     told.rewind()?;
     told.read_to_end(&mut text)?;
-    Ok(serde_json::from_slice(&text).map_err(|_| match end.signal() {
+    Ok(serde_json::from_slice(&text).map_err(|_| match ending_signal(end) {
         Some(signal) => format!("the process died by signal {signal}"),
         None => format!("the process ended without an answer ({end})"),
     }))

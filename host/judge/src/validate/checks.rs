@@ -3,7 +3,8 @@
 use super::path::CONFIG;
 use super::rule::Check;
 use super::untouched::{Host, untouched};
-use super::{Figures, Seen, device, guarded, life, live_parameters, locked, model, passive};
+use super::{Figures, Seen, device, guarded, life, live_parameters, model, passive};
+use crate::platform::locked;
 use crate::subject::prepared;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, Setting, read_metadata};

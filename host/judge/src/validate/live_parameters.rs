@@ -1,8 +1,8 @@
 //! Live parameters: whether a new value takes effect.
 
 use super::checks::Subject;
-use super::model::processor_time;
 use super::path::{CONFIG, finite, walk};
+use crate::platform::processor_time;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Mutability, Parameter};

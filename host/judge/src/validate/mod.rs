@@ -11,26 +11,22 @@ mod device;
 mod guarded;
 mod life;
 mod live_parameters;
-mod locked;
 mod model;
 mod passive;
-mod path;
-mod patience;
+pub(crate) mod path;
+pub(crate) mod patience;
 mod rule;
 mod untouched;
 
 pub use checks::check;
 pub use rule::Check;
 
+use crate::platform::{anonymous_file, ending_signal, locked, standard_input};
 use flotor_hal::abi::loader::read_metadata;
 use flotor_hal::conformance::Rule;
 use patience::Ended;
-use rustix::fs::{MemfdFlags, memfd_create};
 use serde::{Deserialize, Serialize};
-use std::fs::File;
 use std::io::{self, Read, Seek, Write};
-use std::os::fd::AsFd;
-use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
@@ -111,8 +107,7 @@ impl Verdict {
     /// # Errors
     /// Standard input is no such file.
     pub fn deliver(&self) -> io::Result<()> {
-        let mut file = File::from(io::stdin().as_fd().try_clone_to_owned()?);
-        file.write_all(&serde_json::to_vec(self)?)
+        standard_input()?.write_all(&serde_json::to_vec(self)?)
     }
 }
 
@@ -144,7 +139,7 @@ pub fn validate(
     for check in checks.filter(is_wanted) {
         let mut command = program(check);
         match check {
-            Check::SystemCalls => drop(command.env(locked::C_LIBRARY.0, locked::C_LIBRARY.1)),
+            Check::SystemCalls => locked::prepare(&mut command),
             Check::Contract(Rule::InsideMemory) => guarded::with_guard(&mut command),
             _ => {}
         }
@@ -179,8 +174,10 @@ pub fn validate(
 
 /// Explains an end without a verdict.
 fn died(check: Check, end: ExitStatus) -> String {
-    let Some(signal) = end.signal() else { return format!("the process ended without a verdict ({end})") };
-    if check == Check::SystemCalls && signal == locked::CAUGHT.as_raw() {
+    let Some(signal) = ending_signal(end) else {
+        return format!("the process ended without a verdict ({end})");
+    };
+    if check == Check::SystemCalls && locked::has_caught(signal) {
         return "a step allocated memory or made another system call".to_owned();
     }
     let hint = match check {
@@ -211,7 +208,7 @@ fn in_own_process(
     patience: Duration,
 ) -> io::Result<Option<(Verdict, Duration)>> {
     // A file, not a pipe: nobody has to empty it. What a plugin prints is its own business.
-    let mut told = File::from(memfd_create("flotor-verdict", MemfdFlags::CLOEXEC)?);
+    let mut told = anonymous_file("flotor-verdict")?;
     let mut child = command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
     let Some(Ended { status: end, ran }) = patience::wait(&mut child, patience)? else { return Ok(None) };
     let mut text = Vec::new();

@@ -3,13 +3,13 @@
 use super::checks::Subject;
 use super::path::{CONFIG, FAST, directions, finite, grid, step, walk, walk_at};
 use super::untouched::threads;
+use crate::platform::processor_time;
 use crate::subject::input_of;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{
     ActiveRegion, DQuat, DVec3, Demand, Input, Memory, Output, Pose, RegionShape, Twist, Wrench,
 };
-use rustix::time::{ClockId, clock_gettime};
 use std::time::Duration;
 
 fn finite_at(model: &mut Model, pose: Pose) -> Result<(), String> {
@@ -65,12 +65,6 @@ pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
     let differs = first.iter().zip(&second).position(|(a, b)| a.wrench != b.wrench);
     differs
         .map_or(Ok(()), |index| Err(format!("pose {index} of the same path gave another answer after reset")))
-}
-
-/// Time this thread had a processor: what others do on it does not count. A step that waits is found by the lock.
-pub(super) fn processor_time() -> Duration {
-    let now = clock_gettime(ClockId::ThreadCPUTime);
-    Duration::try_from(now).unwrap_or_default()
 }
 
 pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {

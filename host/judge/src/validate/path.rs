@@ -38,7 +38,7 @@ pub(super) fn directions() -> impl Iterator<Item = DVec3> {
 }
 
 /// A walk near home, as inputs of a loop.
-pub(super) fn walk(steps: u64) -> impl Iterator<Item = Input> {
+pub(crate) fn walk(steps: u64) -> impl Iterator<Item = Input> {
     walk_at(1.0, steps)
 }
 

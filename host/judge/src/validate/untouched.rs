@@ -5,8 +5,7 @@
 use super::Seen;
 use super::checks::Subject;
 use super::life::live;
-use rustix::io::Errno;
-use rustix::process::{WaitOptions, waitpid};
+use crate::platform::children;
 use std::fs;
 use std::hint::black_box;
 use std::path::Path;
@@ -132,13 +131,6 @@ fn scheduling() -> Vec<String> {
     let fields: Vec<&str> = text.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let of = |(name, field): (&str, usize)| format!("{name} {}", fields.get(field - 3).unwrap_or(&"unknown"));
     [("nice", 19), ("real-time priority", 40), ("policy", 41)].map(of).to_vec()
-}
-
-fn children() -> &'static str {
-    match waitpid(None, WaitOptions::NOHANG) {
-        Err(Errno::CHILD) => "none",
-        _ => "at least one",
-    }
 }
 
 /// Open files as the system names them; the folder that is being read is among them, under another name each time.

@@ -2,8 +2,8 @@
 //! whose step is such a round trip through the system's futexes.
 
 use super::TickCost;
+use crate::platform::{wait, wake};
 use flotor_judge::call_timer::{net_ns, quantile};
-use rustix::thread::futex;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
@@ -23,7 +23,7 @@ struct Words {
 /// Stores a word and wakes who sleeps on it.
 fn send(word: &AtomicU32, value: u32) {
     word.store(value, Ordering::Release);
-    let _ = futex::wake(word, futex::Flags::empty(), 1);
+    wake(word);
 }
 
 /// Sleeps until the word is no longer `last`.
@@ -33,7 +33,7 @@ fn await_other(word: &AtomicU32, last: u32) -> u32 {
         if value != last {
             return value;
         }
-        let _ = futex::wait(word, futex::Flags::empty(), last, None);
+        wait(word, last);
     }
 }
 

@@ -11,6 +11,7 @@
 mod outbox;
 mod watcher;
 
+use crate::platform::{self, Listening, Stream};
 use crate::{
     Ask, ChangeMessage, Directory, DirectoryError, End, EndKind, Greeting, Kind, Listener, RefusalCause,
     frame,
@@ -20,7 +21,6 @@ use flotor_core::trace::TickRecord;
 use flotor_record::RunDescription;
 use outbox::Outbox;
 use std::io::{self, ErrorKind};
-use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -144,7 +144,7 @@ impl Drop for Publication {
     fn drop(&mut self) {
         self.shared.is_over.store(true, Ordering::Relaxed);
         // The acceptor sits in a call of the system; a connection wakes it up. Without one it ends with the process.
-        let woken = UnixStream::connect(self.listener.path());
+        let woken = platform::connect(self.listener.path());
         if let (Ok(_), Some(acceptor)) = (woken, self.acceptor.take()) {
             let _ = acceptor.join();
         }
@@ -188,11 +188,11 @@ impl Shared {
 }
 
 /// Lets watchers in until the run is over.
-fn accept(socket: &UnixListener, shared: &Arc<Shared>) {
+fn accept(socket: &Listening, shared: &Arc<Shared>) {
     while !shared.is_over.load(Ordering::Relaxed) {
-        match socket.accept() {
+        match platform::accept(socket) {
             Ok(_) if shared.is_over.load(Ordering::Relaxed) => {}
-            Ok((stream, _)) => welcome(stream, shared),
+            Ok(stream) => welcome(stream, shared),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(_) => std::thread::sleep(BREATH),
         }
@@ -200,7 +200,7 @@ fn accept(socket: &UnixListener, shared: &Arc<Shared>) {
 }
 
 /// Serves a connection. A watcher who cannot be served is turned away: the connection closes.
-fn welcome(stream: UnixStream, shared: &Arc<Shared>) {
+fn welcome(stream: Stream, shared: &Arc<Shared>) {
     sweep(shared);
     let mut watchers = shared.watchers();
     let evicted = if watchers.len() >= MOST_CONNECTIONS {

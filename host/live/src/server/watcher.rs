@@ -2,10 +2,10 @@
 
 use super::outbox::Outbox;
 use super::{Shared, thread};
+use crate::platform::Stream;
 use crate::{Answer, Ask, Frames, Kind, RefusalCause, Request, frame};
 use std::io::{ErrorKind, Write};
 use std::net::Shutdown;
-use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -22,7 +22,7 @@ const REQUEST_PERIOD: Duration = Duration::from_millis(1);
 
 pub(super) struct Watcher {
     pub(super) outbox: Arc<Outbox>,
-    stream: UnixStream,
+    stream: Stream,
     writer: JoinHandle<()>,
     reader: JoinHandle<()>,
     /// When it came or asked for something last, ms.
@@ -31,7 +31,7 @@ pub(super) struct Watcher {
 
 impl Watcher {
     /// Serves a connection; `None` if there is no thread to be had.
-    pub(super) fn start(stream: UnixStream, outbox: Arc<Outbox>, shared: &Arc<Shared>) -> Option<Self> {
+    pub(super) fn start(stream: Stream, outbox: Arc<Outbox>, shared: &Arc<Shared>) -> Option<Self> {
         stream.set_write_timeout(Some(WRITE_WAIT)).ok()?;
         let (to_write, to_read) = (stream.try_clone().ok()?, stream.try_clone().ok()?);
         let (for_writer, for_reader, of_run) = (Arc::clone(&outbox), Arc::clone(&outbox), Arc::clone(shared));
@@ -86,7 +86,7 @@ impl Watcher {
 }
 
 /// Writes until the outbox is closed and empty, or nobody reads.
-fn write(mut stream: UnixStream, outbox: &Outbox) {
+fn write(mut stream: Stream, outbox: &Outbox) {
     while let Some(bytes) = outbox.take() {
         if !write_whole(&mut stream, &bytes, outbox) {
             break;
@@ -101,7 +101,7 @@ fn write(mut stream: UnixStream, outbox: &Outbox) {
 }
 
 /// True when all is written; a frozen watcher is waited for as long as the run lasts, and a little longer.
-fn write_whole(stream: &mut UnixStream, mut bytes: &[u8], outbox: &Outbox) -> bool {
+fn write_whole(stream: &mut Stream, mut bytes: &[u8], outbox: &Outbox) -> bool {
     let mut closed_since: Option<Instant> = None;
     while !bytes.is_empty() {
         match stream.write(bytes) {
@@ -119,7 +119,7 @@ fn write_whole(stream: &mut UnixStream, mut bytes: &[u8], outbox: &Outbox) -> bo
 }
 
 /// Does what is asked for until the watcher goes.
-fn read(mut stream: UnixStream, outbox: &Outbox, shared: &Shared, heard_ms: &AtomicU64) {
+fn read(mut stream: Stream, outbox: &Outbox, shared: &Shared, heard_ms: &AtomicU64) {
     let mut frames = Frames::default();
     loop {
         match frames.fill(&mut stream) {

@@ -1,7 +1,7 @@
 //! The plugin call outside the loop that a thread executes: if the process ends there, the message names plugin and call.
 
 use super::line::Line;
-use super::system::install_for_crashes;
+use crate::platform::last_stop::install_for_crashes;
 use std::cell::Cell;
 use std::fmt::{Display, Write};
 

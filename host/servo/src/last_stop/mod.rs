@@ -9,15 +9,14 @@
 
 mod call;
 mod line;
-mod system;
 
-pub use call::{enter_call, leave_call};
-pub(crate) use system::take_sent;
-pub use system::{
-    SignalGuard, TakenSignals, block_signals, ignore_no_signal, leave_process,
-    leave_sent_signals_to_the_loop, spawn_unblocked, wait_for_signal,
+pub(crate) use crate::platform::last_stop::take_sent;
+pub use crate::platform::last_stop::{
+    SignalGuard, TakenSignals, ignore_no_signal, leave_process, spawn_unblocked,
 };
+pub use call::{enter_call, leave_call};
 
+use crate::platform::last_stop as system;
 use crate::{Heartbeat, Place, Stuck};
 use flotor_hal::abi::loader::Stopper;
 use line::Line;
@@ -180,17 +179,22 @@ impl Armed {
 }
 
 /// Called in a signal handler or in `exit`: no lock, no allocation. Returns if no run is energised.
-fn end_if_armed(death: Death) {
+pub(crate) fn end_if_armed(death: Death) {
     if is_armed() {
         die(death);
     }
 }
 
 /// The same; returns if the calling thread is in no call of a plugin outside the loop.
-fn end_if_in_call(death: Death) {
-    if call::current().is_some() {
+pub(crate) fn end_if_in_call(death: Death) {
+    if is_in_call() {
         die(death);
     }
+}
+
+/// True if the calling thread is in a call of a plugin outside the loop. As safe as the two above.
+pub(crate) fn is_in_call() -> bool {
+    call::current().is_some()
 }
 
 /// Whether this process is dying: somebody stops its devices, and will end it.
@@ -289,7 +293,7 @@ fn describe_death(line: &mut Line, death: Death) {
     use std::fmt::Write;
     let _ = match death {
         Death::Signal { signal, sender } => {
-            let told = write!(line, "signal {signal} ({})", system::signal_words(signal));
+            let told = write!(line, "{}", system::Named(signal));
             sender.map_or(told, |sender| write!(line, ", sent by process {sender}"))
         }
         Death::Exit => write!(line, "it called `exit`"),

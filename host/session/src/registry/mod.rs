@@ -6,11 +6,11 @@ mod stamp;
 
 use self::stamp::{FileStamp, hash_of};
 use crate::calls::{self, Call, CallError, attended_while};
+pub use crate::platform::is_same_file;
+use crate::platform::{distrust, user_folder};
 use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
-use rustix::process::geteuid;
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -207,7 +207,7 @@ impl Registry {
     }
 
     fn find(&self, id: &str, kind: Option<PluginKind>) -> Result<Plugin, LookupError> {
-        if id.contains(MAIN_SEPARATOR) {
+        if id.contains(std::path::is_separator) {
             let plugin = self.open(Path::new(id))?;
             check_kind(plugin.metadata(), kind)?;
             return Ok(plugin);
@@ -270,34 +270,6 @@ fn own_folders() -> Vec<PathBuf> {
     beside.map(|folder| if folder.is_empty() { own.to_path_buf() } else { own.join(folder) }).to_vec()
 }
 
-/// Where a user keeps plugins for all installations, by the XDG base directory specification. Root has none: a file of a home
-/// folder is no reason to run code with all rights.
-fn user_folder() -> Option<PathBuf> {
-    if geteuid().is_root() {
-        return None;
-    }
-    let absolute = |variable| std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute());
-    let data = absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")));
-    Some(data?.join("flotor/plugins"))
-}
-
-/// Why a folder is not searched: somebody could put a plugin there whom the user has not trusted yet. Trusted are root, the user,
-/// and the owner of this program.
-fn distrust(folder: &Path, attributes: &std::fs::Metadata) -> Option<String> {
-    let folder = folder.display();
-    if attributes.permissions().mode() & 0o002 != 0 {
-        return Some(format!(
-            "anybody may write into it, and loading a plugin runs its code; `chmod o-w {folder}`"
-        ));
-    }
-    let owner = attributes.uid();
-    let owns_program =
-        || std::env::current_exe().and_then(std::fs::metadata).is_ok_and(|own| own.uid() == owner);
-    (owner != 0 && owner != geteuid().as_raw() && !owns_program()).then(|| {
-        format!("user {owner} owns it, and loading a plugin runs its code; `chown` it, or copy its plugins to a folder of yours")
-    })
-}
-
 /// Whether a plugin belongs to this installation: it is linked into the program, or lies beside it or in
 /// `../lib/flotor/plugins`. Not real-time.
 pub(crate) fn is_installed(plugin: &Path) -> bool {
@@ -324,13 +296,6 @@ pub fn load_file(path: &Path) -> Result<Plugin, LoadError> {
     // SAFETY: the user who runs this program guarantees the plugins that the scene, the command line and the searched
     // folders name, as for the program itself; folders that anybody may write into are not searched.
     unsafe { Plugin::load(path) }
-}
-
-/// Whether two paths lead to one file that exists. Not real-time.
-#[must_use]
-pub fn is_same_file(one: &Path, other: &Path) -> bool {
-    let identity = |path: &Path| std::fs::metadata(path).map(|file| (file.dev(), file.ino()));
-    matches!((identity(one), identity(other)), (Ok(one), Ok(other)) if one == other)
 }
 
 /// Refuses a plugin of the other kind.

@@ -1,7 +1,7 @@
 //! Whether a file is still the one that was read.
 
+use crate::platform;
 use std::fs::File;
-use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 use xxhash_rust::xxh3::Xxh3Default;
@@ -13,10 +13,9 @@ const COARSEST_FILE_TIME: Duration = Duration::from_secs(2);
 /// What the file system says of a file, and when it was asked.
 #[derive(Clone, Debug)]
 pub(super) struct FileStamp {
-    device: u64,
-    inode: u64,
+    identity: [u64; 2],
     length_bytes: u64,
-    /// Of contents or attributes: no program can set it back.
+    /// When it changed last, s and ns since 1970.
     changed: (i64, i64),
     /// Long enough before it was asked that a later change has another time.
     settled: bool,
@@ -26,10 +25,9 @@ impl FileStamp {
     /// Not real-time.
     pub(super) fn of(path: &Path) -> std::io::Result<Self> {
         let file = std::fs::metadata(path)?;
-        let changed = (file.ctime(), file.ctime_nsec());
+        let changed = platform::changed(&file);
         Ok(Self {
-            device: file.dev(),
-            inode: file.ino(),
+            identity: platform::identity(&file),
             length_bytes: file.len(),
             changed,
             settled: is_settled(changed, SystemTime::now()),
@@ -38,7 +36,7 @@ impl FileStamp {
 
     /// Whether the contents read when this stamp was taken are those of a file with that one: a no means to look.
     pub(super) fn is_same_as(&self, other: &Self) -> bool {
-        let what = |stamp: &Self| (stamp.device, stamp.inode, stamp.length_bytes, stamp.changed);
+        let what = |stamp: &Self| (stamp.identity, stamp.length_bytes, stamp.changed);
         self.settled && what(self) == what(other)
     }
 }

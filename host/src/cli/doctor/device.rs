@@ -1,7 +1,7 @@
 //! `flotor doctor --device ID`: what the plugin says when it is opened, and what the machine says of its connection.
 
 use super::Diagnosis;
-use super::usb::{Machine, connection};
+use crate::platform::usb::{Machine, connection};
 use flotor_command::CommandError;
 use flotor_command::options::{KeyValue, settings};
 use flotor_hal::abi::PluginKind;

@@ -5,12 +5,11 @@ use super::memory::{MESSAGE_BYTES, SharedMemory};
 use super::shared_words::{self, Order, wait_for_change};
 use crate::enter_worker_priority;
 use crate::last_stop::ignore_no_signal;
+use crate::platform::processes::HostProcess;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind};
-use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 use std::io;
-use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -44,13 +43,12 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
     // Before anything of the plugin runs: whatever that does, it ends with its host, and by a signal that it sends to itself. The
     // host may have gone before.
     ignore_no_signal();
-    set_parent_process_death_signal(Some(Signal::KILL))?;
-    let host = Pid::from_raw(arguments.host);
-    let has_gone = || getppid() != host;
+    let host = HostProcess::end_with(arguments.host)?;
+    let has_gone = || host.has_gone();
     if has_gone() {
         return Ok(());
     }
-    let memory = SharedMemory::map(io::stdin().as_fd())?;
+    let memory = SharedMemory::of_standard_input()?;
     let (greeting, model) = match prepare(arguments, load) {
         Ok((mut model, parameters)) => {
             put_extent(&mut model, &memory);
@@ -174,15 +172,14 @@ const MORE_TO_COME: CallStatus = CallStatus::WrongPhase;
 
 #[cfg(test)]
 mod tests {
-    use super::super::memory::create_file;
+    use super::super::memory::mapped;
     use super::super::parent::heard;
     use super::*;
 
     #[test]
     fn a_greeting_of_any_length_is_heard_as_it_was_said() {
         for text in [String::new(), "x".repeat(MESSAGE_BYTES), "µ is longer than m. ".repeat(200)] {
-            let file = create_file().expect("an anonymous file");
-            let [here, there] = [0; 2].map(|_| SharedMemory::map(&file).expect("mapped"));
+            let Some([here, there]) = mapped() else { return };
             let said = text.clone();
             let worker = std::thread::spawn(move || greet(&there, &said, || false));
             let (number, told) = heard(&here, || false).expect("it says something");
@@ -193,14 +190,14 @@ mod tests {
 
     #[test]
     fn a_host_that_asks_at_once_is_not_waited_for() {
-        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
+        let Some([memory]) = mapped() else { return };
         memory.request.store(2, Ordering::Release); // it has heard the one piece, and wants a step
         assert_eq!(greet(&memory, "hello", || true), Some(1));
     }
 
     #[test]
     fn a_greeting_that_nobody_hears_ends_with_the_host() {
-        let memory = SharedMemory::map(create_file().expect("an anonymous file")).expect("mapped");
+        let Some([memory]) = mapped() else { return };
         assert_eq!(greet(&memory, "hello", || true), None);
     }
 }

@@ -1,15 +1,9 @@
-//! Memory that two processes see: an anonymous file, mapped by both.
+//! What two processes see of each other: one page of memory, mapped by both.
 //!
 //! Everything in it is an atomic, so that neither side can bring the other to read what it must not: whatever the
-//! other process writes, every bit pattern is a value. Its length is sealed: a worker holds the file as its
-//! standard input, and what it could cut off would be a bus error in the host.
-#![allow(unsafe_code)] // a mapping cannot be made without; tests/tests/system/architecture.rs lists it
+//! other process writes, every bit pattern is a value.
 
-use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, fcntl_get_seals, ftruncate, memfd_create};
-use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
-use std::io;
-use std::os::fd::{AsFd, OwnedFd};
-use std::ptr::NonNull;
+pub(super) use crate::platform::shared_memory::{SharedMemory, create_file};
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64};
 
 /// Words of a step's input: 7 of the pose, 6 of the twist, time, period, tick, buttons and demand in one.
@@ -27,9 +21,9 @@ pub(super) const MESSAGE_BYTES: usize = 508;
 
 /// One request and one answer at a time.
 #[repr(C)]
-pub(super) struct SharedPage {
+pub(crate) struct SharedPage {
     /// Number of the newest request; the worker sleeps on it.
-    pub(super) request: AtomicU32,
+    pub(crate) request: AtomicU32,
     /// Number of the newest request that is answered; the host sleeps on it.
     pub(super) reply: AtomicU32,
     /// What is asked for.
@@ -48,90 +42,17 @@ pub(super) struct SharedPage {
     pub(super) message: [AtomicU8; MESSAGE_BYTES],
 }
 
-/// An [`SharedPage`] that another process may have mapped too.
-pub(super) struct SharedMemory {
-    page: NonNull<SharedPage>,
-}
-
-// SAFETY: the mapping lives until `drop`, and all that is in it is atomic.
-unsafe impl Send for SharedMemory {}
-// SAFETY: as above.
-unsafe impl Sync for SharedMemory {}
-
-/// Makes the anonymous file, of a length that is for ever. Not real-time.
-///
-/// # Errors
-/// What the system says.
-pub(super) fn create_file() -> io::Result<OwnedFd> {
-    let file = memfd_create("flotor-worker", MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)?;
-    ftruncate(&file, size_of::<SharedPage>() as u64)?;
-    fcntl_add_seals(&file, SealFlags::SHRINK | SealFlags::GROW | SealFlags::SEAL)?;
-    Ok(file)
-}
-
-impl SharedMemory {
-    /// Maps a file made by [`create_file`]. Not real-time.
-    ///
-    /// # Errors
-    /// The file is no such file, or what the system says.
-    pub(super) fn map(file: impl AsFd) -> io::Result<Self> {
-        // The seal before the length: a length that was read first might be cut before the seal is there.
-        // What is no anonymous file has no seals to ask for.
-        let is_sealed = fcntl_get_seals(&file).is_ok_and(|seals| seals.contains(SealFlags::SHRINK));
-        let held = rustix::fs::fstat(&file)?.st_size;
-        if !is_sealed || usize::try_from(held).unwrap_or(0) < size_of::<SharedPage>() {
-            return Err(io::Error::other("this is not the memory of a worker"));
-        }
-        let (length, protection) = (size_of::<SharedPage>(), ProtFlags::READ | ProtFlags::WRITE);
-        // SAFETY: a new mapping at an address of the system's choice aliases nothing of this process. The file is at
-        // least as long as the mapping and stays so, being sealed against shrinking: no seal is ever taken off.
-        let address = unsafe { mmap(std::ptr::null_mut(), length, protection, MapFlags::SHARED, file, 0) }?;
-        let page = NonNull::new(address.cast()).ok_or_else(|| io::Error::other("mapped nowhere"))?;
-        Ok(Self { page })
-    }
-}
-
-impl std::ops::Deref for SharedMemory {
-    type Target = SharedPage;
-
-    #[inline]
-    fn deref(&self) -> &SharedPage {
-        // SAFETY: mapped, page-aligned and long enough since `map`, until `drop`; only atomics, for which every bit
-        // pattern is a value, whoever writes it.
-        unsafe { self.page.as_ref() }
-    }
-}
-
-impl Drop for SharedMemory {
-    fn drop(&mut self) {
-        // SAFETY: the address and length of the mapping made in `map`; no reference outlives `self`.
-        let _ = unsafe { munmap(self.page.as_ptr().cast(), size_of::<SharedPage>()) };
-    }
-}
-
+/// The same memory mapped so many times; `None`, and said so, where the system has none to share.
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use rustix::io::Errno;
-    use std::sync::atomic::Ordering;
-
-    #[test]
-    fn whoever_has_the_file_cannot_cut_it_from_under_a_mapping() {
-        let file = create_file().expect("an anonymous file");
-        let memory = SharedMemory::map(&file).expect("mapped");
-        memory.request.store(7, Ordering::Relaxed);
-        assert_eq!(ftruncate(&file, 0), Err(Errno::PERM));
-        assert_eq!(ftruncate(&file, 2 * size_of::<SharedPage>() as u64), Err(Errno::PERM));
-        // Would be a bus error if the file had been cut.
-        assert_eq!(memory.request.load(Ordering::Relaxed), 7);
-    }
-
-    #[test]
-    fn a_file_that_could_be_cut_is_not_mapped() {
-        for flags in [MemfdFlags::CLOEXEC, MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING] {
-            let file = memfd_create("unsealed", flags).expect("an anonymous file");
-            ftruncate(&file, size_of::<SharedPage>() as u64).expect("a length");
-            assert!(SharedMemory::map(&file).is_err(), "{flags:?}");
+pub(super) fn mapped<const TIMES: usize>() -> Option<[SharedMemory; TIMES]> {
+    match create_file() {
+        Err(error) if error.kind() == std::io::ErrorKind::Unsupported => {
+            println!("skipped: {error}");
+            None
+        }
+        file => {
+            let file = file.expect("an anonymous file");
+            Some([(); TIMES].map(|()| SharedMemory::map(&file).expect("mapped")))
         }
     }
 }

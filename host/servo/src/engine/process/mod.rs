@@ -10,11 +10,11 @@
 
 mod child;
 mod memory;
-mod parent;
+pub(crate) mod parent;
 mod shared_words;
 
 pub use child::{LoadFile, WorkerArguments, serve};
-pub(crate) use parent::program;
+pub(crate) use memory::SharedPage;
 pub use parent::{Worker, WorkerOrder};
 
 use serde::{Deserialize, Serialize};

@@ -6,14 +6,13 @@ use super::shared_words::{DEMANDS, NO_DEMAND, Order, wait_for_change};
 use super::{Greeting, Reply};
 use crate::last_stop::spawn_unblocked;
 use crate::monotonic_ns;
+use crate::platform::processes;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
     ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind,
     WorkspaceBounds,
 };
 use std::io;
-use std::os::fd::AsFd;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::sync::OnceLock;
@@ -59,7 +58,7 @@ impl Worker {
     pub fn start(order: &WorkerOrder<'_>) -> Result<Self, Refusal> {
         let no_worker = |error: io::Error| Refusal::resource(format!("no worker process: {error}"));
         let file = create_file().map_err(no_worker)?;
-        let memory = SharedMemory::map(file.as_fd()).map_err(no_worker)?;
+        let memory = SharedMemory::map(&file).map_err(no_worker)?;
         let mut command = Command::new(program().map_err(no_worker)?);
         command.arg("worker").arg(order.plugin);
         command.args(["--host", &std::process::id().to_string()]);
@@ -69,7 +68,7 @@ impl Worker {
         // What a model prints goes where it does no harm, as long as it lives: to the host's errors.
         command.stdin(file).stdout(io::stderr());
         // What a terminal sends is the host's affair: it still needs the model while the force fades out.
-        command.process_group(0);
+        processes::keep_from_terminal(&mut command);
         let child = spawn(command).map_err(no_worker)?;
         let mut worker = Self {
             child,
@@ -232,7 +231,7 @@ impl Worker {
     /// What the model said last, or how its process ended. Not real-time.
     pub fn last_message(&mut self) -> String {
         match self.child.try_wait() {
-            Ok(Some(end)) => match end.signal() {
+            Ok(Some(end)) => match processes::ending_signal(end) {
                 Some(signal) => format!("its process was ended by signal {signal}"),
                 None => format!("its process ended ({end})"),
             },

@@ -1,14 +1,14 @@
 //! What host and worker say to each other, as words in shared memory.
 
 use super::memory::{BOUNDS_WORDS, FIELD_WORDS, INPUT_WORDS, OUTPUT_WORDS, REGION_WORDS, SharedPage};
+pub(super) use crate::platform::shared_memory::wait_for_change;
+use crate::platform::shared_memory::wake;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
     ActiveRegion, Demand, Input, LinearField, Output, Pose, RegionShape, StepStatus, Twist, WorkspaceBounds,
     Wrench,
 };
-use rustix::thread::futex;
-use rustix::time::Timespec;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What a worker is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +46,7 @@ impl SharedPage {
         self.order.store(order.code(), Ordering::Relaxed);
         // Release: who sees the number sees the request.
         self.request.store(number, Ordering::Release);
-        let _ = futex::wake(&self.request, futex::Flags::empty(), 1);
+        wake(&self.request);
     }
 
     /// The host's side: whether a request is answered.
@@ -63,7 +63,7 @@ impl SharedPage {
     pub(super) fn answer(&self, number: u32, status: CallStatus) {
         self.status.store(status as u32, Ordering::Relaxed);
         self.reply.store(number, Ordering::Release);
-        let _ = futex::wake(&self.reply, futex::Flags::empty(), 1);
+        wake(&self.reply);
     }
 
     pub(super) fn status(&self) -> CallStatus {
@@ -225,17 +225,6 @@ fn put(slots: &[AtomicU64], words: impl Iterator<Item = u64>) {
 
 fn load(word: Option<&AtomicU64>) -> u64 {
     word.map_or(0, |word| word.load(Ordering::Relaxed))
-}
-
-/// Sleeps until `word` is no longer `value`, or for `timeout_ns`; may wake earlier. Real-time: one system call.
-#[allow(clippy::cast_possible_wrap)] // seconds of a timeout
-pub(super) fn wait_for_change(word: &AtomicU32, value: u32, timeout_ns: u64) {
-    let timeout = Timespec {
-        tv_sec: (timeout_ns / 1_000_000_000) as i64,
-        tv_nsec: (timeout_ns % 1_000_000_000) as i64,
-    };
-    // Whatever ends the sleep, the caller looks at the word again.
-    let _ = futex::wait(word, futex::Flags::empty(), value, Some(&timeout));
 }
 
 #[cfg(test)]

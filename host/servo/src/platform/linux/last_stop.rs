@@ -3,8 +3,8 @@
 //! Nothing that runs in a handler allocates, locks or formats into memory of its own.
 #![allow(unsafe_code)] // handlers of deadly signals and of `exit` cannot be made without; tests/tests/system/architecture.rs
 
-use super::{Death, call, end_if_armed, end_if_in_call, is_armed};
 use crate::guest::{is_guest, leaves_signals};
+use crate::last_stop::{Death, end_if_armed, end_if_in_call, is_armed, is_in_call};
 use libc::{c_int, c_void, sigaction, siginfo_t, sigset_t};
 use std::io;
 use std::mem::MaybeUninit;
@@ -54,7 +54,7 @@ const SIGNALS: usize = 65;
 /// Bytes of the alternate stack: frames of a handler with the widest registers take some 12 KiB, a device's stop little.
 const STACK_BYTES: usize = 128 * 1024;
 /// Bytes of a thread's name with its end.
-pub(super) const NAME_BYTES: usize = 16;
+pub(crate) const NAME_BYTES: usize = 16;
 
 /// The process that has armed a run: a copy of it, made by `fork`, has the same devices, but they are not its own.
 static OWN_PROCESS: AtomicI32 = AtomicI32::new(0);
@@ -68,14 +68,14 @@ static BEFORE: [OnceLock<sigaction>; SIGNALS] = [const { OnceLock::new() }; SIGN
 
 /// Takes every signal that would end the process, in this thread on a stack of its own, and `exit`. Again for each run: a
 /// plugin may have put something else there. Not real-time.
-pub(super) fn install() {
+pub(crate) fn install() {
     install_for(|signal| !HARMLESS.contains(&signal));
     take_sent();
 }
 
 /// Takes the signals that this thread itself raises when it crashes, and `exit`. What asks the process to end is left as it is:
 /// the host has not said yet who is to hear of it. Not real-time.
-pub(super) fn install_for_crashes() {
+pub(crate) fn install_for_crashes() {
     install_for(|signal| RAISED.contains(&signal));
 }
 
@@ -157,7 +157,7 @@ extern "C" fn on_signal(signal: c_int, info: *mut siginfo_t, _: *mut c_void) {
 }
 
 extern "C" fn at_exit() {
-    if is_own_process() && (is_armed() || call::current().is_some()) {
+    if is_own_process() && (is_armed() || is_in_call()) {
         // A stop that calls `exit` itself comes here once more.
         // SAFETY: as where it was registered first.
         let _ = unsafe { libc::atexit(at_exit) };
@@ -167,7 +167,7 @@ extern "C" fn at_exit() {
 }
 
 /// Ends the process: by the signal that asked it to, if that is what one is for; else with a code.
-pub(super) fn end_by(death: Death, code: i32) -> ! {
+pub(crate) fn end_by(death: Death, code: i32) -> ! {
     if let Death::Signal { signal, .. } = death
         && is_guest()
         && let Some(before) = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)?.get())
@@ -204,13 +204,13 @@ fn raise(signal: c_int) {
 }
 
 /// Writes to standard error, once: a reader that is gone is no reason to stay.
-pub(super) fn say(bytes: &[u8]) {
+pub(crate) fn say(bytes: &[u8]) {
     // SAFETY: the bytes are there for the call, and as many as said.
     let _ = unsafe { libc::write(libc::STDERR_FILENO, bytes.as_ptr().cast(), bytes.len()) };
 }
 
 /// The number of the calling thread.
-pub(super) fn thread_number() -> i32 {
+pub(crate) fn thread_number() -> i32 {
     // SAFETY: takes nothing, and cannot fail.
     unsafe { libc::gettid() }
 }
@@ -221,15 +221,24 @@ fn process_number() -> i32 {
 }
 
 /// The name of the calling thread.
-pub(super) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
+pub(crate) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
     // SAFETY: the system writes 16 bytes at most, which are there for the call.
     unsafe { libc::prctl(libc::PR_GET_NAME, name.as_mut_ptr()) };
     let length = name.iter().position(|byte| *byte == 0).unwrap_or(NAME_BYTES);
     std::str::from_utf8(name.get(..length).unwrap_or_default()).unwrap_or_default()
 }
 
-/// What a signal says, for people.
-pub(super) fn signal_words(signal: c_int) -> &'static str {
+/// A deadly signal, for people.
+pub(crate) struct Named(pub(crate) i32);
+
+impl std::fmt::Display for Named {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(signal) = *self;
+        write!(f, "signal {signal} ({})", signal_words(signal))
+    }
+}
+
+fn signal_words(signal: c_int) -> &'static str {
     match signal {
         libc::SIGSEGV => "SIGSEGV: invalid memory access, or stack overflow",
         libc::SIGBUS => "SIGBUS: memory access error",

@@ -1,7 +1,7 @@
 //! The host's side: starts the process, and tells it when it is needed no more.
 
 use super::{PACKET_BYTES, Packet};
-use crate::engine::process::program;
+use crate::engine::process::parent::program;
 use flotor_hal::Independence;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::{

@@ -1,10 +1,4 @@
-//! The watchdog process: it stops devices whose host is gone, whatever ended that: SIGKILL, `_exit`, `exec`, a limit of the
-//! machine.
-//!
-//! The host starts its own program once more, as `flotor watchdog`, and hands it, over the socket that is its standard input,
-//! for each device a handle and a message of the device's own (extension `flotor.independent-stop/1`). It runs nothing of any
-//! plugin. When the socket closes without an end in order, or the host's process or the thread of its loop has ended, it writes the
-//! messages. It is of a process group of its own and takes no signal that asks it to end: it ends with its host, right after.
+//! Both ends of the link, and what is said over it.
 
 mod guard;
 mod host;

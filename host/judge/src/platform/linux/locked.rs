@@ -8,14 +8,15 @@
 //! [`C_LIBRARY`] does: of a pair of `malloc` and `free` nothing else is left to see. Reading and writing are
 //! counted by the kernel.
 
-use super::Seen;
-use super::path::walk;
+use crate::validate::Seen;
+use crate::validate::path::walk;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Input, Output};
 use rustix::process::{Signal, getpid, kill_process};
 use rustix::thread::{SecureComputingMode, gettid, set_secure_computing_mode};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{Sender, channel};
@@ -23,11 +24,11 @@ use std::time::Duration;
 
 /// Environment variable of the GNU C library, and what makes each allocation a system call: mappings from the
 /// first byte on, in one arena; no more of them than the kernel allows a process.
-pub(super) const C_LIBRARY: (&str, &str) =
+const C_LIBRARY: (&str, &str) =
     ("GLIBC_TUNABLES", "glibc.malloc.mmap_threshold=0:glibc.malloc.mmap_max=30000:glibc.malloc.arena_max=1");
 
 /// How the process ends in which a step called the system.
-pub(super) const CAUGHT: Signal = Signal::SYS;
+const CAUGHT: Signal = Signal::SYS;
 
 /// Steps; the first is locked in, too: a loop has no other.
 const STEPS: usize = 1000;
@@ -41,9 +42,20 @@ const NOT_ALLOWED: u8 = 2;
 const DONE: u8 = 3;
 const FAILED: u8 = 4;
 
+/// Prepares the process of the check.
+pub(crate) fn prepare(command: &mut Command) {
+    let (variable, value) = C_LIBRARY;
+    command.env(variable, value);
+}
+
+/// Whether a process ended because a step called the system, by the signal that ended it.
+pub(crate) fn has_caught(signal: i32) -> bool {
+    signal == CAUGHT.as_raw()
+}
+
 /// Walks the model in a thread that is locked in. **Ends this process** by [`CAUGHT`] if a step called the
 /// system.
-pub(super) fn system_calls(model: Model) -> Result<(), Seen> {
+pub(crate) fn system_calls(model: Model) -> Result<(), Seen> {
     let stage = Arc::new(AtomicU8::new(WAITING));
     let (ready, told) = channel();
     let of_thread = Arc::clone(&stage);

@@ -1,6 +1,6 @@
 //! The connection of a device on USB, as the machine's files tell it: is it there, behind what, who has it, who may use it.
 
-use super::Diagnosis;
+use crate::cli::doctor::Diagnosis;
 use flotor_hal::{UsbAccess, UsbKind};
 use rustix::fs::{Access, access};
 use std::fs::{read_dir, read_link, read_to_string};
@@ -12,7 +12,7 @@ const RULES: [&str; 4] = ["etc/udev/rules.d", "run/udev/rules.d", "usr/lib/udev/
 const IGNORED: &str = "ID_MM_DEVICE_IGNORE";
 
 /// The files of a machine.
-pub(super) struct Machine {
+pub(crate) struct Machine {
     root: PathBuf,
     /// Whether this user may read and write a file.
     may_use: fn(&Path) -> bool,
@@ -33,7 +33,7 @@ struct Seen {
 
 impl Machine {
     /// Whose files are below a folder: `/`, but for tests.
-    pub(super) fn at(root: &Path) -> Self {
+    pub(crate) fn at(root: &Path) -> Self {
         let may_use = |path: &Path| access(path, Access::READ_OK | Access::WRITE_OK).is_ok();
         Self { root: root.to_path_buf(), may_use }
     }
@@ -225,7 +225,7 @@ fn hindrance(is_open: bool, what: &'static str, found: String, remedy: String) -
 }
 
 /// What the machine says of a device of these kinds; whether it could be opened says how bad it is if none is there.
-pub(super) fn connection(machine: &Machine, kinds: &[UsbKind], is_open: bool) -> Vec<Diagnosis> {
+pub(crate) fn connection(machine: &Machine, kinds: &[UsbKind], is_open: bool) -> Vec<Diagnosis> {
     if kinds.is_empty() {
         return Vec::new(); // a simulated one, or behind something else
     }
@@ -259,8 +259,8 @@ fn text_of(folder: &Path, file: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Grade;
     use super::*;
+    use crate::cli::doctor::Grade;
     use std::fs::{create_dir_all, write};
     use std::os::unix::fs::symlink;
 

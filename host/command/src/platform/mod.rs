@@ -1,0 +1,26 @@
+//! What differs between systems for a command: what asks a run to end, the terminal, standard output, other programs.
+//!
+//! Each system has one module with the same items.
+
+#[cfg(not(windows))]
+mod unix;
+#[cfg(windows)]
+mod windows;
+
+#[cfg(not(windows))]
+use unix as system;
+#[cfg(windows)]
+use windows as system;
+
+pub(crate) use system::{
+    INTERRUPTED, KeyTerminal, Requests, ask_to_end, become_program, outlive_requests, results_apart,
+};
+
+/// What asks a run to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Request {
+    /// In order, unless it is repeated.
+    End,
+    /// At once.
+    Emergency,
+}

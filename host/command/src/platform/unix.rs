@@ -1,0 +1,141 @@
+//! Unix: signals, terminals, descriptors.
+
+use super::Request;
+use flotor_servo::StopSwitch;
+use flotor_servo::platform::{block_signals, leave_sent_signals_to_the_loop, wait_for_signal};
+use rustix::process::{Pid, Signal, getpgrp, kill_process};
+use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
+use signal_hook::consts::{
+    SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
+    SIGXFSZ,
+};
+use signal_hook::flag;
+use std::fs::File;
+use std::io::{self, stdin};
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as shells have it.
+pub(crate) const INTERRUPTED: i32 = 130;
+
+/// Signals that stop a run: the keys of a terminal (Ctrl-C, `Ctrl-\`, Ctrl-Z), its closing, and process managers.
+///
+/// By itself a terminal would end the process with the device unstopped, or, at Ctrl-Z, suspend the loop and its
+/// watchdog together, with the last force held.
+const ENDING: [i32; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP];
+
+/// Signals that ask this process for something.
+pub(crate) struct Requests {
+    signals: Vec<i32>,
+}
+
+impl Requests {
+    /// Takes them from now on, in this thread and all that it starts. Not real-time.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn listen(stop: &StopSwitch) -> io::Result<Self> {
+        // Started with `nohup`, a run is to outlive its terminal.
+        let signals: Vec<i32> = ENDING
+            .into_iter()
+            .filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP))
+            .chain([SIGUSR1])
+            .collect();
+        block_signals(&signals)?;
+        // This thread may wait for a processor while a plugin in the loop keeps it busy.
+        leave_sent_signals_to_the_loop()?;
+        // A thread that does not block them, because a library has unblocked them, does no harm when it takes one.
+        for signal in &signals {
+            let flag = if *signal == SIGUSR1 { stop.emergency_flag() } else { stop.stop_flag() };
+            flag::register(*signal, flag)?;
+        }
+        // Otherwise a file at its size limit would end the process, not the recording.
+        flag::register(SIGXFSZ, Arc::<AtomicBool>::default())?;
+        Ok(Self { signals })
+    }
+
+    /// The next one; `None` after `patience`. Not real-time.
+    pub(crate) fn next(&self, patience: Duration) -> Option<Request> {
+        let signal = wait_for_signal(&self.signals, patience)?;
+        Some(if signal == SIGUSR1 { Request::Emergency } else { Request::End })
+    }
+}
+
+/// From now on nothing asks this process to end, in this thread and all that it starts. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn outlive_requests() -> io::Result<()> {
+    let signals = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGXFSZ];
+    block_signals(&[&ENDING[..], &signals].concat())
+}
+
+/// Whether this process was started with a signal ignored.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    (ignored >> (signal - 1)) & 1 == 1 // the lowest bit is signal 1
+}
+
+/// The terminal, which gives keys without a line end while this lives.
+pub(crate) struct KeyTerminal {
+    before: Termios,
+}
+
+impl KeyTerminal {
+    /// `None` where there is no terminal: in a pipe, in the background.
+    pub(crate) fn take() -> Option<Self> {
+        let terminal = stdin();
+        // Changing the terminal from the background would suspend the process.
+        if !isatty(&terminal) || tcgetpgrp(&terminal).ok()? != getpgrp() {
+            return None;
+        }
+        let before = tcgetattr(&terminal).ok()?;
+        let mut keys = before.clone();
+        keys.local_modes.remove(LocalModes::ICANON | LocalModes::ECHO);
+        tcsetattr(&terminal, OptionalActions::Now, &keys).ok()?;
+        Some(Self { before })
+    }
+}
+
+impl Drop for KeyTerminal {
+    fn drop(&mut self) {
+        let _ = tcsetattr(stdin(), OptionalActions::Now, &self.before);
+    }
+}
+
+/// Standard output, kept for the caller alone: who writes there from now on writes to standard error. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn results_apart() -> io::Result<File> {
+    let own = rustix::io::fcntl_dupfd_cloexec(io::stdout(), 3)?;
+    rustix::stdio::dup2_stdout(io::stderr())?;
+    Ok(File::from(own))
+}
+
+/// Replaces this process by a program; why it could not.
+pub(crate) fn become_program(command: &mut Command) -> io::Error {
+    command.exec()
+}
+
+/// Asks a process to end in order.
+pub(crate) fn ask_to_end(child: &mut Child) {
+    let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+    let _ = process.map(|process| kill_process(process, Signal::TERM));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ignored_signals_are_known() {
+        assert!(!is_ignored(signal_hook::consts::SIGKILL), "no process can ignore it");
+        assert!(is_ignored(signal_hook::consts::SIGPIPE), "Rust starts every program so");
+    }
+}

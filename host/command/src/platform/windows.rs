@@ -1,0 +1,144 @@
+//! Windows: events of the console, its modes, handles.
+#![allow(unsafe_code)] // calls of the console, and a function that it calls; tests/tests/system/architecture.rs lists it
+
+use super::Request;
+use flotor_servo::StopSwitch;
+use std::fs::File;
+use std::io::{self, IsTerminal, stdin};
+use std::os::windows::io::AsHandle;
+use std::process::{Child, Command};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+use windows_sys::Win32::System::Console::{
+    CONSOLE_MODE, CTRL_BREAK_EVENT, CTRL_C_EVENT, ENABLE_ECHO_INPUT, ENABLE_LINE_INPUT, GetConsoleMode,
+    GetStdHandle, STD_ERROR_HANDLE, STD_INPUT_HANDLE, STD_OUTPUT_HANDLE, SetConsoleCtrlHandler,
+    SetConsoleMode, SetStdHandle,
+};
+
+/// Exit code after a third request, when nothing else has ended the process: that of a program that Ctrl-C has ended
+/// (`STATUS_CONTROL_C_EXIT`).
+pub(crate) const INTERRUPTED: i32 = 0xc000_013a_u32.cast_signed();
+
+/// How long a console that closes waits: the system ends the process 5 s after it asked.
+const CLOSING: Duration = Duration::from_secs(5);
+
+/// Who is told what the console sends.
+static TOLD: Mutex<Option<Sender<Request>>> = Mutex::new(None);
+
+/// Events of the console that ask this process for something.
+pub(crate) struct Requests {
+    events: Receiver<Request>,
+}
+
+impl Requests {
+    /// Takes them from now on. Not real-time.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn listen(_: &StopSwitch) -> io::Result<Self> {
+        let (tell, events) = channel();
+        *TOLD.lock().unwrap_or_else(PoisonError::into_inner) = Some(tell);
+        handle(on_event)?;
+        Ok(Self { events })
+    }
+
+    /// The next one; `None` after `patience`. Not real-time.
+    pub(crate) fn next(&self, patience: Duration) -> Option<Request> {
+        self.events.recv_timeout(patience).ok()
+    }
+}
+
+type Handler = unsafe extern "system" fn(u32) -> i32;
+
+fn handle(handler: Handler) -> io::Result<()> {
+    // SAFETY: a function that may be called in any thread at any time, as long as the process lives.
+    match unsafe { SetConsoleCtrlHandler(Some(handler), 1) } {
+        0 => Err(io::Error::last_os_error()),
+        _ => Ok(()),
+    }
+}
+
+/// Called in a thread of its own. The answer 1: nobody else has to know.
+unsafe extern "system" fn on_event(event: u32) -> i32 {
+    let request = if event == CTRL_BREAK_EVENT { Request::Emergency } else { Request::End };
+    if let Some(tell) = &*TOLD.lock().unwrap_or_else(PoisonError::into_inner) {
+        let _ = tell.send(request);
+    }
+    if ![CTRL_C_EVENT, CTRL_BREAK_EVENT].contains(&event) {
+        // The console closes, or the user logs off: the process ends when this returns.
+        std::thread::sleep(CLOSING);
+    }
+    1
+}
+
+unsafe extern "system" fn on_event_of_others(_: u32) -> i32 {
+    1
+}
+
+/// From now on nothing that the console sends ends this process. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn outlive_requests() -> io::Result<()> {
+    handle(on_event_of_others)
+}
+
+/// The console, which gives keys without a line end while this lives.
+pub(crate) struct KeyTerminal {
+    before: CONSOLE_MODE,
+}
+
+impl KeyTerminal {
+    /// `None` where there is no console: in a pipe.
+    pub(crate) fn take() -> Option<Self> {
+        if !stdin().is_terminal() {
+            return None;
+        }
+        let mut before = 0;
+        // SAFETY: a handle of this process, and a number that is there for the call.
+        let is_known = unsafe { GetConsoleMode(GetStdHandle(STD_INPUT_HANDLE), &raw mut before) } != 0;
+        let keys = before & !(ENABLE_LINE_INPUT | ENABLE_ECHO_INPUT);
+        (is_known && set_mode(keys)).then_some(Self { before })
+    }
+}
+
+impl Drop for KeyTerminal {
+    fn drop(&mut self) {
+        let _ = set_mode(self.before);
+    }
+}
+
+fn set_mode(mode: CONSOLE_MODE) -> bool {
+    // SAFETY: a handle of this process.
+    unsafe { SetConsoleMode(GetStdHandle(STD_INPUT_HANDLE), mode) != 0 }
+}
+
+/// Standard output, kept for the caller alone: who writes there from now on writes to standard error. A C library that has
+/// taken the handle before keeps it. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn results_apart() -> io::Result<File> {
+    let own = io::stdout().as_handle().try_clone_to_owned()?;
+    // SAFETY: a handle of this process, which stays open as long as it lives.
+    match unsafe { SetStdHandle(STD_OUTPUT_HANDLE, GetStdHandle(STD_ERROR_HANDLE)) } {
+        0 => Err(io::Error::last_os_error()),
+        _ => Ok(File::from(own)),
+    }
+}
+
+/// Runs a program in place of this one, which waits, and ends with its exit code; why it could not.
+pub(crate) fn become_program(command: &mut Command) -> io::Error {
+    // What the console sends is the program's affair.
+    let ran = handle(on_event_of_others).and_then(|()| command.status());
+    match ran {
+        Ok(status) => std::process::exit(status.code().unwrap_or(1)),
+        Err(error) => error,
+    }
+}
+
+/// Ends a process: it cannot be asked.
+pub(crate) fn ask_to_end(child: &mut Child) {
+    let _ = child.kill();
+}

@@ -1,0 +1,104 @@
+//! Linux: anonymous files, signals, the clock of a thread's processor, seccomp.
+
+pub(crate) mod locked;
+
+use super::Used;
+use rustix::fs::{MemfdFlags, memfd_create};
+use rustix::io::Errno;
+use rustix::process::{Signal, WaitOptions, getpid, kill_process, waitpid};
+use rustix::time::{ClockId, clock_gettime};
+use std::fs::File;
+use std::io;
+use std::os::fd::AsFd;
+use std::os::unix::process::ExitStatusExt;
+use std::process::ExitStatus;
+use std::time::Duration;
+
+/// Unit of processor times under /proc: `USER_HZ` is 100 on every Linux.
+const CLOCK_TICK: Duration = Duration::from_millis(10);
+
+/// A file without a name in any folder.
+pub(crate) fn anonymous_file(name: &str) -> io::Result<File> {
+    Ok(File::from(memfd_create(name, MemfdFlags::CLOEXEC)?))
+}
+
+/// Standard input, as the file that it is.
+pub(crate) fn standard_input() -> io::Result<File> {
+    Ok(File::from(io::stdin().as_fd().try_clone_to_owned()?))
+}
+
+/// The signal that ended a process, if one did.
+pub(crate) fn ending_signal(end: ExitStatus) -> Option<i32> {
+    end.signal()
+}
+
+/// Ends this process at once, by a signal that nobody can take.
+pub(crate) fn end_at_once() {
+    kill_process(getpid(), Signal::KILL).ok();
+}
+
+/// Time this thread had a processor: what others do on it does not count.
+pub(crate) fn processor_time() -> Duration {
+    let now = clock_gettime(ClockId::ThreadCPUTime);
+    Duration::try_from(now).unwrap_or_default()
+}
+
+/// Whether this process has started others.
+pub(crate) fn children() -> &'static str {
+    match waitpid(None, WaitOptions::NOHANG) {
+        Err(Errno::CHILD) => "none",
+        _ => "at least one",
+    }
+}
+
+/// What a process did so far, and whether it would do more now.
+pub(crate) fn used(process: u32) -> Used {
+    let fields_of = |path: String| -> Vec<String> {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        text.rsplit(')').next().unwrap_or_default().split_whitespace().map(str::to_owned).collect()
+    };
+    // Fields 14 and 15 of proc(5), user and system; the state, field 3, comes first after the name.
+    let fields = fields_of(format!("/proc/{process}/stat"));
+    let ticks = |field: usize| fields.get(field - 3).and_then(|text| text.parse::<u32>().ok()).unwrap_or(0);
+    let mut threads = std::fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
+    let wants = threads.any(|thread| {
+        let state = fields_of(thread.path().join("stat").display().to_string());
+        // Runs or would run; waits for a disk, or for a page.
+        state.first().is_some_and(|state| matches!(state.as_str(), "R" | "D"))
+    });
+    Used { ran: CLOCK_TICK * ticks(14).saturating_add(ticks(15)), wants }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::validate::patience::wait;
+    use std::process::{Child, Command};
+
+    fn shell(script: &str) -> Child {
+        Command::new("sh").args(["-c", script]).spawn().expect("there is a shell")
+    }
+
+    #[test]
+    fn one_that_runs_and_one_that_sleeps_for_ever_are_ended() {
+        for endless in ["while :; do :; done", "exec sleep 600", "kill -STOP $$"] {
+            let mut child = shell(endless);
+            let outcome = wait(&mut child, Duration::from_millis(100)).expect("it can be ended");
+            assert!(outcome.is_none(), "{endless}: {outcome:?}");
+        }
+    }
+
+    #[test]
+    fn one_that_ends_is_waited_for() {
+        let outcome = wait(&mut shell("exit 7"), Duration::from_secs(60)).expect("it can be waited for");
+        assert_eq!(outcome.and_then(|end| end.status.code()), Some(7));
+    }
+
+    #[test]
+    fn the_time_of_the_processor_is_told() {
+        let script = "i=0; while [ $i -lt 300000 ]; do i=$((i+1)); done";
+        let outcome = wait(&mut shell(script), Duration::from_secs(60)).expect("it can be waited for");
+        let ran = outcome.expect("it ends").ran;
+        assert!(ran > Duration::ZERO && ran < Duration::from_secs(60), "{ran:?}");
+    }
+}

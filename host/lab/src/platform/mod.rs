@@ -1,0 +1,11 @@
+//! What differs between systems in a measurement: how a thread sleeps on a word that two processes may share.
+
+#[cfg(not(windows))]
+mod linux;
+#[cfg(windows)]
+mod windows;
+
+#[cfg(not(windows))]
+pub(crate) use linux::{wait, wake};
+#[cfg(windows)]
+pub(crate) use windows::{wait, wake};

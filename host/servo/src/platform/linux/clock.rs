@@ -1,0 +1,24 @@
+//! The monotonic clock, and sleeping on it.
+
+use rustix::thread::{ClockId, clock_nanosleep_absolute};
+use rustix::time::{Timespec, clock_gettime};
+
+/// Nanoseconds of the monotonic clock. Real-time: bounded, no allocation (a vDSO call).
+#[inline]
+#[must_use]
+#[allow(clippy::cast_sign_loss)] // the monotonic clock starts at boot
+pub fn monotonic_ns() -> u64 {
+    let now = clock_gettime(ClockId::Monotonic);
+    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+}
+
+/// Sleeps until a time of the monotonic clock. Real-time: one system call.
+#[allow(clippy::cast_possible_wrap)] // seconds since boot
+pub fn sleep_until(deadline_ns: u64) {
+    let request = Timespec {
+        tv_sec: (deadline_ns / 1_000_000_000) as i64,
+        tv_nsec: (deadline_ns % 1_000_000_000) as i64,
+    };
+    // An interrupted sleep is as good as a short one: the spin afterwards looks at the clock.
+    let _ = clock_nanosleep_absolute(ClockId::Monotonic, &request);
+}

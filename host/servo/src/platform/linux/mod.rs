@@ -1,0 +1,10 @@
+//! Linux: absolute sleeps, SCHED_FIFO, handlers of signals, anonymous files, handles that go from process to process.
+
+pub(crate) mod clock;
+pub(crate) mod last_stop;
+pub(crate) mod processes;
+pub(crate) mod scheduling;
+pub(crate) mod shared_memory;
+pub(crate) mod watchdog_process;
+
+pub use last_stop::{block_signals, leave_sent_signals_to_the_loop, wait_for_signal};

@@ -1,0 +1,104 @@
+//! Priorities, cores and locked memory.
+
+use rustix::mm::{MlockAllFlags, mlockall};
+use rustix::thread::{CpuSet, sched_setaffinity};
+use thread_priority::unix::{
+    RealtimeThreadSchedulePolicy, ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
+};
+use thread_priority::{Error, ThreadPriority, ThreadPriorityValue};
+
+/// Cores that the system can name.
+pub(crate) const MOST_CORES: usize = CpuSet::MAX_CPU;
+
+/// How this system calls the priority that a loop asks for.
+pub const PRIORITY_NAME: &str = "SCHED_FIFO";
+/// How a user allows it.
+pub(crate) const PRIORITY_ADVICE: &str = "allow it with `@realtime - rtprio 99` in /etc/security/limits.conf, or `setcap \
+                                   cap_sys_nice+ep` on the executable";
+/// How a user allows locked memory.
+pub(crate) const MEMORY_ADVICE: &str =
+    "allow it with `@realtime - memlock unlimited` in /etc/security/limits.conf";
+/// How a user finds the cores that a process may use.
+pub(crate) const CORE_ADVICE: &str = "`grep Cpus_allowed_list /proc/self/status` lists them";
+
+/// Priority of the loop: below the kernel's own threads (99), above everything ordinary.
+const LOOP_PRIORITY: u8 = 80;
+
+/// What a thread of the host is for, which its priority follows from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Duty {
+    /// Runs the loop.
+    Loop,
+    /// Runs a model in a process of its own: below the loop, which waits for it but not for ever.
+    Worker,
+    /// Interrupts the loop: above it.
+    Watchdog,
+}
+
+/// Locks the memory of the process, what it has and what it will have; `None` where the system locks no process. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn lock_memory() -> Option<Result<(), String>> {
+    Some(mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| error.to_string()))
+}
+
+/// Takes it back. Not real-time.
+pub(crate) fn unlock_memory() {
+    let _ = rustix::mm::munlockall();
+}
+
+/// Keeps the calling thread on the core of this number; the process's other threads go where they did. Not real-time.
+///
+/// # Errors
+/// There is no such core, or it is not this process's: the system refuses nothing else.
+pub(crate) fn pin(core: usize) -> Result<(), NoSuchCore> {
+    let mut set = CpuSet::new();
+    set.set(core);
+    sched_setaffinity(None, &set).map_err(|_| NoSuchCore)
+}
+
+/// The machine has no such core, or the process may not use it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct NoSuchCore;
+
+/// Asks for the priority of a duty for the calling thread. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn enter_priority(duty: Duty) -> Result<(), String> {
+    let priority = match duty {
+        Duty::Worker => LOOP_PRIORITY - 1,
+        Duty::Loop => LOOP_PRIORITY,
+        Duty::Watchdog => LOOP_PRIORITY + 1,
+    };
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    let value = ThreadPriorityValue::try_from(priority)?;
+    set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy).map_err(
+        |error| match error {
+            Error::OS(code) => std::io::Error::from_raw_os_error(code).to_string(),
+            other => other.to_string(),
+        },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The cores the calling thread may use, as the system lists them.
+    fn allowed() -> String {
+        let status = std::fs::read_to_string("/proc/thread-self/status").expect("Linux has it");
+        let line = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
+        line.expect("it is in there").trim().to_owned()
+    }
+
+    #[test]
+    fn a_thread_goes_to_the_core_that_is_named_and_no_other_thread_with_it() {
+        let before = allowed();
+        let first = before.split([',', '-']).next().and_then(|number| number.parse::<usize>().ok());
+        let core = first.expect("there is a core");
+        let pinned = std::thread::spawn(move || (pin(core), allowed())).join().expect("it does not panic");
+        assert_eq!((pinned, allowed()), ((Ok(()), core.to_string()), before));
+    }
+}

@@ -1,0 +1,195 @@
+//! What the system does with a process that dies: exceptions that nobody handles, and the end of the process.
+//!
+//! Nothing that runs there allocates, locks or formats into memory of its own. There are no signals: what a console sends is
+//! heard where the command line is, and no plugin can take it away.
+#![allow(unsafe_code)] // neither filter nor callback can be made without; tests/tests/system/architecture.rs lists it
+
+use crate::guest::leaves_signals;
+use crate::last_stop::{Death, end_if_armed, end_if_in_call, is_armed, is_in_call};
+use std::ffi::c_void;
+use std::io;
+use std::process::{Child, Command};
+use windows_sys::Win32::Foundation::{
+    EXCEPTION_ACCESS_VIOLATION, EXCEPTION_BREAKPOINT, EXCEPTION_FLT_DIVIDE_BY_ZERO,
+    EXCEPTION_ILLEGAL_INSTRUCTION, EXCEPTION_IN_PAGE_ERROR, EXCEPTION_INT_DIVIDE_BY_ZERO,
+    EXCEPTION_PRIV_INSTRUCTION, EXCEPTION_STACK_OVERFLOW,
+};
+use windows_sys::Win32::Storage::FileSystem::WriteFile;
+use windows_sys::Win32::System::Console::{GetStdHandle, STD_ERROR_HANDLE};
+use windows_sys::Win32::System::Diagnostics::Debug::{EXCEPTION_POINTERS, SetUnhandledExceptionFilter};
+use windows_sys::Win32::System::SystemServices::DLL_PROCESS_DETACH;
+use windows_sys::Win32::System::Threading::{
+    GetCurrentProcess, GetCurrentThreadId, SetThreadStackGuarantee, TerminateProcess,
+};
+
+/// Bytes of a thread's name with its end.
+pub(crate) const NAME_BYTES: usize = 16;
+/// Bytes of a stack that has overflowed which are left for the filter: a device's stop takes little.
+const STACK_BYTES: u32 = 64 * 1024;
+/// What a filter answers: the next one is asked, which ends the process.
+const CONTINUE_SEARCH: i32 = 0;
+
+/// Takes every exception that would end the process, and its end. Again for each run: a plugin may have put something else
+/// there. Not real-time.
+pub(crate) fn install() {
+    let mut bytes = STACK_BYTES;
+    // SAFETY: a number that is there for the call.
+    let _ = unsafe { SetThreadStackGuarantee(&raw mut bytes) };
+    if !leaves_signals() {
+        // SAFETY: a function that may be called in any thread at any time.
+        let _ = unsafe { SetUnhandledExceptionFilter(Some(on_exception)) };
+    }
+    // A look that cannot be left out keeps the callback in the program.
+    // SAFETY: a static of this module.
+    let _ = unsafe { std::ptr::read_volatile(&raw const AT_END) };
+}
+
+/// The same: an exception is the thread's that raises it.
+pub(crate) fn install_for_crashes() {
+    install();
+}
+
+/// From now on this thread takes what is sent to the process: nothing is.
+pub(crate) fn take_sent() {}
+
+unsafe extern "system" fn on_exception(exception: *const EXCEPTION_POINTERS) -> i32 {
+    // SAFETY: the system passes a description that is there for the call.
+    let code = unsafe { (*(*exception).ExceptionRecord).ExceptionCode };
+    let death = Death::Signal { signal: code, sender: None };
+    end_if_armed(death);
+    end_if_in_call(death);
+    CONTINUE_SEARCH
+}
+
+/// Called by the loader at the end of the process, whoever asked for it, when this is the only thread left.
+#[used]
+#[unsafe(link_section = ".CRT$XLD")]
+static AT_END: unsafe extern "system" fn(*mut c_void, u32, *mut c_void) = at_end;
+
+unsafe extern "system" fn at_end(_: *mut c_void, reason: u32, _: *mut c_void) {
+    if reason == DLL_PROCESS_DETACH && (is_armed() || is_in_call()) {
+        end_if_armed(Death::Exit);
+        end_if_in_call(Death::Exit);
+    }
+}
+
+/// Ends the process with a code.
+pub(crate) fn end_by(_: Death, code: i32) -> ! {
+    leave_process(code)
+}
+
+/// Ends the process at once: nothing of what a process does at its end is done. Real-time: never returns.
+pub fn leave_process(code: i32) -> ! {
+    // SAFETY: the handle that means this process is always there.
+    let _ = unsafe { TerminateProcess(GetCurrentProcess(), code.cast_unsigned()) };
+    // It has ended, if the system lets a process end itself at all.
+    std::process::abort()
+}
+
+/// Writes to standard error, once: a reader that is gone is no reason to stay.
+pub(crate) fn say(bytes: &[u8]) {
+    let (mut written, length) = (0, u32::try_from(bytes.len()).unwrap_or(0));
+    // SAFETY: the bytes are there for the call, and as many as said; a null pointer where no waiting is described.
+    let _ = unsafe {
+        WriteFile(
+            GetStdHandle(STD_ERROR_HANDLE),
+            bytes.as_ptr(),
+            length,
+            &raw mut written,
+            std::ptr::null_mut(),
+        )
+    };
+}
+
+/// The number of the calling thread.
+pub(crate) fn thread_number() -> i32 {
+    // SAFETY: takes nothing, and cannot fail.
+    unsafe { GetCurrentThreadId() }.cast_signed()
+}
+
+/// The name of the calling thread, which is its number: the system gives a name only into memory that it allocates.
+pub(crate) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
+    let mut rest = &mut name[..];
+    let _ = io::Write::write_fmt(&mut rest, format_args!("{}", thread_number().cast_unsigned()));
+    let left = rest.len();
+    std::str::from_utf8(name.get(..NAME_BYTES - left).unwrap_or_default()).unwrap_or_default()
+}
+
+/// An exception, for people.
+pub(crate) struct Named(pub(crate) i32);
+
+impl std::fmt::Display for Named {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(code) = *self;
+        let words = match code {
+            EXCEPTION_ACCESS_VIOLATION => "invalid memory access",
+            EXCEPTION_IN_PAGE_ERROR => "memory access error",
+            EXCEPTION_STACK_OVERFLOW => "stack overflow",
+            EXCEPTION_INT_DIVIDE_BY_ZERO | EXCEPTION_FLT_DIVIDE_BY_ZERO => "arithmetic error",
+            EXCEPTION_ILLEGAL_INSTRUCTION | EXCEPTION_PRIV_INSTRUCTION => "illegal instruction",
+            EXCEPTION_BREAKPOINT => "breakpoint",
+            _ => "one that nobody handles",
+        };
+        f.write_str("exception ")?;
+        write!(f, "{:#010x} ({words})", code.cast_unsigned())
+    }
+}
+
+// ---------------------------------------------------------------- signals, of which there are none
+
+/// Lets every signal that this process ignores end it again: there is none.
+pub fn ignore_no_signal() {}
+
+/// Starts a process. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub fn spawn_unblocked(command: &mut Command) -> io::Result<Child> {
+    command.spawn()
+}
+
+/// How the host's signals are taken: there are none.
+pub struct SignalGuard;
+
+/// Signals of the host that somebody took away: there are none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TakenSignals;
+
+impl SignalGuard {
+    /// How they are taken now.
+    #[must_use]
+    pub fn take() -> Self {
+        Self
+    }
+
+    /// Puts back what has changed since: nothing can.
+    pub fn put_back(&self) -> TakenSignals {
+        TakenSignals
+    }
+}
+
+impl TakenSignals {
+    /// None.
+    #[must_use]
+    pub const fn is_none(self) -> bool {
+        true
+    }
+
+    /// One bit a signal, for a word that threads share.
+    #[must_use]
+    pub(crate) const fn bits(self) -> u64 {
+        0
+    }
+
+    /// The set of such a word.
+    pub(crate) const fn from_bits(_: u64) -> Self {
+        Self
+    }
+}
+
+/// Their names: none.
+impl std::fmt::Display for TakenSignals {
+    fn fmt(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        Ok(())
+    }
+}

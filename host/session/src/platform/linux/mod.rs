@@ -1,0 +1,55 @@
+//! Linux: owners and permissions of folders, numbers of files, limits of the process.
+
+mod machine;
+
+pub(crate) use machine::MachineState;
+
+use rustix::process::geteuid;
+use std::fs::Metadata;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+
+/// What tells a file from all others that exist.
+pub(crate) fn identity(file: &Metadata) -> [u64; 2] {
+    [file.dev(), file.ino()]
+}
+
+/// When contents or attributes changed last, s and ns since 1970: no program can set it back.
+pub(crate) fn changed(file: &Metadata) -> (i64, i64) {
+    (file.ctime(), file.ctime_nsec())
+}
+
+/// Whether two paths lead to one file that exists. Not real-time.
+#[must_use]
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
+    let of = |path: &Path| std::fs::metadata(path).map(|file| identity(&file));
+    matches!((of(one), of(other)), (Ok(one), Ok(other)) if one == other)
+}
+
+/// Where a user keeps plugins for all installations, by the XDG base directory specification. Root has none: a file of a home
+/// folder is no reason to run code with all rights.
+pub(crate) fn user_folder() -> Option<PathBuf> {
+    if geteuid().is_root() {
+        return None;
+    }
+    let absolute = |variable| std::env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute());
+    let data = absolute("XDG_DATA_HOME").or_else(|| Some(absolute("HOME")?.join(".local/share")));
+    Some(data?.join("flotor/plugins"))
+}
+
+/// Why a folder is not searched: somebody could put a plugin there whom the user has not trusted yet. Trusted are root, the user,
+/// and the owner of this program.
+pub(crate) fn distrust(folder: &Path, attributes: &Metadata) -> Option<String> {
+    let folder = folder.display();
+    if attributes.permissions().mode() & 0o002 != 0 {
+        return Some(format!(
+            "anybody may write into it, and loading a plugin runs its code; `chmod o-w {folder}`"
+        ));
+    }
+    let owner = attributes.uid();
+    let owns_program =
+        || std::env::current_exe().and_then(std::fs::metadata).is_ok_and(|own| own.uid() == owner);
+    (owner != 0 && owner != geteuid().as_raw() && !owns_program()).then(|| {
+        format!("user {owner} owns it, and loading a plugin runs its code; `chown` it, or copy its plugins to a folder of yours")
+    })
+}

@@ -1,0 +1,14 @@
+//! What differs between systems for the `flotor` command. Each system has one module with the same items:
+//! - `doctor`, `usb`: what the system tells of itself and of devices on USB;
+//! - `lend`: programs of other makers;
+//! - `most_open_files`, `end_with_parent`: the process.
+
+#[cfg(not(windows))]
+mod linux;
+#[cfg(windows)]
+mod windows;
+
+#[cfg(not(windows))]
+pub(crate) use linux::{doctor, end_with_parent, lend, most_open_files, usb};
+#[cfg(windows)]
+pub(crate) use windows::{doctor, end_with_parent, lend, most_open_files, usb};

@@ -1,0 +1,81 @@
+//! Windows: neither programs of other makers nor the state of devices on USB yet.
+
+/// How many files this process may have open: as many as it likes.
+pub(crate) fn most_open_files() -> Option<u64> {
+    None
+}
+
+/// From now on this process ends with the one that started it: only `flotor lend` needs that.
+pub(crate) fn end_with_parent() {}
+
+pub(crate) mod doctor {
+    //! What `flotor doctor` finds in the system.
+
+    use crate::cli::doctor::Diagnosis;
+
+    /// How a user gets a priority.
+    pub(crate) const PRIORITY_REMEDY: &str = "start the program with normal priority";
+    /// How a user gets locked memory.
+    pub(crate) const MEMORY_REMEDY: &str =
+        "Windows locks the memory of no whole program; keep some memory free";
+
+    /// What this system has to say beside its cores.
+    pub(crate) fn of_the_system() -> Vec<Diagnosis> {
+        vec![Diagnosis::note(
+            "system",
+            "Windows",
+            "it promises no time: sufficient for a first test; for bounded lateness use Linux with PREEMPT_RT",
+        )]
+    }
+}
+
+pub(crate) mod usb {
+    //! The connection of a device on USB.
+
+    use crate::cli::doctor::Diagnosis;
+    use flotor_hal::UsbKind;
+    use std::path::Path;
+
+    /// What the machine says of its devices: it is not asked yet.
+    pub(crate) struct Machine;
+
+    impl Machine {
+        /// Of the machine itself.
+        pub(crate) fn at(_: &Path) -> Self {
+            Self
+        }
+    }
+
+    /// What is known of the connection of a device of these kinds.
+    pub(crate) fn connection(_: &Machine, kinds: &[UsbKind], is_open: bool) -> Vec<Diagnosis> {
+        if kinds.is_empty() || is_open {
+            return Vec::new();
+        }
+        vec![Diagnosis::note(
+            "USB",
+            "not looked at on Windows yet",
+            "the Device Manager lists what is connected",
+        )]
+    }
+}
+
+pub(crate) mod lend {
+    //! `flotor lend`.
+
+    use clap::Args;
+    use flotor_command::CommandError;
+    use std::ffi::OsString;
+
+    /// Run an unmodified program, written for another maker's device (on Linux only)
+    #[derive(Args)]
+    pub(crate) struct LendArguments {
+        /// What is given on Linux
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
+        _arguments: Vec<OsString>,
+    }
+
+    #[allow(clippy::needless_pass_by_value)] // as elsewhere
+    pub(crate) fn run(_: LendArguments) -> Result<(), CommandError> {
+        Err(CommandError::Usage("`flotor lend` is not on Windows yet: its libraries are Linux's".to_owned()))
+    }
+}
