@@ -449,6 +449,116 @@ fn unlisted_unsafe_and_stale_entries_are_noticed() {
     assert!(complaints[1].contains("tests/alloc.rs"));
 }
 
+// ---------------------------------------------------------------- one system
+
+/// What `cfg` asks for to know the system.
+const SYSTEM_CONDITIONS: &[&str] =
+    &["unix", "windows", "target_os", "target_family", "target_env", "target_vendor"];
+
+/// Where a system may be asked for outside a module `platform`: emulators plug a device into the kernel of Linux, and the export
+/// macro asks in the crate of a plugin, which has no such module.
+const ASKED_ELSEWHERE: &[&str] =
+    &["devices/falcon/emulator/", "devices/maglev/emulator/", "devices/usbip/", "hal/src/abi/metadata.rs"];
+
+/// Crates that run on more than one system: what only one of them has is named in their modules `platform` alone. Tests and
+/// examples ask for nothing of a system, but some need its programs.
+const PORTED: &[&str] = &[
+    "devices/simulated/src/",
+    "hal/src/",
+    "host/command/src/",
+    "host/core/src/",
+    "host/judge/src/",
+    "host/lab/src/",
+    "host/live/src/",
+    "host/plot/src/",
+    "host/record/src/",
+    "host/servo/src/",
+    "host/session/src/",
+    "host/src/",
+    "host/statistics/src/",
+    "host/sync/src/",
+    "models/",
+];
+
+/// Crates with what only one system has.
+const SYSTEM_CRATES: &[&str] = &["libc", "rustix", "signal_hook", "thread_priority", "windows_sys"];
+
+/// Whether a file is, or is below, a module `platform`.
+fn is_of_a_platform(file: &str) -> bool {
+    file.contains("/platform/") || file.ends_with("/platform.rs")
+}
+
+/// The system that a source asks for by `cfg`, if it does.
+fn system_conditions(tokens: TokenStream) -> Vec<String> {
+    let (mut found, mut is_cfg) = (Vec::new(), false);
+    for token in tokens {
+        match token {
+            TokenTree::Ident(name) => is_cfg = ["cfg", "cfg_attr"].contains(&name.to_string().as_str()),
+            TokenTree::Punct(mark) if mark.as_char() == '!' => {} // `cfg!(…)`
+            TokenTree::Group(group) if is_cfg => {
+                let asked = identifiers(&group.stream().to_string());
+                found.extend(asked.into_iter().filter(|name| SYSTEM_CONDITIONS.contains(&name.as_str())));
+                is_cfg = false;
+            }
+            TokenTree::Group(group) => found.extend(system_conditions(group.stream())),
+            TokenTree::Punct(_) | TokenTree::Literal(_) => is_cfg = false,
+        }
+    }
+    found
+}
+
+/// What of one system a source names: `std::os`, or a crate of that system.
+fn system_names(source: &str) -> Vec<String> {
+    let names = identifiers(source);
+    let is_std_os = |pair: &[String]| pair == ["std", "os"];
+    let mut found: Vec<String> =
+        names.windows(2).filter(|pair| is_std_os(pair)).map(|pair| pair.join("::")).collect();
+    found.extend(names.into_iter().filter(|name| SYSTEM_CRATES.contains(&name.as_str())));
+    found
+}
+
+/// What a source has that belongs into a module `platform`.
+fn outside_its_platform(file: &str, source: &str) -> Vec<String> {
+    let begins = |folders: &[&str]| folders.iter().any(|folder| file.starts_with(folder));
+    if is_of_a_platform(file) || begins(ASKED_ELSEWHERE) {
+        return Vec::new();
+    }
+    let tokens = source.parse().expect("the compiler reads it, so it is made of tokens");
+    let mut found = system_conditions(tokens);
+    if begins(PORTED) {
+        found.extend(system_names(source));
+    }
+    found
+}
+
+#[test]
+fn what_differs_between_systems_stands_in_modules_of_the_platform() {
+    let mut complaints = Vec::new();
+    for file in files_under("", "rs").expect("the workspace can be read") {
+        let source = std::fs::read_to_string(workspace_root().join(&file)).expect("a source file is text");
+        let name = file.display().to_string();
+        let found = outside_its_platform(&name, &source);
+        if !found.is_empty() {
+            complaints.push(format!("{name} has {found:?}: move it into a module `platform` of its crate"));
+        }
+    }
+    assert_eq!(complaints, Vec::<String>::new());
+}
+
+#[test]
+fn a_system_outside_its_platform_is_noticed() {
+    let count = |file: &str, source: &str| outside_its_platform(file, source).len();
+    let asks = "#[cfg(all(test, unix))] mod tests { fn f() { if cfg!(target_os = \"linux\") {} } }";
+    assert_eq!(count("viewer/src/main.rs", asks), 2);
+    assert_eq!(count("host/src/platform/mod.rs", asks), 0);
+    assert_eq!(count("devices/usbip/src/lib.rs", asks), 0);
+    let names = "use std::os::fd::AsFd; use rustix::io; fn f() { std::process::id() }";
+    assert_eq!((count("host/live/src/client.rs", names), count("viewer/src/main.rs", names)), (2, 0));
+    // Neither text nor other conditions.
+    let harmless = "#[cfg(test)] mod tests { const A: &str = \"cfg(unix)\"; fn windows() { slice.windows(2) } } // cfg(unix)";
+    assert_eq!(count("host/live/src/client.rs", harmless), 0);
+}
+
 // ---------------------------------------------------------------- the same bits everywhere
 
 /// Methods of floating-point numbers whose last bit the system's library or the compiler chooses, or that are slow where the
