@@ -1,6 +1,8 @@
 //! Where running hosts are found: one socket a run, in a folder that belongs to the user alone.
 
-use crate::platform::{Listening, is_ours, is_ours_alone, make_folder, remove_if_over, run_folder};
+use crate::platform::{
+    Listening, Stream, accept, is_ours, is_ours_alone, make_folder, remove_if_over, run_folder,
+};
 use std::ffi::OsStr;
 use std::fs::DirEntry;
 use std::io;
@@ -137,6 +139,14 @@ impl Listener {
     #[must_use]
     pub(crate) fn socket(&self) -> &Listening {
         &self.socket
+    }
+
+    /// Waits for the next connection, without an end.
+    ///
+    /// # Errors
+    /// That of the system; `Interrupted` for a client that is turned away.
+    pub fn accept(&self) -> io::Result<Stream> {
+        accept(&self.socket)
     }
 
     /// Its file.

@@ -142,20 +142,22 @@ impl FakeHost {
 
     /// Meets a client on a thread while `meet` makes one.
     pub(crate) fn welcome<T>(&mut self, meet: impl FnOnce(&Directory) -> T) -> T {
-        let listener = self.listener.socket().try_clone().expect("a second handle");
         let hello = [
             frame(Kind::Greeting, &serde_json::to_vec(&self.greeting).expect("it is JSON")),
             frame(Kind::Run, &self.run.to_bytes()),
         ]
         .concat();
-        let accepting = std::thread::spawn(move || {
-            let (mut stream, _) = listener.accept().expect("somebody comes");
-            stream.write_all(&hello).expect("they listen");
-            stream.set_read_timeout(Some(PATIENCE)).expect("a time-out is legal");
-            stream
+        let (met, stream) = std::thread::scope(|scope| {
+            let accepting = scope.spawn(|| {
+                let mut stream = self.listener.accept().expect("somebody comes");
+                stream.write_all(&hello).expect("they listen");
+                stream.set_read_timeout(Some(PATIENCE)).expect("a time-out is legal");
+                stream
+            });
+            let met = meet(&self.directory);
+            (met, accepting.join().expect("the host waits"))
         });
-        let met = meet(&self.directory);
-        self.stream = Some(accepting.join().expect("the host waits"));
+        self.stream = Some(stream);
         met
     }
 
