@@ -7,7 +7,7 @@
 //!
 //! Both directions are best effort, and only the newest counts: what finds no room is dropped, here and in Zenoh. Nothing of it
 //! is trusted: what is no [`Dispatch`] is refused and counted; a host hears one partner, and believes of its claims what it can check
-//! (`flotor_servo::coupling`).
+//! (`flotor_coupling`).
 
 use crate::keys::Name;
 use crate::link::LinkError;

@@ -3,6 +3,7 @@
 //! - [`trace`]: what a tick leaves behind.
 //! - [`mapping`]: between the device frame and a model's frame.
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range.
+//! - [`plausibility`]: whether a sample can be true.
 //! - [`coupling`]: two devices held together; [`peer`]: what the two ends tell each other.
 //! - [`Change`]: a parameter that changed while the loop ran.
 //!
@@ -16,6 +17,7 @@ pub mod limits;
 pub mod mapping;
 pub mod oscillation;
 pub mod peer;
+pub mod plausibility;
 mod random;
 pub mod trace;
 

@@ -14,10 +14,10 @@ mod region;
 use super::boundary::BoundaryWall;
 use super::passivity::Passivity;
 use super::state::Gate;
-use crate::port_energy::Controller;
 use flotor_core::limits::{Bound, Boundary, Limits};
 use flotor_core::oscillation::Oscillation;
 use flotor_core::trace::Events;
+use flotor_coupling::port_energy::Controller;
 use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench};
 use region::Region;
 

@@ -4,11 +4,11 @@
 
 use super::Heartbeat;
 use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement};
-use crate::coupling::{
+use flotor_core::trace::Events;
+use flotor_coupling::{
     Coupling, CouplingDescription, CouplingEnds, Grip, Hearing, Line, Patience, Pull, Reach, RemoteEnd, Tank,
     TankState,
 };
-use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DeviceState, Tick, Wrench};
 

@@ -1,7 +1,6 @@
 //! The real-time core: one tick after the other, at a rate that is kept, inside limits that no plugin can bypass.
 //!
 //! - [`Servo`]: the tick; [`Clock`] decides when it happens, [`Envelope`] what may reach a hand.
-//! - [`coupling`]: virtual coupling of two devices, over any delay; [`port_energy`]: what crosses a port.
 //! - [`last_stop`], [`watchdog_process`]: a process that dies takes the force along.
 //! - [`engine`]: where a model executes: in the loop, asynchronously at a rate of its own, or in a process of its own.
 //!
@@ -11,7 +10,6 @@
 mod boundary;
 mod budget;
 mod clock;
-pub mod coupling;
 pub mod engine;
 mod envelope;
 mod forces;
@@ -22,8 +20,6 @@ mod models;
 mod parameters;
 mod passivity;
 pub mod platform;
-mod plausibility;
-pub mod port_energy;
 mod queue;
 mod realtime;
 mod run;
@@ -54,7 +50,6 @@ pub use parameters::{
     ScheduledChange, WEIGHT,
 };
 pub use platform::PRIORITY_NAME;
-pub use plausibility::{Implausible, ImplausibleSamples, PlausibilityCheck, Trust};
 pub use queue::{drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
 pub use realtime::{enter_guard_priority, enter_real_time, enter_worker_priority, probe_real_time};

@@ -1,10 +1,10 @@
 //! The envelope's stage for energy: the energy balance of a device's port, and the passivity controller that a scene
 //! may add.
 //!
-//! What crosses a port and how the controller removes it: [`crate::port_energy`].
+//! What crosses a port and how the controller removes it: [`flotor_coupling::port_energy`].
 
-use crate::port_energy::{Controller, Expected, PortObserver};
 use flotor_core::coupling::PassivityMode;
+use flotor_coupling::port_energy::{Controller, Expected, PortObserver};
 use flotor_hal::{DVec3, DeviceState, Twist, Wrench};
 
 /// Accelerations that a handle may have without its next sample being a surprise: 40 N on 0.58 kg are 69 m/s², and

@@ -2,8 +2,10 @@
 
 use super::envelope::Envelope;
 use super::forces::Port;
-use super::plausibility::{Implausible, ImplausibleSamples, PlausibilityCheck, Trust, stale_ticks_limit};
 use super::state::{Cause, Gate, RunEvent};
+use flotor_core::plausibility::{
+    Implausible, ImplausibleSamples, PlausibilityCheck, Trust, stale_ticks_limit,
+};
 use flotor_core::trace::Events;
 use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, Fault, Tick};

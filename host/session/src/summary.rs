@@ -6,9 +6,9 @@ use crate::{Misbehaved, Observer, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
 use flotor_core::trace::{Events, TickRecord};
+use flotor_coupling::Hearing;
 use flotor_hal::{DVec3, EnergyLedger};
 use flotor_servo::RunEnd;
-use flotor_servo::coupling::Hearing;
 use flotor_servo::{CouplingOutcome, ModelHealth, Overrun, Percentiles, Stage, Timing};
 use serde::Serialize;
 

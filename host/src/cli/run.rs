@@ -14,10 +14,10 @@ use flotor_command::{
 };
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
+use flotor_coupling::Line;
 use flotor_live::{Directory, EndKind, Latch};
 use flotor_record::{Note, Recorder, Severity, TraceDigest};
 use flotor_servo::RunEnd;
-use flotor_servo::coupling::Line;
 use flotor_servo::{Clock, Core};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;

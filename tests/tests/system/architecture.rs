@@ -28,6 +28,8 @@ enum Role {
     Sync,
     /// Plain data and maths of a run.
     Core,
+    /// Two devices held together.
+    Coupling,
     /// The real-time core.
     Servo,
     Record,
@@ -67,9 +69,9 @@ enum Role {
 }
 
 use Role::{
-    Calibration, Command, Compat, Contract, Core, Drawing, DropIn, Emulator, Fixture, Guard, Host, Judge,
-    Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record, SceneTest, Service, Servo, Session,
-    Statistics, Study, StudyProgram, Sync, Tests, Viewer,
+    Calibration, Command, Compat, Contract, Core, Coupling, Drawing, DropIn, Emulator, Fixture, Guard, Host,
+    Judge, Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record, SceneTest, Service, Servo,
+    Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -82,10 +84,11 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("devices/emulation", OfEmulators, &[]),
     ("host/sync", Sync, &[]),
     ("host/core", Core, &[Contract, Sync]),
-    ("host/servo", Servo, &[Contract, Sync, Core]),
+    ("host/coupling", Coupling, &[Contract, Sync, Core]),
+    ("host/servo", Servo, &[Contract, Sync, Core, Coupling]),
     ("host/record", Record, &[Contract, Sync, Core]),
     ("host/live", Live, &[Contract, Sync, Core, Record]),
-    ("host/session", Session, &[Contract, Sync, Core, Servo, Record, Live]),
+    ("host/session", Session, &[Contract, Sync, Core, Coupling, Servo, Record, Live]),
     ("host/compat/common", Compat, &[Contract, Sync, Core, Servo, Record, Live, Session]),
     ("host/compat/chai3d", DropIn, &[Contract, Compat]),
     ("host/compat/openhaptics", DropIn, &[Contract, Compat]),
@@ -96,18 +99,18 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/command", Command, &[Contract, Sync, Core, Servo, Record, Live, Session]),
     ("host/lab/guard", Guard, &[]),
     ("host/judge", Judge, &[Contract, Core, Session, Plot]),
-    ("host/lab", Lab, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command, Judge]),
+    ("host/lab", Lab, &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Judge]),
     ("host/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
     // Neither the session nor the loader: everything it runs is a process of its own.
     ("host/scene-test", SceneTest, &[Core, Command]),
-    ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics]),
+    ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
     (
         "host/study/program",
         StudyProgram,
         &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command, Study],
     ),
     // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
-    ("host", Host, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command, Plugin]),
+    ("host", Host, &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Plugin]),
     ("viewer/drawing", Drawing, &[Contract]),
     ("viewer", Viewer, &[Contract, Sync, Core, Record, Live, Plot, Drawing, Study]),
     (
@@ -117,6 +120,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
             Contract,
             Sync,
             Core,
+            Coupling,
             Servo,
             Record,
             Live,

@@ -7,10 +7,10 @@ mod liars;
 
 use flotor_core::peer::Dispatch;
 use flotor_core::trace::{Events, TickRecord};
+use flotor_coupling::{Cut, Line};
 use flotor_hal::{DVec3, Fault};
 use flotor_servo::CouplingOutcome;
 use flotor_servo::RunEnd;
-use flotor_servo::coupling::{Cut, Line};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
 use flotor_session::telemetry::Pairing;

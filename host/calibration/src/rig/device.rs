@@ -6,9 +6,10 @@ use crate::CalibrationError;
 use crate::procedure::Plan;
 use crate::sensor::ForceSensor;
 use flotor_core::limits::{Boundary, CEILING, Limits};
+use flotor_core::plausibility::PlausibilityCheck;
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
 use flotor_hal::{Fault, LoopConfig, Refusal, VerticalCalibration};
-use flotor_servo::{Envelope, PlausibilityCheck, StopSwitch};
+use flotor_servo::{Envelope, StopSwitch};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 

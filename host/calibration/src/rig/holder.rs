@@ -6,12 +6,12 @@
 
 use super::{AVERAGED_TICKS, Mean, PERIOD_NS, locked};
 use crate::CalibrationError;
+use flotor_core::plausibility::{PlausibilityCheck, Trust};
 use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Conditions, Cycle, DeviceState, Fault, Tick};
 use flotor_servo::{
-    EmergencySource, Envelope, Gate, Heartbeat, LastStop, Place, PlausibilityCheck, StopSwitch, Trust,
-    enter_real_time, start_watchdog,
+    EmergencySource, Envelope, Gate, Heartbeat, LastStop, Place, StopSwitch, enter_real_time, start_watchdog,
 };
 use flotor_sync::{Observer, Publisher, Words, latest};
 use std::thread::JoinHandle;

@@ -13,15 +13,14 @@ use held::Held;
 use divergence::Evidence;
 use files::as_recorded;
 use flotor_core::coupling::{CouplingDescription, CouplingEnds};
+use flotor_core::plausibility::{ImplausibleSamples, PlausibilityCheck};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject};
+use flotor_coupling::{Patience, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{Axes, Capabilities, DeviceState, LoopConfig, Tick, Wrench};
 use flotor_record::{Ending, ReadError, Recording, Role, RunDescription};
-use flotor_servo::coupling::{Patience, Reach};
-use flotor_servo::{
-    Clock, Coupled, Forces, Heartbeat, ImplausibleSamples, ModelHealth, PlausibilityCheck, Port, Replacement,
-};
+use flotor_servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
 use flotor_session::registry::Registry;
 use flotor_session::scene::{
     Isolation, KeyValue, Location, ModelUse, ParameterText, PluginKeyValue, PluginUse,

@@ -28,19 +28,20 @@ use epilogue::Epilogue;
 use flotor_core::Change;
 use flotor_core::MOST_DEVICES;
 use flotor_core::limits::Limits;
+use flotor_core::plausibility::ImplausibleSamples;
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
+use flotor_coupling::{Line, Patience, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
 use flotor_hal::{Capabilities, Embodiment, EnergyLedger, Fault, LoopConfig, Parameter, SoftRange};
 use flotor_hal::{Pose, Twist, Wrench};
 use flotor_live::{Directory, Pressed, WrenchLimits};
-use flotor_servo::coupling::{Line, Patience, Reach};
 use flotor_servo::last_stop::TakenSignals;
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
-    Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, ImplausibleSamples, Loop, ModelHealth,
-    ParameterQueue, Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby,
-    StopSwitch, Stuck, Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
+    Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, Loop, ModelHealth, ParameterQueue,
+    Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby, StopSwitch, Stuck,
+    Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
 };
 use prepare::{Scheduled, activate, activate_here};
 use std::sync::Arc;

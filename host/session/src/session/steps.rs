@@ -4,8 +4,8 @@ use super::prepare::activate;
 use super::{ChangeLog, Controls, Observer, RunError, RunOptions, Session};
 use crate::registry::Registry;
 use crate::scene::Scene;
+use flotor_coupling::Line;
 use flotor_hal::abi::loader::Stopper;
-use flotor_servo::coupling::Line;
 use flotor_servo::{Clock, CouplingOutcome, Loop, RunEnd, Schedule, StopSwitch};
 
 /// A run that goes on when it is told to. When it is dropped the devices are stopped.

@@ -7,8 +7,8 @@
 //! A thread for each coupling; the loop never waits for it. Not real-time.
 
 use super::pairing::{LinkCounts, Pairing};
+use flotor_coupling::Line;
 use flotor_live::{Directory, PeerSocket, PublishError};
-use flotor_servo::coupling::Line;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;

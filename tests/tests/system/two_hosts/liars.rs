@@ -3,8 +3,8 @@
 use super::{Host, Random, Registry, WATCHDOG_TICKS, Way, scene};
 use flotor_core::peer::{Dispatch, PeerState, TankState};
 use flotor_core::trace::Events;
+use flotor_coupling::Cut;
 use flotor_hal::{DQuat, DVec3, Pose, Twist};
-use flotor_servo::coupling::Cut;
 use flotor_tests::TestSize;
 use rayon::prelude::*;
 

@@ -350,20 +350,23 @@ impl PlausibilityCheck {
 }
 
 /// Ticks without a usable sample that are borne in a loop of this period. Not real-time.
-pub(crate) fn stale_ticks_limit(period_ns: u64) -> u32 {
+#[must_use]
+pub fn stale_ticks_limit(period_ns: u64) -> u32 {
     let ticks = (STALE_LIMIT_NS / period_ns.max(1)).max(STALE_TICKS_BORNE);
     u32::try_from(ticks).unwrap_or(u32::MAX)
 }
 
 /// True if a quaternion has the length of one. Real-time: bounded, no allocation.
 #[inline]
-pub(crate) fn is_rotation(quaternion: DQuat) -> bool {
+#[must_use]
+pub fn is_rotation(quaternion: DQuat) -> bool {
     (quaternion.length_squared() - 1.0).abs() <= 2.0 * LENGTH_TOLERANCE // false for NaN
 }
 
 /// True if no handle moves like that, or a number is NaN. Real-time: bounded, no allocation.
 #[inline]
-pub(crate) fn is_too_fast(twist: &Twist) -> bool {
+#[must_use]
+pub fn is_too_fast(twist: &Twist) -> bool {
     let per_speed = TWIST_OVERSHOOT * SPEED_M_PER_S;
     let per_spin = TWIST_OVERSHOOT * SPIN_RAD_PER_S;
     let is_possible = twist.linear().length_squared() <= per_speed * per_speed

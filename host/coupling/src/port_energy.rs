@@ -11,7 +11,7 @@
 //! enough, because the handle hardly moves, by scaling the wrench down (the energy tank of Franken and others,
 //! IEEE Trans. Robotics 27(4), 2011, section IV).
 //!
-//! The envelope guards each device's port with it, a [coupling](crate::coupling) each of its ends.
+//! The envelope guards each device's port with it, a [coupling](crate::Coupling) each of its ends.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 

@@ -5,10 +5,10 @@
 //! what can be checked here: what this end has passed on itself, and the work of a hand that moved as the claimed pose did, against
 //! the coupling, with the power of a hand. The rest is cut and counted; who is cut too much is a partner no longer.
 
-use crate::plausibility::{is_rotation, is_too_fast};
 use flotor_core::coupling::CouplingConfig;
 use flotor_core::mapping::Mapping;
 use flotor_core::peer::PeerState;
+use flotor_core::plausibility::{is_rotation, is_too_fast};
 use flotor_hal::{DVec3, DeviceState, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 
 /// How far the device here reaches, device frame: semi-axes of an ellipsoid of positions (m) and of one of rotation vectors (rad).

@@ -28,6 +28,7 @@ mod brake;
 mod claims;
 mod delay;
 mod end;
+pub mod port_energy;
 mod remote;
 mod tank;
 #[cfg(test)]
