@@ -91,9 +91,11 @@ fn contacts_push_the_surface_down_under_each_other() {
     let nodes = [0.0, 0.008, 0.016, 0.024, 0.032];
     let table = Table::new(&remainder, Face::Top, [&nodes, &nodes]);
     for (body, table) in [(Body::HalfSpace, None), (Body::Block(CUBE), Some(&table))] {
-        for (count, spacing_m) in [(2, 0.017), (2, 0.030), (3, 0.020), (4, 0.018), (4, 0.030)] {
+        // The solved ones take a second each; in every change's checks the nearest pair and the farthest four.
+        let tools = [(2, 0.017), (4, 0.030), (2, 0.030), (3, 0.020), (4, 0.018)];
+        for &(count, spacing_m) in &tools[..crate::cases(2, tools.len())] {
             let law = spheres(body, count, spacing_m);
-            for depth_m in [0.0003, 0.001] {
+            for &depth_m in &[0.001, 0.0003][..crate::cases(1, 2)] {
                 let answer = law.answer(DVec3::Z * -depth_m, DQuat::IDENTITY);
                 let centres: Vec<[f64; 2]> =
                     answer.centres_m[..count].iter().map(|centre| [centre.x, centre.y]).collect();
