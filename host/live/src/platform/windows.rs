@@ -9,7 +9,7 @@ use std::net::{Ipv4Addr, TcpListener, UdpSocket};
 use std::os::windows::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A connection.
 pub(crate) use std::net::TcpStream as Stream;
@@ -147,12 +147,23 @@ pub(crate) struct Datagrams {
     socket: UdpSocket,
     secret: String,
     path: String,
-    /// Ports and secrets of others, by their files.
-    known: Mutex<Vec<(PathBuf, u16, String)>>,
+    /// Others, by their files.
+    known: Mutex<Vec<Known>>,
     /// Keeps the file from being removed while the socket is there.
     _file: File,
 }
 
+/// What the file of another says.
+#[derive(Debug)]
+struct Known {
+    path: PathBuf,
+    port: u16,
+    secret: String,
+    seen: Instant,
+}
+
+/// How long what a file says is believed.
+const LOOK_PERIOD: Duration = Duration::from_millis(10);
 /// Longest datagram, bytes: what is longer is cut, as by a system's socket.
 const LONGEST: usize = 8 * 1024;
 
@@ -170,19 +181,21 @@ impl Datagrams {
     /// Sends to the socket of another name.
     pub(crate) fn send_to(&self, bytes: &[u8], path: &Path) -> io::Result<usize> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if !path.exists() {
-            known.retain(|(known, ..)| known != path);
-            return Err(ErrorKind::NotFound.into());
-        }
-        let place = match known.iter().position(|(known, ..)| known == path) {
+        let place = known.iter().position(|known| known.path == path);
+        // A call asks whether the other is there; states are sent often, and a look at a file takes its time.
+        let is_trusted = |known: &Known| !bytes.is_empty() && known.seen.elapsed() < LOOK_PERIOD;
+        let place = match place.filter(|place| known.get(*place).is_some_and(is_trusted)) {
             Some(place) => place,
             None => {
+                known.retain(|known| known.path != path);
                 let (port, secret) = announced(path)?;
-                known.push((path.to_path_buf(), port, secret));
+                known.push(Known { path: path.to_path_buf(), port, secret, seen: Instant::now() });
                 known.len() - 1
             }
         };
-        let Some((_, port, secret)) = known.get(place) else { return Err(ErrorKind::NotFound.into()) };
+        let Some(Known { port, secret, .. }) = known.get(place) else {
+            return Err(ErrorKind::NotFound.into());
+        };
         let length = u16::try_from(self.path.len()).map_err(io::Error::other)?.to_le_bytes();
         let datagram = [secret.as_bytes(), &length, self.path.as_bytes(), bytes].concat();
         self.socket.send_to(&datagram, (Ipv4Addr::LOCALHOST, *port))

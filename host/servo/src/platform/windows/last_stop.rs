@@ -193,3 +193,30 @@ impl std::fmt::Display for TakenSignals {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::last_stop::enter_call;
+
+    /// Set in the process that crashes.
+    const VARIABLE: &str = "FLOTOR_TEST_CRASHES";
+
+    #[test]
+    fn a_plugin_that_crashes_in_a_call_is_named_and_ends_the_process_with_code_3() {
+        if std::env::var_os(VARIABLE).is_some() {
+            enter_call("jelly", "`create`");
+            // SAFETY: it is not sound, and is to crash.
+            unsafe { std::ptr::without_provenance_mut::<u8>(8).write_volatile(1) };
+        }
+        let own = std::env::current_exe().expect("a test has a file");
+        let name = "a_plugin_that_crashes_in_a_call_is_named_and_ends_the_process_with_code_3";
+        let crashed = Command::new(own).args([name, "--nocapture"]).env(VARIABLE, "1").output();
+        let crashed = crashed.expect("it starts");
+        let told = String::from_utf8_lossy(&crashed.stderr);
+        assert_eq!(crashed.status.code(), Some(3), "{told}");
+        let line =
+            "error: `jelly` ended the process in `create`: exception 0xc0000005 (invalid memory access)";
+        assert!(told.contains(line), "{told}");
+    }
+}
