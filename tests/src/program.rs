@@ -45,13 +45,21 @@ pub struct Ran {
 }
 
 impl Flotor {
-    /// The program with these arguments, no plugin folders but its own, and no colours.
+    /// The program with these arguments, no plugin folders but its own, and no colours. `FLOTOR_RUNNER` is a command that runs
+    /// it, as an emulator of another processor does: `FLOTOR_RUNNER="qemu-x86_64 -cpu qemu64"`.
     ///
     /// # Panics
     /// If the program is not built, or older than a source it is made of.
     #[must_use]
     pub fn with<I: AsRef<OsStr>>(arguments: impl IntoIterator<Item = I>) -> Self {
-        let mut command = Command::new(program());
+        let mut command = match std::env::var("FLOTOR_RUNNER") {
+            Ok(runner) => {
+                let mut command = Command::new("sh");
+                command.args(["-c", &format!("exec {runner} \"$@\""), "sh"]).arg(program());
+                command
+            }
+            Err(_) => Command::new(program()),
+        };
         command.args(arguments).env_remove(flotor_session::registry::PATH_VARIABLE).env("NO_COLOR", "1");
         // What a plugin's panic would do to a terminal must not depend on how the tests were started.
         command.env("RUST_BACKTRACE", "1");

@@ -471,6 +471,7 @@ const PORTED: &[&str] = &[
     "hal/src/",
     "host/command/src/",
     "host/core/src/",
+    "host/coupling/src/",
     "host/judge/src/",
     "host/lab/src/",
     "host/live/src/",

@@ -1,8 +1,8 @@
 //! One set of bits (ADR 0012): what runs, replays and tables come to, against the digests in `data/golden.txt`.
 //!
 //! They are the same on every machine with IEEE doubles, debug or optimised. After a change that means to change numbers:
-//! `FLOTOR_WRITE_GOLDEN=1 cargo test -p flotor-tests golden`. `FLOTOR_RUNNER` is a command that runs `flotor`, as an
-//! emulator of another processor does: `FLOTOR_RUNNER="qemu-x86_64 -cpu qemu64"`.
+//! `FLOTOR_WRITE_GOLDEN=1 cargo test -p flotor-tests golden`. Another processor or system has them through `FLOTOR_RUNNER`
+//! (`flotor_tests::program`).
 
 use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
@@ -34,8 +34,7 @@ const TABLES: [(&str, &str); 10] = [
 
 /// What the program says; it must end well.
 fn output(arguments: &[&str], input: &str) -> String {
-    let runner = std::env::var("FLOTOR_RUNNER").unwrap_or_default();
-    let ran = Flotor::with(arguments).through_shell(&format!("exec {runner} \"$@\"")).reading(input).run();
+    let ran = Flotor::with(arguments).reading(input).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{arguments:?} {ran:#?}");
     ran.stdout
 }
