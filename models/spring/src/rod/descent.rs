@@ -18,8 +18,8 @@ use super::search_energy::{COEFFICIENTS, FOURS, Four, Fours, SearchEnergy, dot, 
 
 /// Energies per search at most. A search that needs more is one for Newton's method.
 const MOST_ENERGIES: usize = 24;
-/// What the last step may leave, a force to a hundredth of a micronewton in all. A step leaves about that part of itself that it is
-/// of the one before.
+/// The last step at most, and what it may leave. A step leaves about that part of itself that it is of the one before.
+const LAST_STEP: f64 = 1e-8;
 const LEFT: f64 = 1.5e-10;
 /// Longest step, as the root mean square slope of `p`.
 const LONGEST_STEP: f64 = 0.8;
@@ -97,7 +97,7 @@ impl Descent {
         let (mut known, mut square_before) = (0, 0.0);
         for energies in (2..).take(MOST_ENERGIES) {
             let square = dot(&down, &down);
-            let is_last = square * square <= LEFT * LEFT * square_before;
+            let is_last = square <= LAST_STEP * LAST_STEP && square * square <= LEFT * LEFT * square_before;
             square_before = square;
             if is_last {
                 let shape = added(&shape, -1.0, &down);
