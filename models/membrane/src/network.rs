@@ -270,8 +270,8 @@ impl Network {
     }
 
     /// Steps without drag until the masses rest against a ball, at most so often: whenever the kinetic energy has passed a peak,
-    /// all velocities are taken away (Cundall 1976). Not real-time.
-    pub fn relax(&mut self, ball: &Ball, most_steps: usize) {
+    /// all velocities are taken away (Cundall 1976); true if they do. Not real-time.
+    pub fn relax(&mut self, ball: &Ball, most_steps: usize) -> bool {
         /// It rests when nothing moves by more of a ball's radius in a step: then a sheet is within some micrometres of where it
         /// goes, a tenth of a pixel.
         const STILL: f64 = 1.0e-4;
@@ -280,7 +280,7 @@ impl Network {
         let drag_per_s = std::mem::take(&mut self.surroundings.damping_per_s);
         let nodes = self.inverse_masses_per_kg.len();
         self.state.velocities_m_per_s.clear(0..nodes);
-        let mut rising = 0.0;
+        let (mut rising, mut rests) = (0.0, false);
         for _ in 0..most_steps {
             self.step(step_s, Some(ball));
             let squares = self.state.velocities_m_per_s.sum_of_squares();
@@ -288,13 +288,15 @@ impl Network {
                 rising = squares;
                 continue;
             }
-            if rising.sqrt() * step_s <= STILL * ball.radius_m {
+            rests = rising.sqrt() * step_s <= STILL * ball.radius_m;
+            if rests {
                 break;
             }
             self.state.velocities_m_per_s.clear(0..nodes);
             rising = 0.0;
         }
         self.surroundings.damping_per_s = drag_per_s;
+        rests
     }
 
     /// Changes what acts on every mass, but for the contact stiffness, which the longest step depends on. Real-time:

@@ -214,8 +214,9 @@ impl ShapeModel for Membrane {
         if self.pictured_at_m == Some(centre_m) {
             return &self.drawn;
         }
-        self.pictured_at_m = Some(centre_m);
-        self.touch.rest_under(centre_m, &mut self.pictured, MOST_STEPS_A_PICTURE);
+        // What does not rest yet goes on from here at the next picture.
+        let rests = self.touch.rest_under(centre_m, &mut self.pictured, MOST_STEPS_A_PICTURE);
+        self.pictured_at_m = rests.then_some(centre_m);
         let Shape { primitives, surface } = &mut self.drawn;
         let positions_m = self.pictured.positions_m();
         for (index, (vertex, untouched_m)) in surface.vertices.iter_mut().zip(&self.untouched_m).enumerate() {

@@ -87,13 +87,14 @@ impl Touch {
     }
 
     /// Where the masses come to rest if the ball stays at `centre_m`, found from `state`, which is changed; the network itself is
-    /// as before. Not real-time.
-    pub fn rest_under(&mut self, centre_m: DVec3, state: &mut State, most_steps: usize) {
+    /// as before. True if they rest after so many steps. Not real-time.
+    pub fn rest_under(&mut self, centre_m: DVec3, state: &mut State, most_steps: usize) -> bool {
         self.before.clone_from(self.network.state());
         self.network.restore(state);
-        self.network.relax(&Ball { centre_m, radius_m: self.ball.radius_m }, most_steps);
+        let rests = self.network.relax(&Ball { centre_m, radius_m: self.ball.radius_m }, most_steps);
         state.clone_from(self.network.state());
         self.network.restore(&self.before);
+        rests
     }
 
     /// Back to before anybody touched it, the ball at `start_m`. Real-time: bounded, no allocation.
