@@ -484,10 +484,18 @@ fn an_answer_is_taken_back_in_a_sitting() {
     assert_eq!((trial.event.response, log.withdrawn[0].response), (Response::Second, Response::First));
     let ran = Flotor::with(["analyse", out.to_str().unwrap(), "--each"]).run();
     assert!(ran.stdout.contains("1 answers taken back and given anew"), "{ran:?}");
+    // Taken back, and a break before the answer: it is not taken back a second time.
     let again: Vec<&str> = arguments.into_iter().chain(["--resume"]).collect();
-    let ran = person("json", &([go, go, go, &first].join("\n") + "\n"), &again, &out);
+    let stop = r#"{"input":"stop"}"#;
+    let ran = person("json", &([go, go, go, &first, back, stop].join("\n") + "\n"), &again, &out);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    assert_eq!(SittingLog::read(&log_of(&out, 1)).unwrap().trials.len(), 2);
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    assert!(log.is_answered_anew() && log.trials.len() == 1 && log.withdrawn.len() == 2, "{log:?}");
+    let ran = person("json", &([go, go, go, &first, back, stop].join("\n") + "\n"), &again, &out);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(ran.stdout.contains("no answer to be taken back"), "{ran:?}");
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    assert_eq!((log.trials.len(), log.withdrawn.len()), (2, 2));
 }
 
 /// What a person types to have felt so many trials, practising first where that is offered; then enough for today.

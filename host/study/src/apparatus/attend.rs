@@ -3,8 +3,9 @@
 use super::real_time_rig::RealTimeRig;
 use crate::conduct::{Ending, OutsideError};
 use crate::log::{Event, Incident, LogWriter, TrialEvent, digest};
-use crate::screen::{Attended, Input, Screen, Step};
+use crate::screen::{Attended, Felt, Input, May, Screen, Step};
 use crate::time_of_day::TimeOfDay;
+use crate::trial::Trial;
 use std::time::Instant;
 
 /// What a front end has heard of a person.
@@ -107,17 +108,18 @@ fn sit(
             log.write(&Event::End { trials: attended.presented() })?;
             return Ok(Ending::Complete);
         }
-        let felt = attended.stimulus();
-        if let Some((trial, value)) = felt {
+        let stimulus = attended.stimulus();
+        if let Some((trial, value)) = stimulus {
             if let Some(reason) = rig.begin(&trial, value)? {
                 log.write(&Event::Incident(Incident::NotRecorded { reason }))?;
             }
             attended.felt_from(TimeOfDay::now());
         }
+        let felt = stimulus.map(|(trial, _)| trial);
         front.show(&screen)?;
         let shown = Instant::now();
         let step = loop {
-            let input = match wait_for_input(rig, front, &screen, log)? {
+            let input = match wait_for_input(rig, front, &screen, felt.as_ref(), log)? {
                 Ok(input) => input,
                 Err(incident) => {
                     log.write(&Event::Incident(incident))?;
@@ -128,23 +130,19 @@ fn sit(
                 log.write(&Event::Incident(Incident::Stopped))?;
             }
             let felt_for_s = shown.elapsed().as_secs_f64();
-            if felt.is_some()
+            if may_withdraw(&screen)
                 && input == Input::Withdraw
                 && Least::USUAL.is_missed(felt_for_s, rig.way_m()).is_none()
             {
                 front.refuse("the next one has been felt; the answer before it stays")?;
                 continue;
             }
-            if felt.is_some() && input == Input::Continue {
+            if let Some(trial) = felt.filter(|_| input == Input::Continue) {
                 if let Some(why) = least.is_missed(felt_for_s, rig.way_m()) {
                     front.refuse(why)?;
                     continue;
                 }
-                let felt = rig.end()?;
-                if felt.missed_ticks > 0 {
-                    log.write(&Event::Incident(Incident::MissedTicks { ticks: felt.missed_ticks }))?;
-                }
-                attended.felt(felt);
+                attended.felt(end(rig, &trial, log)?);
             }
             match attended.input(input, shown.elapsed().as_secs_f64()) {
                 Ok(Step::Note(text)) => log.write(&Event::Note { text })?,
@@ -162,8 +160,8 @@ fn sit(
             Step::Withdrawn(trial) => {
                 log.write(&Event::Withdrawn { trial })?;
                 // What had just begun comes again after the answer; of the one to be answered nothing more is felt now.
-                if felt.is_some() {
-                    rig.end()?;
+                if let Some(trial) = felt {
+                    end(rig, &trial, log)?;
                     close_recording(rig, log)?;
                 }
             }
@@ -176,6 +174,28 @@ fn sit(
             Step::Stopped => return Ok(Ending::Stopped),
             Step::Shown | Step::Note(_) => {}
         }
+    }
+}
+
+/// Whether an answer can be taken back while a stimulus is felt.
+fn may_withdraw(screen: &Screen) -> bool {
+    matches!(screen, Screen::Feel { trial, .. } if trial.may.contains(&May::Withdraw))
+}
+
+/// Ends a stimulus, and tells of the ticks that it missed.
+fn end(rig: &mut RealTimeRig<'_>, trial: &Trial, log: &mut LogWriter) -> Result<Felt, OutsideError> {
+    let felt = rig.end()?;
+    if felt.missed_ticks > 0 {
+        log.write(&disturbance(trial, Incident::MissedTicks { ticks: felt.missed_ticks }))?;
+    }
+    Ok(felt)
+}
+
+/// What disturbed a trial: an incident of the sitting, or a note where it is no part of that.
+fn disturbance(trial: &Trial, incident: Incident) -> Event {
+    match trial.number {
+        0 => Event::Note { text: format!("practice before going on: {incident}") },
+        _ => Event::Incident(incident),
     }
 }
 
@@ -192,6 +212,7 @@ fn wait_for_input(
     rig: &mut RealTimeRig<'_>,
     front: &mut dyn FrontEnd,
     screen: &Screen,
+    felt: Option<&Trial>,
     log: &mut LogWriter,
 ) -> Result<Result<Input, Incident>, OutsideError> {
     let mut warned = false;
@@ -205,11 +226,11 @@ fn wait_for_input(
             // The window is closed by an emergency stop, too: that is what has to be known.
             Heard::Closed => return Ok(Err(rig.stopped_by().unwrap_or(Incident::WindowClosed))),
         }
-        let out = rig.is_out_of_range() && matches!(screen, Screen::Feel { .. });
-        if out && !warned {
+        let out = felt.filter(|_| rig.is_out_of_range());
+        if let (Some(trial), false) = (out, warned) {
             front.warn_out_of_range()?;
-            log.write(&Event::Incident(Incident::OutOfRange))?;
+            log.write(&disturbance(trial, Incident::OutOfRange))?;
         }
-        warned = out;
+        warned = out.is_some();
     }
 }

@@ -233,10 +233,9 @@ impl SittingLog {
 
     /// Goes back to where the sitting stood before its last trial: through all answers before it, anew.
     fn withdraw(&mut self, number: u32) -> Result<(), LogProblem> {
-        const ONCE: &str = "`withdrawn` of another trial than the last, or for the second time";
-        let is_new = self.withdrawn.last().is_none_or(|before| before.trial.number < number);
-        let is_last = self.trials.last().is_some_and(|last| last.event.trial.number == number);
-        let last = self.trials.pop().filter(|_| is_new && is_last).ok_or(LogProblem::Order(ONCE))?;
+        const LAST: &str = "`withdrawn` of another trial than the last";
+        let is_last = |last: &TrialRecord| last.event.trial.number == number;
+        let last = self.trials.pop_if(|last| is_last(last)).ok_or(LogProblem::Order(LAST))?;
         self.withdrawn.push(last.event);
         self.sitting = Sitting::new(&self.begin.protocol, self.begin.seed, self.begin.subject);
         for TrialRecord { event, .. } in &self.trials {
@@ -244,6 +243,13 @@ impl SittingLog {
             answered.map_err(|cause| LogProblem::Answer { number: event.trial.number, cause })?;
         }
         Ok(())
+    }
+
+    /// Whether the trial that is open was answered before, and the answer taken back.
+    #[must_use]
+    pub fn is_answered_anew(&self) -> bool {
+        let open = self.sitting.presented() + 1;
+        self.withdrawn.last().is_some_and(|last| last.trial.number == open)
     }
 
     /// The file.

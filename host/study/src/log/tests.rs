@@ -316,6 +316,8 @@ fn an_answer_taken_back_is_told_and_counts_for_nothing() {
         SittingLog::read(&path).unwrap().resume("0.0.0").unwrap().1.write(event).unwrap();
         SittingLog::read(&path)
     };
+    let twice = with(&Event::Withdrawn { trial: last }).unwrap();
+    assert!(twice.is_answered_anew());
     for trial in [0, 1, last - 1, last + 1] {
         let error = with(&Event::Withdrawn { trial }).err().expect("refused");
         assert!(matches!(error.problem, LogProblem::Order(_)), "{trial}: {error}");

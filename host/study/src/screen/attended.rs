@@ -145,6 +145,12 @@ impl Attended {
         Self { offered: self.sitting.practice(), ..self }
     }
 
+    /// The same, where the answer to the trial that is open was taken back before: that happens once.
+    #[must_use]
+    pub fn with_answer_taken_back(self) -> Self {
+        Self { undo: Undo::Used, ..self }
+    }
+
     /// The trial that is open.
     fn trial(&self) -> Option<Trial> {
         self.practice.front().copied().or_else(|| self.sitting.next())
@@ -216,7 +222,7 @@ impl Attended {
                 self.go_to(Stage::Ready(Pause::PhaseChanges))
             }
             (_, Input::Practise) => Err(InputError::NotNow("practice is not offered now")),
-            (_, Input::Withdraw) => self.withdraw(time_s),
+            (_, Input::Withdraw) => self.withdraw(),
             (Stage::Ready(_), Input::Continue) => self.go_to(Stage::Feel(0)),
             (Stage::Feel(index), Input::Continue) => {
                 // The next one was felt: from now on the answer to the one before may depend on it.
@@ -268,7 +274,7 @@ impl Attended {
             return self.practised(trial, response);
         }
         let mut exploration = self.exploration.clone();
-        // Of an answer that replaces another, from the end of the presentation, too.
+        // Of an answer that replaces another, the time to that one, too.
         exploration.response_time_s = Some(exploration.response_time_s.unwrap_or(0.0) + time_s);
         let before = self.sitting.clone();
         let verdict = self.sitting.answer(response, &exploration)?;
@@ -297,13 +303,12 @@ impl Attended {
         Ok(Step::Practised(format!("practice before going on: presented {values:?}, answer {word}")))
     }
 
-    fn withdraw(&mut self, time_s: f64) -> Result<Step, InputError> {
+    fn withdraw(&mut self) -> Result<Step, InputError> {
         match (self.stage, std::mem::replace(&mut self.undo, Undo::Used)) {
             (Stage::Ready(_) | Stage::Feel(0), Undo::Possible(before)) => {
                 let Before { sitting, exploration, since_rest, again } = *before;
                 (self.sitting, self.exploration) = (sitting, exploration);
                 (self.since_rest, self.again) = (since_rest, again);
-                self.exploration.response_time_s = self.exploration.response_time_s.map(|s| s + time_s);
                 self.stage = Stage::Ask;
                 Ok(Step::Withdrawn(self.sitting.presented() + 1))
             }

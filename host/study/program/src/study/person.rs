@@ -52,7 +52,8 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         consent.chain(&common.instructions).map(|path| text_of(path)).collect::<Result<Vec<_>, _>>()?;
     let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
     let presented = earlier.as_ref().map_or(0, |log| log.trials.len());
-    let trials = protocol.presentations_about().saturating_sub(presented as u64) as f64;
+    // A track may take longer than most do: a trial in any case.
+    let trials = protocol.presentations_about().saturating_sub(presented as u64).max(1) as f64;
     let bytes_per_s = if kinematics == Kinematics::Full { apparatus.recording_bytes_per_s() } else { 0.0 };
     space::check(&common.out, Need { stimuli: trials * protocol.stimuli_in_a_trial(), bytes_per_s })?;
     let stop = stop_on_signals();
@@ -61,6 +62,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         .map_err(|error| super::outside(error.as_ref(), &error))?;
     let mut front = Front::open(common, &rig)?;
 
+    let is_answered_anew = earlier.as_ref().is_some_and(|log| log.is_answered_anew());
     let (sitting, mut log) = match earlier {
         None => dataset.begin(begin).map_err(of_dataset)?,
         Some(log) => log.resume(&begin.version).map_err(|error| of_dataset(error.into()))?,
@@ -81,6 +83,9 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let mut attended = Attended::new(sitting, protocol, common.rest_every).after_reading(texts);
     if has_begun {
         attended = attended.with_practice_offered();
+    }
+    if is_answered_anew {
+        attended = attended.with_answer_taken_back();
     }
     if let Some(times) = common.feel_again {
         log.write(&Event::Note { text: format!("felt again {times} times a trial at most") })

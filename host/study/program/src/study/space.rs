@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// How long one stimulus of a person is assumed to last with all that belongs to it: fades, answer, rest, s.
 const STIMULUS_S: f64 = 8.0;
-/// What must be there in any case: one such stimulus for each of a pair, and ten times that for who takes long.
+/// What must be there in any case: so many stimuli, or what is left of the sitting.
 const LEAST_STIMULI: f64 = 20.0;
 /// A line of the event log and one of each table, bytes.
 const ANSWER_BYTES: f64 = 4.0e3;
@@ -65,7 +65,7 @@ pub(super) fn check(folder: &Path, need: Need) -> Result<(), CommandError> {
     match need.of(free) {
         Room::Enough => {}
         Room::Short(bytes) => note(words(bytes, "the rest of the sitting")),
-        Room::None(bytes) => return Err(CommandError::Usage(words(bytes, "the beginning of the sitting"))),
+        Room::None(bytes) => return Err(CommandError::Failed(words(bytes, "the beginning of the sitting"))),
     }
     Ok(())
 }
