@@ -490,7 +490,7 @@ fn an_answer_is_taken_back_in_a_sitting() {
     let ran = person("json", &([go, go, go, &first, back, stop].join("\n") + "\n"), &again, &out);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let log = SittingLog::read(&log_of(&out, 1)).unwrap();
-    assert!(log.is_answered_anew() && log.trials.len() == 1 && log.withdrawn.len() == 2, "{log:?}");
+    assert_eq!((log.is_answered_anew(), log.trials.len(), log.withdrawn.len()), (true, 1, 2));
     let ran = person("json", &([go, go, go, &first, back, stop].join("\n") + "\n"), &again, &out);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     assert!(ran.stdout.contains("no answer to be taken back"), "{ran:?}");
