@@ -212,8 +212,13 @@ mod tests {
         }
         let [mut first, second] = bridges;
         drop(second);
-        host.tell(&dispatch(3));
-        assert_eq!(host.peers.len(), 1);
+        // At the first word to it; on Windows, once its file is looked at again.
+        let is_forgotten = (0..100).any(|_| {
+            std::thread::sleep(Duration::from_millis(1));
+            host.tell(&dispatch(3));
+            host.peers.len() == 1
+        });
+        assert!(is_forgotten);
         drop(host);
         assert_eq!(directory.couplings(), []);
         assert!(!first.call(), "the host is gone");

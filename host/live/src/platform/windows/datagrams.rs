@@ -1,0 +1,177 @@
+//! Datagrams between two programs of this user.
+
+use super::announced::Announced;
+use std::fs::File;
+use std::io::{self, ErrorKind};
+use std::net::{Ipv4Addr, UdpSocket};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Where a datagram comes from.
+#[derive(Debug)]
+pub(crate) struct Address(PathBuf);
+
+impl Address {
+    /// Its file, as that socket says.
+    #[allow(clippy::unnecessary_wraps)] // elsewhere a socket may have none
+    pub(crate) fn as_pathname(&self) -> Option<&Path> {
+        Some(&self.0)
+    }
+}
+
+/// A socket for datagrams, whose file names its port and its secret. A datagram is the receiver's secret, the length of the
+/// name of the sender's file (2 bytes), that name, and what is sent.
+#[derive(Debug)]
+pub(crate) struct Datagrams {
+    socket: UdpSocket,
+    secret: String,
+    path: String,
+    /// Others, by their files.
+    known: Mutex<Vec<Known>>,
+    /// Keeps the file from being removed while the socket is there.
+    _file: File,
+}
+
+/// What the file of another says.
+#[derive(Debug)]
+struct Known {
+    path: PathBuf,
+    announced: Announced,
+    seen: Instant,
+}
+
+/// How long what a file says is believed: whoever makes a socket anew under the same path misses what is sent in that time.
+const LOOK_PERIOD: Duration = Duration::from_millis(10);
+/// Longest datagram, bytes: what is longer is discarded.
+const LONGEST: usize = 8 * 1024;
+/// What the system says of a datagram that is longer (`WSAEMSGSIZE`); its rest is gone.
+const TOO_LONG: i32 = 10040;
+/// Datagrams that are discarded in one look: who floods the port delays nobody for longer.
+const MOST_DISCARDED: usize = 64;
+
+impl Datagrams {
+    /// Makes it. It waits for nothing, both ways.
+    pub(crate) fn bind(path: &Path) -> io::Result<Self> {
+        let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
+        socket.set_nonblocking(true)?;
+        let announced = Announced::new(socket.local_addr()?.port())?;
+        let _file = announced.write(path)?;
+        let path = path.to_str().ok_or_else(|| io::Error::other("its name is no text"))?.to_owned();
+        Ok(Self { socket, secret: announced.secret, path, known: Mutex::default(), _file })
+    }
+
+    /// Sends to the socket of another name.
+    pub(crate) fn send_to(&self, bytes: &[u8], path: &Path) -> io::Result<usize> {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = known.iter().position(|known| known.path == path);
+        // A call asks whether the other is there; states are sent often, and a look at a file takes its time.
+        let is_trusted = |known: &Known| !bytes.is_empty() && known.seen.elapsed() < LOOK_PERIOD;
+        let place = match place.filter(|place| known.get(*place).is_some_and(is_trusted)) {
+            Some(place) => place,
+            None => {
+                known.retain(|known| known.path != path);
+                let announced = Announced::read(path)?;
+                known.push(Known { path: path.to_path_buf(), announced, seen: Instant::now() });
+                known.len() - 1
+            }
+        };
+        let Some(Known { announced: Announced { port, secret }, .. }) = known.get(place) else {
+            return Err(ErrorKind::NotFound.into());
+        };
+        let length = u16::try_from(self.path.len()).map_err(io::Error::other)?.to_le_bytes();
+        let datagram = [secret.as_bytes(), &length, self.path.as_bytes(), bytes].concat();
+        self.socket.send_to(&datagram, (Ipv4Addr::LOCALHOST, *port))
+    }
+
+    /// The next datagram: its length, and where it comes from. `WouldBlock` when all has been read, or much was discarded.
+    pub(crate) fn recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, Address)> {
+        let mut datagram = [0; LONGEST];
+        for _ in 0..MOST_DISCARDED {
+            let length = match self.socket.recv_from(&mut datagram) {
+                Ok((length, _)) => length,
+                Err(error) if error.raw_os_error() == Some(TOO_LONG) => continue,
+                // One that was sent before found nobody: its socket is gone, or made anew.
+                Err(error) if error.kind() == ErrorKind::ConnectionReset => {
+                    self.known.lock().unwrap_or_else(PoisonError::into_inner).clear();
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            // Who does not know the secret says nothing.
+            let Some((path, sent)) = datagram.get(..length).and_then(|said| self.read(said)) else {
+                continue;
+            };
+            let length = sent.len().min(buffer.len());
+            buffer.iter_mut().zip(sent).for_each(|(place, byte)| *place = *byte);
+            return Ok((length, Address(path)));
+        }
+        Err(ErrorKind::WouldBlock.into())
+    }
+
+    fn read<'a>(&self, datagram: &'a [u8]) -> Option<(PathBuf, &'a [u8])> {
+        let rest = datagram.strip_prefix(self.secret.as_bytes())?;
+        let (length, rest) = rest.split_first_chunk()?;
+        let (path, sent) = rest.split_at_checked(u16::from_le_bytes(*length).into())?;
+        Some((std::str::from_utf8(path).ok()?.into(), sent))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair(scratch: &Path) -> [Datagrams; 2] {
+        ["host", "guest"].map(|name| Datagrams::bind(&scratch.join(name)).unwrap())
+    }
+
+    /// The next that comes, or none in a second.
+    fn next(socket: &Datagrams) -> Option<Vec<u8>> {
+        let mut buffer = [0; 64];
+        let tries = (0..1000).map(|_| {
+            std::thread::sleep(Duration::from_millis(1));
+            socket.recv_from(&mut buffer).map(|(length, _)| buffer[..length].to_vec())
+        });
+        tries.filter_map(Result::ok).next()
+    }
+
+    #[test]
+    fn a_datagram_that_is_too_long_is_discarded_and_the_next_is_read() {
+        let scratch = tempfile::tempdir().unwrap();
+        let [host, guest] = pair(scratch.path());
+        guest.send_to(&[7; LONGEST], &scratch.path().join("host")).unwrap();
+        guest.send_to(b"short", &scratch.path().join("host")).unwrap();
+        // At the first look that finds any: what comes after a long one does not wait for another look.
+        assert_eq!(next(&host).as_deref(), Some(&b"short"[..]));
+    }
+
+    #[test]
+    fn a_flood_of_strangers_is_left_after_a_while() {
+        let scratch = tempfile::tempdir().unwrap();
+        let [host, guest] = pair(scratch.path());
+        let port = host.socket.local_addr().unwrap();
+        let stranger = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        for _ in 0..MOST_DISCARDED {
+            stranger.send_to(&[b'0'; 64], port).unwrap();
+        }
+        guest.send_to(b"known", &scratch.path().join("host")).unwrap();
+        std::thread::sleep(Duration::from_millis(100));
+        let mut buffer = [0; 64];
+        assert_eq!(host.recv_from(&mut buffer).unwrap_err().kind(), ErrorKind::WouldBlock);
+        assert_eq!(next(&host).as_deref(), Some(&b"known"[..]));
+    }
+
+    #[test]
+    fn a_socket_made_anew_under_the_same_path_is_found() {
+        let scratch = tempfile::tempdir().unwrap();
+        let [host, guest] = pair(scratch.path());
+        let path = scratch.path().join("host");
+        guest.send_to(b"first", &path).unwrap();
+        assert_eq!(next(&host).as_deref(), Some(&b"first"[..]));
+        drop(host);
+        let host = Datagrams::bind(&path).unwrap();
+        std::thread::sleep(LOOK_PERIOD);
+        guest.send_to(b"second", &path).unwrap();
+        assert_eq!(next(&host).as_deref(), Some(&b"second"[..]));
+    }
+}

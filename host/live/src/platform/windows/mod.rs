@@ -1,0 +1,47 @@
+//! Windows: a port of this machine alone and a secret, both in a file of the user's profile.
+//!
+//! Every program of this machine can reach the port, but only who can read the file knows the secret: by the rights of the
+//! profile that is its user, and administrators. Who does not say it is turned away, and delays nobody.
+//! - `announced`: the file; `door`: connections; `datagrams`: those of couplings.
+
+mod announced;
+mod datagrams;
+mod door;
+
+pub(crate) use datagrams::Datagrams;
+pub(crate) use door::{Listening, Stream, accept, connect};
+
+use std::fs::{Metadata, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The folder of the runs of this user.
+pub(crate) fn run_folder() -> PathBuf {
+    let local = std::env::var_os("LOCALAPPDATA").map(PathBuf::from).filter(|path| path.is_absolute());
+    local.unwrap_or_else(std::env::temp_dir).join("flotor").join("run")
+}
+
+/// Makes a folder, if it is not there. It has the rights of the one above it: in a profile, those of its user.
+pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(path)
+}
+
+/// Whether this is a folder, and no link to one.
+pub(crate) fn is_ours(attributes: &Metadata) -> bool {
+    attributes.is_dir()
+}
+
+/// The same: the rights of a folder are not looked at.
+pub(crate) fn is_ours_alone(attributes: &Metadata) -> bool {
+    is_ours(attributes)
+}
+
+/// A file has the rights of its folder.
+pub(crate) fn private_file(options: &mut OpenOptions) -> &mut OpenOptions {
+    options
+}
+
+/// Removes the file of a run whose process is no more; true if that is so. The file of one that lives cannot be removed.
+pub(crate) fn remove_if_over(path: &Path, _: u32) -> bool {
+    std::fs::remove_file(path).is_ok() || !path.exists()
+}
