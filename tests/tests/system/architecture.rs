@@ -485,6 +485,10 @@ const PORTED: &[&str] = &[
     "models/",
 ];
 
+/// Where files of Linux's kernel are named outside a module `platform`, in crates that run on no other system yet: libraries that
+/// stand in for those of other makers, and the viewer's own cost.
+const KERNEL_FILES_ELSEWHERE: &[&str] = &["host/compat/common/src/process.rs", "viewer/src/cost.rs"];
+
 /// Crates with what only one system has.
 const SYSTEM_CRATES: &[&str] = &["libc", "rustix", "signal_hook", "thread_priority", "windows_sys"];
 
@@ -522,14 +526,42 @@ fn system_names(source: &str) -> Vec<String> {
     found
 }
 
+/// Names of files of Linux's kernel, in texts of a source.
+fn kernel_files(tokens: TokenStream) -> Vec<String> {
+    let mut found = Vec::new();
+    for token in tokens {
+        match token {
+            TokenTree::Group(group) => found.extend(kernel_files(group.stream())),
+            TokenTree::Literal(literal) => {
+                let text = literal.to_string();
+                let of_kernel = |folder: &str| {
+                    let rest = text.trim_start_matches(['b', 'c', 'r', '#']).strip_prefix(folder);
+                    rest.is_some_and(|rest| rest.starts_with(['/', '"']))
+                };
+                found.extend(["\"/proc", "\"/sys"].into_iter().any(of_kernel).then(|| text.clone()));
+            }
+            TokenTree::Ident(_) | TokenTree::Punct(_) => {}
+        }
+    }
+    found
+}
+
+/// Whether a file is a test of its own, which may ask the system that it runs on.
+fn is_a_test(file: &str) -> bool {
+    file.starts_with("tests/") || file.contains("/tests/")
+}
+
 /// What a source has that belongs into a module `platform`.
 fn outside_its_platform(file: &str, source: &str) -> Vec<String> {
     let begins = |folders: &[&str]| folders.iter().any(|folder| file.starts_with(folder));
     if is_of_a_platform(file) || begins(ASKED_ELSEWHERE) {
         return Vec::new();
     }
-    let tokens = source.parse().expect("the compiler reads it, so it is made of tokens");
-    let mut found = system_conditions(tokens);
+    let tokens: TokenStream = source.parse().expect("the compiler reads it, so it is made of tokens");
+    let mut found = system_conditions(tokens.clone());
+    if !is_a_test(file) && !begins(KERNEL_FILES_ELSEWHERE) {
+        found.extend(kernel_files(tokens));
+    }
     if begins(PORTED) {
         found.extend(system_names(source));
     }
@@ -559,6 +591,9 @@ fn a_system_outside_its_platform_is_noticed() {
     assert_eq!(count("devices/usbip/src/lib.rs", asks), 0);
     let names = "use std::os::fd::AsFd; use rustix::io; fn f() { std::process::id() }";
     assert_eq!((count("host/live/src/client.rs", names), count("viewer/src/main.rs", names)), (2, 0));
+    let kernel = "fn f(n: u32) { read(\"/proc/version\"); read(format!(\"/sys/{n}\")); read(\"/processes\"); Path::new(\"/proc\") }";
+    assert_eq!((count("host/judge/src/watch.rs", kernel), count("viewer/tests/memory.rs", kernel)), (3, 0));
+    assert_eq!((count("viewer/src/cost.rs", kernel), count("devices/usbip/src/vhci.rs", kernel)), (0, 0));
     // Neither text nor other conditions.
     let harmless = "#[cfg(test)] mod tests { const A: &str = \"cfg(unix)\"; fn windows() { slice.windows(2) } } // cfg(unix)";
     assert_eq!(count("host/live/src/client.rs", harmless), 0);

@@ -1,7 +1,8 @@
 //! What differs between systems when a plugin is judged in a process of its own. Each system has one module with the same items:
 //! - `anonymous_file`, `standard_input`: what a process says into;
 //! - `ending_signal`, `end_at_once`: how one ends;
-//! - `processor_time`, `used`, `children`: what the system counts;
+//! - `processor_time`, `used`: what the system counts;
+//! - `state`: what the system tells of this process;
 //! - `locked`: whether a step calls the system.
 
 #[cfg(not(windows))]
@@ -15,7 +16,7 @@ use linux as system;
 use windows as system;
 
 pub(crate) use system::{
-    anonymous_file, children, end_at_once, ending_signal, locked, processor_time, standard_input, used,
+    anonymous_file, end_at_once, ending_signal, locked, processor_time, standard_input, state, used,
 };
 
 use std::time::Duration;

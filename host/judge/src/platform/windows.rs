@@ -48,9 +48,31 @@ pub(crate) fn used(_: u32) -> Used {
     Used { ran: Duration::ZERO, wants: false }
 }
 
-/// Whether this process has started others: not known.
-pub(crate) fn children() -> &'static str {
-    "unknown"
+/// What the system tells of this process and thread: nothing that is asked for yet.
+pub(crate) mod state {
+    use crate::validate::untouched::Part;
+
+    /// Why it is not known.
+    const NOT_ASKED: &str =
+        "of this process only environment, folder and floating-point mode are looked at on Windows";
+
+    /// Says that it is not known.
+    pub(crate) fn of_the_system() -> Result<Vec<Part>, &'static str> {
+        Err(NOT_ASKED)
+    }
+
+    /// Says that they are not counted.
+    pub(crate) fn threads() -> Result<usize, &'static str> {
+        Err("threads are not counted on Windows")
+    }
+
+    /// Says that there is no such library.
+    ///
+    /// # Errors
+    /// Always.
+    pub(crate) fn is_loaded_first(_: &str) -> Result<(), String> {
+        Err("only Linux gives a process another allocator (LD_PRELOAD)".to_owned())
+    }
 }
 
 /// Whether a step computes and does nothing else: only a kernel of Linux can lock a thread in.

@@ -58,7 +58,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
             Rule::ResetRepeats => of_model(model::reset_repeats)?,
             Rule::TimeBudget => of_model(model::time_budget)?,
             Rule::Independent => model::independent(&subject)?,
-            Rule::NoThreads => model::no_threads(subject.prepared_model()?, before.threads())?,
+            Rule::NoThreads => model::no_threads(subject.prepared_model()?, before.threads()?)?,
             Rule::EnergyGradient => of_model(model::energy_gradient)?,
             unknown => return Err(format!("this host cannot check `{}`", unknown.id()).into()),
         },

@@ -7,6 +7,7 @@
 use super::Seen;
 use super::checks::Subject;
 use super::life::live;
+use crate::platform::state;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -28,9 +29,6 @@ fn beside(folder: &Path) -> Option<PathBuf> {
 
 /// Lives one life of an instance under the allocator.
 pub(super) fn inside_memory(subject: &Subject) -> Result<(), Seen> {
-    let mapped = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
-    if !mapped.contains(LIBRARY) {
-        return Err(Seen::Missing(format!("{LIBRARY} is not beside this program")));
-    }
+    state::is_loaded_first(LIBRARY).map_err(Seen::Missing)?;
     live(subject, &mut |_, _| Ok(()))
 }

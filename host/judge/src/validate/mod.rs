@@ -16,7 +16,7 @@ mod passive;
 pub(crate) mod path;
 pub(crate) mod patience;
 mod rule;
-mod untouched;
+pub(crate) mod untouched;
 
 pub use checks::check;
 pub use rule::Check;

@@ -1,5 +1,6 @@
 //! Rules of a force model: numbers, repeatability, time, threads, energy, activity.
 
+use super::Seen;
 use super::checks::Subject;
 use super::path::{CONFIG, FAST, directions, finite, grid, step, walk, walk_at};
 use super::untouched::threads;
@@ -117,10 +118,10 @@ pub(super) fn independent(subject: &Subject) -> Result<(), String> {
 }
 
 /// Compares with the number of threads before the library was loaded.
-pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), String> {
-    let more = |when: &str| match threads().saturating_sub(before) {
+pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Seen> {
+    let more = |when: &str| match threads()?.saturating_sub(before) {
         0 => Ok(()),
-        more => Err(format!("the process has {more} more threads after {when}")),
+        more => Err(Seen::Violation(format!("the process has {more} more threads after {when}"))),
     };
     more("create and prepare")?;
     let _ = walked(&mut [&mut model])?;

@@ -5,10 +5,8 @@
 use super::Seen;
 use super::checks::Subject;
 use super::life::live;
-use crate::platform::children;
-use std::fs;
+use crate::platform::state;
 use std::hint::black_box;
-use std::path::Path;
 use std::time::Duration;
 
 /// How long the process is left alone at the end: a timer or a signal that was left behind comes by then.
@@ -16,17 +14,22 @@ const REST: Duration = Duration::from_millis(300);
 
 /// How one part of the state may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum May {
+pub(crate) enum May {
     /// Not at all.
     Stay,
     /// Lines may come, none may go.
     Grow,
 }
 
+/// One part of the state: its name, how it may change, and the lines that describe it.
+pub(crate) type Part = (&'static str, May, Vec<String>);
+
 /// The state of this process and thread.
 pub(super) struct Host {
-    parts: Vec<(&'static str, May, Vec<String>)>,
-    threads: usize,
+    parts: Vec<Part>,
+    /// Why the rest of the state is not known, if it is not.
+    unknown: Option<&'static str>,
+    threads: Result<usize, &'static str>,
 }
 
 /// Lives one life of an instance, and looks after each call.
@@ -37,49 +40,39 @@ pub(super) fn untouched(subject: &Subject, before: &Host) -> Result<(), Seen> {
         _ => Err(format!("{call} changed the floating-point mode: rounding, flush-to-zero or traps")),
     })?;
     std::thread::sleep(REST);
-    Ok(before.compare("what it left behind")?)
+    before.compare("what it left behind")?;
+    before.known()
 }
 
 impl Host {
     pub(super) fn now() -> Self {
-        let whole = |path: &str| fs::read_to_string(path).unwrap_or_default();
-        let (process, thread) = (whole("/proc/self/status"), whole("/proc/thread-self/status"));
-        let named = |text: &str, names: &[&str]| -> Vec<String> {
-            let lines = text.lines().filter(|line| names.iter().any(|name| line.starts_with(name)));
-            lines.map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
-        };
         let environment =
             std::env::vars_os().map(|(name, value)| format!("{}={}", name.display(), value.display()));
         let folder =
             std::env::current_dir().map_or_else(|error| error.to_string(), |dir| dir.display().to_string());
-        let parts = vec![
-            (
-                "signal handlers",
-                May::Stay,
-                [signals(&process, "SigIgn:"), signals(&process, "SigCgt:")].into(),
-            ),
-            ("the blocked signals", May::Stay, vec![signals(&thread, "SigBlk:")]),
+        let mut parts = vec![
             ("the floating-point mode", May::Stay, arithmetic()),
             ("the environment", May::Stay, environment.collect()),
             ("the current folder", May::Stay, vec![folder]),
-            ("the processors of the thread", May::Stay, named(&thread, &["Cpus_allowed:"])),
-            ("the scheduling of the thread", May::Stay, scheduling()),
-            (
-                "the limits of the process",
-                May::Stay,
-                whole("/proc/self/limits").lines().map(str::to_owned).collect(),
-            ),
-            ("umask or tracer", May::Stay, named(&process, &["Umask:", "TracerPid:"])),
-            ("child processes", May::Stay, vec![children().to_owned()]),
-            ("timers", May::Stay, named(&whole("/proc/self/timers"), &["ID:", "signal:"])),
-            ("open files", May::Grow, files()),
         ];
-        Self { parts, threads: threads() }
+        let unknown = match state::of_the_system() {
+            Ok(told) => {
+                parts.extend(told);
+                None
+            }
+            Err(why) => Some(why),
+        };
+        Self { parts, unknown, threads: state::threads() }
     }
 
-    /// Threads at that time.
-    pub(super) const fn threads(&self) -> usize {
-        self.threads
+    /// Threads at that time, if the system tells.
+    pub(super) fn threads(&self) -> Result<usize, Seen> {
+        self.threads.map_err(missing)
+    }
+
+    /// Fails if a part of the state is not known.
+    fn known(&self) -> Result<(), Seen> {
+        self.unknown.map_or(Ok(()), |why| Err(missing(why)))
     }
 
     fn compare(&self, call: &str) -> Result<(), String> {
@@ -99,18 +92,13 @@ impl Host {
     }
 }
 
-/// A set of signals by their numbers, without 32 and 33: the C library uses those for its threads.
-fn signals(status: &str, name: &str) -> String {
-    let set = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix(name)?.trim(), 16).ok());
-    let set = set.unwrap_or_default();
-    let numbers = (1_u32..=64).filter(|number| !matches!(number, 32 | 33) && set >> (number - 1) & 1 == 1);
-    let numbers: Vec<String> = numbers.map(|number| number.to_string()).collect();
-    format!("{name} {}", if numbers.is_empty() { "none".to_owned() } else { numbers.join(" ") })
+/// Threads of this process, if the system tells.
+pub(super) fn threads() -> Result<usize, Seen> {
+    state::threads().map_err(missing)
 }
 
-/// Threads of this process.
-pub(super) fn threads() -> usize {
-    fs::read_dir("/proc/self/task").map_or(0, Iterator::count)
+fn missing(why: &str) -> Seen {
+    Seen::Missing(why.to_owned())
 }
 
 /// What a few sums say about the mode of this thread.
@@ -125,22 +113,6 @@ fn arithmetic() -> Vec<String> {
     ]
 }
 
-/// Priority, nice value, real-time priority and policy, by their fields in proc(5).
-fn scheduling() -> Vec<String> {
-    let text = fs::read_to_string("/proc/thread-self/stat").unwrap_or_default();
-    let fields: Vec<&str> = text.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
-    let of = |(name, field): (&str, usize)| format!("{name} {}", fields.get(field - 3).unwrap_or(&"unknown"));
-    [("nice", 19), ("real-time priority", 40), ("policy", 41)].map(of).to_vec()
-}
-
-/// Open files as the system names them; the folder that is being read is among them, under another name each time.
-fn files() -> Vec<String> {
-    let entries = fs::read_dir("/proc/self/fd").into_iter().flatten().flatten();
-    let named = entries.filter_map(|entry| Some((entry.file_name(), fs::read_link(entry.path()).ok()?)));
-    let kept = named.filter(|(_, target)| !target.starts_with(Path::new("/proc")));
-    kept.map(|(number, target)| format!("{} -> {}", number.display(), target.display())).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,7 +121,8 @@ mod tests {
     fn host(folder: &str, files: &[&str]) -> Host {
         let files = files.iter().map(|file| (*file).to_owned()).collect();
         let folder = vec![folder.to_owned()];
-        Host { parts: vec![("the folder", May::Stay, folder), ("open files", May::Grow, files)], threads: 1 }
+        let parts = vec![("the folder", May::Stay, folder), ("open files", May::Grow, files)];
+        Host { parts, unknown: None, threads: Ok(1) }
     }
 
     #[test]
@@ -167,10 +140,15 @@ mod tests {
     }
 
     #[test]
-    fn signals_are_told_by_their_numbers_without_those_of_the_c_library() {
-        let status = "Name:\tx\nSigIgn:\t0000000180001000\nSigCgt:\t0000000000000000\n";
-        assert_eq!(signals(status, "SigIgn:"), "SigIgn: 13");
-        assert_eq!(signals(status, "SigCgt:"), "SigCgt: none");
+    fn what_the_system_does_not_tell_is_not_said_to_hold() {
+        let unknown =
+            Host { unknown: Some("nobody tells"), threads: Err("nobody counts"), ..host("/here", &[]) };
+        assert_eq!(unknown.known(), Err(Seen::Missing("nobody tells".to_owned())));
+        assert_eq!(unknown.threads().err(), Some(Seen::Missing("nobody counts".to_owned())));
+        assert_eq!(host("/here", &[]).known(), Ok(()));
+        // Of this system: both, or a reason.
+        let now = Host::now();
+        assert_eq!(now.known().is_ok(), now.threads().is_ok());
     }
 
     #[test]

@@ -6,6 +6,7 @@ use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
 use flotor_judge::validate::{Check, Figures, Finding, Verdict, check, validate};
 use flotor_servo::last_stop::ignore_no_signal;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -81,9 +82,12 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if !arguments.json.is_on_standard_output() {
         say!("{}", style::title(&arguments.plugin.display().to_string()));
         findings.iter().for_each(print);
-        if let Some(first) = findings.iter().find_map(|finding| finding.unchecked.as_ref()) {
-            let unchecked = findings.iter().filter(|finding| finding.unchecked.is_some()).count();
-            say!("{unchecked} of {} rules could not be checked: {first}", findings.len());
+        let unchecked: Vec<&str> =
+            findings.iter().filter_map(|finding| finding.unchecked.as_deref()).collect();
+        if !unchecked.is_empty() {
+            let reasons: BTreeSet<&str> = unchecked.iter().copied().collect();
+            let reasons = reasons.into_iter().collect::<Vec<_>>().join("; ");
+            say!("{} of {} rules could not be checked: {reasons}", unchecked.len(), findings.len());
         }
     }
     if violated == 0 {

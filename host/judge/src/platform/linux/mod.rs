@@ -1,11 +1,11 @@
 //! Linux: anonymous files, signals, the clock of a thread's processor, seccomp.
 
 pub(crate) mod locked;
+pub(crate) mod state;
 
 use super::Used;
 use rustix::fs::{MemfdFlags, memfd_create};
-use rustix::io::Errno;
-use rustix::process::{Signal, WaitOptions, getpid, kill_process, waitpid};
+use rustix::process::{Signal, getpid, kill_process};
 use rustix::time::{ClockId, clock_gettime};
 use std::fs::File;
 use std::io;
@@ -41,14 +41,6 @@ pub(crate) fn end_at_once() {
 pub(crate) fn processor_time() -> Duration {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     Duration::try_from(now).unwrap_or_default()
-}
-
-/// Whether this process has started others.
-pub(crate) fn children() -> &'static str {
-    match waitpid(None, WaitOptions::NOHANG) {
-        Err(Errno::CHILD) => "none",
-        _ => "at least one",
-    }
 }
 
 /// What a process did so far, and whether it would do more now.

@@ -1,0 +1,94 @@
+//! What the kernel tells of this process and thread, by the files under `/proc`.
+
+use crate::validate::untouched::{May, Part};
+use rustix::io::Errno;
+use rustix::process::{WaitOptions, waitpid};
+use std::fs;
+use std::path::Path;
+
+/// Why nothing is known.
+const NO_FILES: &str = "the system has no /proc, which the test needs";
+
+/// The parts of the state of this process and thread that only the kernel tells, or why it does not.
+pub(crate) fn of_the_system() -> Result<Vec<Part>, &'static str> {
+    let whole = |path: &str| fs::read_to_string(path).unwrap_or_default();
+    let (process, thread) = (whole("/proc/self/status"), whole("/proc/thread-self/status"));
+    if process.is_empty() || thread.is_empty() {
+        return Err(NO_FILES);
+    }
+    let named = |text: &str, names: &[&str]| -> Vec<String> {
+        let lines = text.lines().filter(|line| names.iter().any(|name| line.starts_with(name)));
+        lines.map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
+    };
+    let limits = whole("/proc/self/limits");
+    Ok(vec![
+        ("signal handlers", May::Stay, [signals(&process, "SigIgn:"), signals(&process, "SigCgt:")].into()),
+        ("the blocked signals", May::Stay, vec![signals(&thread, "SigBlk:")]),
+        ("the processors of the thread", May::Stay, named(&thread, &["Cpus_allowed:"])),
+        ("the scheduling of the thread", May::Stay, scheduling()),
+        ("the limits of the process", May::Stay, limits.lines().map(str::to_owned).collect()),
+        ("umask or tracer", May::Stay, named(&process, &["Umask:", "TracerPid:"])),
+        ("child processes", May::Stay, vec![children().to_owned()]),
+        ("timers", May::Stay, named(&whole("/proc/self/timers"), &["ID:", "signal:"])),
+        ("open files", May::Grow, files()),
+    ])
+}
+
+/// Threads of this process, or why they are not known.
+pub(crate) fn threads() -> Result<usize, &'static str> {
+    fs::read_dir("/proc/self/task").map(Iterator::count).map_err(|_| NO_FILES)
+}
+
+/// Whether this process has loaded a library of that name, started with it before all others.
+///
+/// # Errors
+/// It has not.
+pub(crate) fn is_loaded_first(library: &str) -> Result<(), String> {
+    let mapped = fs::read_to_string("/proc/self/maps").unwrap_or_default();
+    if mapped.contains(library) { Ok(()) } else { Err(format!("{library} is not beside this program")) }
+}
+
+/// Whether this process has started others.
+fn children() -> &'static str {
+    match waitpid(None, WaitOptions::NOHANG) {
+        Err(Errno::CHILD) => "none",
+        _ => "at least one",
+    }
+}
+
+/// A set of signals by their numbers, without 32 and 33: the C library uses those for its threads.
+fn signals(status: &str, name: &str) -> String {
+    let set = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix(name)?.trim(), 16).ok());
+    let set = set.unwrap_or_default();
+    let numbers = (1_u32..=64).filter(|number| !matches!(number, 32 | 33) && set >> (number - 1) & 1 == 1);
+    let numbers: Vec<String> = numbers.map(|number| number.to_string()).collect();
+    format!("{name} {}", if numbers.is_empty() { "none".to_owned() } else { numbers.join(" ") })
+}
+
+/// Priority, nice value, real-time priority and policy, by their fields in proc(5).
+fn scheduling() -> Vec<String> {
+    let text = fs::read_to_string("/proc/thread-self/stat").unwrap_or_default();
+    let fields: Vec<&str> = text.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
+    let of = |(name, field): (&str, usize)| format!("{name} {}", fields.get(field - 3).unwrap_or(&"unknown"));
+    [("nice", 19), ("real-time priority", 40), ("policy", 41)].map(of).to_vec()
+}
+
+/// Open files as the system names them; the folder that is being read is among them, under another name each time.
+fn files() -> Vec<String> {
+    let entries = fs::read_dir("/proc/self/fd").into_iter().flatten().flatten();
+    let named = entries.filter_map(|entry| Some((entry.file_name(), fs::read_link(entry.path()).ok()?)));
+    let kept = named.filter(|(_, target)| !target.starts_with(Path::new("/proc")));
+    kept.map(|(number, target)| format!("{} -> {}", number.display(), target.display())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signals_are_told_by_their_numbers_without_those_of_the_c_library() {
+        let status = "Name:\tx\nSigIgn:\t0000000180001000\nSigCgt:\t0000000000000000\n";
+        assert_eq!(signals(status, "SigIgn:"), "SigIgn: 13");
+        assert_eq!(signals(status, "SigCgt:"), "SigCgt: none");
+    }
+}
