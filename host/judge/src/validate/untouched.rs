@@ -14,6 +14,7 @@ const REST: Duration = Duration::from_millis(300);
 
 /// How one part of the state may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(dead_code)] // a system that tells of no files has none that grows
 pub(crate) enum May {
     /// Not at all.
     Stay,

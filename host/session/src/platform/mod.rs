@@ -1,6 +1,7 @@
 //! What differs between systems around a session. Each system has one module with the same items:
 //! - `MachineState`: what of the process any plugin can change;
 //! - `identity`, `changed`, `is_same_file`: which file a path leads to, and whether it is still the one that was read;
+//! - `NOT_CAUGHT`: what ends the process without a stop of the devices;
 //! - `user_folder`, `distrust`: where a user keeps plugins, and which folders are not searched.
 
 #[cfg(not(windows))]
@@ -11,8 +12,8 @@ mod windows;
 #[cfg(not(windows))]
 pub use linux::is_same_file;
 #[cfg(not(windows))]
-pub(crate) use linux::{MachineState, changed, distrust, identity, user_folder};
+pub(crate) use linux::{MachineState, NOT_CAUGHT, changed, distrust, identity, user_folder};
 #[cfg(windows)]
 pub use windows::is_same_file;
 #[cfg(windows)]
-pub(crate) use windows::{MachineState, changed, distrust, identity, user_folder};
+pub(crate) use windows::{MachineState, NOT_CAUGHT, changed, distrust, identity, user_folder};

@@ -5,6 +5,12 @@ use std::os::windows::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
+/// What ends this process without a stop of the devices, though another system catches it: for people.
+pub(crate) const NOT_CAUGHT: Option<&str> = Some(
+    "on Windows nothing stops a device if a plugin ends this program by `abort` or damages its memory (heap corruption), or if it is \
+     ended from outside (Task Manager); keep a hand at the power switch",
+);
+
 /// The state of the process that plugins share with the host: the working folder. Limits of a process are set from outside, and no
 /// thread of a plugin has another's priority in its reach by a number that it knows.
 pub(crate) struct MachineState {

@@ -6,6 +6,7 @@ use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::calls::{Call, Progress, attended_while, is_to_begin, keeping_machine, limit};
 use crate::estimates;
+use crate::platform::NOT_CAUGHT;
 use crate::registry::{Registry, is_installed};
 use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
@@ -134,6 +135,10 @@ pub(super) fn watchdog_process(
     }
     let names = scene.devices.iter().map(|device| device.name.as_str());
     let means = names.zip(opened).filter_map(|(name, opened)| Some((name, opened.independence.as_ref()?)));
+    // One that stops by itself needs nobody.
+    if opened.iter().any(|opened| opened.without_independent_stop().is_some()) {
+        warnings.extend(NOT_CAUGHT.map(str::to_owned));
+    }
     match WatchdogProcess::start(means) {
         Ok(process) => Ok(process),
         Err(error) if scene.limits.require_independent_stop => Err(RunError::WatchdogProcess(error)),

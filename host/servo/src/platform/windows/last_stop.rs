@@ -2,6 +2,10 @@
 //!
 //! Nothing that runs there allocates, locks or formats into memory of its own. There are no signals: what a console sends is
 //! heard where the command line is, and no plugin can take it away.
+//!
+//! Not caught: `abort` and other quick failures (`__fastfail`), heap corruption that the system finds, which end the process
+//! without asking any filter; and `TerminateProcess`, which asks nobody. Nothing stops a device then but the device. The end of the
+//! process by `exit` is told by a callback of the loader, which Wine 8 does not call for a program: it is not tested.
 #![allow(unsafe_code)] // neither filter nor callback can be made without; tests/tests/system/architecture.rs lists it
 
 use crate::guest::leaves_signals;
@@ -29,8 +33,8 @@ const STACK_BYTES: u32 = 64 * 1024;
 /// What a filter answers: the next one is asked, which ends the process.
 const CONTINUE_SEARCH: i32 = 0;
 
-/// Takes every exception that would end the process, and its end. Again for each run: a plugin may have put something else
-/// there. Not real-time.
+/// Takes the exceptions that nobody handles, and the end of the process by `exit`; not what the head of this module lists. Again
+/// for each run: a plugin may have put something else there. Not real-time.
 pub(crate) fn install() {
     let mut bytes = STACK_BYTES;
     // SAFETY: a number that is there for the call.
