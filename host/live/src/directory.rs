@@ -144,7 +144,7 @@ impl Listener {
     /// Waits for the next connection, without an end.
     ///
     /// # Errors
-    /// That of the system; `Interrupted` for a client that is turned away.
+    /// The error of the system; `Interrupted` for a client that was turned away.
     pub fn accept(&self) -> io::Result<Stream> {
         accept(&self.socket)
     }
