@@ -111,7 +111,7 @@ const SERVO: Effort =
 /// Each equilibrium to rounding, so that nothing of the past is left in an answer.
 const TO_ROUNDING: Effort = Effort {
     most_steps: 10,
-    most_matrices: 6,
+    most_matrices: 5,
     matrix_life: 8,
     tolerance: 1e-13,
     // A step costs a ninth of a matrix: better several with an old one, as long as they contract.

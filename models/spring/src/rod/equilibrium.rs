@@ -31,6 +31,10 @@ const LONGEST_WAY: f64 = 0.097;
 const LONGEST_UNFELT_STEP: f64 = 0.4;
 /// How often a search that is not felt may begin anew.
 const MOST_SEARCHES: u32 = 3;
+/// Most of a bow that a search begins with, of that of the linear column.
+const MOST_BOW: f64 = 2.0;
+/// Steps to the amplitude of that bow.
+const AMPLITUDE_STEPS: u32 = 8;
 /// What the searches of a tick may cost together, in evaluations of the energy, if each costs no more than the one before.
 const MOST_COST: u32 = 160;
 /// Curvature that counts as none. Bending has 4; the softest stable directions have 1e-5; rounding makes
@@ -303,21 +307,43 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, plate: &Plate, demand: Demand) -> Outcome {
         self.reset();
         self.stride = Stride::UNFELT;
+        self.work = Work::default();
         if let Some(start) = start::linear(self.functional.basis(), spring, pose) {
-            self.shape = joined(&start[0], &start[1]);
+            let [swayed, bowed] = start.map(|[x, y]| joined(&x, &y));
+            self.shape = self.bowed(&swayed, &bowed, plate);
         }
-        let (mut outcome, mut work) = (Outcome::Failed, Work::default());
+        let mut outcome = Outcome::Failed;
         for _ in 0..MOST_SEARCHES {
-            self.work = Work::default();
             outcome = self.search(plate, demand);
-            work = work.and(&self.work);
-            if !matches!(outcome, Outcome::Moving(_)) || work.and(&self.work).cost() > MOST_COST {
+            let may_go_on = self.unstable_directions == 0 && self.work.matrices < self.effort.most_matrices;
+            if !matches!(outcome, Outcome::Moving(_)) || !may_go_on {
                 break;
             }
         }
-        self.work = work;
         self.remember(plate, &[0.0; N], &outcome);
         outcome
+    }
+
+    /// From a shape without a bow to that with the bow of the linear column: as much of it as has least energy. The linear
+    /// column does not know how far a bow goes close to buckling. The energy along it is taken for `a t + b t² + d t⁴`, because the
+    /// bulge of a straight rod has no preferred side; two evaluations say what the three are.
+    fn bowed(&mut self, without: &Shape<N>, with: &Shape<N>, plate: &Plate) -> Shape<N> {
+        let bow = added(with, -1.0, without);
+        let (from, to) = (self.functional.value(without, plate), self.functional.value(with, plate));
+        self.work.evaluations += 2;
+        let (first, last, rise) = (dot(&from.slope, &bow), dot(&to.slope, &bow), to.energy - from.energy);
+        let fourth = 0.5 * (first + last) - rise;
+        let second = rise - first - fourth;
+        if !(first < 0.0 && fourth > 0.0) {
+            return *with;
+        }
+        // Newton's method on a + 2 b t + 4 d t³ = 0, from above the root.
+        let mut part = MOST_BOW;
+        for _ in 0..AMPLITUDE_STEPS {
+            let by_part = 4.0 * fourth * part * part;
+            part -= (first + (2.0 * second + by_part) * part) / (2.0 * second + 3.0 * by_part);
+        }
+        if part > 0.0 && part < MOST_BOW { added(without, part, &bow) } else { *with }
     }
 
     /// Keeps what the next tick starts from.

@@ -24,7 +24,7 @@ pub(crate) fn linear<const K: usize, const Q: usize>(
     basis: &Basis<K, Q>,
     spring: &Spring,
     pose: &Pose,
-) -> Option<[[f64; K]; 2]> {
+) -> Option<[[[f64; K]; 2]; 2]> {
     let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
     let chord = pose.chord(free_length_m).ok()?;
     let direction = chord.vector_m / chord.length_m;
@@ -37,20 +37,24 @@ pub(crate) fn linear<const K: usize, const Q: usize>(
     let widest = [0.25, 0.5].map(|u| shape.lean(u)[1].value.abs()).into_iter().fold(0.0, f64::max);
     let bow = bow * (LARGEST_LEAN_RAD / (widest * bow.length()).max(LARGEST_LEAN_RAD));
 
-    let mut coefficients = [[0.0; K]; 2];
-    for i in 0..Q {
-        let [of_sway, of_bow] = shape.lean(basis.station[i] - 0.5);
-        let rate = rate(
-            direction + of_sway.value * sway + of_bow.value * bow,
-            of_sway.slope * sway + of_bow.slope * bow,
-        );
-        for (component, rate) in coefficients.iter_mut().zip(rate.to_array()) {
-            for (coefficient, slope) in component.iter_mut().zip(&basis.slope_at[i]) {
-                *coefficient += basis.weight[i] * rate * slope;
+    let shape_of = |bow: DVec3| {
+        let mut coefficients = [[0.0; K]; 2];
+        for i in 0..Q {
+            let [of_sway, of_bow] = shape.lean(basis.station[i] - 0.5);
+            let rate = rate(
+                direction + of_sway.value * sway + of_bow.value * bow,
+                of_sway.slope * sway + of_bow.slope * bow,
+            );
+            for (component, rate) in coefficients.iter_mut().zip(rate.to_array()) {
+                for (coefficient, slope) in component.iter_mut().zip(&basis.slope_at[i]) {
+                    *coefficient += basis.weight[i] * rate * slope;
+                }
             }
         }
-    }
-    coefficients.as_flattened().iter().all(|coefficient| coefficient.is_finite()).then_some(coefficients)
+        coefficients
+    };
+    let shapes = [shape_of(DVec3::ZERO), shape_of(bow)];
+    shapes.as_flattened().as_flattened().iter().all(|coefficient| coefficient.is_finite()).then_some(shapes)
 }
 
 /// Derivative of `p = d_xy / (1 + d_z)` for a direction `d` along `along`, which changes by `by_s`.
@@ -76,7 +80,7 @@ mod tests {
         let (shear_m, tilt_rad) = (2.5e-6, 2e-4);
         let pose =
             Pose::from_rotation_vector(DVec3::new(shear_m, 0.0, -5e-3), DVec3::new(0.0, tilt_rad, 0.0));
-        let [along, across] = linear(&basis, &spring, &pose).unwrap();
+        let [_, [along, across]] = linear(&basis, &spring, &pose).unwrap();
         assert!(across.iter().all(|coefficient| coefficient.abs() < 1e-12), "{across:?}");
         let length_m = 20e-3;
         let rigidities = spring.rigidities();
