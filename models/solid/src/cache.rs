@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 /// First bytes of a file. The version changes when the same description would give other numbers.
-const MAGIC: &[u8; 16] = b"flotor-solid 01\n";
+const MAGIC: &[u8; 16] = b"flotor-solid 02\n";
 
 /// `FNV-1a` over 64 bits: finds damage, proves nothing.
 pub(crate) fn digest(bytes: &[u8]) -> u64 {

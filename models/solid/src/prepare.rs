@@ -24,6 +24,11 @@ const PROFILE_RINGS: i32 = 10;
 const TABLE_SHARES: [f64; 9] = [1.0, 0.8, 0.62, 0.47, 0.34, 0.23, 0.145, 0.08, 0.03];
 /// Places of the sphere along half a side, from the middle to where the ratio ends.
 const PLACES: [f64; 9] = [0.0, 0.25, 0.44, 0.59, 0.7, 0.785, 0.86, 0.93, 1.0];
+/// Least distance from the clamped bottom at which the law of a side is solved, in radii: nearer, the elements do not resolve
+/// what the bottom takes from a half-space's compliance.
+const CLAMPED_MARGIN: f64 = 0.75;
+/// Least distance of two places, in halves of a side.
+const LEAST_GAP: f64 = 0.05;
 
 /// Distances of the points of a mesh's table and of the places of the sphere from the middle of a face, in halves of a side.
 const FACE_TABLE: [f64; 6] = [0.0, 0.3, 0.55, 0.75, 0.9, 1.0];
@@ -101,14 +106,15 @@ fn column(
         let problem = Problem { radius_m, depth_m, cell_m, on_face: &on_face, smooth: &smooth };
         let contact = patch.solve(&problem, start.as_ref());
         let ratio = contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
-        let before = ratios.last().copied().unwrap_or(1.0);
+        // Near a corner the least contact already has another ratio than one.
+        let before = ratios.last().copied().unwrap_or(ratio);
         if contact.residual < 1.0e-4 && (ratio / before - 1.0).abs() < 0.3 {
             ratios.push(ratio);
             start = Some(contact);
         } else {
-            // It has snapped through: on with what was.
-            let earlier = ratios.len().checked_sub(2).map_or(1.0, |i| ratios[i]);
-            ratios.push(2.0 * before - earlier);
+            // It has snapped through: on as it went.
+            let earlier = ratios.len().checked_sub(2).map_or(before, |i| ratios[i]);
+            ratios.push(before * (before / earlier));
         }
     }
     ratios
@@ -388,21 +394,18 @@ impl Builder<'_> {
         [self.size.half_x_m, self.size.half_y_m, 0.5 * self.size.height_m][axis]
     }
 
-    /// Where along an axis the sphere's law is solved, m: from the middle to twice the rounding before the edge, or from the
-    /// bottom to the top.
+    /// Where along an axis the sphere's law is solved, m: from the middle to twice the rounding before the edge, or from
+    /// [`CLAMPED_MARGIN`] above the clamped bottom to the top.
     fn places(&self, axis: usize) -> Vec<f64> {
         let half_m = self.half_along(axis);
         let up: Vec<f64> = PLACES.iter().map(|share| share * (half_m - 2.0 * self.rounding_m)).collect();
         if axis < 2 {
             return up;
         }
-        let below = up.iter().skip(1).step_by(2).rev().map(|x| -half_m - x);
-        let mut all: Vec<f64> = below.collect();
-        let bottom = 2.0 * self.rounding_m - 2.0 * half_m;
-        if all[0] > bottom {
-            all.insert(0, bottom);
-        }
-        all.extend(up.iter().map(|x| x - half_m));
+        let lowest_m = CLAMPED_MARGIN * self.radius_m - 2.0 * half_m;
+        let below = up.iter().skip(1).rev().map(|x| -half_m - x);
+        let mut all = vec![lowest_m];
+        all.extend(below.chain(up.iter().map(|x| x - half_m)).filter(|&x| x > lowest_m + LEAST_GAP * half_m));
         all
     }
 
