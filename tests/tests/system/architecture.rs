@@ -417,6 +417,7 @@ const UNSAFE: &[(&str, &str)] = &[
         "a filter for exceptions that nobody handles, and a callback at the end of the process",
     ),
     ("host/servo/src/platform/windows/scheduling.rs", "priority and cores of the calling thread"),
+    ("host/study/program/src/platform/windows.rs", "how much of a disk is free"),
     ("tests/tests/realtime.rs", "an allocator that counts, to see that a tick does not allocate"),
 ];
 
@@ -481,6 +482,8 @@ const PORTED: &[&str] = &[
     "host/session/src/",
     "host/src/",
     "host/statistics/src/",
+    "host/study/program/src/",
+    "host/study/src/",
     "host/sync/src/",
     "models/",
 ];

@@ -2,6 +2,7 @@
 
 mod analyse;
 mod page;
+mod platform;
 mod study;
 
 use clap::{CommandFactory, Parser, Subcommand};

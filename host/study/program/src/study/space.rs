@@ -1,5 +1,6 @@
 //! Whether a sitting finds room on the disk, before a person sits down.
 
+use crate::platform::free_bytes;
 use flotor_command::{CommandError, note};
 use std::path::Path;
 
@@ -49,10 +50,9 @@ impl Need {
 pub(super) fn check(folder: &Path, need: Need) -> Result<(), CommandError> {
     let exists =
         folder.ancestors().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
-    let Some(disk) = exists.into_iter().find_map(|folder| rustix::fs::statvfs(folder).ok()) else {
+    let Some(free) = exists.into_iter().find_map(free_bytes) else {
         return Ok(());
     };
-    let free = disk.f_bavail as f64 * disk.f_frsize as f64;
     let words = |bytes: f64, what: &str| {
         let advice = if need.bytes_per_s > 0.0 {
             "free some, or record less with --kinematics summary"
