@@ -1,5 +1,6 @@
 //! What an open window costs: pictures made, and processor time and memory of the whole process, the driver's threads included.
 
+use crate::platform::{processor, resident_mib};
 use egui::{Context, ViewportCommand, ViewportId};
 use std::fmt;
 use std::sync::mpsc::Sender;
@@ -94,20 +95,6 @@ impl Opening {
         let goes_on_for_good = made >= Self::MOST_PICTURES;
         !is_quiet && !goes_on_for_good && now - self.opened < Self::LONGEST
     }
-}
-
-/// Processor time of this process so far.
-fn processor() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    Duration::try_from(time).unwrap_or_default()
-}
-
-/// Memory of this process that is in use, MiB, where the system tells.
-fn resident_mib() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    let kib: u64 = line.trim().trim_end_matches("kB").trim().parse().ok()?;
-    Some(kib / 1024)
 }
 
 #[cfg(test)]

@@ -34,6 +34,7 @@ pub mod palette;
 pub mod panel;
 pub mod picture;
 pub mod placing;
+mod platform;
 pub mod player;
 pub mod pointer_order;
 pub mod quantity;

@@ -1,10 +1,11 @@
 //! What a person has chosen about the window, from one time to the next: a small file of their own.
 //!
-//! It lies where programs keep such things (`$XDG_CONFIG_HOME/flotor/viewer.toml`, else `~/.config/flotor/viewer.toml`). A file
+//! It lies where programs keep such things (`$XDG_CONFIG_HOME/flotor/viewer.toml`, else `~/.config/flotor/viewer.toml`; `%APPDATA%` on Windows). A file
 //! that is missing, damaged or of another version costs the choices in it and nothing else. Pictures without a window and
 //! sittings do not read it: they look the same for everybody.
 
 use crate::palette::Look;
+use crate::platform::settings_folder;
 use crate::quantity::{Quantity, Units};
 use crate::ui::plot_stack::FIRST_TRACES;
 use serde::{Deserialize, Serialize};
@@ -51,10 +52,7 @@ impl Remembered {
     /// Where it is kept; none where there is no home.
     #[must_use]
     pub fn file() -> Option<PathBuf> {
-        let variable = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-        let folder =
-            variable("XDG_CONFIG_HOME").or_else(|| variable("HOME").map(|home| home.join(".config")));
-        folder.map(|folder| folder.join("flotor").join("viewer.toml"))
+        settings_folder().map(|folder| folder.join("flotor").join("viewer.toml"))
     }
 
     /// What was chosen the last time; what cannot be read is as if nothing was chosen.
