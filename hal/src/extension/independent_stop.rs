@@ -35,8 +35,8 @@ pub enum StoppedState {
 pub struct IndependentStop {
     /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns.
     pub(crate) within_ns: u64,
-    /// A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. -1: the
-    /// device stops by itself when no command comes.
+    /// A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. On Windows
+    /// the lower 32 bits of a handle. -1: the device stops by itself when no command comes.
     pub(crate) descriptor: i32,
     /// Bytes of the message, 1 to 64; 0 with descriptor -1.
     pub(crate) length: u32,

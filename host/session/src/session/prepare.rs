@@ -135,20 +135,21 @@ pub(super) fn watchdog_process(
     }
     let names = scene.devices.iter().map(|device| device.name.as_str());
     let means = names.zip(opened).filter_map(|(name, opened)| Some((name, opened.independence.as_ref()?)));
-    // One that stops by itself needs nobody.
-    if opened.iter().any(|opened| opened.without_independent_stop().is_some()) {
-        warnings.extend(NOT_CAUGHT.map(str::to_owned));
-    }
-    match WatchdogProcess::start(means) {
-        Ok(process) => Ok(process),
-        Err(error) if scene.limits.require_independent_stop => Err(RunError::WatchdogProcess(error)),
+    let process = match WatchdogProcess::start(means) {
+        Ok(process) => Some(process),
+        Err(error) if scene.limits.require_independent_stop => return Err(RunError::WatchdogProcess(error)),
         Err(error) => {
             warnings.push(format!(
                 "no watchdog process ({error}): nothing stops the devices if this program is killed"
             ));
-            Ok(None)
+            None
         }
+    };
+    // One that stops by itself needs nobody.
+    if process.is_none() || opened.iter().any(|opened| opened.without_independent_stop().is_some()) {
+        warnings.extend(NOT_CAUGHT.map(str::to_owned));
     }
+    Ok(process.flatten())
 }
 
 /// Loads and opens one device of a scene. Not real-time.

@@ -10,7 +10,6 @@ use std::ffi::{OsStr, c_void};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::windows::fs::OpenOptionsExt;
-use std::os::windows::io::OwnedHandle;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
@@ -22,18 +21,19 @@ const FOLDER: &str = "flotor-plugins";
 /// A copy that is younger may be one that another process has not opened yet.
 const OPENED_WITHIN: Duration = Duration::from_secs(60);
 
-/// What is kept of a plugin's descriptor.
-pub(crate) type Handle = OwnedHandle;
+/// What is kept of a plugin's descriptor: nothing, because no process beside the host uses it yet.
+#[derive(Debug)]
+pub struct Handle;
 
-/// A descriptor is a number of the plugin's own C library here, which means nothing to its host.
+/// Nothing is kept.
 ///
 /// # Errors
-/// Always: a device that needs a message to stop has to stop by itself on this system.
+/// None.
 ///
 /// # Safety
 /// As on other systems; here nothing is done with the descriptor.
-pub(crate) unsafe fn writable_duplicate(descriptor: i32) -> Result<Handle, String> {
-    Err(format!("names the descriptor {descriptor}, which no other program of this system can use"))
+pub(crate) unsafe fn writable_duplicate(_: i32) -> Result<Handle, String> {
+    Ok(Handle)
 }
 
 /// A copy in a file of its own, which nobody can write or remove while this process lives: the file of the plugin stays free to

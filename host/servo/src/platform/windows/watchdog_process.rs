@@ -1,5 +1,4 @@
-//! The watchdog process. There is none yet: a device that is stopped by a message is refused when its plugin is opened, so no
-//! device here waits for one.
+//! The watchdog process. There is none yet: of a device that is stopped by a message the run says so.
 
 use super::not_yet;
 use flotor_hal::Independence;
