@@ -22,6 +22,7 @@ pub mod chip;
 pub mod exchange;
 pub mod firmware;
 pub mod kinematics;
+mod platform;
 mod plugin;
 pub mod protocol;
 pub mod remote;

@@ -1,6 +1,7 @@
 //! The chip on the bus, through libusb.
 
 use crate::chip::{Chip, ChipLost, PRODUCT, Request, VENDOR};
+use crate::platform::{OTHER_REMEDY, access_remedy};
 use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbContext};
 use std::time::{Duration, Instant};
 
@@ -117,16 +118,12 @@ fn refused(error: Error) -> String {
         Error::NotFound => "no Falcon is plugged in (USB 0403:cb48); check cable and power. Without one, `flotor emulate falcon` \
                             starts one in software, for `address = \"tcp:127.0.0.1:4108\"`"
             .to_owned(),
-        Error::Access => format!(
-            "this user may not use the Falcon; put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control \
-             --reload` and plug it in again: SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{VENDOR:04x}\", \
-             ATTR{{idProduct}}==\"{PRODUCT:04x}\", TAG+=\"uaccess\", ENV{{ID_MM_DEVICE_IGNORE}}=\"1\""
-        ),
+        Error::Access => format!("this user may not use the Falcon; {}", access_remedy(VENDOR, PRODUCT)),
         Error::Busy => "the Falcon is in use by another program; close that one first".to_owned(),
         Error::NoDevice => "no Falcon has that serial number, or it was unplugged; `address` is usb, or usb: and a serial \
                             number"
             .to_owned(),
-        other => format!("the Falcon cannot be used ({other}); connect it without a hub, and try again"),
+        other => format!("the Falcon cannot be used ({other}); {OTHER_REMEDY}"),
     }
 }
 
@@ -138,10 +135,10 @@ mod tests {
     fn each_refusal_says_what_to_do() {
         for (error, words) in [
             (Error::NotFound, "check cable and power"),
-            (Error::Access, "ATTR{idProduct}==\"cb48\", TAG+=\"uaccess\", ENV{ID_MM_DEVICE_IGNORE}"),
+            (Error::Access, &access_remedy(VENDOR, PRODUCT)),
             (Error::Busy, "close that one first"),
             (Error::NoDevice, "serial number"),
-            (Error::Io, "without a hub"),
+            (Error::Io, OTHER_REMEDY),
         ] {
             let said = refused(error);
             assert!(said.contains(words) && said.lines().count() == 1, "{said}");

@@ -9,6 +9,7 @@ use std::ffi::c_int;
 const SDK: Sdk = Sdk {
     name: "the Force Dimension SDK",
     files: &["libdrd.so.3", "libdrd.so", "libdhd.so.3", "libdhd.so"],
+    files_on_windows: &["drdms64.dll", "drd64.dll", "dhdms64.dll", "dhd64.dll"],
     variables: &["FDSDK", "FORCEDIM_SDK", "FD_SDK_DIR", "ForceDimensionSDK_DIR"],
 };
 /// Oldest version of the SDK.

@@ -12,6 +12,7 @@
 //! - `plugin`: parameters and the contract.
 
 pub mod line;
+mod platform;
 mod plugin;
 pub mod protocol;
 

@@ -1,7 +1,8 @@
 //! One question at a time over a serial port.
 
+use crate::platform::{ACCESS_QUESTION, Port};
 use crate::protocol::{Lines, QUESTION, parse};
-use serialport::{ClearBuffer, ErrorKind, SerialPort, TTYPort};
+use serialport::{ClearBuffer, ErrorKind, SerialPort};
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
@@ -29,7 +30,7 @@ pub enum Heard {
 
 /// A sensor at the other end of a serial port.
 pub struct SensorLine {
-    port: TTYPort,
+    port: Port,
     lines: Lines,
     /// When the question that waits for its answer was asked.
     asked: Option<Instant>,
@@ -41,7 +42,7 @@ impl SensorLine {
     /// # Errors
     /// One sentence: port, cause and remedy.
     pub fn open(path: &str) -> Result<Self, String> {
-        let port = TTYPort::open(&serialport::new(path, BAUD).timeout(LOOK));
+        let port = Port::open(&serialport::new(path, BAUD).timeout(LOOK));
         let port = port.map_err(|error| {
             // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
             let cause = match error.kind() {
@@ -49,9 +50,7 @@ impl SensorLine {
                 ErrorKind::Unknown if std::path::Path::new(path).exists() => "it is no serial port",
                 _ => error.description.as_str(),
             };
-            format!(
-                "no force sensor at {path}: {cause}; is it connected, and may this user use it (group dialout)?"
-            )
+            format!("no force sensor at {path}: {cause}; {ACCESS_QUESTION}")
         })?;
         // What it said before anybody asked.
         let _ = port.clear(ClearBuffer::Input);

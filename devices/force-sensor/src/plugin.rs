@@ -1,6 +1,7 @@
 //! The sensor as a plugin: a device without axes, whose state holds a measured force.
 
 use crate::line::{Heard, LineLost, SensorLine};
+use crate::platform::{PORT_EXAMPLE, PORT_HELP};
 use flotor_hal::{
     ActiveDevice, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, Fault, LoopConfig,
     NothingToStop, Parameter, Refusal, Settings, Tick, Wrench, export_device,
@@ -8,7 +9,7 @@ use flotor_hal::{
 use std::time::Duration;
 
 const SCHEMA: &[Parameter] = &[
-    Parameter::text("port", "Where the sensor is, as /dev/ttyACM0 or a path below /dev/serial/by-id"),
+    Parameter::text("port", PORT_HELP),
     Parameter::real(
         "timeout_ms",
         "ms",
@@ -74,9 +75,9 @@ impl Device for ForceSensor {
     type Stop = NothingToStop;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let port = settings
-            .text("port")
-            .ok_or_else(|| Refusal::resource("no `port` for the force sensor; set it, as in /dev/ttyACM0"))?;
+        let port = settings.text("port").ok_or_else(|| {
+            Refusal::resource(format!("no `port` for the force sensor; set it, as in {PORT_EXAMPLE}"))
+        })?;
         let timeout = Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3);
         let mut sensor = Self { line: SensorLine::open(port).map_err(Refusal::resource)?, timeout };
         sensor.prove(port).map_err(Refusal::resource)?;

@@ -3,8 +3,9 @@
 //! An answer that does not come is not waited for: after [`FORGET`] what came of it is forgotten and the next request
 //! goes out, which also finds the beginning of an answer again when a byte was lost.
 
+use crate::platform::{ACCESS_REMEDY, PATIENCE, PORT_LIST, Port};
 use crate::protocol::{Answers, Arm, Heard, RESET, setup, torques};
-use serialport::{ClearBuffer, ErrorKind, SerialPort, TTYPort};
+use serialport::{ClearBuffer, ErrorKind, SerialPort};
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
@@ -39,7 +40,7 @@ impl From<LinkLost> for NoAnswer {
 /// A board behind a serial port.
 #[derive(Debug)]
 pub struct Board {
-    port: TTYPort,
+    port: Port,
     answers: Answers,
     /// When the request that is on its way was sent.
     asked: Option<Instant>,
@@ -55,13 +56,13 @@ impl Board {
     /// # Errors
     /// One sentence: why not, and what to do.
     pub fn open(path: &str) -> Result<Self, String> {
-        let builder = serialport::new(path, BAUD).timeout(Duration::ZERO);
-        let port = TTYPort::open(&builder).map_err(|error| refused(path, &error))?;
+        let builder = serialport::new(path, BAUD).timeout(PATIENCE);
+        let port = Port::open(&builder).map_err(|error| refused(path, &error))?;
         Ok(Self::on(port))
     }
 
     /// A board behind a port that is open.
-    fn on(port: TTYPort) -> Self {
+    fn on(port: Port) -> Self {
         Self {
             port,
             answers: Answers::default(),
@@ -76,7 +77,7 @@ impl Board {
     ///
     /// # Errors
     /// What the system says.
-    pub fn second_port(&self) -> io::Result<TTYPort> {
+    pub fn second_port(&self) -> io::Result<Port> {
         self.port.try_clone_native().map_err(io::Error::from)
     }
 
@@ -178,16 +179,15 @@ impl Board {
 
 fn refused(path: &str, error: &serialport::Error) -> String {
     match error.kind() {
-        ErrorKind::Io(io::ErrorKind::PermissionDenied) => format!(
-            "this user may not use {path}; add the user to the group of the port (`sudo usermod -aG dialout $USER`, \
-             then log in anew)"
-        ),
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
+            format!("this user may not use {path}; {ACCESS_REMEDY}")
+        }
         // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
         ErrorKind::NoDevice if std::fs::metadata(path).is_ok() => {
             format!("{path} is in use by another program; close that one first")
         }
         _ => format!(
-            "no board at {path} ({}); is it connected? The parameter `port` must be its path; `ls /dev/serial/by-id` lists the ports",
+            "no board at {path} ({}); is it connected? The parameter `port` must be its path; {PORT_LIST}",
             error.description
         ),
     }

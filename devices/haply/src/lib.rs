@@ -16,6 +16,7 @@
 pub mod board;
 pub mod emulator;
 pub mod pantograph;
+mod platform;
 mod plugin;
 pub mod protocol;
 

@@ -2,6 +2,7 @@
 
 use crate::board::{Board, LinkLost, NoAnswer};
 use crate::pantograph::{Pantograph, Posture};
+use crate::platform::{PORT_EXAMPLE, PORT_HELP, Port, descriptor};
 use crate::protocol::{Arm, Direction, torques};
 use flotor_hal::glam::DVec2;
 use flotor_hal::{
@@ -9,10 +10,8 @@ use flotor_hal::{
     DeviceState, Fault, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal,
     SafeStop, Settings, StoppedState, Tick, Twist, Wrench, choices, export_device, math,
 };
-use serialport::TTYPort;
 use std::f64::consts::TAU;
 use std::io::Write;
-use std::os::fd::AsRawFd;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -38,7 +37,7 @@ const MAX_STIFFNESS_N_PER_M: f64 = 450.0;
 const VERSIONS: Choices = choices!["v2", "v3"];
 
 const SCHEMA: &[Parameter] = &[
-    Parameter::text("port", "Where the board is, as /dev/ttyACM0 or a path below /dev/serial/by-id"),
+    Parameter::text("port", PORT_HELP),
     Parameter::choice("hardware", VERSIONS, 1, "Version of the device: v2 of metal, v3 of plastic (3.1)"),
     Parameter::real("max_force_n", "N", 0.0, 10.0, 3.0, "Largest force on the hand"),
     Parameter::real(
@@ -118,7 +117,7 @@ struct Stop {
     is_stopped: AtomicBool,
     /// The port once more: the board keeps the last torque for ever, so that somebody has to tell it to let go even
     /// if the loop never comes back.
-    port: Mutex<TTYPort>,
+    port: Mutex<Port>,
 }
 
 impl Stop {
@@ -152,10 +151,10 @@ impl Device for HaplyDevice {
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let path = settings.text("port").ok_or_else(|| {
-            Refusal::resource(
-                "where is the board? Say it with `port`, as /dev/ttyACM0; \
-                 `cargo run -p flotor-haply --example emulated_board` starts one without hardware and says where",
-            )
+            Refusal::resource(format!(
+                "where is the board? Say it with `port`, as {PORT_EXAMPLE}; \
+                 `cargo run -p flotor-haply --example emulated_board` starts one without hardware and says where"
+            ))
         })?;
         let board = Board::open(path).map_err(Refusal::resource)?;
         let port = board.second_port().map_err(Refusal::resource)?;
@@ -171,7 +170,7 @@ impl Device for HaplyDevice {
             cutoff_hz: settings.number_or_default("velocity_cutoff_hz"),
             timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
             parameters,
-            descriptor: port.as_raw_fd(),
+            descriptor: descriptor(&port),
             stop: Arc::new(Stop { is_stopped: AtomicBool::new(false), port: Mutex::new(port) }),
         })
     }

@@ -22,6 +22,7 @@ mod ml_client;
 mod ml_device;
 mod own_device;
 mod parameters;
+mod platform;
 mod plugin;
 pub mod protocol;
 mod shaping;

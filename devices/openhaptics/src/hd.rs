@@ -12,6 +12,7 @@ use std::ffi::{c_int, c_uint};
 const SDK: Sdk = Sdk {
     name: "OpenHaptics",
     files: &["libHD.so.3.4", "libHD.so.3.0", "libHD.so"],
+    files_on_windows: &["hd.dll"],
     variables: &["OH_SDK_BASE", "3DTOUCH_BASE"],
 };
 /// Oldest version of the SDK.

@@ -13,6 +13,7 @@
 //! - `plugin`: parameters and the contract.
 
 pub mod motion;
+mod platform;
 mod plugin;
 pub mod report;
 pub mod source;

@@ -1,6 +1,7 @@
 //! The puck as a plugin: pose in, no force out.
 
 use crate::motion::{Deflection, Gains, Motion, MotionRequest};
+use crate::platform::PATH_HELP;
 use crate::report::Report;
 use crate::source::{Gone, HidPuck, REPORT_BYTES, Reports};
 use flotor_hal::{
@@ -33,7 +34,7 @@ const SCHEMA: &[Parameter] = &[
         "Button that brings the pose home while held; 0: none",
     )
     .live(),
-    Parameter::text("path", "Which puck, as /dev/hidraw2; the first one found if not said"),
+    Parameter::text("path", PATH_HELP),
 ];
 
 /// What of the parameters is in force.

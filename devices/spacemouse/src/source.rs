@@ -1,5 +1,6 @@
 //! Where reports come from.
 
+use crate::platform::{ACCESS_REMEDY, PATH_EXAMPLE};
 use flotor_hal::Refusal;
 use hidapi::{HidApi, HidDevice, HidError};
 
@@ -28,11 +29,11 @@ pub trait Reports: Send + 'static {
     fn next(&mut self, report: &mut [u8; REPORT_BYTES]) -> Result<usize, Gone>;
 }
 
-/// A puck at hidraw.
+/// A puck at a HID device of the system.
 pub struct HidPuck(HidDevice);
 
 impl HidPuck {
-    /// Opens the puck at a path like `/dev/hidraw2`, or the first that is found. Not real-time.
+    /// Opens the puck at a path of the system, or the first that is found. Not real-time.
     ///
     /// # Errors
     /// A [`Refusal`] that says what is there and what to do.
@@ -48,9 +49,9 @@ impl HidPuck {
         let path = match path {
             Some(path) => std::ffi::CString::new(path).map_err(Refusal::parameter)?,
             None => api.device_list().find(puck).map(|info| info.path().to_owned()).ok_or_else(|| {
-                Refusal::resource(
-                    "no SpaceMouse is plugged in; if there is one, `path` says where, as /dev/hidraw2",
-                )
+                Refusal::resource(format!(
+                    "no SpaceMouse is plugged in; if there is one, `path` says where, as {PATH_EXAMPLE}"
+                ))
             })?,
         };
         let device = api.open_path(&path).map_err(|error| refused(&path.to_string_lossy(), &error))?;
@@ -62,10 +63,7 @@ impl HidPuck {
 fn refused(path: &str, error: &HidError) -> Refusal {
     let cause = error.to_string();
     Refusal::resource(if cause.contains("ermission") {
-        format!(
-            "this user may not use {path}; put `KERNEL==\"hidraw*\", ATTRS{{idVendor}}==\"256f\", TAG+=\"uaccess\"` \
-             into /etc/udev/rules.d/70-spacemouse.rules, run `sudo udevadm control --reload` and plug it in again"
-        )
+        format!("this user may not use {path}; {ACCESS_REMEDY}")
     } else {
         format!("cannot open {path}: {cause}")
     })

@@ -17,13 +17,13 @@ mod exchange;
 mod latest;
 mod library;
 mod loop_end;
+mod platform;
 mod problem;
 mod search;
-mod signals;
 
 pub use exchange::{Exchange, Orders, Pace, Sample, VALID};
 pub use library::{Library, StandIn};
 pub use loop_end::{LoopEnd, StopSwitch};
+pub use platform::without_signals;
 pub use problem::LibraryProblem;
 pub use search::Sdk;
-pub use signals::without_signals;

@@ -1,9 +1,9 @@
 //! The user's own library, opened at run time and never closed: SDKs leave threads and handlers behind.
 #![allow(unsafe_code)] // libloading; listed in tests/tests/system/architecture.rs
 
+use crate::platform::{self, Loaded};
 use crate::problem::LibraryProblem;
 use crate::search::{Sdk, looked_at};
-use libloading::os::unix::{Library as Loaded, RTLD_LOCAL, RTLD_NOW};
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
@@ -52,7 +52,7 @@ impl Library {
     fn load(path: &Path, stand_in: StandIn) -> Result<Self, LibraryProblem> {
         // SAFETY: the user guarantees that the file is the library of the SDK that is named: loading it runs its code. It is
         // bound at once and shares no names with other libraries.
-        let loaded = unsafe { Loaded::open(Some(path), RTLD_NOW | RTLD_LOCAL) };
+        let loaded = unsafe { platform::open(path) };
         let loaded = loaded.map_err(|error| {
             let mut cause: &dyn std::error::Error = &error;
             while let Some(deeper) = cause.source() {

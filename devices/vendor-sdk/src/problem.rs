@@ -1,5 +1,6 @@
 //! Why the library of an SDK cannot be used: what, where, and what to do.
 
+use crate::platform::{LIBRARY_ENDING, missing_remedy};
 use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -96,7 +97,7 @@ impl fmt::Display for LibraryProblem {
             }
             Self::NotALibrary { path } => write!(
                 f,
-                "{} is no shared library; name the file that ends in .so or in .so and a version",
+                "{} is no shared library; name the file that ends in {LIBRARY_ENDING}",
                 path.display()
             ),
             Self::Architecture { path, found, needed } => write!(
@@ -104,12 +105,9 @@ impl fmt::Display for LibraryProblem {
                 "{} is for {found} and this program for {needed}; install the SDK for {needed}",
                 path.display()
             ),
-            Self::Refused { path, reason } => write!(
-                f,
-                "{} cannot be loaded ({reason}); `ldd {}` lists what it needs and what of that is missing",
-                path.display(),
-                path.display()
-            ),
+            Self::Refused { path, reason } => {
+                write!(f, "{} cannot be loaded ({reason}); {}", path.display(), missing_remedy(path))
+            }
             Self::StandIn { path } => write!(
                 f,
                 "{} is Flotor's own drop-in library and no device is behind it; name the vendor's with `library`, or \

@@ -391,8 +391,8 @@ const UNSAFE: &[(&str, &str)] = &[
         "opens the library of a vendor's SDK that the user has installed, and looks up its functions by name",
     ),
     (
-        "devices/vendor-sdk/src/signals.rs",
-        "the signal mask of a thread: threads that an SDK starts take it over, and signals belong to the host",
+        "devices/vendor-sdk/src/platform/",
+        "opens a library; the signal mask of a thread: threads that an SDK starts take it over, and signals belong to the host",
     ),
     ("devices/force-dimension/src/ffi.rs", "calls into the user's DHD, which is C"),
     (
@@ -469,7 +469,17 @@ const ASKED_ELSEWHERE: &[&str] =
 /// Crates that run on more than one system: what only one of them has is named in their modules `platform` alone. Tests and
 /// examples ask for nothing of a system, but some need its programs.
 const PORTED: &[&str] = &[
+    "devices/falcon/src/",
+    "devices/force-dimension/src/",
+    "devices/force-sensor/src/",
+    "devices/force-switch/src/",
+    "devices/haply/src/",
+    "devices/inverse3/src/",
+    "devices/maglev/src/",
+    "devices/openhaptics/src/",
     "devices/simulated/src/",
+    "devices/spacemouse/src/",
+    "devices/vendor-sdk/src/",
     "hal/src/",
     "host/command/src/",
     "host/core/src/",

@@ -3,8 +3,8 @@
 use crate::ml_api::{
     Acknowledgement, Event, Frame, Function, Intake, Reply, Request, Results, Status, Taken,
 };
+use crate::platform::{reset_when_dropped, wait_for};
 use crate::transport::{OpenError, tcp};
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::Write;
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
@@ -43,7 +43,7 @@ impl Line {
     pub(crate) fn open(address: &str) -> Result<Self, OpenError> {
         let stream = tcp::open(address)?;
         // Reset when dropped: a controller that is left in the lurch is to know it at once.
-        let _ = rustix::net::sockopt::set_socket_linger(&stream, Some(Duration::ZERO));
+        reset_when_dropped(&stream);
         Ok(Self { stream, intake: Intake::default() })
     }
 
@@ -72,12 +72,7 @@ impl Line {
             if rest.is_zero() {
                 return Ok(false);
             }
-            let rest = Timespec {
-                tv_sec: i64::try_from(rest.as_secs()).unwrap_or(i64::MAX),
-                tv_nsec: i64::from(rest.subsec_nanos()),
-            };
-            // Whatever it says, the next look tells.
-            let _ = poll(&mut [PollFd::new(&self.stream, PollFlags::IN)], Some(&rest));
+            wait_for(&self.stream, rest);
         }
     }
 }

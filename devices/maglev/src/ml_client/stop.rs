@@ -3,10 +3,10 @@
 
 use super::connection::Line;
 use crate::ml_api::{Frame, Function, Request};
+use crate::platform;
 use crate::transport::OpenError;
 use flotor_hal::{IndependentStop, SafeStop, StoppedState};
 use std::io::{Read, Write};
-use std::os::fd::AsRawFd;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -63,7 +63,7 @@ impl Stop {
 
     /// How the device is stopped without its host.
     pub(crate) fn independent(&self) -> IndependentStop {
-        let descriptor = self.line.lock().map_or(-1, |line| line.stream().as_raw_fd());
+        let descriptor = self.line.lock().map_or(-1, |line| platform::descriptor(line.stream()));
         IndependentStop::by_message(descriptor, self.frame.bytes(), StoppedState::Landed, LANDING_NS)
     }
 }

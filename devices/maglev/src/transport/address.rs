@@ -1,6 +1,7 @@
 //! Devices on a USB bus by their ids, and what a user has to do once to be allowed to use one.
 
 use super::OpenError;
+use crate::platform::access_remedy;
 
 /// A device by vendor, product and, if there are several, serial number.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,16 +33,9 @@ impl UsbAddress {
     }
 }
 
-/// The line for udev that lets whoever sits at the machine use the device; `subsystem` is `usb` or `hidraw`.
-pub(super) fn udev_remedy(subsystem: &str, wanted: &UsbAddress) -> String {
-    let UsbAddress { vendor, product, .. } = wanted;
-    // A hidraw node has its ids on a parent.
-    let key = if subsystem == "hidraw" { "ATTRS" } else { "ATTR" };
-    format!(
-        "put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control --reload` and plug it in \
-         again: SUBSYSTEM==\"{subsystem}\", {key}{{idVendor}}==\"{vendor:04x}\", \
-         {key}{{idProduct}}==\"{product:04x}\", TAG+=\"uaccess\""
-    )
+/// What a user has to do to be allowed to use it; `subsystem` is `usb` or `hidraw`.
+pub(super) fn remedy(subsystem: &str, wanted: &UsbAddress) -> String {
+    access_remedy(subsystem, wanted.vendor, wanted.product)
 }
 
 #[cfg(test)]
@@ -59,15 +53,5 @@ mod tests {
         for wrong in ["", "1209", "1209:", "1209:xyz", "12345:1"] {
             assert_eq!(UsbAddress::parse(wrong), None, "{wrong}");
         }
-    }
-
-    #[test]
-    fn the_rule_names_the_ids_where_the_subsystem_has_them() {
-        let wanted = UsbAddress::parse("1209:f107").unwrap();
-        let rule = |subsystem| udev_remedy(subsystem, &wanted);
-        assert!(
-            rule("usb").contains("ATTR{idVendor}==\"1209\", ATTR{idProduct}==\"f107\", TAG+=\"uaccess\"")
-        );
-        assert!(rule("hidraw").contains("SUBSYSTEM==\"hidraw\", ATTRS{idVendor}==\"1209\""));
     }
 }

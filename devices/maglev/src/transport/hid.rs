@@ -1,6 +1,6 @@
 //! HID: packets as reports of 64 bytes without a number, through the kernel's hidraw.
 
-use super::address::{UsbAddress, udev_remedy};
+use super::address::{UsbAddress, remedy};
 use super::{Incoming, LinkLost, OpenError, Transport};
 use crate::protocol::FRAME_BYTES;
 use hidapi::{HidApi, HidDevice, HidError};
@@ -67,7 +67,7 @@ fn refused(address: &str, wanted: &UsbAddress, error: &HidError) -> OpenError {
         _ => cause.contains("ermission"),
     };
     match forbidden {
-        true => OpenError::Forbidden { address, remedy: udev_remedy("hidraw", wanted) },
+        true => OpenError::Forbidden { address, remedy: remedy("hidraw", wanted) },
         false => OpenError::Missing { address, cause },
     }
 }

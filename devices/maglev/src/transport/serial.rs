@@ -2,8 +2,8 @@
 
 use super::OpenError;
 use super::stream::StreamLink;
-use serialport::{ErrorKind, SerialPort, TTYPort};
-use std::time::Duration;
+use crate::platform::serial::{self, Port};
+use serialport::ErrorKind;
 
 /// 64 bytes a millisecond each way need 660 kbit/s with start and stop bits; USB CDC ports ignore the number.
 const BAUD: u32 = 2_000_000;
@@ -12,23 +12,17 @@ const BAUD: u32 = 2_000_000;
 ///
 /// # Errors
 /// [`OpenError`].
-pub fn open(path: &str) -> Result<StreamLink<TTYPort>, OpenError> {
-    let builder = serialport::new(path, BAUD).timeout(Duration::ZERO);
-    let mut port = TTYPort::open(&builder).map_err(|error| refused(path, &error))?;
-    // A port without modem lines (a pseudo terminal) says so, and works.
-    let _ = port.write_data_terminal_ready(true);
+pub fn open(path: &str) -> Result<StreamLink<Port>, OpenError> {
+    let port = serial::open(path, BAUD).map_err(|error| refused(path, &error))?;
     Ok(StreamLink::new(port))
 }
 
 fn refused(path: &str, error: &serialport::Error) -> OpenError {
     let address = path.to_owned();
     match error.kind() {
-        ErrorKind::Io(std::io::ErrorKind::PermissionDenied) => OpenError::Forbidden {
-            address,
-            remedy:
-                "add the user to the group of the port (`sudo usermod -aG dialout $USER`, then log in anew)"
-                    .to_owned(),
-        },
+        ErrorKind::Io(std::io::ErrorKind::PermissionDenied) => {
+            OpenError::Forbidden { address, remedy: serial::ACCESS_REMEDY.to_owned() }
+        }
         // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
         ErrorKind::NoDevice if std::fs::metadata(path).is_ok() => OpenError::Busy { address },
         _ => OpenError::Missing { address, cause: error.description.clone() },

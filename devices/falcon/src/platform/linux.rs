@@ -1,0 +1,27 @@
+//! Linux: udev says who may use a device.
+
+/// What helps where no other advice does.
+pub(crate) const OTHER_REMEDY: &str = "connect it without a hub, and try again";
+
+/// How a user is allowed to use the device.
+pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
+    format!(
+        "put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control --reload` and plug it in again: \
+         SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{vendor:04x}\", ATTR{{idProduct}}==\"{product:04x}\", TAG+=\"uaccess\", \
+         ENV{{ID_MM_DEVICE_IGNORE}}=\"1\""
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rule_names_the_device() {
+        let rule = access_remedy(0x0403, 0xcb48);
+        assert!(
+            rule.contains("ATTR{idProduct}==\"cb48\", TAG+=\"uaccess\", ENV{ID_MM_DEVICE_IGNORE}"),
+            "{rule}"
+        );
+    }
+}

@@ -1,0 +1,77 @@
+//! Unix: sockets and terminals are descriptors that can be waited for.
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use std::net::TcpStream;
+use std::os::fd::AsRawFd;
+use std::time::Duration;
+
+/// The other side is to know at once when a connection is dropped. Not real-time.
+pub(crate) fn reset_when_dropped(stream: &TcpStream) {
+    let _ = rustix::net::sockopt::set_socket_linger(stream, Some(Duration::ZERO));
+}
+
+/// Waits until something has come, or for a time. Real-time: bounded by the time, no allocation.
+pub(crate) fn wait_for(stream: &TcpStream, most: Duration) {
+    let most = Timespec {
+        tv_sec: i64::try_from(most.as_secs()).unwrap_or(i64::MAX),
+        tv_nsec: i64::from(most.subsec_nanos()),
+    };
+    // Whatever it says, the next look tells.
+    let _ = poll(&mut [PollFd::new(stream, PollFlags::IN)], Some(&most));
+}
+
+/// The descriptor of a connection.
+pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
+    stream.as_raw_fd()
+}
+
+/// The line for udev that lets whoever sits at the machine use the device; `subsystem` is `usb` or `hidraw`.
+#[cfg(any(feature = "usb", feature = "hid"))]
+pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> String {
+    // A hidraw node has its ids on a parent.
+    let key = if subsystem == "hidraw" { "ATTRS" } else { "ATTR" };
+    format!(
+        "put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control --reload` and plug it in \
+         again: SUBSYSTEM==\"{subsystem}\", {key}{{idVendor}}==\"{vendor:04x}\", \
+         {key}{{idProduct}}==\"{product:04x}\", TAG+=\"uaccess\""
+    )
+}
+
+/// Serial ports.
+#[cfg(feature = "serial")]
+pub(crate) mod serial {
+    use serialport::{SerialPort, TTYPort};
+    use std::time::Duration;
+
+    /// How a user is allowed to use one.
+    pub(crate) const ACCESS_REMEDY: &str =
+        "add the user to the group of the port (`sudo usermod -aG dialout $USER`, then log in anew)";
+
+    /// A port that does not wait.
+    pub(crate) type Port = TTYPort;
+
+    /// Opens one. Not real-time.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn open(path: &str, baud: u32) -> serialport::Result<Port> {
+        let mut port = TTYPort::open(&serialport::new(path, baud).timeout(Duration::ZERO))?;
+        // A port without modem lines (a pseudo terminal) says so, and works.
+        let _ = port.write_data_terminal_ready(true);
+        Ok(port)
+    }
+}
+
+#[cfg(all(test, any(feature = "usb", feature = "hid")))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rule_names_the_ids_where_the_subsystem_has_them() {
+        let rule = |subsystem| access_remedy(subsystem, 0x1209, 0xf107);
+        assert!(
+            rule("usb").contains("ATTR{idVendor}==\"1209\", ATTR{idProduct}==\"f107\", TAG+=\"uaccess\"")
+        );
+        assert!(rule("hidraw").contains("SUBSYSTEM==\"hidraw\", ATTRS{idVendor}==\"1209\""));
+    }
+}

@@ -1,0 +1,11 @@
+//! What differs between systems for a HID device: where it is, and what its user has to do.
+
+#[cfg(not(windows))]
+mod linux;
+#[cfg(windows)]
+mod windows;
+
+#[cfg(not(windows))]
+pub(crate) use linux::{ACCESS_REMEDY, PATH_EXAMPLE, PATH_HELP};
+#[cfg(windows)]
+pub(crate) use windows::{ACCESS_REMEDY, PATH_EXAMPLE, PATH_HELP};

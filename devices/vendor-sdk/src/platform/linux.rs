@@ -1,0 +1,150 @@
+//! Linux: ELF, `dlopen`, signals.
+#![allow(unsafe_code)] // the mask of a thread, and libloading; listed in tests/tests/system/architecture.rs
+
+use crate::problem::LibraryProblem;
+use crate::search::Sdk;
+use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+use std::mem::MaybeUninit;
+use std::path::{Path, PathBuf};
+
+/// An open library.
+pub(crate) type Loaded = Library;
+
+/// Folders of the system.
+const SYSTEM: [&str; 5] = ["/usr/local/lib", "/usr/lib", "/usr/lib64", "/lib", "/opt/lib"];
+/// Bytes of the head of an ELF file that say what it is for.
+pub(crate) const HEAD: usize = 20;
+
+/// What the name of a library ends in.
+pub(crate) const LIBRARY_ENDING: &str = ".so or in .so and a version";
+
+/// How a user finds out why a library is refused.
+pub(crate) fn missing_remedy(path: &Path) -> String {
+    format!("`ldd {}` lists what it needs and what of that is missing", path.display())
+}
+
+/// Names of the library's file.
+pub(crate) fn files(sdk: &Sdk) -> &'static [&'static str] {
+    sdk.files
+}
+
+/// Where the library may be, in order, by the environment.
+pub(crate) fn folders(sdk: &Sdk, said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
+    let machine = std::env::consts::ARCH;
+    let of_sdk = sdk.variables.iter().filter_map(|variable| said(variable)).flat_map(|folder| {
+        let folder = PathBuf::from(folder);
+        [folder.join(format!("lib/release/lin-{machine}-gcc")), folder.join("lib"), folder]
+    });
+    let loader = said("LD_LIBRARY_PATH").unwrap_or_default();
+    let loader: Vec<PathBuf> = std::env::split_paths(&loader).collect();
+    let own = said("HOME").map(|home| PathBuf::from(home).join(".local/lib"));
+    let system = SYSTEM.map(PathBuf::from);
+    let of_machine = PathBuf::from(format!("/usr/lib/{machine}-linux-gnu"));
+    of_sdk.chain(loader).chain(own).chain(system).chain([of_machine]).collect()
+}
+
+/// Whether a file that begins like this is a library for this program.
+pub(crate) fn fits(path: &Path, head: &[u8]) -> Result<(), LibraryProblem> {
+    let Some([0x7f, b'E', b'L', b'F', class, _, .., low, high]) = head.get(..HEAD) else {
+        return Err(LibraryProblem::NotALibrary { path: path.to_path_buf() });
+    };
+    let bits = if *class == 1 { 32 } else { 64 };
+    let machine = u16::from_le_bytes([*low, *high]);
+    let found = match (bits, machine) {
+        (64, 62) => Some((bits, "x86")),
+        (64, 183) => Some((bits, "ARM")),
+        _ => None,
+    };
+    super::compared(path, found, processor(bits, machine))
+}
+
+/// For people.
+fn processor(bits: u32, machine: u16) -> String {
+    match machine {
+        3 | 62 => format!("{bits}-bit x86"),
+        40 | 183 => format!("{bits}-bit ARM"),
+        other => format!("a {bits}-bit processor of number {other}"),
+    }
+}
+
+/// Opens a library: bound at once, and sharing no names with others. Not real-time.
+///
+/// # Errors
+/// What the system says.
+///
+/// # Safety
+/// The caller trusts the library: opening it runs its constructors.
+pub(crate) unsafe fn open(path: &Path) -> Result<Loaded, libloading::Error> {
+    // SAFETY: the caller guarantees it.
+    unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }
+}
+
+/// Runs `body` with all signals of this thread blocked, so that threads it starts never take one: a thread takes over the mask of the
+/// one that starts it, and signals belong to the host. Not real-time.
+pub fn without_signals<T>(body: impl FnOnce() -> T) -> T {
+    let mut before = MaybeUninit::<libc::sigset_t>::zeroed();
+    // SAFETY: two sets on this stack; the first is filled before it is read, the second is written by the system.
+    let is_blocked = unsafe {
+        let mut all = MaybeUninit::<libc::sigset_t>::zeroed();
+        libc::sigfillset(all.as_mut_ptr());
+        libc::pthread_sigmask(libc::SIG_SETMASK, all.as_ptr(), before.as_mut_ptr()) == 0
+    };
+    let value = body();
+    if is_blocked {
+        // SAFETY: the set that the system wrote above.
+        unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, before.as_ptr(), std::ptr::null_mut()) };
+    }
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SDK: Sdk = Sdk {
+        name: "an SDK",
+        files: &["libsome.so.3", "libsome.so"],
+        files_on_windows: &["some64.dll"],
+        variables: &["SOMESDK"],
+    };
+
+    #[test]
+    fn the_folder_of_the_sdk_comes_before_those_of_the_system() {
+        let said = |variable: &str| match variable {
+            "SOMESDK" => Some("/opt/some".to_owned()),
+            "LD_LIBRARY_PATH" => Some("/first::relative:/second".to_owned()),
+            _ => None,
+        };
+        let places: Vec<String> = SDK.places(said).iter().map(|place| place.display().to_string()).collect();
+        let machine = std::env::consts::ARCH;
+        assert_eq!(places[0], format!("/opt/some/lib/release/lin-{machine}-gcc/libsome.so.3"));
+        assert_eq!(
+            places[6..10],
+            ["/first/libsome.so.3", "/first/libsome.so", "/second/libsome.so.3", "/second/libsome.so"]
+        );
+        assert!(
+            places.iter().all(|place| place.starts_with('/')),
+            "a folder of the moment is no place: {places:?}"
+        );
+    }
+
+    #[test]
+    fn a_file_is_told_by_its_head() {
+        const CLASS: u8 = if usize::BITS == 64 { 2 } else { 1 };
+        const MACHINE: u16 = if cfg!(target_arch = "aarch64") { 183 } else { 62 };
+        let path = Path::new("/a/lib.so");
+        let head = |class: u8, machine: u16| {
+            let mut head = [0_u8; HEAD];
+            head[..5].copy_from_slice(&[0x7f, b'E', b'L', b'F', class]);
+            head[18..].copy_from_slice(&machine.to_le_bytes());
+            head
+        };
+        assert_eq!(fits(path, &head(CLASS, MACHINE)), Ok(()));
+        let told = |head: &[u8]| fits(path, head).expect_err("it does not fit").to_string();
+        assert!(told(&head(1, 3)).contains("is for 32-bit x86 and this program for 64-bit"));
+        assert!(told(&head(1, 40)).contains("is for 32-bit ARM"));
+        assert!(told(&head(2, 243)).contains("a 64-bit processor of number 243"));
+        assert!(told(b"#!/bin/sh\n").contains("no shared library"));
+        assert!(told(&head(2, 62)[..19]).contains("no shared library"), "a head that is cut off");
+    }
+}

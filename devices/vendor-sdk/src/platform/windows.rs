@@ -1,0 +1,134 @@
+//! Windows: PE, `LoadLibrary`.
+#![allow(unsafe_code)] // libloading; listed in tests/tests/system/architecture.rs
+
+use crate::problem::LibraryProblem;
+use crate::search::Sdk;
+use libloading::os::windows::Library;
+use std::path::{Path, PathBuf};
+
+/// An open library.
+pub(crate) type Loaded = Library;
+
+/// Bytes of the head of a PE file that say what it is for: the program for DOS before it is short.
+pub(crate) const HEAD: usize = 4096;
+
+/// What the name of a library ends in.
+pub(crate) const LIBRARY_ENDING: &str = ".dll";
+
+/// How a user finds out why a library is refused.
+pub(crate) fn missing_remedy(path: &Path) -> String {
+    format!("a library that {} needs is missing; install the whole SDK", path.display())
+}
+
+/// Names of the library's file.
+pub(crate) fn files(sdk: &Sdk) -> &'static [&'static str] {
+    sdk.files_on_windows
+}
+
+/// Where the library may be, in order, by the environment: in the SDK, beside the program's other libraries (`PATH`), and with those
+/// of the system, where drivers put theirs.
+pub(crate) fn folders(sdk: &Sdk, said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
+    let of_sdk = sdk.variables.iter().filter_map(|variable| said(variable)).flat_map(|folder| {
+        let folder = PathBuf::from(folder);
+        [folder.join("bin"), folder.join("lib").join("x64").join("Release"), folder.join("lib"), folder]
+    });
+    let path = said("PATH").unwrap_or_default();
+    let path: Vec<PathBuf> = std::env::split_paths(&path).collect();
+    let system = said("SystemRoot").map(|folder| PathBuf::from(folder).join("System32"));
+    of_sdk.chain(path).chain(system).collect()
+}
+
+/// Whether a file that begins like this is a library for this program.
+pub(crate) fn fits(path: &Path, head: &[u8]) -> Result<(), LibraryProblem> {
+    let Some(machine) = machine(head) else {
+        return Err(LibraryProblem::NotALibrary { path: path.to_path_buf() });
+    };
+    let found = match machine {
+        0x014c => Some((32, "x86")),
+        0x8664 => Some((64, "x86")),
+        0xaa64 => Some((64, "ARM")),
+        _ => None,
+    };
+    let told = match found {
+        Some((bits, maker)) => format!("{bits}-bit {maker}"),
+        None => format!("a processor of number {machine:#x}"),
+    };
+    super::compared(path, found, told)
+}
+
+/// The number of the processor that a PE file is for.
+fn machine(head: &[u8]) -> Option<u16> {
+    let place = match head {
+        [b'M', b'Z', ..] => u32::from_le_bytes(head.get(0x3c..0x40)?.try_into().ok()?),
+        _ => return None,
+    };
+    match head.get(usize::try_from(place).ok()?..)? {
+        [b'P', b'E', 0, 0, low, high, ..] => Some(u16::from_le_bytes([*low, *high])),
+        _ => None,
+    }
+}
+
+/// Opens a library. Not real-time.
+///
+/// # Errors
+/// What the system says.
+///
+/// # Safety
+/// The caller trusts the library: opening it runs its constructors.
+pub(crate) unsafe fn open(path: &Path) -> Result<Loaded, libloading::Error> {
+    // SAFETY: the caller guarantees it.
+    unsafe { Library::new(path) }
+}
+
+/// Runs `body`: no thread takes a signal here. Not real-time.
+pub fn without_signals<T>(body: impl FnOnce() -> T) -> T {
+    body()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SDK: Sdk = Sdk {
+        name: "an SDK",
+        files: &["libsome.so"],
+        files_on_windows: &["some64.dll", "some.dll"],
+        variables: &["SOMESDK"],
+    };
+
+    #[test]
+    fn the_folder_of_the_sdk_comes_before_those_of_the_system() {
+        let said = |variable: &str| match variable {
+            "SOMESDK" => Some(r"C:\some".to_owned()),
+            "PATH" => Some(r"C:\first;relative;D:\second".to_owned()),
+            "SystemRoot" => Some(r"C:\windows".to_owned()),
+            _ => None,
+        };
+        let places: Vec<String> = SDK.places(said).iter().map(|place| place.display().to_string()).collect();
+        let last =
+            [r"C:\first\some64.dll", r"C:\first\some.dll", r"D:\second\some64.dll", r"D:\second\some.dll"];
+        assert_eq!(places[0], r"C:\some\bin\some64.dll");
+        assert_eq!(places[8..12], last);
+        assert_eq!(places[12..], [r"C:\windows\System32\some64.dll", r"C:\windows\System32\some.dll"]);
+    }
+
+    #[test]
+    fn a_file_is_told_by_its_head() {
+        let path = Path::new(r"C:\some.dll");
+        let head = |machine: u16| {
+            let mut head = vec![0_u8; 0x90];
+            head[..2].copy_from_slice(b"MZ");
+            head[0x3c] = 0x80;
+            head[0x80..0x84].copy_from_slice(b"PE\0\0");
+            head[0x84..0x86].copy_from_slice(&machine.to_le_bytes());
+            head
+        };
+        assert_eq!(fits(path, &head(0x8664)), Ok(()));
+        let told = |head: &[u8]| fits(path, head).expect_err("it does not fit").to_string();
+        assert!(told(&head(0x014c)).contains("is for 32-bit x86 and this program for 64-bit"));
+        assert!(told(&head(0xaa64)).contains("is for 64-bit ARM"));
+        assert!(told(&head(0x0200)).contains("a processor of number 0x200"));
+        assert!(told(b"#!/bin/sh\n").contains("no shared library"));
+        assert!(told(&head(0x8664)[..0x85]).contains("no shared library"), "a head that is cut off");
+    }
+}
