@@ -14,5 +14,6 @@ mod curve;
 mod file;
 mod minimise;
 mod numbers;
+mod platform;
 mod process;
 mod report;

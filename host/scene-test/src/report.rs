@@ -3,6 +3,7 @@
 //! Nothing in them depends on time or on the number of jobs. A file of results appears whole, at the end, or not at all.
 
 use crate::check::Outcome;
+use crate::platform::readable_by_all;
 use flotor_command::{CommandError, report_line, style, write_json};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -112,9 +113,7 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), CommandError> {
     let written = tempfile::NamedTempFile::new_in(folder).and_then(|mut file| {
         file.write_all(text.as_bytes())?;
         file.as_file().sync_all()?;
-        // A scratch file is for its owner alone; a result is for those who may read the folder.
-        let mode = std::os::unix::fs::PermissionsExt::from_mode(0o644);
-        file.as_file().set_permissions(mode)?;
+        readable_by_all(file.as_file())?;
         file.persist(path).map_err(|error| error.error)
     });
     written.map(drop).map_err(|cause| CommandError::file(path, "cannot write the result", cause))
