@@ -975,8 +975,8 @@ typedef struct FlotorConnectionTable {
 typedef struct FlotorIndependentStop {
     // Time from the end of the host's commands, or from the message, until the device is in its safe state, ns.
     uint64_t within_ns;
-    // A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. -1: the
-    // device stops by itself when no command comes.
+    // A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. On Windows
+    // the lower 32 bits of a handle. -1: the device stops by itself when no command comes.
     int32_t descriptor;
     // Bytes of the message, 1 to 64; 0 with descriptor -1.
     uint32_t length;
@@ -1029,21 +1029,26 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_WORKSPACE_BOUNDS "flotor.workspace-bounds/1"
 
-#if defined(__cplusplus)
-#define FLOTOR_EXPORT extern "C" __attribute__((visibility("default")))
+#if defined(_WIN32)
+#define FLOTOR_VISIBLE __declspec(dllexport)
 #else
-#define FLOTOR_EXPORT __attribute__((visibility("default")))
+#define FLOTOR_VISIBLE __attribute__((visibility("default")))
+#endif
+#if defined(__cplusplus)
+#define FLOTOR_EXPORT extern "C" FLOTOR_VISIBLE
+#else
+#define FLOTOR_EXPORT FLOTOR_VISIBLE
 #endif
 
 /* Begins the definition of the entry, in C as in C++:
  * `FLOTOR_ENTRY(flotor_entry_jelly) = { FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model), NULL, get_interface, NULL };` */
 #if defined(__cplusplus)
 #define FLOTOR_ENTRY(name) \
-    extern "C" { extern __attribute__((visibility("default"))) const FlotorEntry name; } \
+    extern "C" { extern FLOTOR_VISIBLE const FlotorEntry name; } \
     const FlotorEntry name
 #else
 #define FLOTOR_ENTRY(name) \
-    extern __attribute__((visibility("default"))) const FlotorEntry name; \
+    extern FLOTOR_VISIBLE const FlotorEntry name; \
     const FlotorEntry name
 #endif
 /* Everything of an entry before its functions. */
