@@ -1,5 +1,27 @@
 //! Windows: neither programs of other makers nor the state of devices on USB yet.
 
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What builds a plugin in C: the compiler of MinGW-w64.
+pub(crate) const C_COMPILER: Option<&str> =
+    Some("gcc -std=c11 -O2 -Wall -Wextra -shared -o your_name.dll plugin.c");
+
+/// A path from the root, without links; as people and cargo write it: without the prefix that the system puts before it, and with
+/// slashes instead of backslashes, which would begin something else in a manifest. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn canonical(path: &Path) -> io::Result<PathBuf> {
+    let whole = path.canonicalize()?;
+    let Some(text) = whole.to_str() else { return Ok(whole) };
+    let text = match text.strip_prefix(r"\\?\UNC\") {
+        Some(shared) => format!("//{shared}"),
+        None => text.trim_start_matches(r"\\?\").to_owned(),
+    };
+    Ok(PathBuf::from(text.replace('\\', "/")))
+}
+
 /// How many files this process may have open: as many as it likes.
 pub(crate) fn most_open_files() -> Option<u64> {
     None
@@ -77,5 +99,18 @@ pub(crate) mod lend {
     #[allow(clippy::needless_pass_by_value)] // as elsewhere
     pub(crate) fn run(_: LendArguments) -> Result<(), CommandError> {
         Err(CommandError::Usage("`flotor lend` is not on Windows yet: its libraries are Linux's".to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_can_stand_in_a_manifest() {
+        let folder = std::env::temp_dir();
+        let text = canonical(&folder).expect("it is there").display().to_string();
+        assert!(!text.contains(['\\', '?']) && text.contains(":/"), "{text}");
+        assert_eq!(canonical(Path::new(&text)).expect("it is the same").display().to_string(), text);
     }
 }

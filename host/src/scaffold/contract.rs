@@ -2,6 +2,7 @@
 
 use super::ScaffoldError;
 use super::vendor::{write_copy, write_file};
+use crate::platform::canonical;
 use std::path::{Path, PathBuf};
 
 /// Where this program's own sources were when it was built.
@@ -88,7 +89,7 @@ impl Contract {
     /// Whether the workspace of the contract would take every new folder in `parent` as a member.
     pub(super) fn has_as_member(&self, parent: &Path) -> bool {
         let (Self::Patched(folder) | Self::Vendored(folder)) = self else { return false };
-        let (Some(workspace), Ok(parent)) = (folder.0.parent(), parent.canonicalize()) else { return false };
+        let (Some(workspace), Ok(parent)) = (folder.0.parent(), canonical(parent)) else { return false };
         ["devices", "models"].iter().any(|members| parent == workspace.join(members))
     }
 }
@@ -111,7 +112,7 @@ impl ContractFolder {
             let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
             manifest.contains("name = \"flotor-hal\"") && folder.join("src/lib.rs").is_file()
         };
-        let found = candidates.iter().find(is_contract).and_then(|folder| folder.canonicalize().ok());
+        let found = candidates.iter().find(is_contract).and_then(|folder| canonical(folder).ok());
         found.map(Self).ok_or_else(|| {
             ScaffoldError::NoContract(candidates.last().map_or_else(PathBuf::new, |last| plain(last)))
         })

@@ -12,7 +12,9 @@ mod vendor;
 pub use contract::{Contract, ContractFolder};
 pub use name::{NameError, PluginName};
 
+use crate::platform::C_COMPILER;
 use flotor_hal::abi::{C_HEADER, PluginKind};
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use vendor::write_file;
 
@@ -133,13 +135,13 @@ pub fn scaffold(
         folder,
         files: written,
         build: text.fill(BUILD),
-        library: text.fill("path/to/library/libyour_name.so"),
+        library: text.fill(&format!("path/to/library/{DLL_PREFIX}your_name{DLL_SUFFIX}")),
     })
 }
 
 /// The files of a plugin: path and template, the one to edit first.
 fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'static str)] {
-    const IGNORE: (&str, &str) = (".gitignore", "/target\n/lib*.so\n/.cargo/config.toml\n");
+    const IGNORE: (&str, &str) = (".gitignore", "/target\n/ANY_LIBRARY\n/.cargo/config.toml\n");
     const HEADER: (&str, &str) = ("flotor.h", C_HEADER);
     const MODEL_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/model-scene.toml"));
     const DEVICE_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/device-scene.toml"));
@@ -169,20 +171,22 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
 const BUILD: &str = "BUILD_COMMAND";
 
 /// What stands in the templates, and what comes instead; also in what came for those before.
-struct Placeholders([(&'static str, String); 8]);
+struct Placeholders([(&'static str, String); 9]);
 
 impl Placeholders {
     fn new(name: &PluginName, language: Language, contract: &Contract) -> Self {
+        // A forge runs Linux.
         let cc = "cc -std=c11 -O2 -Wall -Wextra -shared -fPIC -o libyour_name.so plugin.c -lm";
         let cargo = "cargo build --release";
         let (build, on_a_forge, built_in) = match language {
             Language::Rust => (cargo, format!("{cargo}{}", contract.option_on_a_forge()), "target/release"),
-            Language::C => (cc, cc.to_owned(), "."),
+            Language::C => (C_COMPILER.unwrap_or(cc), cc.to_owned(), "."),
         };
         Self([
             (BUILD, build.to_owned()),
             ("WORKFLOW_BUILD", on_a_forge),
             ("path/to/library", built_in.to_owned()),
+            ("ANY_LIBRARY", format!("{DLL_PREFIX}*{DLL_SUFFIX}")),
             ("your-name", name.id().to_owned()),
             ("your_name", name.symbol()),
             ("YourName", name.type_name()),
@@ -197,7 +201,7 @@ impl Placeholders {
 
     /// Whether the Rust template uses a type that the plugin's own would hide.
     fn clashes_with(&self, template: &str) -> bool {
-        let [_, _, _, _, _, (_, type_name), ..] = &self.0;
+        let [_, _, _, _, _, _, (_, type_name), ..] = &self.0;
         let code = template.lines().filter(|line| !line.trim_start().starts_with("//"));
         let mut words = code.flat_map(|line| line.split(|c: char| !c.is_alphanumeric() && c != '_'));
         words.any(|word| word == type_name)

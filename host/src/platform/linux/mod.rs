@@ -5,6 +5,19 @@ pub(crate) mod lend;
 pub(crate) mod usb;
 
 use rustix::process::{Resource, Signal, getrlimit, set_parent_process_death_signal};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What builds a plugin in C: `cc`.
+pub(crate) const C_COMPILER: Option<&str> = None;
+
+/// A path from the root, without links. Not real-time.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn canonical(path: &Path) -> io::Result<PathBuf> {
+    path.canonicalize()
+}
 
 /// How many files this process may have open; `None`: as many as it likes.
 pub(crate) fn most_open_files() -> Option<u64> {
