@@ -79,12 +79,15 @@ impl SensorLine {
     /// # Errors
     /// [`LineLost`].
     pub fn hear(&mut self) -> Result<Heard, LineLost> {
-        // Asked beforehand: a read without anything to read would make an error, and an error is an allocation.
-        if self.port.bytes_to_read().map_err(|_| LineLost)? == 0 {
+        // Asked beforehand: a read without anything to read would make an error, and an error is an allocation; and a system may wait
+        // for more than there is.
+        let waiting = self.port.bytes_to_read().map_err(|_| LineLost)?;
+        if waiting == 0 {
             return Ok(Heard::Nothing);
         }
         let mut chunk = [0; CHUNK_BYTES];
-        let length = self.port.read(&mut chunk).map_err(|_| LineLost)?;
+        let room = CHUNK_BYTES.min(usize::try_from(waiting).unwrap_or(CHUNK_BYTES));
+        let length = self.port.read(chunk.get_mut(..room).unwrap_or_default()).map_err(|_| LineLost)?;
         if length == 0 {
             return Err(LineLost);
         }

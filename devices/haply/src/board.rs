@@ -133,13 +133,15 @@ impl Board {
     /// [`LinkLost`].
     pub fn hear(&mut self) -> Result<Option<[f64; 2]>, LinkLost> {
         let mut newest = None;
-        // Asked beforehand: a read without anything to read would make an error, and an error is an allocation.
+        // Asked beforehand: a read without anything to read would make an error, and an error is an allocation; and a system may wait
+        // for more than there is.
         let waiting = self.port.bytes_to_read().map_err(|_| LinkLost)?;
         if waiting == 0 {
             return Ok(None);
         }
         let mut chunk = [0; CHUNK_BYTES];
-        let length = self.port.read(&mut chunk).map_err(|_| LinkLost)?;
+        let room = CHUNK_BYTES.min(usize::try_from(waiting).unwrap_or(CHUNK_BYTES));
+        let length = self.port.read(chunk.get_mut(..room).unwrap_or_default()).map_err(|_| LinkLost)?;
         for byte in chunk.iter().take(length) {
             match self.answers.push(*byte) {
                 Heard::Angles(angles_deg) => newest = Some(angles_deg),

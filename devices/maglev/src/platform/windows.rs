@@ -65,9 +65,11 @@ pub(crate) mod serial {
 
     impl Read for Port {
         fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-            match self.0.bytes_to_read()? {
-                0 => Err(io::ErrorKind::WouldBlock.into()),
-                _ => self.0.read(bytes),
+            // More than there is would be waited for.
+            let room = bytes.len().min(usize::try_from(self.0.bytes_to_read()?).unwrap_or(0));
+            match bytes.get_mut(..room) {
+                Some(there) if room > 0 => self.0.read(there),
+                _ => Err(io::ErrorKind::WouldBlock.into()),
             }
         }
     }
