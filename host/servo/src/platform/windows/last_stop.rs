@@ -157,7 +157,7 @@ pub struct SignalGuard;
 
 /// Signals of the host that somebody took away: there are none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct TakenSignals;
+pub struct TakenSignals(());
 
 impl SignalGuard {
     /// How they are taken now.
@@ -168,7 +168,7 @@ impl SignalGuard {
 
     /// Puts back what has changed since: nothing can.
     pub fn put_back(&self) -> TakenSignals {
-        TakenSignals
+        TakenSignals(())
     }
 }
 
@@ -187,7 +187,7 @@ impl TakenSignals {
 
     /// The set of such a word.
     pub(crate) const fn from_bits(_: u64) -> Self {
-        Self
+        Self(())
     }
 }
 
