@@ -379,20 +379,20 @@ fn past_buckling_the_bulge_does_not_jump() {
     assert!((last.torque_nm + before.torque_nm).length() < 1e-3 * before.torque_nm.length(), "{last:?}");
 }
 
-/// What a search past buckling may cost that starts from nothing, in evaluations of the energy, and what a mean one costs at most. A seat
-/// asks twice in a tick where its base loses the ground.
-const MOST_SEARCH: u32 = 90;
-const MOST_MEAN_SEARCH: f64 = 70.0;
+/// What a search past buckling costs at most that starts from nothing, in evaluations of the energy: two for the bow, five matrices of
+/// nine, as many factorings of three and five more where it slides, ten steps in each of three searches and one at their ends.
+const MOST_SEARCH: u32 = 2 + 5 * 9 + 10 * 3 + 3 * (10 + 1);
 
 #[test]
 fn a_search_past_buckling_is_short() {
+    let mut examined = 0;
     for preset in Preset::ALL {
         let spring = preset.spring();
         let mut law = RodBlend::new(&spring);
         if !law.remembers() {
             continue;
         }
-        let (mut costs, mut has_settled) = (Vec::new(), 0);
+        let (mut costs, mut settled) = (Vec::new(), 0);
         for (position_m, rotation_rad) in reached(&spring, 0.6, 2000) {
             law.reset();
             let answer =
@@ -400,13 +400,15 @@ fn a_search_past_buckling_is_short() {
             // A search without buckling is of another kind and costs less than 25.
             if law.cost() > 25 {
                 costs.push(law.cost());
-                has_settled += u32::from(answer.validity == Validity::Ok);
+                settled += usize::from(answer.validity == Validity::Ok);
             }
         }
         let most = costs.iter().copied().max().unwrap_or_default();
         let mean = f64::from(costs.iter().sum::<u32>()) / costs.len().max(1) as f64;
-        println!("{preset:?}: {} searches, {has_settled} end, mean cost {mean:.1}, most {most}", costs.len());
-        assert!(costs.len() > 50 && 10 * has_settled >= 6 * costs.len() as u32, "{preset:?}");
-        assert!(most <= MOST_SEARCH && mean <= MOST_MEAN_SEARCH, "{preset:?}: mean {mean}, most {most}");
+        println!("{preset:?}: {} searches, {settled} end, mean cost {mean:.1}, most {most}", costs.len());
+        assert!(costs.len() > 100 && 2 * settled >= costs.len(), "{preset:?}: most end in one tick");
+        assert!(most <= MOST_SEARCH, "{preset:?}: {most}");
+        examined += 1;
     }
+    assert!(examined > 0, "some springs buckle");
 }

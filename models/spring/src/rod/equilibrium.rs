@@ -302,8 +302,8 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     }
 
     /// The equilibrium at a pose, whatever was before: from the straight column where that has not buckled, else from
-    /// the shape of the linear column, in one go. What happens on the way is not felt, so it may go faster. Real-time:
-    /// bounded, no allocation.
+    /// the shape of the linear column. What happens on the way is not felt, so it may go faster. A shape that slides off a saddle,
+    /// or has used up its matrices, goes on in the next tick. Real-time: bounded, no allocation.
     pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, plate: &Plate, demand: Demand) -> Outcome {
         self.reset();
         self.stride = Stride::UNFELT;
@@ -334,7 +334,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         let (first, last, rise) = (dot(&from.slope, &bow), dot(&to.slope, &bow), to.energy - from.energy);
         let fourth = 0.5 * (first + last) - rise;
         let second = rise - first - fourth;
-        if !(first < 0.0 && fourth > 0.0) {
+        if fourth <= 0.0 {
             return *with;
         }
         // Newton's method on a + 2 b t + 4 d t³ = 0, from above the root.
@@ -343,7 +343,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             let by_part = 4.0 * fourth * part * part;
             part -= (first + (2.0 * second + by_part) * part) / (2.0 * second + 3.0 * by_part);
         }
-        if part > 0.0 && part < MOST_BOW { added(without, part, &bow) } else { *with }
+        if part.is_finite() { added(without, part.clamp(0.0, MOST_BOW), &bow) } else { *with }
     }
 
     /// Keeps what the next tick starts from.
