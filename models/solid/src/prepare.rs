@@ -95,7 +95,7 @@ fn column(
     on_face: &dyn Fn([f64; 2]) -> bool,
 ) -> Vec<f64> {
     let mut ratios: Vec<f64> = Vec::with_capacity(roots.len());
-    let mut start: Option<Contact> = None;
+    let (mut start, mut solved): (Option<Contact>, f64) = (None, 1.0);
     for (root, unbounded) in roots.iter().zip(reference) {
         let depth_m = radius_m * root * root;
         let cell_m = cell_m(radius_m, depth_m, patch.rings());
@@ -106,15 +106,16 @@ fn column(
         let problem = Problem { radius_m, depth_m, cell_m, on_face: &on_face, smooth: &smooth };
         let contact = patch.solve(&problem, start.as_ref());
         let ratio = contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
-        // Near a corner the least contact already has another ratio than one.
-        let before = ratios.last().copied().unwrap_or(ratio);
-        if contact.residual < 1.0e-4 && (ratio / before - 1.0).abs() < 0.3 {
+        let is_contact = contact.residual < 1.0e-4 && ratio.is_finite() && ratio > 0.0;
+        // Near a corner the least contact already has another ratio than one; where nothing is below it, it has none.
+        let before = ratios.last().copied().unwrap_or(if is_contact { ratio } else { 1.0 });
+        if is_contact && (ratio / before - 1.0).abs() < 0.3 {
             ratios.push(ratio);
-            start = Some(contact);
+            (start, solved) = (Some(contact), ratio);
         } else {
-            // It has snapped through: on as it went.
+            // It has snapped through: on as it went, by a half at most.
             let earlier = ratios.len().checked_sub(2).map_or(before, |i| ratios[i]);
-            ratios.push(before * (before / earlier));
+            ratios.push((2.0 * before - earlier).clamp(0.5 * solved, 1.5 * solved));
         }
     }
     ratios

@@ -114,7 +114,7 @@ fn other_places_depths_and_bodies() {
         };
         let rounding_m = (0.02 * (2.0 * size.half_y_m).min(size.height_m)).min(0.25 * radius_m);
         for kind in ["centre", "q34", "edge", "side", "corner", "two edges"] {
-            let mut worst = (0.0, String::new());
+            let (mut worst, mut compared) = ((0.0, String::new()), 0);
             let mut near = |about: f64, by: f64| numbers.between(about - by, about + by);
             let half_m = [size.half_x_m, size.half_y_m];
             let (face, place_m) = match kind {
@@ -139,6 +139,7 @@ fn other_places_depths_and_bodies() {
                 centre[face.axes()[2]] += radius_m - depth_m;
                 let answer = atlas.answer(centre);
                 let force = -DVec3::from_array(answer.energy.slope);
+                compared += 1;
                 let error = (force - truth).length() / truth.length();
                 println!("  {kind} {place_m:?} {depth_m}: {error:.4}");
                 let bound = match kind {
@@ -154,7 +155,7 @@ fn other_places_depths_and_bodies() {
                 "nu {poisson_ratio} R {radius_m} {size:?} {kind}: worst {} of its bound, {}",
                 worst.0, worst.1
             );
-            assert!(worst.0 < 1.0, "{kind} {}", worst.1);
+            assert!(compared >= 4 && worst.0 < 1.0, "{kind} {compared} {}", worst.1);
         }
     }
 }

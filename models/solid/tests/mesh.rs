@@ -3,6 +3,7 @@
 use crate::table::rows;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{DVec3, orientation_from_rotation_vector};
+use flotor_solid::atlas::Atlas;
 use flotor_solid::cells::Kind;
 use flotor_solid::dissection::{Stiffness, subtract_forces};
 use flotor_solid::gmsh;
@@ -23,6 +24,8 @@ struct Boxes {
     to_m: [f64; 3],
     kind: Kind,
     named: Vec<(usize, usize, &'static str)>,
+    /// Columns of cells that are not there: all of these along x and y.
+    hole: [std::ops::Range<usize>; 2],
 }
 
 impl Boxes {
@@ -62,6 +65,9 @@ impl Boxes {
         for z in 0..self.counts[2] {
             for y in 0..self.counts[1] {
                 for x in 0..self.counts[0] {
+                    if self.hole[0].contains(&x) && self.hole[1].contains(&y) {
+                        continue;
+                    }
                     for corners in self.elements([x, y, z]) {
                         let mut nodes: Vec<usize> = corners.iter().map(|&at| self.node(at)).collect();
                         for [a, b] in self.kind.edges() {
@@ -134,14 +140,14 @@ impl Boxes {
 
 fn beam(kind: Kind, counts: [usize; 3]) -> Boxes {
     let (from_m, to_m) = ([-0.2, -0.02, -0.02], [0.0, 0.02, 0.02]);
-    Boxes { counts, from_m, to_m, kind, named: vec![(0, 0, "fixed"), (0, 1, "touched")] }
+    Boxes { counts, from_m, to_m, kind, named: vec![(0, 0, "fixed"), (0, 1, "touched")], hole: [0..0, 0..0] }
 }
 
 fn cube(kind: Kind, count: usize) -> Boxes {
     // Off the origin: the body is moved so that the middle of its touched face is there.
     let (from_m, to_m) = ([0.01, 0.02, 0.03], [0.09, 0.10, 0.11]);
     let named = vec![(2, 0, "fixed"), (2, 1, "touched")];
-    Boxes { counts: [count; 3], from_m, to_m, kind, named }
+    Boxes { counts: [count; 3], from_m, to_m, kind, named, hole: [0..0, 0..0] }
 }
 
 fn on_mesh(tool: Tool, poisson_ratio: f64, mesh: &Mesh) -> (Law, f64) {
@@ -209,6 +215,36 @@ fn a_sphere_on_a_block_from_a_file() {
     }
     assert!(seen >= 4);
     assert!(atlas.answer([0.041, 0.0, 0.010]).is_beyond);
+}
+
+/// Where a face does not fill its box there are places of the law with nothing below them.
+#[test]
+fn a_sphere_on_a_face_that_does_not_fill_its_box() {
+    if crate::leaves_out_long_tests() {
+        return;
+    }
+    let radius_m = 0.01;
+    let law = |hole: [std::ops::Range<usize>; 2]| {
+        let mesh = Boxes { hole, ..cube(Kind::Brick, 4) }.mesh();
+        let (Law::Sphere(atlas), _) = on_mesh(Tool::Sphere { radius_m }, 0.3, &mesh) else {
+            panic!("a sphere")
+        };
+        atlas
+    };
+    let [whole, with_hole] = [law([0..0, 0..0]), law([2..4, 2..4])];
+    for depth_m in [0.0005, 0.002, 0.005] {
+        // The middle of the quarter opposite to the hole, and places all over the box.
+        let energy = |atlas: &Atlas, x: f64, y: f64| atlas.answer([x, y, radius_m - depth_m]).energy;
+        let ratio = energy(&with_hole, -0.02, -0.02).value / energy(&whole, -0.02, -0.02).value;
+        println!("{depth_m}: {ratio:.4}");
+        assert!(ratio > 0.7 && ratio < 1.0, "{depth_m}: {ratio}");
+        for k in 0..400 {
+            let (x, y) = (-0.039 + 0.0039 * f64::from(k % 20), -0.039 + 0.0039 * f64::from(k / 20));
+            let there = energy(&with_hole, x, y);
+            let is_finite = there.slope.iter().all(|slope| slope.is_finite());
+            assert!(is_finite && there.value > 0.0 && there.slope[2] < 0.0, "{x} {y} {depth_m}: {there:?}");
+        }
+    }
 }
 
 #[test]
