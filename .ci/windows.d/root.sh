@@ -32,9 +32,9 @@ mkdir -p "$root/flotor" "$root/built/x86_64-pc-windows-gnu/debug/deps"
 # What is under version control, as it is now.
 git ls-files -z --cached --others --exclude-standard | tar --null -cT - | tar -xC "$root/flotor"
 rm "$root/flotor/rust-toolchain.toml"
-for folder in . deps examples; do
-    mkdir -p "$root/built/x86_64-pc-windows-gnu/debug/$folder"
-    cp "$root/bcryptprimitives.dll" "$root/built/x86_64-pc-windows-gnu/debug/$folder/"
+for beside in . deps examples; do
+    mkdir -p "$root/built/x86_64-pc-windows-gnu/debug/$beside"
+    cp "$root/bcryptprimitives.dll" "$root/built/x86_64-pc-windows-gnu/debug/$beside/"
 done
 
 # A command in that Debian.
