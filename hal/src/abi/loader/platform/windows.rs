@@ -9,7 +9,9 @@ use object::read::pe::ImageNtHeaders;
 use std::ffi::{OsStr, c_void};
 use std::fs::{File, OpenOptions};
 use std::io;
+use std::marker::PhantomData;
 use std::os::windows::fs::OpenOptionsExt;
+use std::os::windows::io::OwnedHandle;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
@@ -22,8 +24,7 @@ const FOLDER: &str = "flotor-plugins";
 const OPENED_WITHIN: Duration = Duration::from_secs(60);
 
 /// What is kept of a plugin's descriptor: nothing, because no process beside the host uses it yet.
-#[derive(Debug)]
-pub struct Handle;
+pub(crate) type Handle = PhantomData<OwnedHandle>;
 
 /// Nothing is kept.
 ///
@@ -33,7 +34,7 @@ pub struct Handle;
 /// # Safety
 /// As on other systems; here nothing is done with the descriptor.
 pub(crate) unsafe fn writable_duplicate(_: i32) -> Result<Handle, String> {
-    Ok(Handle)
+    Ok(PhantomData)
 }
 
 /// A copy in a file of its own, which nobody can write or remove while this process lives: the file of the plugin stays free to
