@@ -6,4 +6,4 @@
 //! plugin. When the socket closes without an end in order, or the host's process or the thread of its loop has ended, it writes the
 //! messages. It is of a process group of its own and takes no signal that asks it to end: it ends with its host, right after.
 
-pub use crate::platform::watchdog_process::{WatchdogProcess, serve};
+pub use crate::platform::watchdog_process::{WatchdogProcess, is_offered, serve};

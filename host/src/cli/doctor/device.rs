@@ -6,8 +6,13 @@ use flotor_command::CommandError;
 use flotor_command::options::{KeyValue, settings};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, OpenedDevice, Plugin};
-use flotor_hal::{Axes, Capabilities};
+use flotor_hal::{Axes, Capabilities, Independence, Refusal};
+use flotor_servo::watchdog_process;
 use flotor_session::registry::Registry;
+use std::io;
+
+/// What a diagnosis of its stop is about.
+const WITHOUT_ITS_HOST: &str = "without its host";
 
 /// What is to be known of a device before it runs. Opens it, without force.
 pub(super) fn diagnose(
@@ -42,16 +47,34 @@ fn abilities(plugin: &Plugin, device: &mut OpenedDevice) -> Vec<Diagnosis> {
         Ok(capabilities) => diagnoses.push(Diagnosis::good("axes", axes(&capabilities))),
         Err(refusal) => diagnoses.push(Diagnosis::told("axes", refusal.to_string())),
     }
-    diagnoses.push(match device.independent_stop() {
-        Ok(Some(_)) => Diagnosis::good("without its host", "stops by itself, or is stopped"),
-        Ok(None) => Diagnosis::note(
-            "without its host",
-            "nothing is known to stop it",
-            "keep a hand at its power switch; `[limits] require_independent_stop = true` refuses such a device",
-        ),
-        Err(refusal) => Diagnosis::told("without its host", refusal.to_string()),
-    });
+    diagnoses.push(without_its_host(device.independent_stop()));
     diagnoses
+}
+
+/// What stops it when the host is gone.
+fn without_its_host(told: Result<Option<Independence>, Refusal>) -> Diagnosis {
+    match told {
+        Ok(Some(Independence::Itself { .. })) => Diagnosis::good(WITHOUT_ITS_HOST, "stops by itself"),
+        Ok(Some(Independence::Message { .. })) => by_message(watchdog_process::is_offered()),
+        Ok(None) => not_stopped("nothing is known to stop it"),
+        Err(refusal) => Diagnosis::told(WITHOUT_ITS_HOST, refusal.to_string()),
+    }
+}
+
+/// A device that is stopped by a message: somebody has to send it.
+fn by_message(watchdog_process: io::Result<()>) -> Diagnosis {
+    match watchdog_process {
+        Ok(()) => Diagnosis::good(WITHOUT_ITS_HOST, "the watchdog process stops it, by a message"),
+        Err(why) => not_stopped(format!("a message would stop it, and nothing sends it: {why}")),
+    }
+}
+
+fn not_stopped(found: impl Into<String>) -> Diagnosis {
+    Diagnosis::note(
+        WITHOUT_ITS_HOST,
+        found,
+        "keep a hand at its power switch; `[limits] require_independent_stop = true` refuses such a device",
+    )
 }
 
 fn axes(told: &Capabilities) -> String {
@@ -68,4 +91,20 @@ fn axes(told: &Capabilities) -> String {
         most(told.max_force_n),
         most(told.max_torque_nm)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::doctor::Grade;
+
+    #[test]
+    fn a_device_that_is_stopped_by_a_message_is_well_only_where_it_is_sent() {
+        let sent = by_message(Ok(()));
+        assert_eq!((sent.grade, sent.remedy), (Grade::Good, None));
+        let not_sent = by_message(Err(io::Error::other("it is not on this system")));
+        assert_eq!(not_sent.grade, Grade::Note);
+        assert!(not_sent.found.ends_with("nothing sends it: it is not on this system"), "{}", not_sent.found);
+        assert!(not_sent.remedy.is_some_and(|remedy| remedy.contains("a hand at its power switch")));
+    }
 }

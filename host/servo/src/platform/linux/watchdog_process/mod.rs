@@ -6,6 +6,15 @@ mod host;
 pub use guard::serve;
 pub use host::WatchdogProcess;
 
+/// Whether this system has one: it has. Not real-time.
+///
+/// # Errors
+/// None.
+#[allow(clippy::unnecessary_wraps)] // as on other systems
+pub fn is_offered() -> std::io::Result<()> {
+    Ok(())
+}
+
 /// Bytes of the longest packet between the two: what it says, and a message or a name.
 const PACKET_BYTES: usize = 128;
 
