@@ -42,7 +42,7 @@ pub(crate) struct Line {
 impl Line {
     pub(crate) fn open(address: &str) -> Result<Self, OpenError> {
         let stream = tcp::open(address)?;
-        // Reset when dropped: a controller that is left in the lurch is to know it at once.
+        // Reset when dropped: a controller whose client is gone is to know it at once.
         reset_when_dropped(&stream);
         Ok(Self { stream, intake: Intake::default() })
     }
