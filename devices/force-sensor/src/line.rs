@@ -1,15 +1,13 @@
 //! One question at a time over a serial port.
 
-use crate::platform::{ACCESS_QUESTION, Port};
+use crate::platform::ACCESS_QUESTION;
 use crate::protocol::{Lines, QUESTION, parse};
-use serialport::{ClearBuffer, ErrorKind, SerialPort};
+use flotor_serial::{NotOpened, Port};
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
 /// Speed of the line, baud: what microcontrollers' boards start with.
 const BAUD: u32 = 115_200;
-/// How long the system may take to accept a question of two bytes.
-const LOOK: Duration = Duration::from_millis(20);
 /// Bytes looked at at once: several answers.
 const CHUNK_BYTES: usize = 256;
 
@@ -42,18 +40,17 @@ impl SensorLine {
     /// # Errors
     /// One sentence: port, cause and remedy.
     pub fn open(path: &str) -> Result<Self, String> {
-        let port = Port::open(&serialport::new(path, BAUD).timeout(LOOK));
-        let port = port.map_err(|error| {
-            // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
-            let cause = match error.kind() {
-                ErrorKind::NoDevice if std::path::Path::new(path).exists() => "another program uses it",
-                ErrorKind::Unknown if std::path::Path::new(path).exists() => "it is no serial port",
-                _ => error.description.as_str(),
+        let port = Port::open(path, BAUD).map_err(|reason| {
+            let cause = match &reason {
+                NotOpened::Forbidden { .. } => "this user may not use it",
+                NotOpened::InUse => "another program uses it",
+                NotOpened::NoPort => "it is no serial port",
+                NotOpened::Missing { cause } => cause,
             };
             format!("no force sensor at {path}: {cause}; {ACCESS_QUESTION}")
         })?;
         // What it said before anybody asked.
-        let _ = port.clear(ClearBuffer::Input);
+        let _ = port.forget_input();
         Ok(Self { port, lines: Lines::default(), asked: None })
     }
 
@@ -81,12 +78,12 @@ impl SensorLine {
     pub fn hear(&mut self) -> Result<Heard, LineLost> {
         // Asked beforehand: a read without anything to read would make an error, and an error is an allocation; and a system may wait
         // for more than there is.
-        let waiting = self.port.bytes_to_read().map_err(|_| LineLost)?;
+        let waiting = self.port.waiting().map_err(|_| LineLost)?;
         if waiting == 0 {
             return Ok(Heard::Nothing);
         }
         let mut chunk = [0; CHUNK_BYTES];
-        let room = CHUNK_BYTES.min(usize::try_from(waiting).unwrap_or(CHUNK_BYTES));
+        let room = CHUNK_BYTES.min(waiting);
         let length = self.port.read(chunk.get_mut(..room).unwrap_or_default()).map_err(|_| LineLost)?;
         if length == 0 {
             return Err(LineLost);

@@ -3,9 +3,9 @@
 //! An answer that does not come is not waited for: after [`FORGET`] what came of it is forgotten and the next request
 //! goes out, which also finds the beginning of an answer again when a byte was lost.
 
-use crate::platform::{ACCESS_REMEDY, PATIENCE, PORT_LIST, Port};
+use crate::platform::PORT_LIST;
 use crate::protocol::{Answers, Arm, Heard, RESET, setup, torques};
-use serialport::{ClearBuffer, ErrorKind, SerialPort};
+use flotor_serial::{NotOpened, Port};
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
@@ -56,8 +56,7 @@ impl Board {
     /// # Errors
     /// One sentence: why not, and what to do.
     pub fn open(path: &str) -> Result<Self, String> {
-        let builder = serialport::new(path, BAUD).timeout(PATIENCE);
-        let port = Port::open(&builder).map_err(|error| refused(path, &error))?;
+        let port = Port::open(path, BAUD).map_err(|reason| refused(path, &reason))?;
         Ok(Self::on(port))
     }
 
@@ -78,7 +77,7 @@ impl Board {
     /// # Errors
     /// What the system says.
     pub fn second_port(&self) -> io::Result<Port> {
-        self.port.try_clone_native().map_err(io::Error::from)
+        self.port.second()
     }
 
     /// Tells the board about its arms, without force, and waits for its first answer: angles, °. Not real-time.
@@ -87,7 +86,7 @@ impl Board {
     /// [`NoAnswer`] after `patience`.
     pub fn start(&mut self, arms: &[Arm; 2], patience: Duration) -> Result<[f64; 2], NoAnswer> {
         let started = Instant::now();
-        let _ = self.port.clear(ClearBuffer::Input);
+        let _ = self.port.forget_input();
         self.answers.clear();
         self.asked = None;
         self.send(&RESET)?;
@@ -116,7 +115,7 @@ impl Board {
             }
             self.lost_answers += 1;
             self.answers.clear();
-            self.port.clear(ClearBuffer::Input).map_err(|_| LinkLost)?;
+            self.port.forget_input().map_err(|_| LinkLost)?;
         }
         #[allow(clippy::cast_possible_truncation)] // f32 is what the board has
         self.send(&torques(torques_nm.map(|torque_nm| torque_nm as f32)))?;
@@ -135,12 +134,12 @@ impl Board {
         let mut newest = None;
         // Asked beforehand: a read without anything to read would make an error, and an error is an allocation; and a system may wait
         // for more than there is.
-        let waiting = self.port.bytes_to_read().map_err(|_| LinkLost)?;
+        let waiting = self.port.waiting().map_err(|_| LinkLost)?;
         if waiting == 0 {
             return Ok(None);
         }
         let mut chunk = [0; CHUNK_BYTES];
-        let room = CHUNK_BYTES.min(usize::try_from(waiting).unwrap_or(CHUNK_BYTES));
+        let room = CHUNK_BYTES.min(waiting);
         let length = self.port.read(chunk.get_mut(..room).unwrap_or_default()).map_err(|_| LinkLost)?;
         for byte in chunk.iter().take(length) {
             match self.answers.push(*byte) {
@@ -179,18 +178,16 @@ impl Board {
     }
 }
 
-fn refused(path: &str, error: &serialport::Error) -> String {
-    match error.kind() {
-        ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
-            format!("this user may not use {path}; {ACCESS_REMEDY}")
-        }
-        // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
-        ErrorKind::NoDevice if std::fs::metadata(path).is_ok() => {
-            format!("{path} is in use by another program; close that one first")
-        }
-        _ => format!(
-            "no board at {path} ({}); is it connected? The parameter `port` must be its path; {PORT_LIST}",
-            error.description
-        ),
+fn refused(path: &str, reason: &NotOpened) -> String {
+    let missing = |cause| {
+        format!(
+            "no board at {path} ({cause}); is it connected? The parameter `port` must be its path; {PORT_LIST}"
+        )
+    };
+    match reason {
+        NotOpened::Forbidden { remedy } => format!("this user may not use {path}; {remedy}"),
+        NotOpened::InUse => format!("{path} is in use by another program; close that one first"),
+        NotOpened::NoPort => missing("it is no serial port"),
+        NotOpened::Missing { cause } => missing(cause),
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::board::{Board, LinkLost, NoAnswer};
 use crate::pantograph::{Pantograph, Posture};
-use crate::platform::{PORT_EXAMPLE, PORT_HELP, Port, descriptor};
+use crate::platform::{PORT_EXAMPLE, PORT_HELP};
 use crate::protocol::{Arm, Direction, torques};
 use flotor_hal::glam::DVec2;
 use flotor_hal::{
@@ -10,6 +10,7 @@ use flotor_hal::{
     DeviceState, Fault, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal,
     SafeStop, Settings, StoppedState, Tick, Twist, Wrench, choices, export_device, math,
 };
+use flotor_serial::Port;
 use std::f64::consts::TAU;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -170,7 +171,7 @@ impl Device for HaplyDevice {
             cutoff_hz: settings.number_or_default("velocity_cutoff_hz"),
             timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
             parameters,
-            descriptor: descriptor(&port),
+            descriptor: port.descriptor(),
             stop: Arc::new(Stop { is_stopped: AtomicBool::new(false), port: Mutex::new(port) }),
         })
     }

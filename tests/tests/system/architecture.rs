@@ -78,6 +78,7 @@ use Role::{
 const CRATES: &[(&str, Role, &[Role])] = &[
     ("hal", Contract, &[]),
     ("devices/force-switch", OfDevices, &[Contract]),
+    ("devices/serial", OfDevices, &[]),
     ("devices/vendor-sdk", OfDevices, &[Contract]),
     ("models/lanes", OfModels, &[Contract]),
     ("devices/usbip", OfEmulators, &[]),
@@ -477,6 +478,7 @@ const PORTED: &[&str] = &[
     "devices/inverse3/src/",
     "devices/maglev/src/",
     "devices/openhaptics/src/",
+    "devices/serial/src/",
     "devices/simulated/src/",
     "devices/spacemouse/src/",
     "devices/vendor-sdk/src/",

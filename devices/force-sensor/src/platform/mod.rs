@@ -1,6 +1,6 @@
-//! What differs between systems for a sensor at a serial port. Each system has one module with the same items:
-//! - `Port`: a port;
-//! - `PORT_HELP`, `PORT_EXAMPLE`, `ACCESS_QUESTION`: for people.
+//! What differs between systems for a sensor at a serial port: what people are told. Each system has one module with the same items:
+//! - `PORT_HELP`, `PORT_EXAMPLE`: where a port is;
+//! - `ACCESS_QUESTION`: what to ask if it cannot be opened.
 
 #[cfg(not(windows))]
 mod unix;
@@ -8,6 +8,6 @@ mod unix;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use unix::{ACCESS_QUESTION, PORT_EXAMPLE, PORT_HELP, Port};
+pub(crate) use unix::{ACCESS_QUESTION, PORT_EXAMPLE, PORT_HELP};
 #[cfg(windows)]
-pub(crate) use windows::{ACCESS_QUESTION, PORT_EXAMPLE, PORT_HELP, Port};
+pub(crate) use windows::{ACCESS_QUESTION, PORT_EXAMPLE, PORT_HELP};

@@ -1,8 +1,5 @@
 //! Unix: terminals.
 
-/// A serial port.
-pub(crate) type Port = serialport::TTYPort;
-
 /// What the parameter `port` is.
 pub(crate) const PORT_HELP: &str = "Where the sensor is, as /dev/ttyACM0 or a path below /dev/serial/by-id";
 /// What it may be.

@@ -1,8 +1,5 @@
 //! Windows: communication ports.
 
-/// A serial port.
-pub(crate) type Port = serialport::COMPort;
-
 /// What the parameter `port` is.
 pub(crate) const PORT_HELP: &str = "Where the sensor is, as COM3";
 /// What it may be.

@@ -1,6 +1,5 @@
-//! What differs between systems for a board at a serial port. Each system has one module with the same items:
-//! - `Port`, `PATIENCE`, `descriptor`: a port, how long it is waited for, and its number for a host that outlives this one;
-//! - `PORT_HELP`, `PORT_EXAMPLE`, `PORT_LIST`, `ACCESS_REMEDY`: for people.
+//! What differs between systems for a board at a serial port: what people are told. Each system has one module with the same items:
+//! - `PORT_HELP`, `PORT_EXAMPLE`, `PORT_LIST`: where a port is.
 
 #[cfg(not(windows))]
 mod unix;
@@ -8,6 +7,6 @@ mod unix;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use unix::{ACCESS_REMEDY, PATIENCE, PORT_EXAMPLE, PORT_HELP, PORT_LIST, Port, descriptor};
+pub(crate) use unix::{PORT_EXAMPLE, PORT_HELP, PORT_LIST};
 #[cfg(windows)]
-pub(crate) use windows::{ACCESS_REMEDY, PATIENCE, PORT_EXAMPLE, PORT_HELP, PORT_LIST, Port, descriptor};
+pub(crate) use windows::{PORT_EXAMPLE, PORT_HELP, PORT_LIST};

@@ -1,6 +1,5 @@
 //! What differs between systems for a controller. Each system has one module with the same items:
 //! - `reset_when_dropped`, `wait_for`, `descriptor`: connections;
-//! - `serial`: ports, and what people are told of them;
 //! - `access_remedy`: how a user is allowed to use a device on USB.
 
 #[cfg(not(windows))]
@@ -15,6 +14,4 @@ use windows as system;
 
 #[cfg(any(feature = "usb", feature = "hid"))]
 pub(crate) use system::access_remedy;
-#[cfg(feature = "serial")]
-pub(crate) use system::serial;
 pub(crate) use system::{descriptor, reset_when_dropped, wait_for};

@@ -37,31 +37,6 @@ pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> Strin
     )
 }
 
-/// Serial ports.
-#[cfg(feature = "serial")]
-pub(crate) mod serial {
-    use serialport::{SerialPort, TTYPort};
-    use std::time::Duration;
-
-    /// How a user is allowed to use one.
-    pub(crate) const ACCESS_REMEDY: &str =
-        "add the user to the group of the port (`sudo usermod -aG dialout $USER`, then log in anew)";
-
-    /// A port that does not wait.
-    pub(crate) type Port = TTYPort;
-
-    /// Opens one. Not real-time.
-    ///
-    /// # Errors
-    /// What the system says.
-    pub(crate) fn open(path: &str, baud: u32) -> serialport::Result<Port> {
-        let mut port = TTYPort::open(&serialport::new(path, baud).timeout(Duration::ZERO))?;
-        // A port without modem lines (a pseudo terminal) says so, and works.
-        let _ = port.write_data_terminal_ready(true);
-        Ok(port)
-    }
-}
-
 #[cfg(all(test, any(feature = "usb", feature = "hid")))]
 mod tests {
     use super::*;

@@ -1,4 +1,4 @@
-//! Windows: sockets are waited for in steps of milliseconds, which are longer than a tick; ports wait a millisecond at least.
+//! Windows: sockets are waited for in steps of milliseconds, which are longer than a tick.
 
 use rustix::net::sockopt::set_socket_linger;
 use std::net::TcpStream;
@@ -46,52 +46,5 @@ pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> Strin
             format!("give the device {vendor:04x}:{product:04x} the driver WinUSB, with the program Zadig")
         }
         _ => format!("close the program that uses the device {vendor:04x}:{product:04x}"),
-    }
-}
-
-/// Serial ports.
-#[cfg(feature = "serial")]
-pub(crate) mod serial {
-    use serialport::{COMPort, SerialPort};
-    use std::io::{self, Read, Write};
-    use std::time::Duration;
-
-    /// How a user is allowed to use one.
-    pub(crate) const ACCESS_REMEDY: &str = "close the program that uses the port";
-
-    /// A port that does not wait: it is read when something has come. A frame of some 70 bytes always finds room.
-    #[derive(Debug)]
-    pub struct Port(COMPort);
-
-    impl Read for Port {
-        fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-            // More than there is would be waited for.
-            let room = bytes.len().min(usize::try_from(self.0.bytes_to_read()?).unwrap_or(0));
-            match bytes.get_mut(..room) {
-                Some(there) if room > 0 => self.0.read(there),
-                _ => Err(io::ErrorKind::WouldBlock.into()),
-            }
-        }
-    }
-
-    impl Write for Port {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.0.write(bytes)
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            self.0.flush()
-        }
-    }
-
-    /// Opens one. Not real-time.
-    ///
-    /// # Errors
-    /// What the system says.
-    pub(crate) fn open(path: &str, baud: u32) -> serialport::Result<Port> {
-        // No time is for ever.
-        let mut port = COMPort::open(&serialport::new(path, baud).timeout(Duration::from_millis(1)))?;
-        let _ = port.write_data_terminal_ready(true);
-        Ok(Port(port))
     }
 }

@@ -2,8 +2,7 @@
 
 use super::OpenError;
 use super::stream::StreamLink;
-use crate::platform::serial::{self, Port};
-use serialport::ErrorKind;
+use flotor_serial::{NotOpened, Port};
 
 /// 64 bytes a millisecond each way need 660 kbit/s with start and stop bits; USB CDC ports ignore the number.
 const BAUD: u32 = 2_000_000;
@@ -13,18 +12,17 @@ const BAUD: u32 = 2_000_000;
 /// # Errors
 /// [`OpenError`].
 pub fn open(path: &str) -> Result<StreamLink<Port>, OpenError> {
-    let port = serial::open(path, BAUD).map_err(|error| refused(path, &error))?;
+    let mut port = Port::open(path, BAUD).map_err(|reason| refused(path, reason))?;
+    port.announce();
     Ok(StreamLink::new(port))
 }
 
-fn refused(path: &str, error: &serialport::Error) -> OpenError {
+fn refused(path: &str, reason: NotOpened) -> OpenError {
     let address = path.to_owned();
-    match error.kind() {
-        ErrorKind::Io(std::io::ErrorKind::PermissionDenied) => {
-            OpenError::Forbidden { address, remedy: serial::ACCESS_REMEDY.to_owned() }
-        }
-        // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
-        ErrorKind::NoDevice if std::fs::metadata(path).is_ok() => OpenError::Busy { address },
-        _ => OpenError::Missing { address, cause: error.description.clone() },
+    match reason {
+        NotOpened::Forbidden { remedy } => OpenError::Forbidden { address, remedy: remedy.to_owned() },
+        NotOpened::InUse => OpenError::Busy { address },
+        NotOpened::NoPort => OpenError::Missing { address, cause: "it is no serial port".to_owned() },
+        NotOpened::Missing { cause } => OpenError::Missing { address, cause },
     }
 }

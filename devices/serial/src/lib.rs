@@ -1,0 +1,138 @@
+//! What device plugins at a serial port share.
+//!
+//! - [`Port`]: a port that does not wait, whatever the system.
+//! - [`NotOpened`]: why one cannot be opened, so that a plugin can say what to do.
+
+mod platform;
+
+use serialport::{ClearBuffer, SerialPort};
+use std::io::{self, Read, Write};
+
+/// A serial port that does not wait: what does not fit or is not there is [`io::ErrorKind::WouldBlock`] or
+/// [`io::ErrorKind::TimedOut`]. Windows has no wait of no time: there a write for which there is no room takes a millisecond.
+#[derive(Debug)]
+pub struct Port(platform::System);
+
+/// Why a port cannot be opened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NotOpened {
+    /// This user may not use it.
+    Forbidden {
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// Another program has it.
+    InUse,
+    /// Something else is there.
+    NoPort,
+    /// Nothing is there, or the system says something else.
+    Missing {
+        /// What the system says.
+        cause: String,
+    },
+}
+
+impl Port {
+    /// Opens the port at a path of the system (`/dev/ttyACM0`, `COM3`) at a speed in baud. Not real-time.
+    ///
+    /// # Errors
+    /// [`NotOpened`].
+    pub fn open(path: &str, baud: u32) -> Result<Self, NotOpened> {
+        let builder = serialport::new(path, baud).timeout(platform::PATIENCE);
+        platform::System::open(&builder).map(Self).map_err(|error| platform::reason(path, error))
+    }
+
+    /// The same port once more, for another thread. Not real-time.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn second(&self) -> io::Result<Self> {
+        Ok(Self(self.0.try_clone_native()?))
+    }
+
+    /// Tells the other end that somebody is here, if the port has a line for it (DTR). Not real-time.
+    pub fn announce(&mut self) {
+        // A port without modem lines (a pseudo terminal) says so, and works.
+        let _ = self.0.write_data_terminal_ready(true);
+    }
+
+    /// How many bytes have come. Real-time: bounded, no allocation; one call of the system.
+    ///
+    /// # Errors
+    /// The port is gone.
+    pub fn waiting(&self) -> io::Result<usize> {
+        Ok(usize::try_from(self.0.bytes_to_read()?).unwrap_or(usize::MAX))
+    }
+
+    /// Forgets what has come. Real-time: bounded, no allocation; one call of the system.
+    ///
+    /// # Errors
+    /// The port is gone.
+    pub fn forget_input(&self) -> io::Result<()> {
+        Ok(self.0.clear(ClearBuffer::Input)?)
+    }
+
+    /// The descriptor of the port, or the lower half of its handle, as the contract has it.
+    #[must_use]
+    pub fn descriptor(&self) -> i32 {
+        platform::descriptor(&self.0)
+    }
+}
+
+impl Read for Port {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        platform::read(&mut self.0, bytes)
+    }
+}
+
+impl Write for Port {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        taken(self.0.write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+/// Of a write whose time is over Windows says that it went well, with no byte: to `write_all` that is a port which is gone.
+fn taken(written: io::Result<usize>) -> io::Result<usize> {
+    match written {
+        Ok(0) => Err(io::ErrorKind::WouldBlock.into()),
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Takes a few bytes, then none, as a port of Windows whose other end has stopped.
+    struct Stalled(usize);
+
+    impl Write for Stalled {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let room = self.0.min(bytes.len());
+            self.0 -= room;
+            taken(Ok(room))
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_port_without_room_is_full_and_not_gone() {
+        assert!(Stalled(5).write_all(b"abcde").is_ok());
+        let full = Stalled(3).write_all(b"abcde").expect_err("two bytes have no room");
+        assert_eq!(full.kind(), io::ErrorKind::WouldBlock);
+    }
+
+    #[test]
+    fn where_nothing_is_the_system_says_so() {
+        assert!(
+            matches!(Port::open("/nowhere/COM999", 9600), Err(NotOpened::Missing { cause }) if !cause.is_empty())
+        );
+    }
+}

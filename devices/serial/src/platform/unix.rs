@@ -1,0 +1,71 @@
+//! Unix: terminals.
+
+use crate::NotOpened;
+use serialport::{Error, ErrorKind, TTYPort};
+use std::io::{self, Read};
+use std::os::fd::AsRawFd;
+use std::path::Path;
+use std::time::Duration;
+
+pub(crate) type System = TTYPort;
+
+/// How long a read or a write waits: not at all.
+pub(crate) const PATIENCE: Duration = Duration::ZERO;
+
+/// Why a port cannot be opened.
+pub(crate) fn reason(path: &str, error: Error) -> NotOpened {
+    let is_there = || Path::new(path).exists();
+    match error.kind() {
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => NotOpened::Forbidden {
+            remedy: "add the user to the group of the port (`sudo usermod -aG dialout $USER`, then log in anew)",
+        },
+        // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
+        ErrorKind::NoDevice if is_there() => NotOpened::InUse,
+        ErrorKind::Unknown if is_there() => NotOpened::NoPort,
+        _ => NotOpened::Missing { cause: error.description },
+    }
+}
+
+/// Takes what has come.
+pub(crate) fn read(port: &mut TTYPort, bytes: &mut [u8]) -> io::Result<usize> {
+    port.read(bytes)
+}
+
+/// The descriptor of a port.
+pub(crate) fn descriptor(port: &TTYPort) -> i32 {
+    port.as_raw_fd()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Port;
+    use serialport::SerialPort;
+    use std::io::Write;
+
+    #[test]
+    fn each_reason_is_that_of_the_system() {
+        let (_ours, theirs) = TTYPort::pair().expect("the system has pseudo terminals");
+        let path = theirs.name().expect("a pseudo terminal has a path");
+        drop(theirs);
+        let _first = Port::open(&path, 9600).expect("it is free");
+        assert_eq!(Port::open(&path, 9600).err(), Some(NotOpened::InUse));
+        let file = tempfile::NamedTempFile::new().expect("there is room");
+        let file = file.path().to_str().expect("its name is text");
+        assert_eq!(Port::open(file, 9600).err(), Some(NotOpened::NoPort));
+        // Root may use every file: the error is that of the system, not asked for here.
+        let refused = Error::from(io::Error::from_raw_os_error(13));
+        assert!(matches!(reason("/dev/ttyACM0", refused), NotOpened::Forbidden { .. }));
+    }
+
+    #[test]
+    fn a_port_that_nobody_reads_takes_no_more_and_is_not_gone() {
+        let (_ours, theirs) = TTYPort::pair().expect("the system has pseudo terminals");
+        let path = theirs.name().expect("a pseudo terminal has a path");
+        drop(theirs);
+        let mut port = Port::open(&path, 9600).expect("it is free");
+        let full = std::iter::repeat_with(|| port.write_all(&[b'x'; 64])).take(10_000).find_map(Result::err);
+        let kind = full.expect("no port takes so much").kind();
+        assert!(matches!(kind, io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut), "{kind}");
+    }
+}

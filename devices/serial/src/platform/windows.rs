@@ -1,0 +1,60 @@
+//! Windows: communication ports.
+
+use crate::NotOpened;
+use serialport::{COMPort, Error, ErrorKind, SerialPort};
+use std::io::{self, Read};
+use std::os::windows::io::AsRawHandle;
+use std::time::Duration;
+
+pub(crate) type System = COMPort;
+
+/// How long a write waits at most: no time is for ever, and the shortest is a millisecond.
+pub(crate) const PATIENCE: Duration = Duration::from_millis(1);
+
+/// `ERROR_ACCESS_DENIED`: of a port, that another program has it.
+const ACCESS_DENIED: i32 = 5;
+
+/// Why a port cannot be opened.
+pub(crate) fn reason(_: &str, error: Error) -> NotOpened {
+    match error.kind() {
+        // serialport has one kind for a port that is not there and one that is not given: the system's words tell them apart, in
+        // whatever language it has.
+        ErrorKind::NoDevice if error.description == words(ACCESS_DENIED) => NotOpened::InUse,
+        _ => NotOpened::Missing { cause: error.description },
+    }
+}
+
+/// What the system says of an error.
+fn words(code: i32) -> String {
+    let said = io::Error::from_raw_os_error(code).to_string();
+    said.strip_suffix(&format!(" (os error {code})")).unwrap_or(&said).trim().to_owned()
+}
+
+/// Takes what has come: more than there is would be waited for.
+pub(crate) fn read(port: &mut COMPort, bytes: &mut [u8]) -> io::Result<usize> {
+    let room = bytes.len().min(usize::try_from(port.bytes_to_read()?).unwrap_or(0));
+    match bytes.get_mut(..room) {
+        Some(there) if room > 0 => port.read(there),
+        _ => Err(io::ErrorKind::WouldBlock.into()),
+    }
+}
+
+/// The number of a port's handle, of which the system uses 32 bits.
+#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // as the contract says
+pub(crate) fn descriptor(port: &COMPort) -> i32 {
+    port.as_raw_handle() as usize as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Port;
+
+    #[test]
+    fn what_the_system_does_not_give_is_in_use() {
+        // A folder is refused with the same error as a port that another program has.
+        assert_eq!(Port::open(r"\\?\C:\windows", 9600).err(), Some(NotOpened::InUse));
+        let nowhere = Port::open("COM999", 9600).err();
+        assert!(matches!(nowhere, Some(NotOpened::Missing { .. })), "{nowhere:?}");
+    }
+}
