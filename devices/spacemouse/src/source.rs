@@ -1,6 +1,6 @@
 //! Where reports come from.
 
-use crate::platform::{ACCESS_REMEDY, PATH_EXAMPLE};
+use crate::platform::{ACCESS_REMEDY, PATH_EXAMPLE, is_refused};
 use flotor_hal::Refusal;
 use hidapi::{HidApi, HidDevice, HidError};
 
@@ -61,11 +61,10 @@ impl HidPuck {
 }
 
 fn refused(path: &str, error: &HidError) -> Refusal {
-    let cause = error.to_string();
-    Refusal::resource(if cause.contains("ermission") {
+    Refusal::resource(if is_refused(error) {
         format!("this user may not use {path}; {ACCESS_REMEDY}")
     } else {
-        format!("cannot open {path}: {cause}")
+        format!("cannot open {path}: {error}")
     })
 }
 

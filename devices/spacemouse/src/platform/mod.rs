@@ -6,6 +6,6 @@ mod linux;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use linux::{ACCESS_REMEDY, PATH_EXAMPLE, PATH_HELP};
+pub(crate) use linux::{ACCESS_REMEDY, PATH_EXAMPLE, PATH_HELP, is_refused};
 #[cfg(windows)]
-pub(crate) use windows::{ACCESS_REMEDY, PATH_EXAMPLE, PATH_HELP};
+pub(crate) use windows::{ACCESS_REMEDY, PATH_EXAMPLE, PATH_HELP, is_refused};

@@ -1,5 +1,11 @@
 //! Windows: HID devices by the paths of their interfaces.
 
+use hidapi::HidError;
+use std::io::ErrorKind;
+
+/// `ERROR_SHARING_VIOLATION`: another program has it for itself.
+const SHARING_VIOLATION: i32 = 32;
+
 /// What the parameter `path` is.
 pub(crate) const PATH_HELP: &str =
     r"Which puck, as \\?\HID#VID_256F and what follows there; the first one found if not said";
@@ -7,3 +13,23 @@ pub(crate) const PATH_HELP: &str =
 pub(crate) const PATH_EXAMPLE: &str = r"\\?\HID#VID_256F and what follows there";
 /// How a user is allowed to use it.
 pub(crate) const ACCESS_REMEDY: &str = "close the program that uses it";
+
+/// Whether the system does not give a device, which another program has.
+pub(crate) fn is_refused(error: &HidError) -> bool {
+    let HidError::IoError { error } = error else { return false };
+    error.kind() == ErrorKind::PermissionDenied || error.raw_os_error() == Some(SHARING_VIOLATION)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::File;
+
+    #[test]
+    fn what_the_system_does_not_give_is_told_from_what_is_not_there() {
+        let of = |path| HidError::from(File::open(path).expect_err("it cannot be opened"));
+        assert!(is_refused(&of(r"C:\windows")), "a folder is refused as a device is");
+        assert!(!is_refused(&of(r"C:\windows\nowhere")));
+        assert!(is_refused(&HidError::from(std::io::Error::from_raw_os_error(SHARING_VIOLATION))));
+    }
+}
