@@ -1,6 +1,7 @@
 //! What differs between systems for a controller. Each system has one module with the same items:
 //! - `reset_when_dropped`, `wait_for`, `descriptor`: connections;
-//! - `access_remedy`: how a user is allowed to use a device on USB.
+//! - `access_remedy`, `driver_remedy`: how a user is allowed to use a device on USB, and gives it a driver;
+//! - `hid_is_offered`: whether a loop can send by HID.
 
 #[cfg(not(windows))]
 mod unix;
@@ -14,4 +15,8 @@ use windows as system;
 
 #[cfg(any(feature = "usb", feature = "hid"))]
 pub(crate) use system::access_remedy;
+#[cfg(feature = "usb")]
+pub(crate) use system::driver_remedy;
+#[cfg(feature = "hid")]
+pub(crate) use system::hid_is_offered;
 pub(crate) use system::{descriptor, reset_when_dropped, wait_for};

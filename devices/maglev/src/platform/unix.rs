@@ -37,6 +37,22 @@ pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> Strin
     )
 }
 
+/// What gives a device on USB a driver that lets programs use it: the kernel has it.
+#[cfg(feature = "usb")]
+pub(crate) fn driver_remedy(_: u16, _: u16) -> Option<String> {
+    None
+}
+
+/// Whether HID can be used in a loop: the kernel takes a report at once.
+///
+/// # Errors
+/// None.
+#[cfg(feature = "hid")]
+#[allow(clippy::unnecessary_wraps)] // as on other systems
+pub(crate) fn hid_is_offered() -> Result<(), &'static str> {
+    Ok(())
+}
+
 #[cfg(all(test, any(feature = "usb", feature = "hid")))]
 mod tests {
     use super::*;

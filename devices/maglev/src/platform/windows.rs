@@ -40,11 +40,42 @@ pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
 
 /// What a device on USB needs to be used.
 #[cfg(any(feature = "usb", feature = "hid"))]
-pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> String {
-    match subsystem {
-        "usb" => {
-            format!("give the device {vendor:04x}:{product:04x} the driver WinUSB, with the program Zadig")
-        }
-        _ => format!("close the program that uses the device {vendor:04x}:{product:04x}"),
+pub(crate) fn access_remedy(_: &str, vendor: u16, product: u16) -> String {
+    format!("close the program that uses {vendor:04x}:{product:04x}")
+}
+
+/// What gives a device on USB a driver that lets programs use it.
+#[cfg(feature = "usb")]
+pub(crate) fn driver_remedy(vendor: u16, product: u16) -> Option<String> {
+    Some(format!("give {vendor:04x}:{product:04x} the driver WinUSB, with the program Zadig"))
+}
+
+/// Whether HID can be used in a loop.
+///
+/// # Errors
+/// Why not.
+#[cfg(feature = "hid")]
+pub(crate) fn hid_is_offered() -> Result<(), &'static str> {
+    Err(
+        "`transport` = `hid` is not offered on Windows: sending a report may take a second there, and the loop would wait for it; \
+         use `serial` or `usb`",
+    )
+}
+
+#[cfg(all(test, any(feature = "usb", feature = "hid")))]
+mod tests {
+    #[cfg(feature = "hid")]
+    #[test]
+    fn hid_is_refused_because_sending_would_wait() {
+        use crate::transport::{Kind, open};
+        let refused = open(Kind::Hid, "1209:f107").err().map(|error| error.to_string());
+        assert!(refused.is_some_and(|said| said.contains("not offered on Windows")));
+    }
+
+    #[cfg(feature = "usb")]
+    #[test]
+    fn a_device_without_winusb_needs_a_driver() {
+        let remedy = super::driver_remedy(0x1209, 0xf107).expect("there is one");
+        assert!(remedy.contains("1209:f107 the driver WinUSB"), "{remedy}");
     }
 }

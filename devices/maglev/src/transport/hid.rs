@@ -1,7 +1,9 @@
-//! HID: packets as reports of 64 bytes without a number, through the kernel's hidraw.
+//! HID: packets as reports of 64 bytes without a number, through the kernel's hidraw. Not on Windows, where a
+//! write waits until the device has taken it.
 
 use super::address::{UsbAddress, remedy};
 use super::{Incoming, LinkLost, OpenError, Transport};
+use crate::platform::hid_is_offered;
 use crate::protocol::FRAME_BYTES;
 use hidapi::{HidApi, HidDevice, HidError};
 use std::time::Duration;
@@ -19,6 +21,7 @@ pub struct HidLink {
 /// # Errors
 /// [`OpenError`].
 pub fn open(address: &str) -> Result<HidLink, OpenError> {
+    hid_is_offered().map_err(|why| OpenError::NotOffered { why })?;
     let wanted = UsbAddress::parse(address).ok_or_else(|| UsbAddress::misread(address))?;
     let refused = |error: HidError| refused(address, &wanted, &error);
     let api = HidApi::new().map_err(refused)?;

@@ -109,6 +109,18 @@ pub enum OpenError {
         /// The name.
         host: String,
     },
+    /// This system cannot carry it.
+    NotOffered {
+        /// Why not, and what to do.
+        why: &'static str,
+    },
+    /// The system has no driver for it that lets programs use it.
+    NoDriver {
+        /// What was looked for.
+        address: String,
+        /// What to do.
+        remedy: String,
+    },
     /// The plugin was built without this transport.
     NotBuilt {
         /// The feature it needs.
@@ -132,6 +144,10 @@ impl std::fmt::Display for OpenError {
             Self::Address { address, expected } => write!(f, "`address` = `{address}` is not {expected}"),
             Self::UnknownHost { host } => {
                 write!(f, "no host `{host}` is known (`address`); check the name or use its IP address")
+            }
+            Self::NotOffered { why } => f.write_str(why),
+            Self::NoDriver { address, remedy } => {
+                write!(f, "{address} has a driver that programs cannot use, or none; {remedy}")
             }
             Self::NotBuilt { feature } => write!(
                 f,

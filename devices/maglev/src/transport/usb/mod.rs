@@ -10,6 +10,7 @@ mod queue;
 
 use super::address::{UsbAddress, remedy};
 use super::{Incoming, LinkLost, OpenError, Transport};
+use crate::platform::driver_remedy;
 use crate::protocol::FRAME_BYTES;
 use queue::Queue;
 use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbContext};
@@ -158,6 +159,11 @@ fn refused(address: &str, wanted: &UsbAddress, error: Error) -> OpenError {
     match error {
         Error::Access => OpenError::Forbidden { address, remedy: remedy("usb", wanted) },
         Error::Busy => OpenError::Busy { address },
+        // libusb opens no device whose driver it cannot speak to.
+        Error::NotSupported => match driver_remedy(wanted.vendor, wanted.product) {
+            Some(remedy) => OpenError::NoDriver { address, remedy },
+            None => OpenError::Missing { address, cause: error.to_string() },
+        },
         other => OpenError::Missing { address, cause: other.to_string() },
     }
 }
@@ -171,6 +177,10 @@ mod tests {
         let wanted = UsbAddress::parse("1209:f107").unwrap();
         let said = refused("1209:f107", &wanted, Error::Access).to_string();
         assert!(said.ends_with(&remedy("usb", &wanted)) && said.contains("f107"), "{said}");
+        // Where the system has a driver for every device, it has another fault.
+        let told = refused("1209:f107", &wanted, Error::NotSupported).to_string();
+        let remedy = driver_remedy(wanted.vendor, wanted.product);
+        assert!(remedy.map_or(told.contains("switched on?"), |remedy| told.ends_with(&remedy)), "{told}");
         assert!(refused("1209:f107", &wanted, Error::Busy).to_string().contains("in use by another program"));
     }
 
