@@ -6,8 +6,8 @@ use crate::curve::POSE;
 use crate::file::{TestFile, Validate};
 use crate::minimise::shortest;
 use crate::numbers::at;
-use crate::platform::UNTOLD_RULES;
 use crate::process::{Flotor, Ran};
+use crate::rule::Told;
 use flotor_command::note;
 use serde::Serialize;
 use serde_json::Value;
@@ -310,23 +310,18 @@ fn validate(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Ou
             outcome.failures.push(Failure::new("validate", "an answer", error));
             continue;
         };
-        let mut untold = Vec::new();
         for finding in &findings {
-            let word = |key: &str| finding.get(key).and_then(Value::as_str);
-            let unchecked = || word("unchecked").map(|why| format!("it could not be checked: {why}"));
-            let Some(seen) = word("violation").map(str::to_owned).or_else(unchecked) else { continue };
-            let rule = word("rule").unwrap_or_default();
-            if word("violation").is_none() && UNTOLD_RULES.contains(&rule) {
-                untold.push(rule);
-                continue;
+            match Told::of(finding) {
+                Told::Holds => {}
+                Told::NotOnThisSystem { rule, why } => {
+                    note(format!("{plugin}: the rule {rule} passes unchecked: {why}"));
+                }
+                Told::Fails { rule, text, seen } => {
+                    outcome.failures.push(Failure::new(format!("rule {rule}"), text, seen));
+                    let arguments = ["validate", &plugin, "--only", rule].map(str::to_owned);
+                    outcome.repeat.get_or_insert_with(|| command_line(&arguments));
+                }
             }
-            let says = word("text").unwrap_or_default();
-            outcome.failures.push(Failure::new(format!("rule {rule}"), says, seen));
-            let arguments = ["validate", &plugin, "--only", rule].map(str::to_owned);
-            outcome.repeat.get_or_insert_with(|| command_line(&arguments));
-        }
-        if !untold.is_empty() {
-            note(format!("{plugin}: this system cannot check {}; Linux can", untold.join(", ")));
         }
     }
 }

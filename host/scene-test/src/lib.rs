@@ -17,3 +17,4 @@ mod numbers;
 mod platform;
 mod process;
 mod report;
+mod rule;

@@ -50,28 +50,27 @@ pub(crate) fn used(_: u32) -> Used {
 
 /// What the system tells of this process and thread: nothing that is asked for yet.
 pub(crate) mod state {
+    use crate::validate::Seen;
     use crate::validate::untouched::Part;
 
-    /// Why it is not known.
-    const NOT_ASKED: &str =
-        "of this process only environment, folder and floating-point mode are looked at on Windows";
-
     /// Says that it is not known.
-    pub(crate) fn of_the_system() -> Result<Vec<Part>, &'static str> {
-        Err(NOT_ASKED)
+    pub(crate) fn of_the_system() -> Result<Vec<Part>, Seen> {
+        let looked_at =
+            "of this process only environment, folder and floating-point mode are looked at on Windows";
+        Err(Seen::NotOnThisSystem(looked_at.to_owned()))
     }
 
     /// Says that they are not counted.
-    pub(crate) fn threads() -> Result<usize, &'static str> {
-        Err("threads are not counted on Windows")
+    pub(crate) fn threads() -> Result<usize, Seen> {
+        Err(Seen::NotOnThisSystem("threads are not counted on Windows".to_owned()))
     }
 
     /// Says that there is no such library.
     ///
     /// # Errors
     /// Always.
-    pub(crate) fn is_loaded_first(_: &str) -> Result<(), String> {
-        Err("only Linux gives a process another allocator (LD_PRELOAD)".to_owned())
+    pub(crate) fn is_loaded_first(_: &str) -> Result<(), Seen> {
+        Err(Seen::NotOnThisSystem("only Linux gives a process another allocator (LD_PRELOAD)".to_owned()))
     }
 }
 
@@ -91,6 +90,6 @@ pub(crate) mod locked {
 
     /// Says that it cannot be checked.
     pub(crate) fn system_calls(_: Model) -> Result<(), Seen> {
-        Err(Seen::Missing("only Linux can tell (seccomp)".to_owned()))
+        Err(Seen::NotOnThisSystem("only Linux can tell (seccomp)".to_owned()))
     }
 }

@@ -29,6 +29,6 @@ fn beside(folder: &Path) -> Option<PathBuf> {
 
 /// Lives one life of an instance under the allocator.
 pub(super) fn inside_memory(subject: &Subject) -> Result<(), Seen> {
-    state::is_loaded_first(LIBRARY).map_err(Seen::Missing)?;
+    state::is_loaded_first(LIBRARY)?;
     live(subject, &mut |_, _| Ok(()))
 }

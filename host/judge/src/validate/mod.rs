@@ -40,10 +40,22 @@ pub struct Finding {
     pub text: &'static str,
     /// The violation.
     pub violation: Option<String>,
-    /// Why it could not be checked here: something that the plugin needs is missing.
+    /// Why it could not be checked here.
     pub unchecked: Option<String>,
+    /// What was in the way then.
+    pub obstacle: Option<Obstacle>,
     /// What was measured on the way.
     pub figures: Option<Figures>,
+}
+
+/// What was in the way of a rule that could not be checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Obstacle {
+    /// This system cannot check the rule for any plugin.
+    System,
+    /// Something that the plugin or the check needs is missing.
+    Requirement,
 }
 
 /// Measurements of a model without memory near home. No contract limits them, but a person can distinguish newtons per
@@ -59,12 +71,13 @@ pub struct Figures {
 impl Finding {
     fn new(check: Check, verdict: Verdict) -> Self {
         let Verdict { seen, figures } = verdict;
-        let (violation, unchecked) = match seen {
-            None => (None, None),
-            Some(Seen::Violation(seen)) => (Some(seen), None),
-            Some(Seen::Missing(what)) => (None, Some(what)),
+        let (violation, unchecked, obstacle) = match seen {
+            None => (None, None, None),
+            Some(Seen::Violation(seen)) => (Some(seen), None, None),
+            Some(Seen::Missing(what)) => (None, Some(what), Some(Obstacle::Requirement)),
+            Some(Seen::NotOnThisSystem(why)) => (None, Some(why), Some(Obstacle::System)),
         };
-        Self { rule: check.id(), text: check.text(), violation, unchecked, figures }
+        Self { rule: check.id(), text: check.text(), violation, unchecked, obstacle, figures }
     }
 }
 
@@ -76,6 +89,8 @@ pub enum Seen {
     Violation(String),
     /// The plugin needs something that is not there (a device, a permission): neither its fault nor a proof.
     Missing(String),
+    /// This system cannot tell, whatever the plugin does.
+    NotOnThisSystem(String),
 }
 
 /// Result of the process that checks one rule.

@@ -29,8 +29,8 @@ pub(crate) type Part = (&'static str, May, Vec<String>);
 pub(super) struct Host {
     parts: Vec<Part>,
     /// Why the rest of the state is not known, if it is not.
-    unknown: Option<&'static str>,
-    threads: Result<usize, &'static str>,
+    unknown: Option<Seen>,
+    threads: Result<usize, Seen>,
 }
 
 /// Lives one life of an instance, and looks after each call.
@@ -68,12 +68,12 @@ impl Host {
 
     /// Threads at that time, if the system tells.
     pub(super) fn threads(&self) -> Result<usize, Seen> {
-        self.threads.map_err(missing)
+        self.threads.clone()
     }
 
     /// Fails if a part of the state is not known.
     fn known(&self) -> Result<(), Seen> {
-        self.unknown.map_or(Ok(()), |why| Err(missing(why)))
+        self.unknown.clone().map_or(Ok(()), Err)
     }
 
     fn compare(&self, call: &str) -> Result<(), String> {
@@ -95,11 +95,7 @@ impl Host {
 
 /// Threads of this process, if the system tells.
 pub(super) fn threads() -> Result<usize, Seen> {
-    state::threads().map_err(missing)
-}
-
-fn missing(why: &str) -> Seen {
-    Seen::Missing(why.to_owned())
+    state::threads()
 }
 
 /// What a few sums say about the mode of this thread.
@@ -142,10 +138,9 @@ mod tests {
 
     #[test]
     fn what_the_system_does_not_tell_is_not_said_to_hold() {
-        let unknown =
-            Host { unknown: Some("nobody tells"), threads: Err("nobody counts"), ..host("/here", &[]) };
-        assert_eq!(unknown.known(), Err(Seen::Missing("nobody tells".to_owned())));
-        assert_eq!(unknown.threads().err(), Some(Seen::Missing("nobody counts".to_owned())));
+        let why = Seen::NotOnThisSystem("nobody tells".to_owned());
+        let unknown = Host { unknown: Some(why.clone()), threads: Err(why.clone()), ..host("/here", &[]) };
+        assert_eq!((unknown.known(), unknown.threads()), (Err(why.clone()), Err(why)));
         assert_eq!(host("/here", &[]).known(), Ok(()));
         // Of this system: both, or a reason.
         let now = Host::now();

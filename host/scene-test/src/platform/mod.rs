@@ -1,4 +1,4 @@
-//! What differs between systems for a test of scenes: who may read a result, and which rules of `flotor validate` it cannot check.
+//! What differs between systems for a test of scenes: who may read a result.
 
 #[cfg(not(windows))]
 mod unix;
@@ -6,6 +6,6 @@ mod unix;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use unix::{UNTOLD_RULES, readable_by_all};
+pub(crate) use unix::readable_by_all;
 #[cfg(windows)]
-pub(crate) use windows::{UNTOLD_RULES, readable_by_all};
+pub(crate) use windows::readable_by_all;

@@ -4,9 +4,6 @@ use std::fs::{File, Permissions};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
 
-/// Rules that the system cannot check: none.
-pub(crate) const UNTOLD_RULES: &[&str] = &[];
-
 /// A scratch file is for its owner alone; a result is for those who may read the folder.
 pub(crate) fn readable_by_all(file: &File) -> io::Result<()> {
     file.set_permissions(Permissions::from_mode(0o644))

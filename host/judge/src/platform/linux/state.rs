@@ -1,20 +1,23 @@
 //! What the kernel tells of this process and thread, by the files under `/proc`.
 
+use crate::validate::Seen;
 use crate::validate::untouched::{May, Part};
 use rustix::io::Errno;
 use rustix::process::{WaitOptions, waitpid};
 use std::fs;
 use std::path::Path;
 
-/// Why nothing is known.
-const NO_FILES: &str = "the system has no /proc, which the test needs";
+/// That nothing is known.
+fn no_files() -> Seen {
+    Seen::Missing("the system has no /proc, which the test needs".to_owned())
+}
 
 /// The parts of the state of this process and thread that only the kernel tells, or why it does not.
-pub(crate) fn of_the_system() -> Result<Vec<Part>, &'static str> {
+pub(crate) fn of_the_system() -> Result<Vec<Part>, Seen> {
     let whole = |path: &str| fs::read_to_string(path).unwrap_or_default();
     let (process, thread) = (whole("/proc/self/status"), whole("/proc/thread-self/status"));
     if process.is_empty() || thread.is_empty() {
-        return Err(NO_FILES);
+        return Err(no_files());
     }
     let named = |text: &str, names: &[&str]| -> Vec<String> {
         let lines = text.lines().filter(|line| names.iter().any(|name| line.starts_with(name)));
@@ -35,17 +38,20 @@ pub(crate) fn of_the_system() -> Result<Vec<Part>, &'static str> {
 }
 
 /// Threads of this process, or why they are not known.
-pub(crate) fn threads() -> Result<usize, &'static str> {
-    fs::read_dir("/proc/self/task").map(Iterator::count).map_err(|_| NO_FILES)
+pub(crate) fn threads() -> Result<usize, Seen> {
+    fs::read_dir("/proc/self/task").map(Iterator::count).map_err(|_| no_files())
 }
 
 /// Whether this process has loaded a library of that name, started with it before all others.
 ///
 /// # Errors
 /// It has not.
-pub(crate) fn is_loaded_first(library: &str) -> Result<(), String> {
+pub(crate) fn is_loaded_first(library: &str) -> Result<(), Seen> {
     let mapped = fs::read_to_string("/proc/self/maps").unwrap_or_default();
-    if mapped.contains(library) { Ok(()) } else { Err(format!("{library} is not beside this program")) }
+    match mapped.contains(library) {
+        true => Ok(()),
+        false => Err(Seen::Missing(format!("{library} is not beside this program"))),
+    }
 }
 
 /// Whether this process has started others.

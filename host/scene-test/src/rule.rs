@@ -1,0 +1,48 @@
+//! What `flotor validate` says of one rule.
+
+use serde_json::Value;
+
+/// What came of a rule.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Told<'a> {
+    /// It holds.
+    Holds,
+    /// This system cannot check it for any plugin, and why.
+    NotOnThisSystem { rule: &'a str, why: &'a str },
+    /// It is violated, or was not checked though it could be.
+    Fails { rule: &'a str, text: &'a str, seen: String },
+}
+
+impl<'a> Told<'a> {
+    /// Reads a finding of its JSON.
+    pub(crate) fn of(finding: &'a Value) -> Self {
+        let word = |key: &str| finding.get(key).and_then(Value::as_str);
+        let (rule, text) = (word("rule").unwrap_or_default(), word("text").unwrap_or_default());
+        match (word("violation"), word("unchecked")) {
+            (Some(seen), _) => Self::Fails { rule, text, seen: seen.to_owned() },
+            (None, Some(why)) if word("obstacle") == Some("system") => Self::NotOnThisSystem { rule, why },
+            (None, Some(why)) => Self::Fails { rule, text, seen: format!("it could not be checked: {why}") },
+            (None, None) => Self::Holds,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn only_what_no_plugin_could_pass_here_passes_unchecked() {
+        let finding = |obstacle: Option<&str>| json!({ "rule": "no-threads", "text": "it starts none", "violation": null, "unchecked": "why", "obstacle": obstacle });
+        let here = finding(Some("system"));
+        assert_eq!(Told::of(&here), Told::NotOnThisSystem { rule: "no-threads", why: "why" });
+        for obstacle in [Some("requirement"), None] {
+            let failed = finding(obstacle);
+            let Told::Fails { rule, seen, .. } = Told::of(&failed) else { panic!("{obstacle:?} passed") };
+            assert_eq!((rule, seen.as_str()), ("no-threads", "it could not be checked: why"));
+        }
+        assert_eq!(Told::of(&json!({ "rule": "loads", "violation": null, "unchecked": null })), Told::Holds);
+        assert!(matches!(Told::of(&json!({ "rule": "loads", "violation": "no" })), Told::Fails { .. }));
+    }
+}
