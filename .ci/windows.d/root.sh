@@ -62,7 +62,8 @@ bring_sources() {
     done
 }
 
-# A command in that Debian.
+# A command in that Debian. Its linker writes a time into each program and library: one for all, so that the same sources give the
+# same bytes.
 inside() {
     unshare --mount bash -euc '
         mount --make-rprivate /
@@ -70,6 +71,7 @@ inside() {
         mount --rbind /dev "$0/dev"
         exec chroot "$0" /usr/bin/env -i HOME=/root LANG=C.UTF-8 TERM=dumb PATH=/usr/sbin:/usr/bin:/sbin:/bin ${http_proxy:+http_proxy="$http_proxy"} \
             ${https_proxy:+https_proxy="$https_proxy"} CARGO_HTTP_CAINFO=/etc/ssl/certs/ca-certificates.crt RUSTC_BOOTSTRAP=1 \
+            SOURCE_DATE_EPOCH=315532800 \
             CARGO_TARGET_DIR=/built CARGO_BUILD_TARGET=x86_64-pc-windows-gnu CARGO_UNSTABLE_BUILD_STD=std,panic_unwind \
             CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER=x86_64-w64-mingw32-gcc-win32 \
             CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUNNER=/usr/lib/wine/wine64 WINEDEBUG=-all WINEPREFIX=/wine \
