@@ -111,7 +111,7 @@ const SERVO: Effort =
 /// Each equilibrium to rounding, so that nothing of the past is left in an answer.
 const TO_ROUNDING: Effort = Effort {
     most_steps: 10,
-    most_matrices: 5,
+    most_matrices: 6,
     matrix_life: 8,
     tolerance: 1e-13,
     // A step costs a ninth of a matrix: better several with an old one, as long as they contract.
@@ -198,7 +198,9 @@ impl Rod {
     /// allocates.
     #[must_use]
     pub(crate) fn for_a_blend(spring: &Spring) -> Self {
-        let equilibrium = Equilibrium::new(Ratios::new(spring, Coils::Pass), TO_ROUNDING);
+        // A base that loses the ground has to search twice in a tick.
+        let effort = Effort { most_matrices: 5, ..TO_ROUNDING };
+        let equilibrium = Equilibrium::new(Ratios::new(spring, Coils::Pass), effort);
         Self::solved_by(Solver::Blend(Box::new(equilibrium), Box::new(Descent::new())), spring, Coils::Pass)
     }
 
