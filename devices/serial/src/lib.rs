@@ -1,4 +1,4 @@
-//! What device plugins at a serial port share.
+//! A non-blocking serial port, shared by device plugins.
 //!
 //! - [`Port`]: a port that does not wait, whatever the system.
 //! - [`NotOpened`]: why one cannot be opened, so that a plugin can say what to do.
@@ -8,8 +8,8 @@ mod platform;
 use serialport::{ClearBuffer, SerialPort};
 use std::io::{self, Read, Write};
 
-/// A serial port that does not wait: what does not fit or is not there is [`io::ErrorKind::WouldBlock`] or
-/// [`io::ErrorKind::TimedOut`]. Windows has no wait of no time: there a write for which there is no room takes a millisecond.
+/// A non-blocking serial port: a read without data and a write without room return [`io::ErrorKind::WouldBlock`] or
+/// [`io::ErrorKind::TimedOut`]. The shortest timeout of Windows is a millisecond: a write without room takes that long there.
 #[derive(Debug)]
 pub struct Port(platform::System);
 
@@ -56,7 +56,7 @@ impl Port {
         let _ = self.0.write_data_terminal_ready(true);
     }
 
-    /// How many bytes have come. Real-time: bounded, no allocation; one call of the system.
+    /// Number of bytes received and not yet read. Real-time: bounded, no allocation; one call of the system.
     ///
     /// # Errors
     /// The port is gone.
@@ -64,7 +64,7 @@ impl Port {
         Ok(usize::try_from(self.0.bytes_to_read()?).unwrap_or(usize::MAX))
     }
 
-    /// Forgets what has come. Real-time: bounded, no allocation; one call of the system.
+    /// Discards the bytes received and not yet read. Real-time: bounded, no allocation; one call of the system.
     ///
     /// # Errors
     /// The port is gone.

@@ -33,7 +33,7 @@ pub trait Reports: Send + 'static {
 pub struct HidPuck(HidDevice);
 
 impl HidPuck {
-    /// Opens the puck at a path of the system, or the first that is found. Not real-time.
+    /// Opens the puck at a device path, or the first puck found. Not real-time.
     ///
     /// # Errors
     /// A [`Refusal`] that says what is there and what to do.

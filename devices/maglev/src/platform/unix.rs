@@ -25,7 +25,7 @@ pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
     stream.as_raw_fd()
 }
 
-/// The line for udev that lets whoever sits at the machine use the device; `subsystem` is `usb` or `hidraw`.
+/// The udev rule that gives the logged-in user access to the device; `subsystem` is `usb` or `hidraw`.
 #[cfg(any(feature = "usb", feature = "hid"))]
 pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> String {
     // A hidraw node has its ids on a parent.
@@ -37,7 +37,7 @@ pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> Strin
     )
 }
 
-/// What gives a device on USB a driver that lets programs use it: the kernel has it.
+/// How to install a driver that gives programs access to a USB device: not needed, the kernel has one.
 #[cfg(feature = "usb")]
 pub(crate) fn driver_remedy(_: u16, _: u16) -> Option<String> {
     None

@@ -44,7 +44,7 @@ pub(crate) fn access_remedy(_: &str, vendor: u16, product: u16) -> String {
     format!("close the program that uses {vendor:04x}:{product:04x}")
 }
 
-/// What gives a device on USB a driver that lets programs use it.
+/// How to install a driver that gives programs access to a USB device.
 #[cfg(feature = "usb")]
 pub(crate) fn driver_remedy(vendor: u16, product: u16) -> Option<String> {
     Some(format!("give {vendor:04x}:{product:04x} the driver WinUSB, with the program Zadig"))

@@ -14,7 +14,7 @@ pub(crate) const PATH_EXAMPLE: &str = r"\\?\HID#VID_256F and what follows there"
 /// How a user is allowed to use it.
 pub(crate) const ACCESS_REMEDY: &str = "close the program that uses it";
 
-/// Whether the system does not give a device, which another program has.
+/// Whether access was denied, because another program has the device open.
 pub(crate) fn is_refused(error: &HidError) -> bool {
     let HidError::IoError { error } = error else { return false };
     error.kind() == ErrorKind::PermissionDenied || error.raw_os_error() == Some(SHARING_VIOLATION)

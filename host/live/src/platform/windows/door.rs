@@ -1,4 +1,4 @@
-//! Connections: who connects says the secret first, within a time, and is waited for together with everybody else who connects.
+//! Connections: each client sends the secret first, within a time limit; the host waits for all of them at once.
 //!
 //! One thread does all of it, and never waits for one of them: whoever says nothing, or one byte now and then, is turned away
 //! when its time is over, and the end of a run waits for none of them.

@@ -3,7 +3,7 @@
 //! Nothing that runs there allocates, locks or formats into memory of its own. There are no signals: what a console sends is
 //! heard where the command line is, and no plugin can take it away.
 //!
-//! Not caught: `abort` and other quick failures (`__fastfail`), heap corruption that the system finds, which end the process
+//! Not caught: `abort` and other immediate terminations (`__fastfail`), heap corruption that the system finds, which end the process
 //! without asking any filter; and `TerminateProcess`, which asks nobody. Nothing stops a device then but the device. The end of the
 //! process by `exit` is told by a callback of the loader, which Wine 8 does not call for a program: it is not tested.
 #![allow(unsafe_code)] // neither filter nor callback can be made without; tests/tests/system/architecture.rs lists it

@@ -1,4 +1,4 @@
-//! What differs between systems for the commands of experiments: how much of a disk is free.
+//! What differs between systems for the commands of experiments: the free space of a disk.
 
 #[cfg(not(windows))]
 mod unix;
