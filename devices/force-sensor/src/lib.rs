@@ -12,7 +12,6 @@
 //! - `plugin`: parameters and the contract.
 
 pub mod line;
-mod platform;
 mod plugin;
 pub mod protocol;
 

@@ -1,8 +1,7 @@
 //! One question at a time over a serial port.
 
-use crate::platform::ACCESS_QUESTION;
 use crate::protocol::{Lines, QUESTION, parse};
-use flotor_serial::{NotOpened, Port};
+use flotor_serial::Port;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
@@ -40,15 +39,7 @@ impl SensorLine {
     /// # Errors
     /// One sentence: port, cause and remedy.
     pub fn open(path: &str) -> Result<Self, String> {
-        let port = Port::open(path, BAUD).map_err(|reason| {
-            let cause = match &reason {
-                NotOpened::Forbidden { .. } => "this user may not use it",
-                NotOpened::InUse => "another program uses it",
-                NotOpened::NoPort => "it is no serial port",
-                NotOpened::Missing { cause } => cause,
-            };
-            format!("no force sensor at {path}: {cause}; {ACCESS_QUESTION}")
-        })?;
+        let port = Port::open(path, BAUD).map_err(|reason| format!("no force sensor at {path}: {reason}"))?;
         // What it said before anybody asked.
         let _ = port.forget_input();
         Ok(Self { port, lines: Lines::default(), asked: None })

@@ -1,11 +1,11 @@
 //! The sensor as a plugin: a device without axes, whose state holds a measured force.
 
 use crate::line::{Heard, LineLost, SensorLine};
-use crate::platform::{PORT_EXAMPLE, PORT_HELP};
 use flotor_hal::{
     ActiveDevice, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, Fault, LoopConfig,
     NothingToStop, Parameter, Refusal, Settings, Tick, Wrench, export_device,
 };
+use flotor_serial::{PORT_EXAMPLE, PORT_HELP};
 use std::time::Duration;
 
 const SCHEMA: &[Parameter] = &[

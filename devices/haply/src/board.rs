@@ -3,9 +3,8 @@
 //! An answer that does not come is not waited for: after [`FORGET`] what came of it is forgotten and the next request
 //! goes out, which also finds the beginning of an answer again when a byte was lost.
 
-use crate::platform::PORT_LIST;
 use crate::protocol::{Answers, Arm, Heard, RESET, setup, torques};
-use flotor_serial::{NotOpened, Port};
+use flotor_serial::Port;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
@@ -56,7 +55,7 @@ impl Board {
     /// # Errors
     /// One sentence: why not, and what to do.
     pub fn open(path: &str) -> Result<Self, String> {
-        let port = Port::open(path, BAUD).map_err(|reason| refused(path, &reason))?;
+        let port = Port::open(path, BAUD).map_err(|reason| format!("no board at {path}: {reason}"))?;
         Ok(Self::on(port))
     }
 
@@ -175,19 +174,5 @@ impl Board {
             }
             Err(_) => Err(LinkLost),
         }
-    }
-}
-
-fn refused(path: &str, reason: &NotOpened) -> String {
-    let missing = |cause| {
-        format!(
-            "no board at {path} ({cause}); is it connected? The parameter `port` must be its path; {PORT_LIST}"
-        )
-    };
-    match reason {
-        NotOpened::Forbidden { remedy } => format!("this user may not use {path}; {remedy}"),
-        NotOpened::InUse => format!("{path} is in use by another program; close that one first"),
-        NotOpened::NoPort => missing("it is no serial port"),
-        NotOpened::Missing { cause } => missing(cause),
     }
 }

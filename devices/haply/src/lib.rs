@@ -16,7 +16,6 @@
 pub mod board;
 pub mod emulator;
 pub mod pantograph;
-mod platform;
 mod plugin;
 pub mod protocol;
 

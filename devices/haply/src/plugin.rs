@@ -2,7 +2,6 @@
 
 use crate::board::{Board, LinkLost, NoAnswer};
 use crate::pantograph::{Pantograph, Posture};
-use crate::platform::{PORT_EXAMPLE, PORT_HELP};
 use crate::protocol::{Arm, Direction, torques};
 use flotor_hal::glam::DVec2;
 use flotor_hal::{
@@ -10,7 +9,7 @@ use flotor_hal::{
     DeviceState, Fault, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal,
     SafeStop, Settings, StoppedState, Tick, Twist, Wrench, choices, export_device, math,
 };
-use flotor_serial::Port;
+use flotor_serial::{PORT_EXAMPLE, PORT_HELP, Port};
 use std::f64::consts::TAU;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -153,7 +152,7 @@ impl Device for HaplyDevice {
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let path = settings.text("port").ok_or_else(|| {
             Refusal::resource(format!(
-                "where is the board? Say it with `port`, as {PORT_EXAMPLE}; \
+                "no `port` for the board; set it, as in {PORT_EXAMPLE}; \
                  `cargo run -p flotor-haply --example emulated_board` starts one without hardware and says where"
             ))
         })?;

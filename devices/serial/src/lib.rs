@@ -1,19 +1,26 @@
 //! A non-blocking serial port, shared by device plugins.
 //!
 //! - [`Port`]: a port that does not wait, whatever the system.
-//! - [`NotOpened`]: why one cannot be opened, so that a plugin can say what to do.
+//! - [`NotOpened`]: why one cannot be opened, and what to do.
+//! - [`PORT_HELP`], [`PORT_EXAMPLE`]: what a plugin's parameter `port` is.
 
 mod platform;
 
 use serialport::{ClearBuffer, SerialPort};
+use std::fmt;
 use std::io::{self, Read, Write};
+
+/// Help text of a plugin's parameter `port`.
+pub const PORT_HELP: &str = platform::PORT_HELP;
+/// A value of that parameter.
+pub const PORT_EXAMPLE: &str = platform::PORT_EXAMPLE;
 
 /// A non-blocking serial port: a read without data and a write without room return [`io::ErrorKind::WouldBlock`] or
 /// [`io::ErrorKind::TimedOut`]. The shortest timeout of Windows is a millisecond: a write without room takes that long there.
 #[derive(Debug)]
 pub struct Port(platform::System);
 
-/// Why a port cannot be opened.
+/// Why a port cannot be opened. Displays as the cause and what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NotOpened {
     /// This user may not use it.
@@ -31,6 +38,19 @@ pub enum NotOpened {
         cause: String,
     },
 }
+
+impl fmt::Display for NotOpened {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Forbidden { remedy } => write!(f, "this user may not use it; {remedy}"),
+            Self::InUse => f.write_str("another program uses it; close that one first"),
+            Self::NoPort => write!(f, "it is no serial port; {}", platform::PORT_LIST),
+            Self::Missing { cause } => write!(f, "{cause}; is it connected? {}", platform::PORT_LIST),
+        }
+    }
+}
+
+impl std::error::Error for NotOpened {}
 
 impl Port {
     /// Opens the port at a path of the system (`/dev/ttyACM0`, `COM3`) at a speed in baud. Not real-time.

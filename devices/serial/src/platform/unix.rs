@@ -9,6 +9,13 @@ use std::time::Duration;
 
 pub(crate) type System = TTYPort;
 
+/// What a parameter `port` is.
+pub(crate) const PORT_HELP: &str = "Path of its serial port, as /dev/ttyACM0 or one below /dev/serial/by-id";
+/// What it may be.
+pub(crate) const PORT_EXAMPLE: &str = "/dev/ttyACM0";
+/// How a user finds it.
+pub(crate) const PORT_LIST: &str = "`ls /dev/serial/by-id` lists the ports";
+
 /// How long a read or a write waits: not at all.
 pub(crate) const PATIENCE: Duration = Duration::ZERO;
 

@@ -8,6 +8,13 @@ use std::time::Duration;
 
 pub(crate) type System = COMPort;
 
+/// What a parameter `port` is.
+pub(crate) const PORT_HELP: &str = "Name of its serial port, as COM3";
+/// What it may be.
+pub(crate) const PORT_EXAMPLE: &str = "COM3";
+/// How a user finds it.
+pub(crate) const PORT_LIST: &str = "the Device Manager lists the ports";
+
 /// How long a write waits at most: no time is for ever, and the shortest is a millisecond.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(1);
 
