@@ -1,15 +1,15 @@
 //! Windows: a port of this machine alone and a secret, both in a file of the user's profile.
 //!
 //! Every program of this machine can reach the port, but only who can read the file knows the secret: by the rights of the
-//! profile that is its user, and administrators. Who does not say it is turned away, and delays nobody.
-//! - `announced`: the file; `door`: connections; `datagrams`: those of couplings.
+//! profile that is its user, and administrators. A client that does not send it is rejected, and delays no other.
+//! - `announced`: the file; `connections`; `datagrams`: those of couplings.
 
 mod announced;
+mod connections;
 mod datagrams;
-mod door;
 
+pub(crate) use connections::{Listening, Stream, accept, connect};
 pub(crate) use datagrams::Datagrams;
-pub(crate) use door::{Listening, Stream, accept, connect};
 
 use std::fs::{Metadata, OpenOptions};
 use std::io;

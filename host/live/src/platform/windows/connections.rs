@@ -1,0 +1,218 @@
+//! Connections: each client sends the secret first, within a time limit; the host waits for all of them at once.
+//!
+//! One thread reads from all of them and blocks on none: a client that sends nothing, or a byte now and then, is rejected when
+//! its time is over, and the end of a run waits for no client.
+
+use super::announced::{Announced, SECRET_BYTES};
+use std::fs::File;
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// A connection.
+pub(crate) use std::net::TcpStream as Stream;
+
+/// How long a client may take to send the whole secret.
+const SECRET_WAIT: Duration = Duration::from_secs(1);
+/// Most clients without the secret at a time; for one more, the oldest is rejected.
+const MOST_PENDING: usize = 16;
+/// Pause between two reads from the clients without the secret.
+const POLL_PERIOD: Duration = Duration::from_millis(2);
+
+/// Where connections come in.
+#[derive(Clone, Debug)]
+pub(crate) struct Listening(Arc<Shared>);
+
+#[derive(Debug)]
+struct Shared {
+    socket: TcpListener,
+    secret: String,
+    /// Locked by the thread that accepts: one at a time.
+    pending: Mutex<Vec<Pending>>,
+    /// Keeps the file from being removed while the run lives.
+    _file: File,
+}
+
+/// A client that has not sent the whole secret yet.
+#[derive(Debug)]
+struct Pending {
+    stream: Stream,
+    received: [u8; SECRET_BYTES],
+    length: usize,
+    since: Instant,
+}
+
+/// What a client has sent so far.
+enum Check {
+    Incomplete,
+    Passed,
+    /// Not the secret, or not in time.
+    Failed,
+}
+
+impl Listening {
+    /// Takes a port, and writes it with a new secret into a file.
+    pub(crate) fn bind(path: &Path) -> io::Result<Self> {
+        let socket = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+        let announced = Announced::new(socket.local_addr()?.port())?;
+        let _file = announced.write(path)?;
+        Ok(Self(Arc::new(Shared { socket, secret: announced.secret, pending: Mutex::default(), _file })))
+    }
+
+    /// A second handle.
+    #[allow(clippy::unnecessary_wraps)] // elsewhere a system makes it
+    pub(crate) fn try_clone(&self) -> io::Result<Self> {
+        Ok(self.clone())
+    }
+}
+
+/// Connects to the run behind a file.
+pub(crate) fn connect(path: &Path) -> io::Result<Stream> {
+    let Announced { port, secret } = Announced::read(path)?;
+    let mut stream = Stream::connect((Ipv4Addr::LOCALHOST, port))?;
+    stream.set_nodelay(true)?;
+    stream.write_all(secret.as_bytes())?;
+    Ok(stream)
+}
+
+/// Waits for the next client that sends the secret; `Interrupted` when one was rejected.
+pub(crate) fn accept(Listening(shared): &Listening) -> io::Result<Stream> {
+    let mut pending = shared.pending.lock().unwrap_or_else(PoisonError::into_inner);
+    loop {
+        // Without a pending client there is nothing to do but to wait for one.
+        shared.socket.set_nonblocking(!pending.is_empty())?;
+        match shared.socket.accept() {
+            Ok((stream, _)) => {
+                let is_full = pending.len() >= MOST_PENDING;
+                if is_full {
+                    pending.remove(0);
+                }
+                pending.extend(Pending::new(stream));
+                if is_full {
+                    return Err(ErrorKind::Interrupted.into());
+                }
+            }
+            Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(POLL_PERIOD),
+            // The client left before it was accepted.
+            Err(error) if is_by_client(error.kind()) => return Err(ErrorKind::Interrupted.into()),
+            Err(error) => return Err(error),
+        }
+        let decided =
+            pending.iter_mut().enumerate().find_map(|(place, one)| match one.read_secret(&shared.secret) {
+                Check::Incomplete => None,
+                check => Some((place, check)),
+            });
+        if let Some((place, check)) = decided {
+            let Pending { stream, .. } = pending.remove(place);
+            let is_accepted = matches!(check, Check::Passed)
+                && stream.set_nonblocking(false).and_then(|()| stream.set_nodelay(true)).is_ok();
+            return if is_accepted { Ok(stream) } else { Err(ErrorKind::Interrupted.into()) };
+        }
+    }
+}
+
+fn is_by_client(kind: ErrorKind) -> bool {
+    matches!(kind, ErrorKind::ConnectionReset | ErrorKind::ConnectionAborted | ErrorKind::Interrupted)
+}
+
+impl Pending {
+    fn new(stream: Stream) -> Option<Self> {
+        stream.set_nonblocking(true).ok()?;
+        Some(Self { stream, received: [0; SECRET_BYTES], length: 0, since: Instant::now() })
+    }
+
+    /// Reads what has arrived, and no byte beyond the secret.
+    fn read_secret(&mut self, secret: &str) -> Check {
+        let rest = self.received.get_mut(self.length..).unwrap_or_default();
+        match self.stream.read(rest) {
+            Ok(0) => return Check::Failed,
+            Ok(length) => self.length += length,
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
+            Err(_) => return Check::Failed,
+        }
+        match self.length {
+            SECRET_BYTES if self.received == *secret.as_bytes() => Check::Passed,
+            SECRET_BYTES => Check::Failed,
+            _ if self.since.elapsed() > SECRET_WAIT => Check::Failed,
+            _ => Check::Incomplete,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Accepts until a client passes; how many were rejected before it.
+    fn accept_one(listening: &Listening) -> (Stream, usize) {
+        let mut rejected = 0;
+        loop {
+            match accept(listening) {
+                Ok(stream) => return (stream, rejected),
+                Err(error) => {
+                    assert_eq!(error.kind(), ErrorKind::Interrupted);
+                    rejected += 1;
+                }
+            }
+        }
+    }
+
+    fn without_secret(path: &Path) -> Stream {
+        Stream::connect((Ipv4Addr::LOCALHOST, Announced::read(path).unwrap().port)).unwrap()
+    }
+
+    #[test]
+    fn a_client_with_another_secret_or_none_is_rejected() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("1-0.run");
+        let listening = Listening::bind(&path).unwrap();
+        let mut wrong = without_secret(&path);
+        wrong.write_all(&[b'0'; SECRET_BYTES]).unwrap();
+        drop(without_secret(&path));
+        let mut client = connect(&path).unwrap();
+        client.write_all(b"and more").unwrap();
+        let (mut stream, rejected) = accept_one(&listening);
+        assert!(rejected <= 2);
+        let mut rest = [0; 8];
+        stream.read_exact(&mut rest).unwrap();
+        assert_eq!(&rest, b"and more", "what follows the secret is left in the connection");
+    }
+
+    #[test]
+    fn clients_that_send_it_byte_by_byte_delay_no_other() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("1-0.run");
+        let listening = Listening::bind(&path).unwrap();
+        let mut slow: Vec<Stream> = (0..4).map(|_| without_secret(&path)).collect();
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for _ in 0..SECRET_BYTES / 2 {
+                    for client in &mut slow {
+                        let _ = client.write_all(b"0"); // rejected at some point
+                    }
+                    std::thread::sleep(SECRET_WAIT / 8);
+                }
+            });
+            let clients: Vec<Stream> = (0..4).map(|_| connect(&path).unwrap()).collect();
+            let rejected: usize = clients.iter().map(|_| accept_one(&listening).1).sum();
+            // All four of them would be, if each was waited for; a busy machine may take the time of some.
+            assert!(rejected < 4, "{rejected}");
+        });
+    }
+
+    #[test]
+    fn a_client_that_sends_nothing_is_rejected_in_time() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("1-0.run");
+        let listening = Listening::bind(&path).unwrap();
+        let mut silent = without_secret(&path);
+        silent.write_all(b"0").unwrap();
+        assert_eq!(accept(&listening).unwrap_err().kind(), ErrorKind::Interrupted);
+        let crowd: Vec<Stream> = (0..=MOST_PENDING).map(|_| without_secret(&path)).collect();
+        let client = connect(&path).unwrap();
+        let _ = accept_one(&listening);
+        drop((crowd, client));
+    }
+}
