@@ -21,17 +21,17 @@ pub struct ForceSensor {
 }
 
 impl ForceSensor {
-    /// Opens the sensor of a plugin, at a port if it has one. Not real-time.
+    /// Opens the sensor of a plugin at a port, with its other settings. Not real-time.
     ///
     /// # Errors
     /// [`CalibrationError`] if there is no sensor, or its plugin has no `port`.
-    pub fn open(plugin: &Plugin, port: &str) -> Result<Self, CalibrationError> {
+    pub fn open(plugin: &Plugin, port: &str, mut settings: Vec<Setting>) -> Result<Self, CalibrationError> {
         let setting = Setting::parse(plugin.parameters(), "port", port);
-        let setting =
-            setting.map_err(|error| CalibrationError::Refused(Refusal::parameter(error.to_string())))?;
+        settings
+            .push(setting.map_err(|error| CalibrationError::Refused(Refusal::parameter(error.to_string())))?);
         let config =
             LoopConfig { period_ns: u64::try_from(LOOK_AGAIN.as_nanos()).unwrap_or(u64::MAX), seed: 0 };
-        let device = plugin.open_device(&[setting])?.activate(&config);
+        let device = plugin.open_device(&settings)?.activate(&config);
         let device = device.map_err(|(_, refusal)| CalibrationError::Refused(refusal))?;
         Ok(Self { device, opened: Instant::now(), tick: Tick::default() })
     }

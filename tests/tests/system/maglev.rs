@@ -148,7 +148,8 @@ fn start_calibrating(emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> 
     let address = format!("address={}", emulator.address);
     let device =
         ["--device", "maglev", "--set", &address, "--set", "watchdog_ms=700", "--set", "timeout_ms=8000"];
-    let sensor = ["--sensor", sensor.to_str().expect("a scratch folder has a plain name")];
+    let sensor = sensor.to_str().expect("a scratch folder has a plain name");
+    let sensor = ["--sensor", sensor, "--sensor-set", "timeout_ms=20000"];
     Flotor::with(["calibrate"].iter().chain(arguments).chain(&device).chain(&sensor)).start()
 }
 

@@ -108,7 +108,14 @@ mod tests {
     fn the_rig_is_simulated_or_a_device_with_its_sensor() {
         assert!(refusal("vertical").contains("<--simulated|--device <ID>>"), "{}", refusal("vertical"));
         assert!(refusal("vertical --device maglev").contains("--sensor <PORT>"));
-        for option in ["--sensor X", "--set a=b", "--patience 5s", "--sensor-plugin x", "--device maglev"] {
+        for option in [
+            "--sensor X",
+            "--set a=b",
+            "--patience 5s",
+            "--sensor-plugin x",
+            "--sensor-set a=b",
+            "--device maglev",
+        ] {
             let refusal = refusal(&format!("vertical --simulated {option}"));
             assert!(refusal.contains("cannot be used with"), "{option}: {refusal}");
         }

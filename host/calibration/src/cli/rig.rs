@@ -39,6 +39,9 @@ pub(super) struct RigArguments {
     /// Plugin of the force sensor (id or file): a device with a parameter `port`
     #[arg(long, value_name = "ID", default_value = SERIAL_SENSOR, conflicts_with = "simulated")]
     sensor_plugin: String,
+    /// Set a parameter of the force sensor (repeatable)
+    #[arg(long = "sensor-set", value_name = "KEY=VALUE", conflicts_with = "simulated")]
+    sensor_sets: Vec<KeyValue>,
     /// Largest distance of the handle from a requested height, in mm
     #[arg(long, value_name = "MM", default_value_t = 0.4, conflicts_with = "simulated", value_parser = number("mm", "length", 0.005..=1.0))]
     tolerance_mm: f64,
@@ -73,15 +76,16 @@ impl RigArguments {
         let registry = self.plugin_path.registry();
         let plugin = registry.load(self.plugin(), PluginKind::Device)?;
         let sensor_plugin = registry.load(&self.sensor_plugin, PluginKind::Device)?;
-        let settings = settings(&plugin, &self.sets)?;
+        let device_settings = settings(&plugin, &self.sets)?;
+        let sensor_settings = settings(&sensor_plugin, &self.sensor_sets)?;
         let port = self.sensor.as_deref().unwrap_or_default();
-        let sensor = ForceSensor::open(&sensor_plugin, port).map_err(refused)?;
+        let sensor = ForceSensor::open(&sensor_plugin, port, sensor_settings).map_err(refused)?;
         let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
         progress.enable_steady_tick(REDRAWN);
         let watch = LatchGuard::of_this_user().obey(&stop)?;
         let guide = guide(&progress, &stop, watch);
-        let rig = DeviceRig::open(&plugin, &settings, sensor, close_m, patience, stop, guide);
+        let rig = DeviceRig::open(&plugin, &device_settings, sensor, close_m, patience, stop, guide);
         Ok((rig.map_err(refused)?, progress))
     }
 }
