@@ -124,7 +124,8 @@ pub struct Spheres {
     poisson_ratio: f64,
     /// Centres from the handle, in its frame, m.
     offsets_m: Vec<DVec3>,
-    beyond: Option<Beyond>,
+    /// How a block differs from a half-space under another contact.
+    pub beyond: Option<Beyond>,
 }
 
 /// What several spheres feel, for a modulus of 1 Pa.

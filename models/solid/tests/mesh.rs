@@ -334,12 +334,15 @@ fn a_sphere_on_a_cylinder_lies_between_two_blocks() {
     };
     let block = |half_m: f64| Body::Block(Size { half_x_m: half_m, half_y_m: half_m, height_m: 0.04 });
     let cylinder = solve(Body::Cylinder { radius_m: 0.02, height_m: 0.04 });
-    let [inside, around] = [0.02 * 0.5_f64.sqrt(), 0.02].map(|half_m| solve(block(half_m)));
-    for depth_m in [0.002, 0.004, 0.008] {
-        let at = [0.0, 0.0, radius_m - depth_m];
-        let [low, middle, high] = [&inside, &cylinder, &around].map(|atlas| atlas.answer(at).energy.value);
-        println!("{depth_m}: {:.4} {:.4}", middle / low, middle / high);
-        assert!(low < middle && middle < high, "{depth_m}: {low} {middle} {high}");
+    // Each takes some seconds to solve: in every change's checks the one inside, which differs more.
+    for half_m in &[0.02 * 0.5_f64.sqrt(), 0.02][..crate::cases(1, 2)] {
+        let block = solve(block(*half_m));
+        for depth_m in [0.002, 0.004, 0.008] {
+            let at = [0.0, 0.0, radius_m - depth_m];
+            let ratio = cylinder.answer(at).energy.value / block.answer(at).energy.value;
+            println!("{half_m} {depth_m}: {ratio:.4}");
+            assert_eq!(ratio > 1.0, *half_m < 0.02, "{half_m} {depth_m}: {ratio}");
+        }
     }
     for k in 0..400 {
         let turn = 0.37 * f64::from(k);

@@ -9,6 +9,7 @@ use flotor_solid::law::{Body, Description, Law, RESOLUTIONS, Tool};
 use flotor_solid::remainder::{Face, Remainder, Size};
 use flotor_solid::several::Spheres;
 use flotor_solid::table::Table;
+use std::sync::OnceLock;
 
 const RADIUS_M: f64 = 0.008;
 const NU: f64 = 0.3;
@@ -16,10 +17,19 @@ const SOLID: HalfSpace = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio: NU }
 const CUBE: Size = Size { half_x_m: 0.04, half_y_m: 0.04, height_m: 0.08 };
 
 fn spheres(body: Body, count: usize, spacing_m: f64) -> Spheres {
-    let tool = Tool::Spheres { radius_m: RADIUS_M, count, spacing_m };
-    let description = Description { body, tool, poisson_ratio: NU, resolution: 0 };
-    let Law::Spheres(spheres) = description.solve().expect("a solid").0 else { panic!("spheres") };
-    *spheres
+    let solve = || {
+        let tool = Tool::Spheres { radius_m: RADIUS_M, count, spacing_m };
+        let description = Description { body, tool, poisson_ratio: NU, resolution: 0 };
+        let Law::Spheres(spheres) = description.solve().expect("a solid").0 else { panic!("spheres") };
+        *spheres
+    };
+    // A block takes a second to solve, whatever the number and distance of the spheres.
+    static ON_CUBE: OnceLock<Spheres> = OnceLock::new();
+    if body != Body::Block(CUBE) {
+        return solve();
+    }
+    let Spheres { atlas, beyond, .. } = ON_CUBE.get_or_init(solve).clone();
+    Spheres::new(atlas, NU, count, spacing_m, beyond)
 }
 
 /// Vertical forces, N, of spheres with their centres at these places and the face this deep inside, all contacts solved
