@@ -9,6 +9,7 @@ use egui_kittest::wgpu::{create_render_state, default_wgpu_setup};
 use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_drawing::camera::Camera;
+use flotor_drawing::gpu::GpuScene;
 use flotor_hal::Pose;
 use flotor_record::{PluginDescription, Role, RunDescription};
 use flotor_sync::Words;
@@ -241,9 +242,37 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     });
 }
 
+/// The 3D scene at the size of the window, drawn by an adapter: time until it has, not processor time.
+fn scene_by_adapter(criterion: &mut Criterion) {
+    let Ok(state) =
+        std::panic::catch_unwind(|| create_render_state(default_wgpu_setup(), Default::default()))
+    else {
+        return;
+    };
+    let info = state.adapter.get_info();
+    let (history, palette) = (history(), Palette::of(Look::Dark));
+    let (mut shapes, _) = shapes_of(history.run(), &[library("spring")]);
+    let camera = Camera::experimenter(SceneBuilder::height_mm(&shapes));
+    let scale = ArrowScale::fitting(history.samples());
+    let sample = *history.at(0.2).expect("ten seconds");
+    let mut builder = SceneBuilder::default();
+    let (mesh, _) = builder.build(&mut shapes, &[sample], &palette, &camera, HEIGHT_PX, scale, true);
+    let mut scene = GpuScene::new(&state.device, &state.queue);
+    criterion.bench_function(
+        &format!("3D scene at 1280x800 drawn by {} ({})", info.name, info.backend),
+        |bench| {
+            bench.iter(|| {
+                black_box(scene.draw(mesh, &camera, palette.backdrop, [1280, 800]));
+                state.device.poll(wgpu::PollType::wait_indefinitely()).expect("the adapter answers");
+            });
+        },
+    );
+}
+
 criterion_group! {
-    name = benches;
+    name = processor;
     config = Criterion::default().with_measurement(ProcessorTime);
     targets = frame, whole_picture
 }
-criterion_main!(benches);
+criterion_group!(adapter, scene_by_adapter);
+criterion_main!(processor, adapter);
