@@ -257,15 +257,15 @@ pub fn core(text: &str) -> Result<Core, String> {
     Core::new(number).ok_or_else(|| format!("no core {number} on this machine"))
 }
 
-/// Checks `--set KEY=VALUE` against the schema of a plugin.
+/// Checks the values `KEY=VALUE` of an option, such as `--set`, against the schema of a plugin.
 ///
 /// # Errors
 /// If the schema knows no such parameter, or the value is not legal.
-pub fn settings(plugin: &Plugin, sets: &[KeyValue]) -> Result<Vec<Setting>, CommandError> {
+pub fn settings(plugin: &Plugin, option: &str, sets: &[KeyValue]) -> Result<Vec<Setting>, CommandError> {
     let check = |set: &KeyValue| {
         let parameter = set.parameter();
         Setting::parse(plugin.parameters(), &parameter.key, &parameter.value)
-            .map_err(|error| CommandError::Usage(format!("{}: {error}", parameter.location)))
+            .map_err(|error| CommandError::Usage(format!("{option} {}: {error}", parameter.key)))
     };
     sets.iter().map(check).collect()
 }

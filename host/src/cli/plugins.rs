@@ -140,7 +140,7 @@ const TIMED_TICKS: usize = 1000;
 /// What a model says of its own error with some settings, and the time of a tick: where it estimates one, or settings are
 /// given.
 fn print_certificate(plugin: &Plugin, sets: &[KeyValue]) -> Result<(), CommandError> {
-    let settings = settings(plugin, sets)?;
+    let settings = settings(plugin, "--set", sets)?;
     let started = Instant::now();
     let id = &plugin.metadata().id;
     let mut model = match while_preparing(id, || plugin.create_model(&settings)) {

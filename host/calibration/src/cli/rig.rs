@@ -76,8 +76,11 @@ impl RigArguments {
         let registry = self.plugin_path.registry();
         let plugin = registry.load(self.plugin(), PluginKind::Device)?;
         let sensor_plugin = registry.load(&self.sensor_plugin, PluginKind::Device)?;
-        let device_settings = settings(&plugin, &self.sets)?;
-        let sensor_settings = settings(&sensor_plugin, &self.sensor_sets)?;
+        let device_settings = settings(&plugin, "--set", &self.sets)?;
+        if self.sensor_sets.iter().any(|set| set.parameter().key == "port") {
+            return Err(CommandError::Usage("--sensor-set port: `--sensor` is the port".to_owned()));
+        }
+        let sensor_settings = settings(&sensor_plugin, "--sensor-set", &self.sensor_sets)?;
         let port = self.sensor.as_deref().unwrap_or_default();
         let sensor = ForceSensor::open(&sensor_plugin, port, sensor_settings).map_err(refused)?;
         let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));

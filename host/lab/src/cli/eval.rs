@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
         return Err(CommandError::Usage(format!("--out {out}: holds the poses; choose another file")));
     }
     let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
-    let settings = settings(&plugin, &arguments.sets)?;
+    let settings = settings(&plugin, "--set", &arguments.sets)?;
     // A refused setting is told before a long file is read.
     let first = while_preparing(&plugin.metadata().id, || plugin.create_model(&settings))?;
     let details = if arguments.details { first.details() } else { &[] };

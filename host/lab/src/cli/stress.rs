@@ -67,7 +67,7 @@ fn part(word: &str) -> Result<Part, String> {
 
 pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
     let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
-    let settings = settings(&plugin, &arguments.sets)?;
+    let settings = settings(&plugin, "--set", &arguments.sets)?;
     let StressArguments { size, seed, symmetry, .. } = *arguments;
     let options = StressOptions { size, seed, reach: Reach::default(), symmetry };
     let patience = Duration::from_secs_f64(arguments.timeout);

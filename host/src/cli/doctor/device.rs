@@ -27,7 +27,7 @@ pub(super) fn diagnose(
             "--device: `{id}` is a model; `flotor plugins` lists the devices"
         )));
     }
-    let settings = settings(&plugin, sets)?;
+    let settings = settings(&plugin, "--set", sets)?;
     let opened = plugin.open_device(&settings);
     let mut diagnoses = connection(machine, plugin.usb_kinds(), opened.is_ok());
     match opened {
