@@ -220,13 +220,25 @@ programs() {
         -p flotor-haply-service
     python3 -m venv target/programs
     target/programs/bin/pip install --quiet forcedimension-core==1.0.0 pyopenhaptics==1.0.1
-    target/release/flotor lend --api dhd -- target/programs/bin/python tests/programs/dhd.py 60
-    target/release/flotor lend --api openhaptics -- target/programs/bin/python tests/programs/openhaptics.py 60
+    lent dhd target/programs/bin/python tests/programs/dhd.py 60
+    lent openhaptics target/programs/bin/python tests/programs/openhaptics.py 60
     cc -std=c11 -Wall -Wextra -Werror -O2 -o target/programs/phantom tests/c/programs/phantom.c -ldl -lm -lpthread
     target/release/flotor lend --api chai3d -- target/programs/phantom plain 60000
-    target/release/flotor lend --api haply -- python3 tests/programs/haply.py 60
+    lent haply python3 tests/programs/haply.py 60
     haply_examples
     target/release/flotor lend --api haply -- tests/programs/haply.sh target/programs/haply/target/debug/examples
+}
+
+# lent API PROGRAM...: a program on the simulated flotor, which comes as often a second as the loop ticks in the same run.
+lent() {
+    local api=$1 said=target/programs/said summary=target/programs/summary.json
+    shift
+    target/release/flotor lend --api "$api" --json "$summary" -- "$@" | tee "$said"
+    python3 -c 'import json, re, sys
+said, summary = open(sys.argv[1]).read(), json.load(open(sys.argv[2]))
+own_hz, loop_hz = float(re.search(r"ok: ([\d.]+)", said)[1]), summary["ticks"] / summary["wall_s"]
+print(f"{own_hz:.1f} a second, of {loop_hz:.1f} ticks")
+assert own_hz >= 0.995 * loop_hz' "$said" "$summary"
 }
 
 # The examples of Haply's crate, whose sources cargo fetches as those of a dependency.
