@@ -229,16 +229,19 @@ programs() {
     target/release/flotor lend --api haply -- tests/programs/haply.sh target/programs/haply/target/debug/examples
 }
 
-# lent API PROGRAM...: a program on the simulated flotor, which comes as often a second as the loop ticks in the same run.
+# lent API PROGRAM...: a program on the simulated flotor. Its loops a second are the ticks a second of the same run, by half a percent.
 lent() {
     local api=$1 said=target/programs/said summary=target/programs/summary.json
     shift
+    rm -f "$said" "$summary"
     target/release/flotor lend --api "$api" --json "$summary" -- "$@" | tee "$said"
     python3 -c 'import json, re, sys
 said, summary = open(sys.argv[1]).read(), json.load(open(sys.argv[2]))
 own_hz, loop_hz = float(re.search(r"ok: ([\d.]+)", said)[1]), summary["ticks"] / summary["wall_s"]
 print(f"{own_hz:.1f} a second, of {loop_hz:.1f} ticks")
-assert own_hz >= 0.995 * loop_hz' "$said" "$summary"
+assert own_hz >= 0.995 * loop_hz
+# A machine that takes the processor away costs some periods; half of them, or more, would be our own doing.
+assert loop_hz >= 0.9 * summary["rate_hz"]' "$said" "$summary"
 }
 
 # The examples of Haply's crate, whose sources cargo fetches as those of a dependency.
@@ -318,5 +321,8 @@ has_bare_root() {
 
 # Every crate that is meant to be published compiles from its package alone. Needs the network, for the registry's index.
 packages() {
-    cargo publish --workspace --dry-run --locked
+    # What an earlier dry run has unpacked and built of these crates has the same version, and would be taken for them. The registry of
+    # a dry run has no host, and so a folder whose name begins with a dash and its hash.
+    rm -rf target/packages "${CARGO_HOME:-$HOME/.cargo}"/registry/{src,cache}/-*/flotor-*
+    cargo publish --workspace --dry-run --locked --target-dir target/packages
 }
