@@ -55,7 +55,8 @@ impl Board {
     /// # Errors
     /// One sentence: why not, and what to do.
     pub fn open(path: &str) -> Result<Self, String> {
-        let port = Port::open(path, BAUD).map_err(|reason| format!("no board at {path}: {reason}"))?;
+        let port =
+            Port::open(path, BAUD).map_err(|reason| format!("no board at {path}, the `port`: {reason}"))?;
         Ok(Self::on(port))
     }
 

@@ -56,13 +56,22 @@ mod tests {
         let path = theirs.name().expect("a pseudo terminal has a path");
         drop(theirs);
         let _first = Port::open(&path, 9600).expect("it is free");
-        assert_eq!(Port::open(&path, 9600).err(), Some(NotOpened::InUse));
+        let in_use = Port::open(&path, 9600).expect_err("one at a time");
+        assert_eq!(in_use, NotOpened::InUse);
+        assert_eq!(in_use.to_string(), "another program uses it; close that one first");
         let file = tempfile::NamedTempFile::new().expect("there is room");
         let file = file.path().to_str().expect("its name is text");
         assert_eq!(Port::open(file, 9600).err(), Some(NotOpened::NoPort));
         // Root may use every file: the error is that of the system, not asked for here.
         let refused = Error::from(io::Error::from_raw_os_error(13));
-        assert!(matches!(reason("/dev/ttyACM0", refused), NotOpened::Forbidden { .. }));
+        let refused = reason("/dev/ttyACM0", refused);
+        assert!(matches!(refused, NotOpened::Forbidden { .. }));
+        assert!(
+            refused.to_string().starts_with("this user may not use it; add the user to the group"),
+            "{refused}"
+        );
+        let nowhere = Port::open("/dev/nowhere", 9600).expect_err("there is none").to_string();
+        assert!(nowhere.ends_with("; is it connected? `ls /dev/serial/by-id` lists the ports"), "{nowhere}");
     }
 
     #[test]
