@@ -15,6 +15,7 @@ use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{watch, watch_strong};
 use rustix::process::Signal;
+use serialport::{SerialPort, TTYPort};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -231,12 +232,18 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     assert!(ran.error().contains("no force sensor at /dev/null: it is no serial port"), "{}", ran.error());
     for (set, words) in [
         ("timout_ms=50", "--sensor-set timout_ms: no parameter"),
-        ("port=/dev/null", "--sensor-set port: `--sensor` is the port"),
+        ("port=/dev/null", "--sensor-set port: leave it out; `--sensor PORT` sets it"),
     ] {
         let ran = calibrate(&emulator, &sensor, &["vertical", "--sensor-set", set]);
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
         assert!(ran.error().contains(words), "{}", ran.error());
     }
+    // A port that nobody answers at, for as long as the setting says.
+    let (_silent, port) = TTYPort::pair().expect("the system has pseudo terminals");
+    let port = port.name().expect("a pseudo terminal has a path");
+    let sensor = ["--sensor", &port, "--sensor-set", "timeout_ms=50"];
+    let ran = Flotor::with(["calibrate", "vertical", "--device", "maglev"].iter().chain(&sensor)).run();
+    assert!(ran.error().contains("does not answer within 50 ms"), "{}", ran.error());
     let ran = Flotor::with(["calibrate", "vertical", "--device", "maglev"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
 }

@@ -78,7 +78,9 @@ impl RigArguments {
         let sensor_plugin = registry.load(&self.sensor_plugin, PluginKind::Device)?;
         let device_settings = settings(&plugin, "--set", &self.sets)?;
         if self.sensor_sets.iter().any(|set| set.parameter().key == "port") {
-            return Err(CommandError::Usage("--sensor-set port: `--sensor` is the port".to_owned()));
+            return Err(CommandError::Usage(
+                "--sensor-set port: leave it out; `--sensor PORT` sets it".to_owned(),
+            ));
         }
         let sensor_settings = settings(&sensor_plugin, "--sensor-set", &self.sensor_sets)?;
         let port = self.sensor.as_deref().unwrap_or_default();
