@@ -124,7 +124,7 @@ pub struct Spheres {
     poisson_ratio: f64,
     /// Centres from the handle, in its frame, m.
     offsets_m: Vec<DVec3>,
-    /// How a block differs from a half-space under another contact.
+    /// What a block adds to the compliance of a half-space, for a modulus of 1 Pa (m/N); none of a half-space.
     pub beyond: Option<Beyond>,
 }
 

@@ -23,7 +23,7 @@ fn spheres(body: Body, count: usize, spacing_m: f64) -> Spheres {
         let Law::Spheres(spheres) = description.solve().expect("a solid").0 else { panic!("spheres") };
         *spheres
     };
-    // A block takes a second to solve, whatever the number and distance of the spheres.
+    // A block takes a second to solve, whatever the number and distance of the spheres; a half-space is solved each time.
     static ON_CUBE: OnceLock<Spheres> = OnceLock::new();
     if body != Body::Block(CUBE) {
         return solve();
