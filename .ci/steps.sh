@@ -229,7 +229,7 @@ programs() {
     target/release/flotor lend --api haply -- tests/programs/haply.sh target/programs/haply/target/debug/examples
 }
 
-# lent API PROGRAM...: a program on the simulated flotor. Its loops a second are the ticks a second of the same run, by half a percent.
+# lent API PROGRAM...: runs a program on the simulated flotor. It must loop at the tick rate of the same run, to half a percent.
 lent() {
     local api=$1 said=target/programs/said summary=target/programs/summary.json
     shift
@@ -240,7 +240,7 @@ said, summary = open(sys.argv[1]).read(), json.load(open(sys.argv[2]))
 own_hz, loop_hz = float(re.search(r"ok: ([\d.]+)", said)[1]), summary["ticks"] / summary["wall_s"]
 print(f"{own_hz:.1f} a second, of {loop_hz:.1f} ticks")
 assert own_hz >= 0.995 * loop_hz
-# A machine that takes the processor away costs some periods; half of them, or more, would be our own doing.
+# A machine that takes the processor away costs a few periods in a hundred; a library that blocks the loop costs more.
 assert loop_hz >= 0.9 * summary["rate_hz"]' "$said" "$summary"
 }
 

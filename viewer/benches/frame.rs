@@ -242,7 +242,7 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     });
 }
 
-/// The 3D scene at the size of the window, drawn by an adapter: time until it has, not processor time.
+/// The 3D scene at the size of the window, drawn by an adapter: elapsed time until the adapter is done, not processor time.
 fn scene_by_adapter(criterion: &mut Criterion) {
     let Ok(state) =
         std::panic::catch_unwind(|| create_render_state(default_wgpu_setup(), Default::default()))

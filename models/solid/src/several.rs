@@ -124,7 +124,7 @@ pub struct Spheres {
     poisson_ratio: f64,
     /// Centres from the handle, in its frame, m.
     offsets_m: Vec<DVec3>,
-    /// What a block adds to the compliance of a half-space, for a modulus of 1 Pa (m/N); none of a half-space.
+    /// What a block adds to the compliance of a half-space, for a modulus of 1 Pa (m/N). `None` on a half-space.
     pub beyond: Option<Beyond>,
 }
 

@@ -86,18 +86,18 @@ impl Emulator {
         Err(seen)
     }
 
-    /// A controller, and a host that levitates its handle. Once more where the machine held the host up before, for longer than the
-    /// watchdog of the controller bears.
+    /// A controller, and a host that levitates its handle. Starts both again if the machine delays the host so long that the
+    /// watchdog of the controller expires before.
     fn levitating(transport: &'static str, scratch: &Scratch) -> (Self, Owned) {
         for _ in 0..3 {
             let mut emulator = Self::start(transport, &[]);
             let host = emulator.host(scratch);
             match emulator.line_with(&["mode Levitating"]) {
                 Ok(_) => return (emulator, host),
-                Err(seen) => eprintln!("no handle levitates, tried again: {seen:#?}"),
+                Err(seen) => eprintln!("the handle did not levitate; started again: {seen:#?}"),
             }
         }
-        panic!("three hosts, and no handle levitates");
+        panic!("the handle did not levitate with any of three hosts");
     }
 
     /// A scene on this controller. Timings are loose: a test machine may be delayed for long, and none of these

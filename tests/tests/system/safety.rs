@@ -498,16 +498,16 @@ fn a_model_that_hangs_in_a_process_of_its_own_costs_two_ticks_of_force() {
     let hangs = isolated("", "fault = \"hangs\"\nat_tick = 50", "[limits]\nramp_s = 0\nwatchdog_ms = 1000");
     let scene = hangs.replace("duration_s = 0.2", "duration_s = 1");
     let overrun = |run: &Watched| the_model(run).overrun.expect("it is late in every tick from then on");
-    // Once more where the machine held the process of the model up before it hung.
+    // Run again if the machine delays the process of the model before it hangs.
     let mut runs = std::iter::repeat_with(|| watch_in_real_time(&scene)).take(3);
     let run = runs.find(|run| {
         let is_begun = overrun(run).tick >= 50;
         if !is_begun {
-            eprintln!("out before it hung, tried again: {:?}", the_model(run));
+            eprintln!("the model was late before it hung; run again: {:?}", the_model(run));
         }
         is_begun
     });
-    let run = run.expect("three runs, and none came to tick 50");
+    let run = run.expect("one of three runs reaches tick 50");
     assert_eq!(run.outcome.end, RunEnd::Finished);
     assert!(overrun(&run).tick >= 54, "five ticks more than in time: {:?}", the_model(&run));
     assert_force_ends_within_two_ticks(&run, 50);

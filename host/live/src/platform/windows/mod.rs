@@ -2,7 +2,7 @@
 //!
 //! Every program of this machine can reach the port, but only who can read the file knows the secret: by the rights of the
 //! profile that is its user, and administrators. A client that does not send it is rejected, and delays no other.
-//! - `announced`: the file; `connections`; `datagrams`: those of couplings.
+//! - `announced`: the file; `connections`: those of clients; `datagrams`: those of couplings.
 
 mod announced;
 mod connections;
