@@ -1,35 +1,66 @@
 //! A run in one line: equal digests, equal runs.
 
 use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
+use flotor_hal::Wrench;
 use flotor_sync::Words;
 use xxhash_rust::xxh3::Xxh3;
 
 /// Words of a record that depend on the run alone, not on the machine.
 const DIGEST_WORDS: usize = RECORD_WORDS - TIMING_WORDS;
 
-/// Streaming xxh3-64 over what every tick left behind, measured times left out.
+/// The parts of a record that a digest covers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coverage {
+    /// Time, pose, twist, commanded and delivered wrench, events and buttons: equal for a run with and without observers.
+    #[default]
+    Hand,
+    /// Also the wrench and energy of the models, and the energy of the port.
+    Everything,
+}
+
+impl Coverage {
+    /// The record with zeros in the parts that the digest does not cover.
+    #[inline]
+    fn of(self, record: &TickRecord) -> TickRecord {
+        match self {
+            Self::Hand => TickRecord { model: Wrench::ZERO, energy_j: 0.0, port_energy_j: 0.0, ..*record },
+            Self::Everything => *record,
+        }
+    }
+}
+
+/// Streaming xxh3-64 over the records of a run, without measured times.
 ///
 /// The hash runs over the 64-bit words of each record, little endian, in the order of [`TickRecord`], so it
-/// depends neither on the machine nor on how records arrive. Every NaN counts as the same and zero has no sign: processors and
+/// depends neither on the machine nor on how records arrive; a part that the digest does not [cover](Coverage) counts as
+/// zero. Every NaN counts as the same and zero has no sign: processors and
 /// compilers choose these as they please. It distinguishes runs; it is no protection against malice.
 #[derive(Clone, Default)]
 pub struct TraceDigest {
+    coverage: Coverage,
     hash: Xxh3,
     ticks: u64,
 }
 
 impl TraceDigest {
-    /// The digest of no ticks.
+    /// The digest of no ticks, of what the hand gets.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
+    /// The digest of no ticks, of these parts of a record.
+    #[must_use]
+    pub fn covering(coverage: Coverage) -> Self {
+        Self { coverage, ..Self::default() }
+    }
+
     /// Adds the next tick. Real-time: bounded, no allocation.
     pub fn update(&mut self, record: &TickRecord) {
         let mut bytes = [0; DIGEST_WORDS * size_of::<u64>()];
+        let words = self.coverage.of(record).to_words();
         // The shorter side ends the walk: the timing words at the end find no place.
-        for (place, word) in bytes.chunks_exact_mut(size_of::<u64>()).zip(record.to_words()) {
+        for (place, word) in bytes.chunks_exact_mut(size_of::<u64>()).zip(words) {
             place.copy_from_slice(&canonical(word).to_le_bytes());
         }
         self.hash.update(&bytes);

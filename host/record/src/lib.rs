@@ -46,7 +46,7 @@ mod writer;
 mod tests;
 
 pub use container::Damage;
-pub use digest::TraceDigest;
+pub use digest::{Coverage, TraceDigest};
 pub use files::NamedFile;
 pub use messages::{NoMessage, TickMessages, change_from_bytes, change_to_bytes, tick_from_messages};
 pub use reader::{Ending, ReadError, Recording};

@@ -1,9 +1,13 @@
 //! One set of bits (ADR 0012): what runs, replays and tables come to, against the digests in `data/golden.txt`.
 //!
+//! A run has two digests: that of its summary, over what the hand gets, and one over everything, from a recording, which asks
+//! the models for all outputs.
+//!
 //! They are the same on every machine with IEEE doubles, debug or optimised. After a change that means to change numbers:
 //! `FLOTOR_WRITE_GOLDEN=1 cargo test -p flotor-tests golden`. Another processor or system has them through `FLOTOR_RUNNER`
 //! (`flotor_tests::program`).
 
+use flotor_record::{Coverage, Recording, TraceDigest};
 use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -13,6 +17,7 @@ use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::Path;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Scenes that need a device or another host.
@@ -39,12 +44,29 @@ fn output(arguments: &[&str], input: &str) -> String {
     ran.stdout
 }
 
-/// The digest of a run on the virtual clock.
-fn run(arguments: &[&str]) -> String {
-    let always = ["run", "--clock", "virtual", "--seed", "1", "--json", "-"];
+/// Runs on the virtual clock into a recording: the digest of its summary.
+fn recorded_run(arguments: &[&str], recording: &Path) -> String {
+    let recording = recording.display().to_string();
+    let always = ["run", "--clock", "virtual", "--seed", "1", "--json", "-", "--record", &recording];
     let summary: Value =
         serde_json::from_str(&output(&[&always, arguments].concat(), "")).expect("it is JSON");
     summary["trace_digest"].as_str().expect("a digest is text").to_owned()
+}
+
+/// The two digests of a run on the virtual clock.
+fn run(arguments: &[&str]) -> String {
+    let scratch = Scratch::default();
+    let file = scratch.path().join("run.mcap");
+    let of_the_hand = recorded_run(arguments, &file);
+    let digests = [Coverage::Hand, Coverage::Everything].map(|coverage| {
+        let mut digest = TraceDigest::covering(coverage);
+        let records = Recording::open(&file).expect("it was recorded");
+        records.for_each(|record| digest.update(&record.expect("it is whole")));
+        digest.finish()
+    });
+    let [of_the_recorded_hand, of_everything] = digests;
+    assert_eq!(of_the_recorded_hand, of_the_hand, "{arguments:?}");
+    format!("{of_the_hand} {of_everything}")
 }
 
 fn digest_of(text: &str) -> String {
@@ -71,8 +93,9 @@ fn poses() -> String {
 /// A replay by another law: its numbers, but the time it took.
 fn replay() -> String {
     let scratch = Scratch::default();
-    let recording = scratch.path().join("run.mcap").display().to_string();
-    let _ = run(&["--duration", "2s", "--record", &recording]);
+    let recording = scratch.path().join("run.mcap");
+    let _ = recorded_run(&["--duration", "2s"], &recording);
+    let recording = recording.display().to_string();
     let report = output(&["replay", &recording, "--set", "spring.variant=current-length", "--json", "-"], "");
     digest_of(&report.lines().filter(|line| !line.contains("wall_s")).collect::<String>())
 }
@@ -88,7 +111,7 @@ fn all() -> BTreeMap<String, String> {
             .filter(|file| file.extension() == Some("toml".as_ref()))
             .filter(|file| !file.to_string_lossy().ends_with(".test.toml"))
     };
-    let stem = |file: &std::path::Path| file.file_stem().expect("it has a name").display().to_string();
+    let stem = |file: &Path| file.file_stem().expect("it has a name").display().to_string();
     for file in folder("host/scenes").filter(|file| !NOT_VIRTUAL.contains(&stem(file).as_str())) {
         work.push(Box::new(move || {
             entry(format!("scene {}", stem(&file)), run(&[&file.display().to_string()]))
