@@ -51,7 +51,8 @@ impl RunEnd {
     fn of(run: RunState, heart: &Heartbeat) -> Self {
         match (run, heart.bitten()) {
             (RunState::Faulted(Cause::Device(fault)), _) => Self::DeviceFault(fault),
-            (RunState::Faulted(Cause::Watchdog), Some(stuck)) => Self::Watchdog(stuck),
+            // One that was stopped with the whole process has not bitten.
+            (RunState::Faulted(Cause::Watchdog), stuck) => Self::Watchdog(stuck.unwrap_or(heart.now())),
             (RunState::Faulted(Cause::Oscillation), _) => Self::Oscillation,
             (RunState::EmergencyStopped(source), _) => Self::EmergencyStop(source),
             _ => Self::Stopped,

@@ -25,7 +25,7 @@ pub struct RunConfig {
     pub period_ns: u64,
     /// Time over which force fades in and out, ns.
     pub ramp_ns: u64,
-    /// Time without a tick after which force has to fade in again: the hand is not where it was, ns.
+    /// Time without a tick after which the run ends: this process was stopped, and the hand is not where it was, ns.
     pub longest_gap_ns: u64,
     /// Buttons of the device that are emergency stops, one bit each.
     pub emergency_buttons: u32,
@@ -252,9 +252,6 @@ impl Servo {
         stop: &StopSwitch,
         events: &mut Events,
     ) {
-        if tick.dt_ns > self.config.longest_gap_ns {
-            self.change_state(RunEvent::SamplesLost, tick);
-        }
         // An active run with a sample goes on as it is.
         if (self.run, sample) != (RunState::Active, RunEvent::SamplesBack) {
             self.change_state(RunEvent::Time, tick);
@@ -263,7 +260,7 @@ impl Servo {
         if stop.is_stop_asked() {
             self.change_state(RunEvent::StopAsked, tick);
         }
-        if self.heart.bitten().is_some() {
+        if self.heart.bitten().is_some() || tick.dt_ns > self.config.longest_gap_ns {
             self.change_state(RunEvent::Failed(Cause::Watchdog), tick);
         }
         let pressed = buttons & self.config.emergency_buttons != 0;

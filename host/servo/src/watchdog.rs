@@ -8,6 +8,7 @@ use super::clock::{monotonic_ns, sleep_until};
 use super::last_stop::{SignalGuard, TakenSignals, end_dying, is_dying, take_sent};
 use super::realtime::enter_guard_priority;
 use super::stop::StopSwitch;
+use super::watchdog_process::SignOfLife;
 use flotor_core::MOST_DEVICES;
 use flotor_hal::abi::loader::Stopper;
 use std::sync::Arc;
@@ -196,11 +197,14 @@ const LONGEST_COMMAND_NS: u64 = 1_000_000;
 const COMMAND_LOOK_NS: u64 = 20_000;
 /// Looks for which a process may be dying: half a second.
 const DYING_LOOKS: u32 = 500;
+/// Signs of life for the watchdog process within the limit: its patience ends when one is late by the limit.
+const SIGNS_OF_LIFE: u64 = 4;
 /// Looks between two at whether the signals are still the host's: a tenth of a second.
 const SIGNAL_LOOKS: u64 = 100;
 
 /// Starts the watchdog's thread: the `stoppers` of all devices are used when `heart` has not changed for `limit_ns`, or when the
-/// emergency stop is pressed. Not real-time; ends with [`Heartbeat::finish`].
+/// emergency stop is pressed. As long as the thread runs it gives the watchdog process, if there is one, `signs` of life. Not
+/// real-time; ends with [`Heartbeat::finish`].
 ///
 /// # Errors
 /// What the system says if there can be no further thread.
@@ -209,6 +213,7 @@ pub fn start(
     stoppers: Vec<Stopper>,
     stop: StopSwitch,
     limit_ns: u64,
+    signs: Option<SignOfLife>,
 ) -> std::io::Result<JoinHandle<()>> {
     let thread = std::thread::Builder::new().name("flotor-watchdog".to_owned());
     thread.spawn(move || {
@@ -216,6 +221,8 @@ pub fn start(
         enter_guard_priority();
         take_sent();
         let look_ns = (limit_ns / LOOKS).min(LONGEST_LOOK_NS);
+        let sign_ns = limit_ns / SIGNS_OF_LIFE;
+        let mut next_sign_ns = 0;
         let mut last = heart.beat();
         let mut changed_ns = monotonic_ns();
         let mut stopped = false;
@@ -237,6 +244,12 @@ pub fn start(
                 continue;
             }
             let (beat, now_ns) = (heart.beat(), monotonic_ns());
+            if let Some(signs) = &signs
+                && now_ns >= next_sign_ns
+            {
+                signs.give(limit_ns + sign_ns);
+                next_sign_ns = now_ns + sign_ns;
+            }
             if stop.emergency().is_some() && !stopped {
                 heart.silence();
                 stoppers.iter().for_each(Stopper::safe_stop);

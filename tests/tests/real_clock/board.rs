@@ -125,10 +125,13 @@ pub(crate) enum Where {
 
 /// A run of a model on a board for longer than any test waits, recorded.
 pub(crate) fn run_on(board: &Board, scratch: &Scratch, model: &Path, place: Where) -> Flotor {
-    run_with(board, scratch, model, place, "require_independent_stop = true")
+    run_with(board, scratch, model, place, &format!("{PATIENT}\nrequire_independent_stop = true"))
 }
 
-/// The same with another line of `[limits]`.
+/// A watchdog that waits longer than any test.
+pub(crate) const PATIENT: &str = "watchdog_ms = 60000";
+
+/// The same with other lines of `[limits]`.
 pub(crate) fn run_with(board: &Board, scratch: &Scratch, model: &Path, place: Where, limits: &str) -> Flotor {
     let isolation = match place {
         Where::InTheHost => "isolation = \"none\"",
@@ -137,7 +140,7 @@ pub(crate) fn run_with(board: &Board, scratch: &Scratch, model: &Path, place: Wh
     let scene = format!(
         "rate_hz = 1000\nduration_s = 120\n[device]\nplugin = \"haply\"\n[device.parameters]\nport = \"{}\"\n\
          timeout_ms = 9000\n[[model]]\nplugin = \"{}\"\nname = \"culprit\"\n{isolation}\n\
-         [limits]\nforce_n = [3, 3, 0]\nwatchdog_ms = 60000\nramp_s = 0.05\n{limits}\n",
+         [limits]\nforce_n = [3, 3, 0]\nramp_s = 0.05\n{limits}\n",
         board.path,
         model.display(),
     );

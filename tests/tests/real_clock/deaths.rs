@@ -1,7 +1,8 @@
 //! A process that dies takes the force along: seen from a board that keeps its last torque for ever, in its own log.
 
 use crate::board::{
-    Board, FELT_N, PAST, Where, children_of, dies, mark_in, recorded_ticks, run_on, run_with, wait_until,
+    Board, FELT_N, PAST, PATIENT, Where, children_of, dies, mark_in, recorded_ticks, run_on, run_with,
+    wait_until,
 };
 use flotor_tests::TestSize;
 use flotor_tests::program::{Ran, exit_code};
@@ -179,7 +180,8 @@ fn a_host_notices_that_its_watchdog_process_is_gone() {
     let gone = "the watchdog process is gone; nothing stops the devices if this program is killed";
     show_each(&["require_independent_stop = true", ""], |limits| {
         let (board, scratch) = (Board::start(), Scratch::default());
-        let running = run_with(&board, &scratch, dies(), Where::InTheHost, limits).start();
+        let lines = format!("{PATIENT}\n{limits}");
+        let running = run_with(&board, &scratch, dies(), Where::InTheHost, &lines).start();
         board.wait_for_force(0);
         let watchdog = children_of(running.pid());
         assert_eq!(watchdog.len(), 1, "{watchdog:?}");

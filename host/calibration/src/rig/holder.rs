@@ -152,7 +152,7 @@ impl Holder {
         let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
         let Guard { envelope, plausibility, stopper, stop } = guard;
         let heart = Heartbeat::default();
-        start_watchdog(heart.clone(), vec![stopper.clone()], stop.clone(), WATCHDOG_NS)?;
+        start_watchdog(heart.clone(), vec![stopper.clone()], stop.clone(), WATCHDOG_NS, None)?;
         let thread_heart = heart.clone();
         let hold = move || {
             let name = "the device of the rig".to_owned();

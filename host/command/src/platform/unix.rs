@@ -6,8 +6,8 @@ use flotor_servo::platform::{block_signals, leave_sent_signals_to_the_loop, wait
 use rustix::process::{Pid, Signal, getpgrp, kill_process};
 use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
 use signal_hook::consts::{
-    SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU,
-    SIGXFSZ,
+    SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2,
+    SIGVTALRM, SIGXCPU, SIGXFSZ,
 };
 use signal_hook::flag;
 use std::fs::File;
@@ -27,6 +27,10 @@ pub(crate) const INTERRUPTED: i32 = 130;
 /// watchdog together, with the last force held.
 const ENDING: [i32; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP];
 
+/// Signals that suspend a process in the background which writes to its terminal or reads from it, the loop and its watchdog
+/// together: nobody takes them, so that the progress line is written, and a read fails.
+const SUSPENDING: [i32; 2] = [SIGTTIN, SIGTTOU];
+
 /// Signals that ask this process for something.
 pub(crate) struct Requests {
     signals: Vec<i32>,
@@ -44,7 +48,7 @@ impl Requests {
             .filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP))
             .chain([SIGUSR1])
             .collect();
-        block_signals(&signals)?;
+        block_signals(&[&signals[..], &SUSPENDING].concat())?;
         // This thread may wait for a processor while a plugin in the loop keeps it busy.
         leave_sent_signals_to_the_loop()?;
         // A thread that does not block them, because a library has unblocked them, does no harm when it takes one.
@@ -70,7 +74,7 @@ impl Requests {
 /// What the system says.
 pub(crate) fn outlive_requests() -> io::Result<()> {
     let signals = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGXFSZ];
-    block_signals(&[&ENDING[..], &signals].concat())
+    block_signals(&[&ENDING[..], &SUSPENDING, &signals].concat())
 }
 
 /// Whether this process was started with a signal ignored.
@@ -90,8 +94,8 @@ impl KeyTerminal {
     /// `None` where there is no terminal: in a pipe, in the background.
     pub(crate) fn take() -> Option<Self> {
         let terminal = stdin();
-        // Changing the terminal from the background would suspend the process.
-        if !isatty(&terminal) || tcgetpgrp(&terminal).ok()? != getpgrp() {
+        // In the background the terminal is another program's.
+        if !isatty(&terminal) || !is_in_foreground() {
             return None;
         }
         let before = tcgetattr(&terminal).ok()?;
@@ -104,8 +108,16 @@ impl KeyTerminal {
 
 impl Drop for KeyTerminal {
     fn drop(&mut self) {
-        let _ = tcsetattr(stdin(), OptionalActions::Now, &self.before);
+        // In the background the terminal is another program's.
+        if is_in_foreground() {
+            let _ = tcsetattr(stdin(), OptionalActions::Now, &self.before);
+        }
     }
+}
+
+/// Whether the terminal's keys go to this process.
+fn is_in_foreground() -> bool {
+    tcgetpgrp(stdin()).is_ok_and(|group| group == getpgrp())
 }
 
 /// Standard output, kept for the caller alone: who writes there from now on writes to standard error. Not real-time.

@@ -662,10 +662,11 @@ impl Session {
         let loop_stopping = Arc::clone(&stopping);
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
-            if let Some(process) = &watchdog_process {
-                // That it is gone is noticed by who looks on.
+            // That it is gone is noticed by who looks on.
+            let signs = watchdog_process.as_ref().and_then(|process| {
                 let _ = process.follow_this_thread();
-            }
+                process.sign_of_life().ok()
+            });
             let spin = match pacing {
                 Pacing::Host => Some(SpinWindow::measure(period_ns)),
                 Pacing::Device => None,
@@ -678,7 +679,8 @@ impl Session {
                 Some(window) => Schedule::start_real(period_ns, window),
                 None => Schedule::start_paced(period_ns),
             };
-            let watchdog = start_watchdog(loop_heart, stoppers.clone(), loop_stop.clone(), watchdog_ns);
+            let watchdog =
+                start_watchdog(loop_heart, stoppers.clone(), loop_stop.clone(), watchdog_ns, signs);
             let mut runner = Loop::new(servo, schedule, duration_ns).releasing();
             // Without a watchdog nothing is moved.
             // A full queue drops records and counts them: observers never delay the loop.

@@ -145,11 +145,21 @@ pub(super) fn watchdog_process(
             None
         }
     };
+    let process_is_there = process.as_ref().and_then(Option::as_ref);
+    warnings.extend(process_is_there.and_then(WatchdogProcess::shared_group).map(shared_group_warning));
     // One that stops by itself needs nobody.
     if process.is_none() || opened.iter().any(|opened| opened.without_independent_stop().is_some()) {
         warnings.extend(NOT_CAUGHT.map(str::to_owned));
     }
     Ok(process.flatten())
+}
+
+/// Returns the warning that whoever kills a control group kills this program and the watchdog process.
+fn shared_group_warning(group: &str) -> String {
+    format!(
+        "the watchdog process is in the control group `{group}` of this program: nothing stops the devices if all processes of \
+         the group are killed, as at the end of a service or a container, or when memory runs out; `flotor doctor` says what to do"
+    )
 }
 
 /// Loads and opens one device of a scene. Not real-time.

@@ -1,6 +1,7 @@
 //! What `flotor doctor` finds in the files of the kernel.
 
 use crate::cli::doctor::Diagnosis;
+use flotor_servo::watchdog_process::probe_shared_group;
 use std::fs::read_to_string;
 
 /// How a user gets real-time priority.
@@ -10,9 +11,27 @@ pub(crate) const PRIORITY_REMEDY: &str = "as root: `groupadd -f realtime`, `user
 pub(crate) const MEMORY_REMEDY: &str = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - memlock unlimited` \
                 in /etc/security/limits.conf; then log in again";
 
+/// How a user keeps the watchdog process alive when the run is killed with its group.
+const SHARED_GROUP_REMEDY: &str = "start the run where systemd's user or system manager can be reached (`busctl --user status`), or in a \
+                                   group with a writable outer group. In a service: `KillMode=mixed`, `OOMPolicy=continue`, \
+                                   `ManagedOOMPreference=avoid`. In a container: end the run with a signal before the container";
+
 /// What this system has to say beside its cores.
 pub(crate) fn of_the_system() -> Vec<Diagnosis> {
-    vec![isolated_cores(), kernel(), throttling(), governor()]
+    vec![isolated_cores(), kernel(), throttling(), governor(), killed_together()]
+}
+
+/// Whether a kill of all processes of a control group ends the watchdog process with the host.
+fn killed_together() -> Diagnosis {
+    match probe_shared_group() {
+        Ok(None) => Diagnosis::good("watchdog process", "in a control group of its own"),
+        Ok(Some(group)) => Diagnosis::bad(
+            "watchdog process",
+            format!("in the control group `{group}` of the run: a kill of the group leaves the force on"),
+            SHARED_GROUP_REMEDY,
+        ),
+        Err(error) => Diagnosis::bad("watchdog process", error.to_string(), "run the `flotor` of one build"),
+    }
 }
 
 fn isolated_cores() -> Diagnosis {

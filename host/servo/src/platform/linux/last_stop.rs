@@ -33,8 +33,8 @@ const HARMLESS: [c_int; 9] = [
 /// What a timer, a limit or another program sends to the process as a whole.
 const SENT: [c_int; 7] =
     [libc::SIGUSR2, libc::SIGALRM, libc::SIGVTALRM, libc::SIGPROF, libc::SIGXCPU, libc::SIGIO, libc::SIGPWR];
-/// Signals that stay the host's, whatever a plugin does: what is raised, what asks a run to end, the emergency stop.
-const KEPT: [c_int; 13] = [
+/// Signals that stay the host's, whatever a plugin does: what is raised, what asks a run to end or suspends it, the emergency stop.
+const KEPT: [c_int; 15] = [
     libc::SIGSEGV,
     libc::SIGBUS,
     libc::SIGFPE,
@@ -47,6 +47,8 @@ const KEPT: [c_int; 13] = [
     libc::SIGHUP,
     libc::SIGQUIT,
     libc::SIGTSTP,
+    libc::SIGTTIN,
+    libc::SIGTTOU,
     libc::SIGUSR1,
 ];
 /// Numbers of signals, 1 to 64; two of them belong to the C library, which says so.
@@ -271,6 +273,8 @@ fn name_of(signal: c_int) -> Option<&'static str> {
         libc::SIGHUP => "SIGHUP",
         libc::SIGQUIT => "SIGQUIT",
         libc::SIGTSTP => "SIGTSTP",
+        libc::SIGTTIN => "SIGTTIN",
+        libc::SIGTTOU => "SIGTTOU",
         libc::SIGUSR1 => "SIGUSR1",
         libc::SIGPIPE => "SIGPIPE",
         _ => return None,

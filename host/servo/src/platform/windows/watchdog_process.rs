@@ -15,6 +15,16 @@ pub fn is_offered() -> io::Result<()> {
 /// The watchdog process of this host. There is none yet.
 pub enum WatchdogProcess {}
 
+/// Tells the watchdog process that this process runs. There is none yet.
+pub enum SignOfLife {}
+
+impl SignOfLife {
+    /// Announces the next call within this time.
+    pub(crate) fn give(&self, _: u64) {
+        match *self {}
+    }
+}
+
 impl WatchdogProcess {
     /// Starts it for the devices that are stopped by a message; `None` if there are none. Not real-time.
     ///
@@ -30,6 +40,14 @@ impl WatchdogProcess {
         }
     }
 
+    /// Returns what tells the process that this one runs.
+    ///
+    /// # Errors
+    /// None.
+    pub fn sign_of_life(&self) -> io::Result<SignOfLife> {
+        match *self {}
+    }
+
     /// The calling thread runs the loop.
     ///
     /// # Errors
@@ -38,11 +56,25 @@ impl WatchdogProcess {
         match *self {}
     }
 
+    /// Returns the control group that the process shares with the host: this system has none.
+    #[must_use]
+    pub fn shared_group(&self) -> Option<&str> {
+        match *self {}
+    }
+
     /// Whether it has ended before it was told to.
     #[must_use]
     pub fn is_gone(&self) -> bool {
         match *self {}
     }
+}
+
+/// Returns the control group that a watchdog process would share with this process. Not real-time.
+///
+/// # Errors
+/// Always.
+pub fn probe_shared_group() -> io::Result<Option<String>> {
+    is_offered().map(|()| None)
 }
 
 /// Guards the devices of a host.

@@ -1,13 +1,14 @@
 //! The process itself.
 
-use super::{PACKET_BYTES, Packet};
+use super::control_group::leave_those_of;
+use super::{PACKET_BYTES, Packet, bytes_of};
 use crate::realtime::enter_guard_priority;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::{Errno, write};
 use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::net::{RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, SendFlags, recvmsg, send};
-use rustix::process::{Pid, PidfdFlags, getppid, pidfd_open};
+use rustix::process::{Pid, PidfdFlags, getppid, pidfd_open, setsid};
 use std::io::{self, IoSliceMut, Write};
 use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, OwnedFd};
@@ -62,50 +63,94 @@ pub fn serve(host: i32) -> io::Result<()> {
     if getppid() != host_number {
         return Ok(()); // gone, and another one has its number
     }
+    // A kill of the host's session, process group or control group is the host's alone.
+    let _ = setsid();
+    let shared_group = leave_those_of(host).unwrap_or_default();
     enter_guard_priority();
     let _ = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE);
-    send(link.as_fd(), &[Packet::Ready as u8], SendFlags::NOSIGNAL)?;
-    if wait_for_end(link.as_fd(), &process) == Ended::InOrder {
-        return Ok(());
+    send(link.as_fd(), &bytes_of(Packet::Ready, shared_group.as_bytes()), SendFlags::NOSIGNAL)?;
+    let mut watch = Watch { link, process, thread: None, patience: None };
+    let event = loop {
+        match watch.wait_for_event() {
+            // It may go on, and may be killed before: this process stays.
+            Event::HostSilent => {
+                stop(&devices);
+                report("the host does not run", &devices);
+            }
+            event => break event,
+        }
+    };
+    if event == Event::HostGone {
+        stop(&devices);
+        report("the host is gone", &devices);
     }
-    stop(&devices);
-    let names: Vec<String> =
-        devices.iter().map(|device| format!("`{}`", device.name.escape_debug())).collect();
-    let _ = writeln!(io::stderr(), "flotor watchdog: the host is gone; stopped {}", names.join(", "));
     Ok(())
 }
 
-/// How a host ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Ended {
-    InOrder,
-    Gone,
+/// Writes why which devices were stopped to standard error.
+fn report(why: &str, devices: &[Guarded]) {
+    let names: Vec<String> =
+        devices.iter().map(|device| format!("`{}`", device.name.escape_debug())).collect();
+    let _ = writeln!(io::stderr(), "flotor watchdog: {why}; stopped {}", names.join(", "));
 }
 
-/// Waits until the host says that it is over, closes the link, or ends, or the thread of its loop does.
-fn wait_for_end(link: impl AsFd, process: &OwnedFd) -> Ended {
-    let mut thread: Option<OwnedFd> = None;
-    loop {
-        let mut all = vec![PollFd::new(&link, PollFlags::IN), PollFd::new(process, PollFlags::IN)];
-        all.extend(thread.as_ref().map(|thread| PollFd::new(thread, PollFlags::IN)));
-        match poll(&mut all, None) {
-            Ok(_) => {}
-            Err(Errno::INTR) => continue,
-            Err(_) => return Ended::Gone,
-        }
-        if all.first().is_none_or(|said| said.revents().is_empty()) {
-            // Nothing was said, so something has ended. What says that this is in order may be on its way from another thread.
-            let mut link = [PollFd::new(&link, PollFlags::IN)];
-            if !poll(&mut link, Some(&LAST_WORD)).is_ok_and(|seen| seen > 0) {
-                return Ended::Gone;
+/// What happens to a host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Event {
+    EndedInOrder,
+    /// It is there and has given no sign of life in time.
+    HostSilent,
+    HostGone,
+}
+
+/// The watch over a host.
+struct Watch<L> {
+    link: L,
+    process: OwnedFd,
+    /// The thread of the loop.
+    thread: Option<OwnedFd>,
+    /// How long the host may be silent; for ever while it has promised nothing.
+    patience: Option<Timespec>,
+}
+
+impl<L: AsFd> Watch<L> {
+    /// Waits until the host says that it is over, closes the link, or ends, or the thread of its loop does, or until the host has
+    /// been silent for too long.
+    fn wait_for_event(&mut self) -> Event {
+        loop {
+            let Self { link, process, thread, patience } = self;
+            let mut all = vec![PollFd::new(&*link, PollFlags::IN), PollFd::new(&*process, PollFlags::IN)];
+            all.extend(thread.as_ref().map(|thread| PollFd::new(thread, PollFlags::IN)));
+            match poll(&mut all, patience.as_ref()) {
+                Ok(0) => {
+                    self.patience = None;
+                    return Event::HostSilent;
+                }
+                Ok(_) => {}
+                Err(Errno::INTR) => continue,
+                Err(_) => return Event::HostGone,
+            }
+            if all.first().is_none_or(|said| said.revents().is_empty()) {
+                // Nothing was said, so something has ended. What says that this is in order may be on its way from another thread.
+                let mut link = [PollFd::new(&*link, PollFlags::IN)];
+                if !poll(&mut link, Some(&LAST_WORD)).is_ok_and(|seen| seen > 0) {
+                    return Event::HostGone;
+                }
+            }
+            match receive(self.link.as_fd()) {
+                Ok((Some(Packet::End), ..)) => return Event::EndedInOrder,
+                Ok((Some(Packet::Thread), number, _)) => self.thread = thread_of(&number),
+                Ok((Some(Packet::Alive), limit, _)) => self.patience = patience_of(&limit),
+                Ok((Some(Packet::Quiet), ..)) => self.patience = None,
+                _ => return Event::HostGone,
             }
         }
-        match receive(link.as_fd()) {
-            Ok((Some(Packet::End), ..)) => return Ended::InOrder,
-            Ok((Some(Packet::Thread), number, _)) => thread = thread_of(&number),
-            _ => return Ended::Gone,
-        }
     }
+}
+
+/// The longest silence that a sign of life announces.
+fn patience_of(limit_ns: &[u8]) -> Option<Timespec> {
+    Timespec::try_from(Duration::from_nanos(u64::from_le_bytes(limit_ns.try_into().ok()?))).ok()
 }
 
 /// A handle of the thread with this number; nothing before Linux 6.9, which knows processes only.
@@ -193,7 +238,9 @@ mod tests {
 
     #[test]
     fn a_host_that_closes_the_link_is_gone_and_one_that_says_so_has_ended() {
-        for (said, ended) in [(&b"e"[..], Ended::InOrder), (b"", Ended::Gone), (b"x", Ended::Gone)] {
+        for (said, event) in
+            [(&b"e"[..], Event::EndedInOrder), (b"", Event::HostGone), (b"x", Event::HostGone)]
+        {
             let (host, link) =
                 socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None)
                     .expect("two ends");
@@ -203,12 +250,36 @@ mod tests {
                 send(&host, said, SendFlags::NOSIGNAL).expect("it is sent");
             }
             drop(host);
-            assert_eq!(wait_for_end(&link, &own), ended, "{said:?}");
+            assert_eq!(watch(link, own).wait_for_event(), event, "{said:?}");
         }
     }
+
+    fn watch(link: OwnedFd, process: OwnedFd) -> Watch<OwnedFd> {
+        Watch { link, process, thread: None, patience: None }
+    }
+
+    #[test]
+    fn a_host_that_promised_a_sign_of_life_and_gives_none_is_silent_until_it_is_quiet_or_gone() {
+        let (host, link) = socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None)
+            .expect("two ends");
+        let own = pidfd_open(rustix::process::getpid(), PidfdFlags::empty()).expect("this process is there");
+        let mut watch = watch(link, own);
+        let say = |packet: &[u8]| send(&host, packet, SendFlags::NOSIGNAL).expect("it is sent");
+        let alive = [&[Packet::Alive as u8][..], &1_000_000_u64.to_le_bytes()].concat();
+        say(&alive);
+        assert_eq!(watch.wait_for_event(), Event::HostSilent);
+        // Once: nothing more is due until the next sign. One that is quiet may be so for ever.
+        say(&alive);
+        say(&[Packet::Quiet as u8]);
+        say(&[Packet::End as u8]);
+        assert_eq!(watch.wait_for_event(), Event::EndedInOrder);
+        drop(host);
+        assert_eq!(watch.wait_for_event(), Event::HostGone);
+    }
+
     #[test]
     fn a_host_whose_loop_ends_without_a_word_is_gone_however_long_its_other_threads_live() {
-        for (last_words, ended) in [(&b"e"[..], Ended::InOrder), (b"", Ended::Gone)] {
+        for (last_words, event) in [(&b"e"[..], Event::EndedInOrder), (b"", Event::HostGone)] {
             let (host, link) =
                 socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None)
                     .expect("two ends");
@@ -226,11 +297,11 @@ mod tests {
                         send(host, last_words, SendFlags::NOSIGNAL).expect("it is sent");
                     }
                 });
-                let waiting = scope.spawn(|| wait_for_end(&link, &own));
+                let waiting = scope.spawn(|| watch(link, own).wait_for_event());
                 // It waits by now, or will see the thread end all the same.
                 std::thread::sleep(Duration::from_millis(20));
                 begin.send(()).expect("it listens");
-                assert_eq!(waiting.join().expect("it returns"), ended, "{last_words:?}");
+                assert_eq!(waiting.join().expect("it returns"), event, "{last_words:?}");
             });
         }
     }

@@ -1,6 +1,6 @@
 //! The host's side: starts the process, and tells it when it is needed no more.
 
-use super::{PACKET_BYTES, Packet};
+use super::{PACKET_BYTES, Packet, bytes_of};
 use crate::engine::process::parent::program;
 use flotor_hal::Independence;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -12,7 +12,6 @@ use rustix::thread::gettid;
 use std::io::{self, IoSlice};
 use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, OwnedFd};
-use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
 
 /// How long the process may take to be on guard.
@@ -22,6 +21,7 @@ const PATIENCE: Timespec = Timespec { tv_sec: 5, tv_nsec: 0 };
 pub struct WatchdogProcess {
     child: Child,
     link: OwnedFd,
+    shared_group: Option<String>,
 }
 
 impl WatchdogProcess {
@@ -33,28 +33,47 @@ impl WatchdogProcess {
         devices: impl IntoIterator<Item = (&'a str, &'a Independence)>,
     ) -> io::Result<Option<Self>> {
         let by_message = |(name, means): (&'a str, &'a Independence)| match means {
-            Independence::Message { handle, message, .. } => Some((name, handle, message)),
+            Independence::Message { handle, message, .. } => Some((name, handle, &message[..])),
             Independence::Itself { .. } => None,
         };
         let devices: Vec<_> = devices.into_iter().filter_map(by_message).collect();
         if devices.is_empty() {
             return Ok(None);
         }
+        Self::start_for(&devices).map(Some)
+    }
+
+    fn start_for(devices: &[(&str, &OwnedFd, &[u8])]) -> io::Result<Self> {
         let (link, theirs) =
             socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None)?;
         let mut command = Command::new(program()?);
         command.args(["watchdog", "--host", &std::process::id().to_string()]);
-        command.stdin(Stdio::from(theirs)).stdout(Stdio::null()).process_group(0);
+        command.stdin(Stdio::from(theirs)).stdout(Stdio::null());
         let child = command.spawn()?;
         drop(command); // and with it the other end of the link
-        let process = Self { child, link };
+        let mut process = Self { child, link, shared_group: None };
         for (name, handle, message) in devices {
             process.hand_over(handle, message)?;
             process.say(Packet::Name, name.as_bytes())?;
         }
         process.say(Packet::Begin, &[])?;
-        process.wait_until_ready()?;
-        Ok(Some(process))
+        process.shared_group = process.wait_until_ready()?;
+        Ok(process)
+    }
+
+    /// Returns the control group that the process shares with the host, because no way led out of it: whoever kills the group
+    /// kills both.
+    #[must_use]
+    pub fn shared_group(&self) -> Option<&str> {
+        self.shared_group.as_deref()
+    }
+
+    /// Returns what tells the process that this one runs. Not real-time.
+    ///
+    /// # Errors
+    /// The system has no further descriptor.
+    pub fn sign_of_life(&self) -> io::Result<SignOfLife> {
+        Ok(SignOfLife { link: self.link.try_clone()? })
     }
 
     /// The calling thread runs the loop: when it ends without an end in order, the host counts as gone. Not real-time.
@@ -88,21 +107,52 @@ impl WatchdogProcess {
         poll(&mut link, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })).is_ok_and(|seen| seen > 0)
     }
 
-    fn wait_until_ready(&self) -> io::Result<()> {
-        let mut answer = [0; 1];
+    /// Waits until the process is on guard; returns the control group that it could not leave.
+    fn wait_until_ready(&self) -> io::Result<Option<String>> {
+        let mut answer = [0; PACKET_BYTES];
         let mut link = [PollFd::new(&self.link, PollFlags::IN)];
         let is_there = poll(&mut link, Some(&PATIENCE))? > 0;
         let length = if is_there { recv(&self.link, &mut answer, RecvFlags::empty())?.0 } else { 0 };
-        if length == 1 && Packet::of(answer[0]) == Some(Packet::Ready) {
-            return Ok(());
+        match answer.get(..length).and_then(<[u8]>::split_first) {
+            Some((first, group)) if Packet::of(*first) == Some(Packet::Ready) => {
+                Ok(Some(String::from_utf8_lossy(group).into_owned()).filter(|group| !group.is_empty()))
+            }
+            _ => Err(io::Error::other("the watchdog process does not answer")),
         }
-        Err(io::Error::other("the watchdog process does not answer"))
     }
 }
 
-/// A packet, its end cut off if it is too long.
-fn bytes_of(packet: Packet, rest: &[u8]) -> Vec<u8> {
-    std::iter::once(packet as u8).chain(rest.iter().copied()).take(PACKET_BYTES).collect()
+/// Tells the watchdog process that this process runs: the devices are stopped when it does not, because somebody has stopped or
+/// traces it.
+pub struct SignOfLife {
+    link: OwnedFd,
+}
+
+impl SignOfLife {
+    /// Announces the next call within `limit_ns`. Bounded: waits for nobody.
+    pub(crate) fn give(&self, limit_ns: u64) {
+        self.send(&bytes_of(Packet::Alive, &limit_ns.to_le_bytes()));
+    }
+
+    fn send(&self, packet: &[u8]) {
+        // A process that reads nothing is stopped itself, or gone: the run finds that out where it looks at the process.
+        let _ = send(&self.link, packet, SendFlags::NOSIGNAL | SendFlags::DONTWAIT);
+    }
+}
+
+impl Drop for SignOfLife {
+    fn drop(&mut self) {
+        self.send(&[Packet::Quiet as u8]);
+    }
+}
+
+/// Starts a watchdog process without devices and ends it; returns the control group that it shares with this process. Not
+/// real-time.
+///
+/// # Errors
+/// As [`WatchdogProcess::start`].
+pub fn probe_shared_group() -> io::Result<Option<String>> {
+    WatchdogProcess::start_for(&[]).map(|process| process.shared_group.clone())
 }
 
 impl Drop for WatchdogProcess {

@@ -1,10 +1,11 @@
 //! Both ends of the link, and what is said over it.
 
+mod control_group;
 mod guard;
 mod host;
 
 pub use guard::serve;
-pub use host::WatchdogProcess;
+pub use host::{SignOfLife, WatchdogProcess, probe_shared_group};
 
 /// Whether this system has one: it has. Not real-time.
 ///
@@ -31,7 +32,11 @@ enum Packet {
     /// To the process: the number of the thread that runs the loop. A killed process ends with its last thread, which on a busy
     /// machine may wait for its turn; this one has priority.
     Thread = b't',
-    /// From the process: it is on guard.
+    /// To the process: the host runs, and says so again within this many ns. A process that is stopped does not.
+    Alive = b'a',
+    /// To the process: the host says no more that it runs.
+    Quiet = b'q',
+    /// From the process: it is on guard; the control group that it shares with the host, if it could not leave one.
     Ready = b'r',
     /// To the process: the devices are stopped, nobody has to guard them any more.
     End = b'e',
@@ -39,8 +44,21 @@ enum Packet {
 
 impl Packet {
     fn of(byte: u8) -> Option<Self> {
-        [Self::Device, Self::Name, Self::Begin, Self::Thread, Self::Ready, Self::End]
-            .into_iter()
-            .find(|packet| *packet as u8 == byte)
+        const ALL: [Packet; 8] = [
+            Packet::Device,
+            Packet::Name,
+            Packet::Begin,
+            Packet::Thread,
+            Packet::Alive,
+            Packet::Quiet,
+            Packet::Ready,
+            Packet::End,
+        ];
+        ALL.into_iter().find(|packet| *packet as u8 == byte)
     }
+}
+
+/// A packet, its end cut off if it is too long.
+fn bytes_of(packet: Packet, rest: &[u8]) -> Vec<u8> {
+    std::iter::once(packet as u8).chain(rest.iter().copied()).take(PACKET_BYTES).collect()
 }

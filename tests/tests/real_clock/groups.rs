@@ -1,0 +1,164 @@
+//! All processes of a group killed at once, as an out-of-memory daemon, a container and a service manager do it: the watchdog
+//! process has left the group, and takes the force away. Seen from a board that keeps its last torque for ever, in its own log.
+
+use crate::board::{Board, FELT_N, PAST, Where, dies, run_on, run_with, wait_until};
+use flotor_tests::TestSize;
+use flotor_tests::program::exit_code;
+use flotor_tests::scratch::Scratch;
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Tries of a kill, at full size and else.
+const TRIES: [u32; 2] = [50, 4];
+
+fn tries() -> u32 {
+    let [full, quick] = TRIES;
+    if TestSize::of_this_run() == TestSize::Full { full } else { quick }
+}
+
+/// A control group of the test's own in one hierarchy.
+struct ControlGroup(PathBuf);
+
+impl ControlGroup {
+    /// One in each hierarchy in which this process may make one. The memory controller of version 1 is left out: nothing leaves its
+    /// groups, because it kills single processes.
+    fn in_each_hierarchy() -> Vec<Self> {
+        let mounts = std::fs::read_to_string("/proc/mounts").unwrap_or_default();
+        let folder = |line: &str| {
+            let mut fields = line.split(' ').skip(1);
+            let (folder, system) = (fields.next()?, fields.next()?);
+            let is_memory = fields.next()?.split(',').any(|option| option == "memory");
+            (system.starts_with("cgroup") && !is_memory).then(|| PathBuf::from(folder))
+        };
+        let made = |folder: PathBuf| {
+            let group = folder.join(format!("flotor-test-{}", std::process::id()));
+            std::fs::create_dir(&group).ok()?;
+            let made = Self(group);
+            // A group of processor sets takes processes only once it has both.
+            for file in ["cpuset.cpus", "cpuset.mems"] {
+                if let Ok(outer) = std::fs::read_to_string(folder.join(file)) {
+                    std::fs::write(made.0.join(file), outer).ok()?;
+                }
+            }
+            Some(made)
+        };
+        mounts.lines().filter_map(folder).filter_map(made).collect()
+    }
+
+    fn list(&self) -> PathBuf {
+        self.0.join("cgroup.procs")
+    }
+
+    fn processes(&self) -> Vec<Pid> {
+        let list = std::fs::read_to_string(self.list()).expect("it is ours");
+        list.lines().filter_map(|number| Pid::from_raw(number.parse().ok()?)).collect()
+    }
+
+    /// Kills all of it, by the kernel where it can.
+    fn kill(&self) {
+        if std::fs::write(self.0.join("cgroup.kill"), "1").is_err() {
+            for process in self.processes() {
+                let _ = kill_process(process, Signal::KILL);
+            }
+        }
+    }
+}
+
+impl Drop for ControlGroup {
+    fn drop(&mut self) {
+        // A process that has just been killed may be in it for a while.
+        for _ in 0..100 {
+            if std::fs::remove_dir(&self.0).is_ok() {
+                return;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+    }
+}
+
+fn load() -> String {
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    load.split(' ').next().unwrap_or("unknown").to_owned()
+}
+
+#[test]
+fn a_killed_control_group_leaves_no_force() {
+    let _turn = crate::alone();
+    let groups = ControlGroup::in_each_hierarchy();
+    if groups.is_empty() {
+        let _ = writeln!(std::io::stderr(), "skipped: a killed control group: this user may make none");
+        return;
+    }
+    let lists: Vec<String> = groups.iter().map(|group| group.list().display().to_string()).collect();
+    let enter = format!("for list in {}; do echo $$ > $list; done; exec \"$@\"", lists.join(" "));
+    for (attempt, group) in (1..=tries()).zip(groups.iter().cycle()) {
+        let (board, scratch) = (Board::start(), Scratch::default());
+        let running = run_on(&board, &scratch, dies(), Where::InTheHost).through_shell(&enter).start();
+        board.wait_for_force(PAST);
+        assert!(board.force_n() > FELT_N, "{:?}", board.log());
+        assert_eq!(group.processes(), [running.pid()], "only the host is in it: {}", group.0.display());
+        group.kill();
+        let ran = running.wait();
+        assert_eq!(ran.code, None, "{ran:?}");
+        assert!(!ran.stderr.contains("control group"), "it was left: {ran:?}");
+        let after = board.assert_stopped("the group is killed");
+        println!(
+            "{attempt}, {}: no force {after:?} after the last request for one, load {}",
+            group.0.display(),
+            load()
+        );
+    }
+}
+
+#[test]
+fn a_killed_process_group_leaves_no_force() {
+    let _turn = crate::alone();
+    for attempt in 1..=tries() {
+        let (board, scratch) = (Board::start(), Scratch::default());
+        let run = run_on(&board, &scratch, dies(), Where::InTheHost);
+        let running = run.through_shell("exec setsid \"$@\"").start();
+        board.wait_for_force(PAST);
+        kill_process_group(running.pid(), Signal::KILL).expect("it is ours");
+        let _ = running.wait();
+        let after = board.assert_stopped("the process group is killed");
+        println!("{attempt}: no force {after:?} after the last request for one, load {}", load());
+    }
+}
+
+#[test]
+fn a_suspended_host_loses_its_force_and_ends_when_it_goes_on() {
+    let _turn = crate::alone();
+    let (board, scratch) = (Board::start(), Scratch::default());
+    let running = run_with(&board, &scratch, dies(), Where::InTheHost, "watchdog_ms = 100").start();
+    board.wait_for_force(PAST);
+    running.signal(Signal::STOP);
+    let after = board.assert_stopped("the host is suspended");
+    println!("no force {after:?} after the last request for one, load {}", load());
+    let before = board.log().len();
+    running.signal(Signal::CONT);
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
+    assert!(ran.stderr.contains("flotor watchdog: the host does not run; stopped `device`"), "{ran:?}");
+    assert!(ran.stderr.contains("the watchdog stopped the device"), "{ran:?}");
+    let _ = board.assert_stopped("the end");
+    // A command that the host was about to send when it was suspended goes out.
+    let commands = board.log().iter().skip(before).filter(|(_, force_n)| *force_n > 0.0).count();
+    assert!(commands <= 1, "{commands}");
+}
+
+#[test]
+fn a_terminal_cannot_suspend_a_run_in_the_background() {
+    let _turn = crate::alone();
+    let (board, scratch) = (Board::start(), Scratch::default());
+    let running = run_on(&board, &scratch, dies(), Where::InTheHost).start();
+    board.wait_for_force(PAST);
+    for signal in [Signal::TTOU, Signal::TTIN] {
+        running.signal(signal);
+        let before = board.log().len();
+        wait_until("the loop goes on", || board.log().len() > before + PAST);
+    }
+    running.signal(Signal::INT);
+    assert_eq!(running.wait().code, Some(exit_code::OK));
+    let _ = board.assert_stopped("the end");
+}
