@@ -606,7 +606,7 @@ typedef struct FlotorCapabilities {
     double max_force_slew_n_per_s;
     // Fastest change of torque the device accepts, N·m/s.
     double max_torque_slew_nm_per_s;
-    // Largest stiffness the device renders stably at its nominal rate, N/m; 0: it says none.
+    // Largest stiffness the device renders stably at its nominal rate, with the damping it recommends, N/m; 0: unknown.
     double max_stiffness_n_per_m;
     // Slowest and fastest loop the device runs at, Hz.
     double rate_hz[2];

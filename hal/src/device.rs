@@ -262,7 +262,8 @@ pub struct Capabilities {
     pub max_force_slew_n_per_s: f64,
     /// Fastest change of torque the device accepts, N·m/s.
     pub max_torque_slew_nm_per_s: f64,
-    /// Largest stiffness the device renders stably at its nominal rate, N/m; 0: it says none.
+    /// Largest stiffness the device renders stably at its nominal rate, with the damping it recommends, N/m; 0: unknown.
+    /// [`SampledLoop::largest_stiffness`](crate::SampledLoop::largest_stiffness) computes one.
     pub max_stiffness_n_per_m: f64,
     /// Slowest and fastest loop the device runs at, Hz.
     pub rate_hz: [f64; 2],

@@ -37,6 +37,7 @@ pub mod math;
 mod model;
 mod parameter;
 mod refusal;
+mod sampled_loop;
 mod text_file;
 
 pub use abi::Choices;
@@ -71,4 +72,5 @@ pub use glam::{DMat3, DQuat, DVec3};
 pub use model::{Demand, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, StepStatus};
 pub use parameter::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Settings};
 pub use refusal::{Refusal, RefusalKind};
+pub use sampled_loop::{Damper, SampledLoop};
 pub use text_file::{TextProblem, read_text};

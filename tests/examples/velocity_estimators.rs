@@ -97,7 +97,7 @@ fn estimates(
 }
 
 fn noise_m_per_s(estimator: EstimatorKind) -> Result<f64, InvalidParameter> {
-    let parameters = SensingParameters { estimator, latency_ticks: 0, ..SensingParameters::MAGLEV };
+    let parameters = SensingParameters { estimator, latency_ns: 0, ..SensingParameters::MAGLEV };
     let (mut sum, mut count) = (0.0, 0.0);
     for place in 0..PLACES {
         // Golden section: places spread over a millimetre, nowhere near the steps of the sensor.
@@ -113,7 +113,7 @@ fn noise_m_per_s(estimator: EstimatorKind) -> Result<f64, InvalidParameter> {
 fn lag_s(estimator: EstimatorKind) -> Result<f64, InvalidParameter> {
     let parameters = SensingParameters {
         estimator,
-        latency_ticks: 0,
+        latency_ns: 0,
         noise_m: 0.0,
         step_m: 0.0,
         edge_nonlinearity: 0.0,

@@ -77,6 +77,7 @@ fn run(model: &str) -> RunDescription {
             places_m: Vec::new(),
             blend: Blend::default(),
             field: None,
+            latency_s: 0.0,
             settings: Vec::new(),
             parameters: Vec::new(),
             device: 0,

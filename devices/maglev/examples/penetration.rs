@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release -p flotor-maglev --example penetration [PUSH_N]`
 
+use flotor_hal::SampledLoop;
 use flotor_maglev::boundary::Walls;
 use flotor_maglev::facts;
 
@@ -16,7 +17,8 @@ fn main() {
     println!("{:>9} {:>12} {:>10} {:>10}   result", "delay", "stiffness", "at rest", "at most");
     for delay_ms in [0.0, 0.5, 1.0, 2.0] {
         let delay_s = delay_ms * 1.0e-3;
-        let wall = Walls::maker(RADIUS_M).stabilised(PERIOD_S, delay_s).sphere;
+        let wall =
+            Walls::maker(RADIUS_M).stabilised(&SampledLoop { period_s: PERIOD_S, latency_s: delay_s }).sphere;
         let depth = wall.penetration(push_n, 0.0, facts::FLOTOR_MASS_KG[0], PERIOD_S, delay_s);
         let [rest_mm, most_mm] = [depth.at_rest, depth.at_most].map(|metres| metres * 1.0e3);
         let then = if most_mm <= margin_mm { "held" } else { "may end in a landing" };

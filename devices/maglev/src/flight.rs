@@ -12,7 +12,7 @@ use crate::boundary::Wall;
 use crate::host_link::HostLink;
 use crate::protocol::{Condition, Mode, Request, Status};
 use crate::transport::LinkLost;
-use flotor_hal::{DVec3, Wrench};
+use flotor_hal::{DVec3, SampledLoop, Wrench};
 use std::time::{Duration, Instant};
 
 /// Stiffness and damping about home along each axis, N/m and N·s/m, and about each, N·m/rad and N·m·s/rad (client
@@ -143,9 +143,9 @@ impl Holder {
     }
 
     fn command(&self, target: &Target, status: &Status) -> Wrench {
-        let period_s = f64::from(self.period_us) * 1.0e-6;
+        let sampled = SampledLoop { period_s: f64::from(self.period_us) * 1.0e-6, latency_s: self.delay_s };
         let axes = |gains: [Wall; 3], off: DVec3, speed: DVec3| {
-            let [x, y, z] = gains.map(|gain| gain.stabilised(period_s, self.delay_s));
+            let [x, y, z] = gains.map(|gain| gain.stabilised(&sampled, gain.damping));
             let stiffness = DVec3::new(x.stiffness, y.stiffness, z.stiffness) * target.strength;
             let damping = DVec3::new(x.damping, y.damping, z.damping);
             -(off * stiffness) - speed * damping

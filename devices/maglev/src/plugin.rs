@@ -9,7 +9,7 @@ use crate::shaping::Shaping;
 use flotor_hal::{
     ActiveDevice, CalibrationDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, IndependentStop,
     IndependentStopDevice, LoopConfig, OutOfRange, PacingDevice, Parameter, Refusal, SafeStop, SampleWait,
-    Settings, Tick, VerticalCalibration, Wrench, export_device,
+    SampledLoop, Settings, Tick, VerticalCalibration, Wrench, export_device,
 };
 use std::sync::Arc;
 
@@ -213,11 +213,12 @@ impl LevitatingDevice {
     }
 
     fn build_walls(&mut self) {
-        let delay_s = match &self.active {
+        let latency_s = match &self.active {
             Active::Own(device) => device.latency_s(),
             Active::MlApi(_) => MlDevice::latency_s(self.options.lockstep),
         };
-        let walls = self.values.walls().map(|walls| walls.stabilised(self.period_s, delay_s));
+        let sampled = SampledLoop { period_s: self.period_s, latency_s };
+        let walls = self.values.walls().map(|walls| walls.stabilised(&sampled));
         self.shaping().walls = walls;
     }
 }

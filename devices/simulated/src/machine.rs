@@ -1,7 +1,7 @@
 //! Preset `full`: the machine between the controller and the simulated flotor.
 //!
 //! One cycle: the wrench of the last write goes through amplifiers, coils and field and moves the flotor for the
-//! time of the tick; then the cells take a sample, and the one that has come through the latency is handed out.
+//! time of the tick; the cells take a sample, and the one that has come through the latency is returned.
 //! Faults reach in where they would on the real thing. The flotor goes on moving whatever the controller is
 //! told.
 
@@ -85,7 +85,8 @@ impl Machine {
             _ => Wiring::Intact,
         };
         let delivered = self.actuation.drive(commanded, wiring, simulation.state().position_m.z, dt_s);
-        let stopped = self.move_and_sample(simulation, tick, delivered, fault);
+        let (waiting_ticks, early_ns) = self.sensing.latency(tick.dt_ns);
+        let stopped = self.move_and_sample(simulation, tick, delivered, (fault, early_ns));
         state.delivered = flotor_hal::Wrench::new(delivered.force_n, delivered.torque_nm);
         let when = |is: bool, condition| if is { condition } else { Conditions::NONE };
         state.conditions = when(self.actuation.is_saturated(), Conditions::SATURATED)
@@ -104,7 +105,7 @@ impl Machine {
             return Cycle::Fault(fault);
         }
         let late_ticks = usize::from(fault == Some(FaultKind::LateSample));
-        let Sample { taken_ns, pose, velocity } = self.sensing.arrived(late_ticks);
+        let Sample { taken_ns, pose, velocity } = self.sensing.arrived(waiting_ticks + late_ticks);
         let Some(mut pose) = pose else { return Cycle::Fault(Fault::SensorOutOfRange) };
         match fault {
             Some(FaultKind::StuckAxis(axis)) => self.hold(axis, &mut pose),
@@ -119,20 +120,21 @@ impl Machine {
         }
     }
 
-    /// Advances the simulation by the tick and samples at its end, or earlier if the clock stutters; true if the
-    /// motion left every physical range.
+    /// Advances the simulation by the tick and samples `early_ns` before its end, or earlier if the clock has jitter; true
+    /// if the motion left every physical range.
     fn move_and_sample(
         &mut self,
         simulation: &mut Simulation,
         tick: &Tick,
         delivered: Wrench,
-        fault: Option<FaultKind>,
+        (fault, early_ns): (Option<FaultKind>, u64),
     ) -> bool {
-        let early_ns = match fault {
+        let jitter_ns = match fault {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a share of the tick
             Some(FaultKind::ClockJitter) => (self.faults.jitter() * tick.dt_ns as f64) as u64,
             _ => 0,
         };
+        let early_ns = (early_ns + jitter_ns).min(tick.dt_ns);
         let before = simulation.advance(tick.dt_ns - early_ns, delivered);
         let taken_ns = tick.time_ns.saturating_sub(early_ns);
         self.sensing.sample(&simulation.state(), taken_ns, tick.dt_ns as f64 * 1.0e-9);

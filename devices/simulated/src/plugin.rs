@@ -11,10 +11,10 @@ use crate::workspace::{
     TRANSLATION_RANGE_M,
 };
 use flotor_hal::{
-    ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Device, DeviceInfo, DeviceState,
-    EnergyLedger, EnergyLedgerDevice, Fault, IndependentStop, IndependentStopDevice, LoopConfig,
-    PacingDevice, Parameter, Pose, Refusal, SafeStop, SampleWait, Settings, StoppedState, Tick, Twist,
-    VerticalCalibration, export_device,
+    ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Damper, Device, DeviceInfo,
+    DeviceState, EnergyLedger, EnergyLedgerDevice, Fault, IndependentStop, IndependentStopDevice, LoopConfig,
+    PacingDevice, Parameter, Pose, Refusal, SafeStop, SampleWait, SampledLoop, Settings, StoppedState, Tick,
+    Twist, VerticalCalibration, export_device,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -60,8 +60,10 @@ impl SafeStop for CoilSwitch {
 const FORCE_SLEW_N_PER_S: f64 = 55.0e3;
 /// Fastest change of torque, N·m/s: full scale in a millisecond. An estimate; no figure is published.
 const TORQUE_SLEW_NM_PER_S: f64 = 6.3e3;
-/// Tick that the latency in seconds is told for, s; the rate is not known yet when a device is asked.
-const NOMINAL_TICK_S: f64 = 1.0e-3;
+/// Period of the device's own controller, s: a loop at its nominal rate.
+const NOMINAL_PERIOD_S: f64 = 1.0e-3;
+/// Damping of the device's own boundary mode, N·s/m (client program of the University of Utah).
+const RENDERED_DAMPING_NS_PER_M: f64 = 15.0;
 /// Rates the device's controller accepts, Hz (public client of the device's interface).
 const RATE_HZ: [f64; 2] = [100.0, 10_000.0];
 
@@ -99,7 +101,7 @@ impl Device for SimulatedFlotor {
             max_torque_nm: TORQUE_LIMIT_NM.to_array(),
             max_force_slew_n_per_s: FORCE_SLEW_N_PER_S,
             max_torque_slew_nm_per_s: TORQUE_SLEW_NM_PER_S,
-            max_stiffness_n_per_m: STIFFNESS_LIMIT_N_PER_M,
+            max_stiffness_n_per_m: self.largest_stiffness_n_per_m(0.0),
             rate_hz: RATE_HZ,
             latency_s: 0.0,
         };
@@ -107,11 +109,13 @@ impl Device for SimulatedFlotor {
         else {
             return plain;
         };
+        let latency_s = machine.sensing.latency_ns as f64 * 1.0e-9;
         Capabilities {
             resolution_m: machine.sensing.step_m,
             max_force_n: limits.force_n.to_array(),
             max_torque_nm: limits.torque_nm.to_array(),
-            latency_s: machine.sensing.latency_ticks as f64 * NOMINAL_TICK_S,
+            max_stiffness_n_per_m: self.largest_stiffness_n_per_m(latency_s),
+            latency_s,
             ..plain
         }
     }
@@ -141,6 +145,17 @@ impl Device for SimulatedFlotor {
 
     fn parameter(&self, index: usize) -> f64 {
         in_force(&self.setup, &self.values, index)
+    }
+}
+
+impl SimulatedFlotor {
+    /// Returns the largest stiffness that is stable with this latency, with the damping of the boundary mode in both
+    /// directions, and at most the published one.
+    fn largest_stiffness_n_per_m(&self, latency_s: f64) -> f64 {
+        let sampled = SampledLoop { period_s: NOMINAL_PERIOD_S, latency_s };
+        let drag_ns_per_m = self.setup.flotor.drag.translational_ns_per_m;
+        let stable = sampled.largest_stiffness(drag_ns_per_m, Damper::BothWays(RENDERED_DAMPING_NS_PER_M));
+        stable.min(STIFFNESS_LIMIT_N_PER_M)
     }
 }
 

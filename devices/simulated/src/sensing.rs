@@ -25,8 +25,8 @@ use flotor_hal::glam::DVec3;
 use optics::{Optics, OpticsGeometry, Spots};
 use velocity::{Estimator, EstimatorKind, Velocity};
 
-/// Longest delay of a sample, ticks.
-pub const MAX_LATENCY_TICKS: usize = 32;
+/// Samples that are kept: 32 ms at 10 kHz, the newest and one more for a late sample.
+const KEPT_SAMPLES: usize = 322;
 
 /// What the sensing is built from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,8 +41,8 @@ pub struct SensingParameters {
     pub edge_nonlinearity: f64,
     /// Bandwidth of cells and amplifiers, Hz; 0 for no limit.
     pub bandwidth_hz: f64,
-    /// Ticks between a sample and its arrival, at most [`MAX_LATENCY_TICKS`].
-    pub latency_ticks: usize,
+    /// Time between a sample and its arrival, ns, at most 32 ms at 10 kHz.
+    pub latency_ns: u64,
     /// How velocity is estimated.
     pub estimator: EstimatorKind,
 }
@@ -57,7 +57,7 @@ impl SensingParameters {
         step_m: 2.0e-6,
         edge_nonlinearity: 0.01,
         bandwidth_hz: 0.0,
-        latency_ticks: 1,
+        latency_ns: 1_000_000,
         estimator: EstimatorKind::UTAH,
     };
 
@@ -94,7 +94,7 @@ pub struct Sensing {
     /// Spots after the bandwidth limit; none before the first sample.
     slow_spots: Option<Spots>,
     /// The last samples, a ring.
-    samples: [Sample; MAX_LATENCY_TICKS + 1],
+    samples: [Sample; KEPT_SAMPLES],
     newest: usize,
 }
 
@@ -114,7 +114,7 @@ impl Sensing {
             bandwidth: (parameters.bandwidth_hz > 0.0).then(|| Lag::of_bandwidth(parameters.bandwidth_hz)),
             found: *start,
             slow_spots: None,
-            samples: [empty; MAX_LATENCY_TICKS + 1],
+            samples: [empty; KEPT_SAMPLES],
             newest: 0,
         })
     }
@@ -136,12 +136,22 @@ impl Sensing {
         }
     }
 
-    /// The sample that arrives now: the newest but the latency, and `late_ticks` more. Real-time: bounded, no
-    /// allocation.
+    /// Returns how many ticks of `dt_ns` a sample waits before it arrives, and how long before the end of its tick it is
+    /// taken (ns): together the latency. Real-time: bounded, no allocation.
     #[must_use]
-    pub fn arrived(&self, late_ticks: usize) -> Sample {
+    pub fn latency(&self, dt_ns: u64) -> (usize, u64) {
+        let (whole, rest_ns) = match dt_ns {
+            0 => (0, 0),
+            dt_ns => (self.parameters.latency_ns / dt_ns, self.parameters.latency_ns % dt_ns),
+        };
+        (usize::try_from(whole).unwrap_or(usize::MAX), rest_ns)
+    }
+
+    /// Returns the sample `age` ticks before the newest, or the oldest that is kept. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn arrived(&self, age: usize) -> Sample {
         let length = self.samples.len();
-        let age = (self.parameters.latency_ticks + late_ticks).min(length - 1);
+        let age = age.min(length - 1);
         let index = (self.newest + length - age) % length;
         self.samples.get(index).copied().unwrap_or(Sample {
             taken_ns: 0,

@@ -2,7 +2,8 @@
 //!
 //! - [`trace`]: what a tick leaves behind.
 //! - [`mapping`]: between the device frame and a model's frame.
-//! - [`limits`]: limits of force and motion, the wall at the end of a device's range.
+//! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
+//!   a device, in a loop.
 //! - [`plausibility`]: whether a sample can be true.
 //! - [`coupling`]: two devices held together; [`peer`]: what the two ends tell each other.
 //! - [`Change`]: a parameter that changed while the loop ran.
@@ -19,6 +20,7 @@ pub mod oscillation;
 pub mod peer;
 pub mod plausibility;
 mod random;
+pub mod rendered_boundary;
 pub mod trace;
 
 pub use change::{Change, ChangeOutcome, ChangeSubject};

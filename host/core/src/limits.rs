@@ -130,7 +130,7 @@ impl Default for Limits {
 /// A spring-damper wall a little inside the device's range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Boundary {
-    /// How far inside the device's range the wall begins, m.
+    /// How far inside the device's range the wall begins at least, m.
     pub margin_m: f64,
     /// How far inside the device's rotation range the wall begins, rad.
     pub margin_rad: f64,
@@ -146,12 +146,12 @@ pub struct Boundary {
 
 impl Default for Boundary {
     fn default() -> Self {
-        // Half of (b + B) / (T / 2) at 1 kHz without plant damping (Gil et al. 2009): 15 / 0.0005 = 30 kN/m. The
-        // gains 15 N s/m, 50 N m/rad and 0.15 N m s/rad are those of the device's own boundary mode (Utah client).
+        // The largest stiffness at 1 kHz without latency (`SampledLoop`). The gains 15 N s/m, 50 N m/rad and
+        // 0.15 N m s/rad are those of the device's own boundary mode (Utah client).
         Self {
             margin_m: 0.5e-3,
             margin_rad: 0.005,
-            stiffness_n_per_m: 10_000.0,
+            stiffness_n_per_m: 7_500.0,
             damping_ns_per_m: 15.0,
             stiffness_nm_per_rad: 50.0,
             damping_nms_per_rad: 0.15,

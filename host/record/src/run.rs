@@ -54,6 +54,8 @@ pub struct PluginDescription {
     pub blend: Blend,
     /// Of a model that was computed asynchronously: when.
     pub field: Option<FieldTiming>,
+    /// Of a device: the latency that it declares, s; 0 in recordings of earlier versions.
+    pub latency_s: f64,
     /// What scene and command line set, as written, in order: to repeat the run, set these.
     pub settings: Vec<(String, String)>,
     /// Every parameter with the value in force: to know what they were.
@@ -188,6 +190,7 @@ impl PluginDescription {
                 rate_hz: Some(field.rate_hz),
                 latency_s: Some(field.latency_s),
             }),
+            latency_s: matches!(self.role, Role::Device).then_some(self.latency_s),
         }
     }
 
@@ -213,6 +216,7 @@ impl PluginDescription {
             blend,
             device: u16::try_from(plugin.device).map_err(|_| Missing("plugin.device"))?,
             field,
+            latency_s: plugin.latency_s.unwrap_or(0.0),
             name: plugin.name,
             id: plugin.id,
             version: plugin.version,

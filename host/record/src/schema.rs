@@ -190,6 +190,7 @@ messages! {
         blend: Option<Blend> = 9 [message, optional],
         device: u32 = 10 [uint32],
         field: Option<FieldTiming> = 11 [message, optional],
+        latency_s: Option<f64> = 12 [double, optional],
     }
 
     FieldTiming: Copy {

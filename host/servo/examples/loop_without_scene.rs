@@ -4,8 +4,8 @@
 
 use flotor_core::limits::{Boundary, Limits};
 use flotor_core::mapping::{Blend, Mapping, MappingConfig};
-use flotor_hal::LoopConfig;
 use flotor_hal::abi::loader::Plugin;
+use flotor_hal::{LoopConfig, SampledLoop};
 use flotor_servo::{
     Engine, Envelope, Forces, Guarded, Layer, Loop, ParameterQueue, RunConfig, Schedule, Standby, StopSwitch,
     TimeBudget, swap_queues,
@@ -20,11 +20,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let envelope = Envelope::new(&Limits::default(), &Boundary::default(), &capabilities, config.period_ns);
     let device = Guarded { device, capabilities, envelope };
 
+    let sampled =
+        SampledLoop { period_s: config.period_ns as f64 * 1.0e-9, latency_s: capabilities.latency_s };
+
     // The force model, where the handle's home is its own.
     let mut model = Plugin::in_process(&flotor_wall::FLOTOR_ENTRY)?.create_model(&[])?;
     model.prepare(&config)?;
     let instances = vec![(Engine::Here(model), Mapping::new(&MappingConfig::default()))];
-    let layer = Layer::new(instances, &Blend::default(), TimeBudget::default(), &config);
+    let layer = Layer::new(instances, &Blend::default(), TimeBudget::default(), &sampled);
 
     // Nothing is scheduled, and nobody changes anything while it runs.
     let (parameters, _sender, _reports) = ParameterQueue::new(Vec::new(), 1);

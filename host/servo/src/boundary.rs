@@ -3,11 +3,10 @@
 //! The range is an ellipsoid of positions and one of rotation vectors; equal semi-axes make it the sphere of the
 //! thesis's boundary (section 3.2). Nearly every tick is inside, so that is seen first, without a root or an arc.
 //!
-//! Home is always well inside: a margin takes at most half of the range, and along an axis without range there is no wall.
-//! (Pairing has refused a margin that leaves nothing.)
+//! Stiffness and place of the wall are those of a [`RenderedBoundary`].
 
-use flotor_core::limits::Boundary;
-use flotor_hal::{Capabilities, DVec3, DeviceState, Wrench, rotation_vector};
+use flotor_core::rendered_boundary::RenderedBoundary;
+use flotor_hal::{DVec3, DeviceState, Wrench, rotation_vector};
 use std::f64::consts::PI;
 
 /// The wall of one device.
@@ -17,24 +16,20 @@ pub(super) struct BoundaryWall {
 }
 
 impl BoundaryWall {
-    /// A wall the boundary's margin inside the device's range, no stiffer than the device and a loop of this period render
-    /// stably. Not real-time.
-    pub(super) fn new(boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
-        let Boundary {
-            margin_m,
-            margin_rad,
+    /// A wall as it is rendered on a device. Not real-time.
+    pub(super) fn new(rendered: &RenderedBoundary) -> Self {
+        let RenderedBoundary {
+            begins_m,
+            begins_rad,
             stiffness_n_per_m,
             damping_ns_per_m,
             stiffness_nm_per_rad,
             damping_nms_per_rad,
-        } = *boundary;
-        let stiffness_n_per_m = stiffness_n_per_m
-            .min(stable_stiffness(damping_ns_per_m, period_ns))
-            .min(declared(device.max_stiffness_n_per_m));
-        let stiffness_nm_per_rad = stiffness_nm_per_rad.min(stable_stiffness(damping_nms_per_rad, period_ns));
+            ..
+        } = *rendered;
         Self {
-            position: Ellipsoid::new(device.range_m, margin_m, stiffness_n_per_m, damping_ns_per_m),
-            rotation: Ellipsoid::new(device.range_rad, margin_rad, stiffness_nm_per_rad, damping_nms_per_rad),
+            position: Ellipsoid::new(begins_m, stiffness_n_per_m, damping_ns_per_m),
+            rotation: Ellipsoid::new(begins_rad, stiffness_nm_per_rad, damping_nms_per_rad),
         }
     }
 
@@ -66,22 +61,6 @@ impl BoundaryWall {
     }
 }
 
-/// Share of the stiffness at which a sampled wall of a damping begins to add energy, `B / (T / 2)` (Gil et al. 2009, without
-/// damping of the plant).
-const STABILITY_MARGIN: f64 = 0.5;
-
-/// How stiff a wall of this damping may be in a loop of this period. One without a damper is what its scene says: only the
-/// device's own damping can hold it. Not real-time.
-pub(super) fn stable_stiffness(damping: f64, period_ns: u64) -> f64 {
-    let half_a_period_s = 0.5 * period_ns as f64 * 1.0e-9;
-    if damping > 0.0 { STABILITY_MARGIN * damping / half_a_period_s } else { f64::INFINITY }
-}
-
-/// A limit, if the device declares one.
-fn declared(limit: f64) -> f64 {
-    if limit > 0.0 { limit } else { f64::INFINITY }
-}
-
 /// Where translation or rotation may be, and what it meets outside. Metres and newtons, or radians and newton metres.
 struct Ellipsoid {
     /// Without end on an axis without range, so that nothing there is beyond it.
@@ -97,15 +76,9 @@ struct Ellipsoid {
 /// Squared distance from the centre, in semi-axes, below which rounding cannot make an inside of an outside.
 const SURELY_INSIDE: f64 = 1.0 - 1.0e-12;
 
-/// Part of the range that is free of the wall, whatever the margin.
-const LEAST_SHARE_OF_RANGE: f64 = 0.5;
-
 impl Ellipsoid {
-    fn new(range: [f64; 3], margin: f64, stiffness: f64, damping: f64) -> Self {
-        let range = DVec3::from_array(range);
-        let inside = (range - margin).max(range * LEAST_SHARE_OF_RANGE);
-        // Where nobody says how far the handle goes, nobody knows where a wall belongs.
-        let semi_axes = DVec3::select(range.cmpgt(DVec3::ZERO), inside, DVec3::INFINITY);
+    fn new(semi_axes: [f64; 3], stiffness: f64, damping: f64) -> Self {
+        let semi_axes = DVec3::from_array(semi_axes);
         Self { semi_axes, per_semi_axis: semi_axes.recip(), stiffness, damping }
     }
 

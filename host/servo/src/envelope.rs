@@ -16,6 +16,7 @@ use super::passivity::Passivity;
 use super::state::Gate;
 use flotor_core::limits::{Bound, Boundary, Limits};
 use flotor_core::oscillation::Oscillation;
+use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::Events;
 use flotor_coupling::port_energy::Controller;
 use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench};
@@ -54,7 +55,7 @@ impl Envelope {
                 limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
                 limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
             ],
-            wall: BoundaryWall::new(boundary, device, period_ns),
+            wall: BoundaryWall::new(&RenderedBoundary::new(boundary, device, &force_n, period_ns)),
             // Damping the device is known to stand: that of its boundary.
             passivity: Passivity::new(
                 limits.passivity,

@@ -54,6 +54,7 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         places_m: Vec::new(),
         blend: Blend::default(),
         field: None,
+        latency_s: report.latency_s,
         settings: settings.collect(),
         parameters: report.parameters.iter().cloned().chain(named_files(report)).collect(),
     }

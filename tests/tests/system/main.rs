@@ -4,6 +4,7 @@
 mod architecture;
 mod asynchronous_models;
 mod book;
+mod boundary;
 mod c_plugins;
 mod calibration;
 mod campaign;

@@ -65,6 +65,7 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
         places_m: Vec::new(),
         blend: Blend::default(),
         field: None,
+        latency_s: 0.0,
         settings,
         parameters,
         device: 0,

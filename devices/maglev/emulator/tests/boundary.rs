@@ -3,7 +3,7 @@
 //! that bound is beyond the range the controller lands before the sensors lose it.
 #![allow(clippy::cast_possible_truncation)] // f32 is what the wire has
 
-use flotor_hal::{Axes, Capabilities, DQuat, DVec3, DeviceState, Pose, Twist, Wrench};
+use flotor_hal::{Axes, Capabilities, DQuat, DVec3, DeviceState, Pose, SampledLoop, Twist, Wrench};
 use flotor_maglev::boundary::Walls;
 use flotor_maglev::facts;
 use flotor_maglev::protocol::{Condition, Mode, Request, RequestFrame};
@@ -146,7 +146,8 @@ fn pushes_end_at_the_wall_or_in_a_landing() {
         let radius_m = 7.0e-3 + 4.0e-3 * random.below_one();
         let delay_ticks = usize::from(random.below_one() < 0.5);
         let delay_s = PERIOD_S * delay_ticks as f64;
-        let walls = Walls::maker(radius_m).stabilised(PERIOD_S, delay_s);
+        let walls =
+            Walls::maker(radius_m).stabilised(&SampledLoop { period_s: PERIOD_S, latency_s: delay_s });
         let direction = DVec3::from_array([(); 3].map(|()| random.below_one() - 0.5));
         let outward = direction.try_normalize().unwrap_or(DVec3::Z);
         let (push_n, run_up_m) = (MOST_N * random.below_one(), 2.0e-3 * random.below_one());

@@ -4,15 +4,12 @@
 //! Varadharajan 2007, section 3.2 and appendix A). Here, too, with three differences:
 //! - Damping acts once. The program of the thesis damps rotation always, and again beyond the limit.
 //! - Damping in a wall resists going out only: it does not pull a handle that comes back by itself.
-//! - Every stiffness is scaled down to half of what is stable for its damping, period and delay (Gil et al. 2009,
-//!   `K < (b + B) / (T / 2 + delay)`), and the stiffness in force is what is reported.
+//! - Every stiffness is at most [half of what is stable](SampledLoop::largest_stiffness) for its damping, period and
+//!   latency, and the stiffness in force is reported.
 //!
 //! Real-time: bounded, no allocation.
 
-use flotor_hal::{DVec3, DeviceState, Wrench, rotation_vector};
-
-/// How far from the limit of stability a wall stays.
-const STABILITY_MARGIN: f64 = 0.5;
+use flotor_hal::{DVec3, Damper, DeviceState, SampledLoop, Wrench, rotation_vector};
 
 /// A spring and a damper that begin at a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,10 +23,11 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// The same wall with a stiffness that is stable at a period and a delay, s.
+    /// Returns this wall with a stiffness that is stable in a loop. Its damper acts outwards only; `everywhere` of its
+    /// damping (N·s/m or N·m·s/rad) acts in both directions.
     #[must_use]
-    pub fn stabilised(self, period_s: f64, delay_s: f64) -> Self {
-        let most = STABILITY_MARGIN * self.damping / (0.5 * period_s + delay_s);
+    pub fn stabilised(self, sampled: &SampledLoop, everywhere: f64) -> Self {
+        let most = sampled.largest_stiffness(everywhere, Damper::OneWay(self.damping - everywhere));
         Self { stiffness: self.stiffness.min(most), ..self }
     }
 
@@ -140,22 +138,19 @@ impl Walls {
         }
     }
 
-    /// The same walls, each stable at a period and a delay, s.
+    /// Returns these walls, each stable in a loop.
     #[must_use]
-    pub fn stabilised(mut self, period_s: f64, delay_s: f64) -> Self {
-        self.sphere = self.sphere.stabilised(period_s, delay_s);
-        self.planes = self.planes.map(|plane| plane.stabilised(period_s, delay_s));
+    pub fn stabilised(mut self, sampled: &SampledLoop) -> Self {
+        let everywhere = self.rotation_damping_nms_per_rad;
+        self.sphere = self.sphere.stabilised(sampled, 0.0);
+        self.planes = self.planes.map(|plane| plane.stabilised(sampled, 0.0));
         // One damper at a time: the larger, so that the wall is as damped as it was stabilised for.
         for turn in [&mut self.tilt, &mut self.yaw] {
-            turn.damping = turn.damping.max(self.rotation_damping_nms_per_rad);
-            *turn = turn.stabilised(period_s, delay_s);
+            turn.damping = turn.damping.max(everywhere);
+            *turn = turn.stabilised(sampled, everywhere);
         }
-        let spring = Wall {
-            limit: 0.0,
-            stiffness: self.yaw_spring_nm_per_rad,
-            damping: self.rotation_damping_nms_per_rad,
-        };
-        self.yaw_spring_nm_per_rad = spring.stabilised(period_s, delay_s).stiffness;
+        let stable = sampled.largest_stiffness(0.0, Damper::BothWays(everywhere));
+        self.yaw_spring_nm_per_rad = self.yaw_spring_nm_per_rad.min(stable);
         self
     }
 

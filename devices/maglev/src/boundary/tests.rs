@@ -1,7 +1,7 @@
 //! Walls: where they begin, which way they push, and that damping acts once.
 
 use super::{THESIS_ANGLE_LIMIT_RAD, Wall, Walls};
-use flotor_hal::{DQuat, DVec3, DeviceState, Pose, Twist};
+use flotor_hal::{DQuat, DVec3, DeviceState, Pose, SampledLoop, Twist};
 
 fn state(position: DVec3, velocity: DVec3, turn: DVec3, spin: DVec3) -> DeviceState {
     DeviceState {
@@ -59,11 +59,13 @@ fn damping_of_rotation_acts_once() {
 #[test]
 fn no_wall_is_stiffer_than_half_of_what_is_stable() {
     let wall = Wall { limit: 0.0, stiffness: 15_000.0, damping: 15.0 };
-    // (15 N s/m) / (0.5 ms) = 30 kN/m: half of it is what the makers chose.
-    assert_eq!(wall.stabilised(1.0e-3, 0.0).stiffness, 15_000.0);
-    assert_eq!(wall.stabilised(1.0e-3, 1.0e-3).stiffness, 5_000.0);
-    assert_eq!(Wall { damping: 0.0, ..wall }.stabilised(1.0e-3, 0.0).stiffness, 0.0);
-    // 0.15 N m s/rad allow 150 N m/rad without delay and 50 with one of a millisecond.
-    let walls = Walls::maker(11.0e-3).stabilised(1.0e-3, 1.0e-3);
-    assert_eq!(walls.tilt.stiffness, 50.0);
+    let late = |latency_s| SampledLoop { period_s: 1.0e-3, latency_s };
+    // (15 N s/m outwards, 7.5 N s/m in the mean) / (0.5 ms) = 15 kN/m: the makers chose the limit itself.
+    assert_eq!(wall.stabilised(&late(0.0), 0.0).stiffness, 7_500.0);
+    assert_eq!(wall.stabilised(&late(1.0e-3), 0.0).stiffness, 2_500.0);
+    assert_eq!(wall.stabilised(&late(1.0e-3), 15.0).stiffness, 5_000.0, "a damper of both directions");
+    assert_eq!(Wall { damping: 0.0, ..wall }.stabilised(&late(0.0), 0.0).stiffness, 0.0);
+    // 0.15 N m s/rad outwards allow 50 N m/rad with a latency of a millisecond, 0.15 everywhere 100.
+    assert_eq!(Walls::maker(11.0e-3).stabilised(&late(1.0e-3)).tilt.stiffness, 25.0);
+    assert_eq!(Walls::thesis(11.0e-3, 17.0).stabilised(&late(1.0e-3)).tilt.stiffness, 42.5);
 }

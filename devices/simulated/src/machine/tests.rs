@@ -19,7 +19,7 @@ const TRANSPARENT: MachineParameters = MachineParameters {
         noise_m: 0.0,
         step_m: 0.0,
         edge_nonlinearity: 0.0,
-        latency_ticks: 0,
+        latency_ns: 0,
         ..SensingParameters::MAGLEV
     },
     fault: None,

@@ -56,7 +56,7 @@ fn sensing(settings: &Settings<'_>) -> SensingParameters {
         step_m: value("sensor_resolution_um") * UM,
         edge_nonlinearity: value("sensor_edge_percent") * PERCENT,
         bandwidth_hz: value("sensor_bandwidth_hz"),
-        latency_ticks: whole(value("sensor_latency_ticks")),
+        latency_ns: whole(value("sensor_latency_ticks")) as u64 * TICK_OF_THE_SENSORS_NS,
         estimator: estimator(settings),
     }
 }
@@ -99,6 +99,9 @@ fn fault(settings: &Settings<'_>) -> Option<FaultPlan> {
         rate_per_s: value("fault_rate_per_s"),
     })
 }
+
+/// Tick of the latency of the sensors, ns: of the device's own controller.
+const TICK_OF_THE_SENSORS_NS: u64 = 1_000_000;
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the schema keeps it between 0 and 32
 fn whole(number: f64) -> usize {

@@ -273,7 +273,14 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         "Full: bandwidth of the cells (0: no limit; the device as a whole has 125)",
     ),
-    Parameter::real("sensor_latency_ticks", "1", 0.0, 32.0, 1.0, "Full: ticks from a sample to its arrival"),
+    Parameter::real(
+        "sensor_latency_ticks",
+        "1",
+        0.0,
+        32.0,
+        1.0,
+        "Full: ticks from a sample to its arrival, of the device's own 1 kHz at every rate of the loop",
+    ),
     Parameter::choice("velocity", ESTIMATORS, 0, "Full: how velocity is estimated from the poses"),
     Parameter::real(
         "velocity_bandwidth_hz",

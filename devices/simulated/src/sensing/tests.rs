@@ -14,7 +14,7 @@ const IDEAL: SensingParameters = SensingParameters {
     step_m: 0.0,
     edge_nonlinearity: 0.0,
     bandwidth_hz: 0.0,
-    latency_ticks: 0,
+    latency_ns: 0,
     estimator: EstimatorKind::Difference,
     ..SensingParameters::MAGLEV
 };
@@ -106,12 +106,15 @@ fn state(pose: &Pose) -> State {
 
 #[test]
 fn a_sample_arrives_after_its_latency_with_the_time_it_was_taken() {
-    let mut sensing = sensing(&SensingParameters { latency_ticks: 3, ..IDEAL });
+    let mut sensing = sensing(&SensingParameters { latency_ns: 3_400_000, ..IDEAL });
+    assert_eq!(sensing.latency(1_000_000), (3, 400_000));
+    assert_eq!(sensing.latency(4_000_000), (0, 3_400_000));
+    assert_eq!(sensing.latency(250_000), (13, 150_000));
     for tick in 0..10_u32 {
         let truth = pose([0.0, 0.0, 0.1 * f64::from(tick)], [0.0; 3]);
         sensing.sample(&state(&truth), u64::from(tick), TICK_S);
         if tick >= 3 {
-            let sample = sensing.arrived(0);
+            let sample = sensing.arrived(3);
             assert_eq!(sample.taken_ns, u64::from(tick - 3));
             let expected = pose([0.0, 0.0, 0.1 * f64::from(tick - 3)], [0.0; 3]);
             assert_same(&sample.pose.expect("in range"), &expected);

@@ -386,6 +386,7 @@ fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
             isolation: Isolation::None, // no hand is on the device
             field: plugin.field,
             budget_s: None,
+            latency_s: run.devices().nth(usize::from(plugin.device)).map_or(0.0, |device| device.latency_s),
         }),
     };
     run.plugins.iter().filter_map(model).collect()

@@ -10,7 +10,7 @@
 //!   9:011005): a linear rule for little damping, short delay and fast sampling.
 
 use super::search::largest_stable;
-use flotor_hal::math;
+use flotor_hal::{Damper, SampledLoop, math};
 pub use flotor_judge::plant::Plant;
 use std::convert::Infallible;
 use std::f64::consts::PI;
@@ -72,7 +72,8 @@ pub fn passive_limit_n_per_m(damping_ns_per_m: f64, rendering: &Rendering) -> f6
 #[must_use]
 pub fn gil_limit_n_per_m(plant: &Plant, rendering: &Rendering) -> f64 {
     let Rendering { period_s, delay_ticks, virtual_damping_ns_per_m } = *rendering;
-    (plant.damping_ns_per_m + virtual_damping_ns_per_m) / (period_s * (0.5 + f64::from(delay_ticks)))
+    let sampled = SampledLoop { period_s, latency_s: period_s * f64::from(delay_ticks) };
+    sampled.stability_limit(plant.damping_ns_per_m, Damper::BothWays(virtual_damping_ns_per_m))
 }
 
 /// Force to position of a plant whose force is held for a period: `(b1 z + b0) / (z^2 + a1 z + a0)`.

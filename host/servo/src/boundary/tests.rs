@@ -1,10 +1,11 @@
 use super::*;
-use flotor_hal::{Pose, orientation_from_rotation_vector};
+use flotor_core::limits::{Bound, Boundary};
+use flotor_hal::{Capabilities, Pose, orientation_from_rotation_vector};
 
 /// What is surely inside meets no wall, anywhere near the edge of either range.
 #[test]
 fn nothing_that_meets_a_wall_is_taken_for_inside() {
-    let ellipsoid = Ellipsoid::new([0.012, 0.01, 0.0], 0.0005, 1.0e4, 15.0);
+    let ellipsoid = Ellipsoid::new([0.0115, 0.0095, f64::INFINITY], 1.0e4, 15.0);
     let mut outside = 0;
     for step in 0..10_000_u32 {
         let angle = f64::from(step) * 0.37;
@@ -29,7 +30,7 @@ fn a_wall_never_pushes_at_home() {
     {
         let device = Capabilities { range_m: [x, 0.012, z], range_rad: [z, x, 0.12], ..CAPABILITIES };
         let boundary = Boundary { margin_m: margin, margin_rad: margin, ..Boundary::default() };
-        let wall = BoundaryWall::new(&boundary, &device, 1_000_000);
+        let wall = wall(&boundary, &device, 1_000_000);
         let noise = |range: f64| if range > 0.0 { 0.2 * range.min(1.0) } else { 1.0e-3 };
         for share in [0.0, 1.0e-9, 1.0] {
             let mut state = DeviceState::HOME;
@@ -44,7 +45,7 @@ fn a_wall_never_pushes_at_home() {
 /// A planar device that reports a height pushes in its plane only.
 #[test]
 fn an_axis_without_range_has_no_part_in_the_push() {
-    let ellipsoid = Ellipsoid::new([0.05, 0.04, 0.0], 5.0e-4, 1.0e4, 15.0);
+    let ellipsoid = Ellipsoid::new([0.0495, 0.0395, f64::INFINITY], 1.0e4, 15.0);
     let push = ellipsoid.push(DVec3::new(0.0505, 0.0, 0.3), DVec3::Z * 9.0).expect("a millimetre beyond");
     assert!((push - DVec3::X * -10.0).length() < 1.0e-9, "{push}");
 }
@@ -53,7 +54,7 @@ fn an_axis_without_range_has_no_part_in_the_push() {
 fn a_rotation_that_meets_a_wall_is_not_taken_for_inside() {
     let boundary = Boundary::default();
     let device = Capabilities { range_m: [1.0; 3], range_rad: [0.12, 3.0, 0.5], ..CAPABILITIES };
-    let wall = BoundaryWall::new(&boundary, &device, 1_000_000);
+    let wall = wall(&boundary, &device, 1_000_000);
     for step in 0..20_000_u32 {
         let turn = f64::from(step);
         let direction = DVec3::new((turn * 0.7).sin(), (turn * 1.3).cos(), (turn * 0.31).sin());
@@ -64,9 +65,13 @@ fn a_rotation_that_meets_a_wall_is_not_taken_for_inside() {
     }
 }
 
-/// Force of the wall half a millimetre deep in it at a device and a rate, N.
+fn wall(boundary: &Boundary, device: &Capabilities, period_ns: u64) -> BoundaryWall {
+    BoundaryWall::new(&RenderedBoundary::new(boundary, device, &Bound::NONE, period_ns))
+}
+
+/// Force of the wall at the end of the range of a device at a rate, N.
 fn push_n(device: &Capabilities, rate_hz: u64) -> f64 {
-    let wall = BoundaryWall::new(&Boundary::default(), device, 1_000_000_000 / rate_hz);
+    let wall = wall(&Boundary::default(), device, 1_000_000_000 / rate_hz);
     let mut state = DeviceState::HOME;
     state.pose = Pose::new(DVec3::Z * 0.012, DeviceState::HOME.pose.orientation());
     wall.push(&state).map_or(0.0, |push| -push.force().z)
@@ -75,10 +80,140 @@ fn push_n(device: &Capabilities, rate_hz: u64) -> f64 {
 #[test]
 fn the_wall_is_as_stiff_as_device_and_rate_allow() {
     let is = |found: f64, n: f64| assert!((found - n).abs() < 1.0e-9, "{found} is not {n}");
-    is(push_n(&CAPABILITIES, 1000), 5.0); // the default's 10 kN/m
-    is(push_n(&CAPABILITIES, 100), 0.75); // 15 N s/m / 10 ms
-    is(push_n(&Capabilities { max_stiffness_n_per_m: 450.0, ..CAPABILITIES }, 1000), 0.225);
-    is(push_n(&Capabilities { max_stiffness_n_per_m: 0.0, ..CAPABILITIES }, 1000), 5.0); // says nothing
+    is(push_n(&CAPABILITIES, 1000), 10.0); // twice 5 N
+    is(push_n(&CAPABILITIES, 4000), 10.0);
+    is(push_n(&Capabilities { latency_s: 1.0e-3, ..CAPABILITIES }, 1000), 10.0);
+    // Half of the range: 0.5 (15 N s/m / 2) / 5 ms over 6 mm.
+    is(push_n(&CAPABILITIES, 100), 4.5);
+    is(push_n(&Capabilities { max_stiffness_n_per_m: 450.0, ..CAPABILITIES }, 1000), 2.7);
+    is(push_n(&Capabilities { max_stiffness_n_per_m: 0.0, ..CAPABILITIES }, 1000), 10.0); // unknown
+}
+
+/// Handle of a device as its plugin declares it, under a weight that is laid on it at the beginning of the wall.
+struct Handle {
+    name: &'static str,
+    range_m: f64,
+    max_force_n: f64,
+    latency_s: f64,
+    max_stiffness_n_per_m: f64,
+    rates_hz: &'static [u64],
+    /// Mass at the handle (estimate) and damping of the mechanism (a low one).
+    mass_kg: f64,
+    damping_ns_per_m: f64,
+}
+
+/// Declarations of the plugins `falcon`, `inverse3`, `force-dimension` (its nearest range, of an omega) and `touch` (forces and
+/// stiffness as its SDK reports them for a Touch).
+const HANDLES: [Handle; 4] = [
+    Handle {
+        name: "Falcon",
+        range_m: 0.05,
+        max_force_n: 8.0,
+        latency_s: 2.0e-3,
+        max_stiffness_n_per_m: 0.0,
+        rates_hz: &[250, 500, 1000],
+        mass_kg: 0.25,
+        damping_ns_per_m: 0.3,
+    },
+    Handle {
+        name: "Inverse3",
+        range_m: 0.06,
+        max_force_n: 5.0,
+        latency_s: 1.0e-3,
+        max_stiffness_n_per_m: 0.0,
+        rates_hz: &[250, 500, 1000, 2000, 4000],
+        mass_kg: 0.15,
+        damping_ns_per_m: 0.3,
+    },
+    Handle {
+        name: "omega",
+        range_m: 0.055,
+        max_force_n: 12.0,
+        latency_s: 1.0e-3,
+        max_stiffness_n_per_m: 0.0,
+        rates_hz: &[250, 500, 1000, 2000, 4000],
+        mass_kg: 0.25,
+        damping_ns_per_m: 0.3,
+    },
+    Handle {
+        name: "Touch",
+        range_m: 0.035,
+        max_force_n: 3.3,
+        latency_s: 1.0e-3,
+        max_stiffness_n_per_m: 700.0,
+        rates_hz: &[250, 500, 1000],
+        mass_kg: 0.045,
+        damping_ns_per_m: 0.1,
+    },
+];
+
+/// Step of the plant, s: a tick of 4 ms and a latency of 1 ms are multiples of it.
+const STEP_S: f64 = 25.0e-6;
+
+impl Handle {
+    /// Lays a weight on the handle within a second; returns the places (m) along one axis in the last quarter of eight seconds,
+    /// and the place of rest. Fails where the handle leaves its range.
+    ///
+    /// Nine tenths of what the wall takes: at a limit of the force itself nothing more pushes back.
+    fn rests(&self, rate_hz: u64) -> (Vec<f64>, f64) {
+        let device = Capabilities {
+            range_m: [self.range_m; 3],
+            max_force_n: [self.max_force_n; 3],
+            latency_s: self.latency_s,
+            max_stiffness_n_per_m: self.max_stiffness_n_per_m,
+            ..CAPABILITIES
+        };
+        let rendered =
+            RenderedBoundary::new(&Boundary::default(), &device, &Bound::NONE, 1_000_000_000 / rate_hz);
+        assert!(
+            rendered.takes_n > 0.999 * self.max_force_n.min(5.0),
+            "{} at {rate_hz} Hz: {rendered:?}",
+            self.name
+        );
+        let weight_n = 0.9 * rendered.takes_n;
+        let wall = BoundaryWall::new(&rendered);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // counts
+        let [steps, late, all] = [1.0 / (STEP_S * rate_hz as f64), self.latency_s / STEP_S, 8.0 / STEP_S]
+            .map(|count| count.round() as usize);
+        let (mut at, mut speed, mut force_n) = (rendered.begins_m[2], 0.0, 0.0);
+        let mut before = vec![at; late + 1];
+        let mut last = at;
+        let mut seen = Vec::new();
+        for step in 0..all {
+            if step % steps == 0 {
+                let sampled = before[step % before.len()];
+                let estimate = (sampled - last) * rate_hz as f64;
+                last = sampled;
+                let mut state = DeviceState::HOME;
+                state.pose = Pose::new(DVec3::Z * sampled, DeviceState::HOME.pose.orientation());
+                state.twist = flotor_hal::Twist::new(DVec3::Z * estimate, DVec3::ZERO);
+                force_n = wall.push(&state).map_or(0.0, |push| push.force().z.max(-self.max_force_n));
+            }
+            let laid_on_n = weight_n * (step as f64 * STEP_S).min(1.0);
+            speed += (laid_on_n + force_n - self.damping_ns_per_m * speed) / self.mass_kg * STEP_S;
+            at += speed * STEP_S;
+            let length = before.len();
+            before[step % length] = at;
+            assert!(at < self.range_m, "{} at {rate_hz} Hz leaves its range", self.name);
+            if step > all * 3 / 4 {
+                seen.push(at);
+            }
+        }
+        (seen, rendered.begins_m[2] + weight_n / rendered.stiffness_n_per_m)
+    }
+}
+
+/// The oscillation has decayed to a hundredth of the depth.
+#[test]
+fn a_weight_on_the_wall_of_every_kind_of_device_comes_to_rest() {
+    for handle in HANDLES {
+        for rate_hz in handle.rates_hz {
+            let (seen, rest_m) = handle.rests(*rate_hz);
+            let off_m = seen.iter().fold(0.0_f64, |most, at| most.max((at - rest_m).abs()));
+            let depth_m = handle.max_force_n.min(5.0) / 7500.0;
+            assert!(off_m < 0.01 * depth_m, "{} at {rate_hz} Hz: {off_m} m off", handle.name);
+        }
+    }
 }
 
 const CAPABILITIES: Capabilities = Capabilities {

@@ -187,14 +187,14 @@ fn not_a_number_becomes_no_force_and_is_told() {
 fn the_gate_scales_models_and_boundary() {
     let mut envelope = envelope(&Limits::default());
     let mut state = DeviceState::HOME;
-    state.pose = Pose::new(DVec3::new(0.0, 0.0, 0.0117), flotor_hal::DQuat::IDENTITY); // the wall pushes with 2 N
+    state.pose = Pose::new(DVec3::new(0.0, 0.0, 0.0117), flotor_hal::DQuat::IDENTITY); // the wall pushes with 7.75 N
     let mut sent = |models, boundary| {
         let (gate, request) = (Gate { models, boundary }, Wrench::from_force(DVec3::X));
         envelope.last = Wrench::ZERO;
         envelope.apply(&request, gate, &state, &tick(1), &mut Events::NONE.clone()).force()
     };
-    assert!((sent(0.5, 1.0) - DVec3::new(0.5, 0.0, -2.0)).length() < 1.0e-9);
-    assert!((sent(1.0, 0.5) - DVec3::new(1.0, 0.0, -1.0)).length() < 1.0e-9);
+    assert!((sent(0.5, 1.0) - DVec3::new(0.5, 0.0, -7.75)).length() < 1.0e-9);
+    assert!((sent(1.0, 0.5) - DVec3::new(1.0, 0.0, -3.875)).length() < 1.0e-9);
     assert_eq!(sent(0.0, 0.0), DVec3::ZERO);
 }
 
@@ -283,16 +283,16 @@ fn the_wall_pushes_inwards_only_and_only_outside() {
         envelope.last = Wrench::ZERO;
         envelope.apply(&Wrench::ZERO, Gate::OPEN, &state, &tick(1), &mut events).force()
     };
-    let inside = push(DVec3::new(0.0, 0.0, 0.0114), DVec3::Z);
+    let inside = push(DVec3::new(0.0, 0.0, 0.0106), DVec3::Z);
     assert_eq!(inside, DVec3::ZERO);
-    // 0.2 mm beyond the wall at 11.5 mm, 10 kN/m.
+    // 7.5 kN/m from 12 mm - 2 (5 N) / (7.5 kN/m) = 10.67 mm on.
     let outside = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::ZERO);
-    assert!((outside - DVec3::new(0.0, 0.0, -2.0)).length() < 1.0e-9, "{outside}");
+    assert!((outside - DVec3::new(0.0, 0.0, -7.75)).length() < 1.0e-9, "{outside}");
     let leaving = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::Z * 0.1);
-    assert!((leaving.z + 3.5).abs() < 1.0e-9, "damping resists going out: {leaving}");
+    assert!((leaving.z + 9.25).abs() < 1.0e-9, "damping resists going out: {leaving}");
     let returning = push(DVec3::new(0.0, 0.0, 0.0117), DVec3::Z * -10.0);
     assert!(
-        (returning.z + 2.0).abs() < 1.0e-9,
+        (returning.z + 7.75).abs() < 1.0e-9,
         "and does not pull a handle out that comes back: {returning}"
     );
     let sideways = push(DVec3::new(0.00936, 0.0, 0.00702), DVec3::ZERO); // 11.7 mm at 3:4

@@ -3,15 +3,14 @@
 //! It belongs to the model's share: it fades, yields and goes with the model. The [boundary](crate) of the device
 //! stands beside it; whichever is nearer is felt first.
 
-use crate::boundary::stable_stiffness;
 use flotor_core::mapping::Mapping;
-use flotor_hal::{DVec3, LoopConfig, Pose, Twist, WorkspaceBounds, Wrench};
+use flotor_hal::{DVec3, Damper, Pose, SampledLoop, Twist, WorkspaceBounds, Wrench};
 
 /// Damping of the wall, N·s/m: that of the device's own boundary mode (client program of the University of Utah).
 const DAMPING_NS_PER_M: f64 = 15.0;
 
-/// Its stiffness at 1 kHz and faster, N/m: that of the [boundary](flotor_core::limits::Boundary).
-const MOST_STIFFNESS_N_PER_M: f64 = 10_000.0;
+/// Largest stiffness of the wall, N/m: that of the [boundary](flotor_core::limits::Boundary) at 1 kHz.
+const MOST_STIFFNESS_N_PER_M: f64 = 7_500.0;
 
 /// True if a wall at the end of a model in this place would push a handle at the home of its device. Real-time: bounded, no
 /// allocation.
@@ -27,9 +26,10 @@ pub(super) struct EndWall {
 }
 
 impl EndWall {
-    /// A wall as stiff as the period allows; `None` for a model that has no end. Not real-time.
-    pub(super) fn new(bounds: &WorkspaceBounds, mapping: &Mapping, config: &LoopConfig) -> Option<Self> {
-        let stable_n_per_m = stable_stiffness(DAMPING_NS_PER_M, config.period_ns);
+    /// A wall as stiff as the loop allows; `None` for a model that has no end. Not real-time.
+    pub(super) fn new(bounds: &WorkspaceBounds, mapping: &Mapping, sampled: &SampledLoop) -> Option<Self> {
+        // The damping of the device is not known.
+        let stable_n_per_m = sampled.largest_stiffness(0.0, Damper::OneWay(DAMPING_NS_PER_M));
         let stiffness_n_per_m = MOST_STIFFNESS_N_PER_M.min(stable_n_per_m);
         bounds.is_bounded().then(|| {
             let mut wall = Self { bounds: WorkspaceBounds::UNBOUNDED, stiffness_n_per_m };

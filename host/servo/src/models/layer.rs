@@ -8,7 +8,7 @@ use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    DVec3, Demand, DeviceState, Input, LoopConfig, Memory, Output, RegionShape, StepStatus, Tick, Wrench,
+    DVec3, Demand, DeviceState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick, Wrench,
 };
 
 /// How a plugin swapped in for a model has behaved so far, in all its places.
@@ -134,17 +134,17 @@ pub struct LayerReport {
 impl Layer {
     /// A model's instances, each with its mapping, and the time they may take together. Not real-time.
     ///
-    /// Where a model ends, there is a wall as stiff as a loop of this `config` allows.
+    /// Where a model ends, there is a wall as stiff as the loop allows.
     pub fn new(
         instances: Vec<(Engine, Mapping)>,
         blend: &Blend,
         budget: TimeBudget,
-        config: &LoopConfig,
+        sampled: &SampledLoop,
     ) -> Self {
         let served = |(model, _): &(Engine, Mapping)| Demand::ALL.limited_to(model.serves());
         let demand = instances.first().map_or(Demand::ALL, served);
         let object = |(mut model, mapping): (Engine, Mapping)| {
-            let end = EndWall::new(&model.workspace_bounds(), &mapping, config);
+            let end = EndWall::new(&model.workspace_bounds(), &mapping, sampled);
             Object { model, mapping, end, last: None, stepped_at: None, float_changes: 0, is_out: false }
         };
         let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();

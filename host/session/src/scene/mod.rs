@@ -121,6 +121,8 @@ pub struct ModelUse {
     pub field: Option<FieldTiming>,
     /// Longest time a step may take, s; `None`: half a period in real time, anything on the virtual clock.
     pub budget_s: Option<f64>,
+    /// Latency that its device declares, s; 0 until a session has opened the device.
+    pub latency_s: f64,
 }
 
 /// What stands between a model and the host.
@@ -284,6 +286,7 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
         isolation,
         field,
         budget_s: budget_us.map(|microseconds| microseconds * 1.0e-6),
+        latency_s: 0.0,
     };
     let only = on.len() == 1;
     let on_device = |number: u16| {

@@ -29,11 +29,12 @@ use flotor_core::Change;
 use flotor_core::MOST_DEVICES;
 use flotor_core::limits::Limits;
 use flotor_core::plausibility::ImplausibleSamples;
+use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_coupling::{Line, Patience, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
-use flotor_hal::{Capabilities, Embodiment, EnergyLedger, Fault, LoopConfig, Parameter, SoftRange};
+use flotor_hal::{Axes, Capabilities, Embodiment, EnergyLedger, Fault, LoopConfig, Parameter, SoftRange};
 use flotor_hal::{Pose, Twist, Wrench};
 use flotor_live::{Directory, Pressed, WrenchLimits};
 use flotor_servo::last_stop::TakenSignals;
@@ -143,6 +144,8 @@ pub struct PluginReport {
     pub parameters: Vec<(String, String)>,
     /// Where each parameter is usefully moved by hand; none for what is no number.
     pub soft_ranges: Vec<Option<SoftRange>>,
+    /// Latency that a device declares, s; 0 of a model.
+    pub latency_s: f64,
     /// Signals of the host that it took away while it was made, and that were taken back.
     pub signals_taken: TakenSignals,
     /// What a model says of its own error when it is ready ([`crate::estimates`]), by name.
@@ -217,6 +220,7 @@ pub struct Session {
     /// Of the devices, in order, as scene and device allow: without the host's ceiling.
     strong_envelopes: Vec<Envelope>,
     norm_notice: Option<String>,
+    boundary_notices: Vec<String>,
     warnings: Vec<String>,
     /// Stops what has a means of its own to be stopped, if this process is gone (real clock only).
     watchdog_process: Option<WatchdogProcess>,
@@ -352,6 +356,8 @@ impl Session {
             opened.iter().map(|device| device.embodiment == Embodiment::Simulated).collect();
         for model in &mut scene.models {
             prepare::settle_isolation(model, options.clock, &simulated);
+            let device = opened.get(usize::from(model.device));
+            model.latency_s = device.map_or(0.0, |device| device.capabilities.latency_s);
         }
         let scene = &scene;
         let mut models = Vec::new();
@@ -396,6 +402,14 @@ impl Session {
             StrongDevice::of(names, opened.embodiment, &scene.limits, &opened.capabilities)
         });
         let strong_devices = strong_devices.collect();
+        let boundary_notices =
+            scene.devices.iter().zip(&capabilities).filter_map(|(device, capabilities)| {
+                let wall =
+                    RenderedBoundary::new(&scene.boundary, capabilities, &scene.limits.force_n, period_ns);
+                let is_driven = capabilities.actuated != Axes::NONE;
+                wall.notice().filter(|_| is_driven).map(|notice| format!("`{}`: {notice}", device.name))
+            });
+        let boundary_notices = boundary_notices.collect();
         let devices = opened.into_iter().map(|opened| {
             let limits = under_ceiling(&scene.limits, opened.embodiment);
             let envelope = guard(&limits, &opened.capabilities);
@@ -436,6 +450,7 @@ impl Session {
             strong_devices,
             strong_envelopes,
             norm_notice: norm_notice(&scene.limits, &capabilities),
+            boundary_notices,
             warnings,
             watchdog_process,
             requires_independent_stop: scene.limits.require_independent_stop,
@@ -478,7 +493,7 @@ impl Session {
     #[must_use]
     pub fn notices(&self) -> Vec<String> {
         let strong = self.strong_devices.iter().map(|device| device.notice(self.strength));
-        self.norm_notice.iter().cloned().chain(strong).collect()
+        self.norm_notice.iter().chain(&self.boundary_notices).cloned().chain(strong).collect()
     }
 
     /// What people should know before this runs, a sentence each.

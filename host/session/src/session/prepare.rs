@@ -17,7 +17,8 @@ use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting, Stopper};
 use flotor_hal::{
-    Axes, Capabilities, Embodiment, Independence, LoopConfig, Parameter, ParameterKind, Refusal, SoftRange,
+    Axes, Capabilities, Embodiment, Independence, LoopConfig, Parameter, ParameterKind, Refusal, SampledLoop,
+    SoftRange,
 };
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
@@ -188,6 +189,7 @@ pub(super) fn open_device(
         calibrate(&plugin, &mut device, calibration)?;
     }
     report.signals_taken = signals.put_back();
+    report.latency_s = capabilities.latency_s;
     let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
     Ok((Opened { device, capabilities, embodiment, independence }, report))
 }
@@ -323,7 +325,8 @@ impl Making {
             (_, None) => TimeBudget::new(budget_ns),
             (_, Some(_)) => TimeBudget::default(),
         };
-        Ok((Layer::new(instances, &model.blend, budget, config), values, estimates))
+        let sampled = SampledLoop { period_s: config.period_ns as f64 * 1.0e-9, latency_s: model.latency_s };
+        Ok((Layer::new(instances, &model.blend, budget, &sampled), values, estimates))
     }
 
     /// One instance, wherever it is to run.
@@ -436,6 +439,7 @@ fn report(
         settings: written.collect(),
         soft_ranges: soft_ranges(plugin, &parameters),
         parameters,
+        latency_s: 0.0,
         signals_taken: TakenSignals::default(),
         estimates: Vec::new(),
     }

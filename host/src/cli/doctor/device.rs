@@ -4,6 +4,8 @@ use super::Diagnosis;
 use crate::platform::usb::{Machine, connection};
 use flotor_command::CommandError;
 use flotor_command::options::{KeyValue, settings};
+use flotor_core::limits::{Bound, Boundary};
+use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, OpenedDevice, Plugin};
 use flotor_hal::{Axes, Capabilities, Independence, Refusal};
@@ -44,7 +46,10 @@ fn abilities(plugin: &Plugin, device: &mut OpenedDevice) -> Vec<Diagnosis> {
     let mut diagnoses =
         vec![Diagnosis::good("opening", format!("{} is open, without force", plugin.metadata().name))];
     match device.capabilities() {
-        Ok(capabilities) => diagnoses.push(Diagnosis::good("axes", axes(&capabilities))),
+        Ok(capabilities) => {
+            diagnoses.push(Diagnosis::good("axes", axes(&capabilities)));
+            diagnoses.push(Diagnosis::good("boundary wall", boundary_wall(&capabilities)));
+        }
         Err(refusal) => diagnoses.push(Diagnosis::told("axes", refusal.to_string())),
     }
     diagnoses.push(without_its_host(device.independent_stop()));
@@ -75,6 +80,14 @@ fn not_stopped(found: impl Into<String>) -> Diagnosis {
         found,
         "keep a hand at its power switch; `[limits] require_independent_stop = true` refuses such a device",
     )
+}
+
+/// Returns the wall of a scene without `[limits]` and `[boundary]`, at 1 kHz or the nearest rate of the device.
+fn boundary_wall(device: &Capabilities) -> String {
+    let [slowest, fastest] = device.rate_hz;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a rate of a device is not zero
+    let period_ns = (1.0e9 / 1000.0_f64.min(fastest).max(slowest)).round() as u64;
+    RenderedBoundary::new(&Boundary::default(), device, &Bound::NONE, period_ns).to_string()
 }
 
 fn axes(told: &Capabilities) -> String {

@@ -1,0 +1,83 @@
+//! A weight laid on the boundary wall of the simulated flotor comes to rest, whatever its sensors' latency and the rate.
+
+use flotor_core::limits::{Bound, Boundary};
+use flotor_core::rendered_boundary::RenderedBoundary;
+use flotor_hal::Capabilities;
+use flotor_servo::{Clock, RunEnd};
+use flotor_tests::watched::{prepared, watch};
+
+/// Run of an open hand that starts at the wall, under a load.
+fn scene(preset: &str, latency_ticks: u32, rate_hz: u32, start_mm: f64, load_n: f64) -> String {
+    let latency = match preset {
+        "full" => format!("sensor_latency_ticks = {latency_ticks}"),
+        _ => String::new(),
+    };
+    format!(
+        r#"
+duration_s = 4
+rate_hz = {rate_hz}
+[device]
+plugin = "simulated"
+[device.parameters]
+preset = "{preset}"
+hand = "open"
+start_z_mm = {start_mm}
+{latency}
+[[model]]
+plugin = "load"
+[model.parameters]
+kind = "felt"
+force_n = {load_n}
+"#
+    )
+}
+
+/// The wall of the flotor: 12 mm of range, and a limit of force far above 5 N.
+fn wall(latency_ticks: u32, rate_hz: u32) -> RenderedBoundary {
+    let flotor = Capabilities {
+        range_m: [0.012; 3],
+        max_force_n: [50.0; 3],
+        latency_s: f64::from(latency_ticks) * 1.0e-3,
+        ..Capabilities::UNDRIVEN
+    };
+    RenderedBoundary::new(&Boundary::default(), &flotor, &Bound::NONE, 1_000_000_000 / u64::from(rate_hz))
+}
+
+#[test]
+fn a_weight_laid_on_the_boundary_comes_to_rest() {
+    for rate_hz in [250, 500, 1000, 2000, 4000] {
+        for (preset, latency_ticks) in [("plain", 0), ("full", 0), ("full", 1), ("full", 2), ("full", 3)] {
+            let wall = wall(latency_ticks, rate_hz);
+            let load_n = wall.takes_n;
+            let what = format!("{preset}, {latency_ticks} ticks, {rate_hz} Hz, {load_n:.2} N");
+            let text = scene(preset, latency_ticks, rate_hz, -wall.begins_m[2] * 1.0e3, load_n);
+            let notices = prepared(Clock::Virtual, &text).notices();
+            let says_the_force =
+                notices.iter().any(|notice| notice.contains(&format!("takes {load_n:.1} N instead")));
+            assert_eq!(says_the_force, load_n < 4.999, "{what}: {notices:?}");
+            let run = watch(&text);
+            assert_eq!(run.outcome.end, RunEnd::Finished, "{what}");
+            let last = run.records.get(run.records.len() * 3 / 4..).unwrap_or_default();
+            let heights = || last.iter().map(|record| record.pose.position().z);
+            let (lowest, highest) =
+                (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+            let depth_m = load_n / wall.stiffness_n_per_m;
+            // At rest but for the noise of the sensors: a limit cycle has tenths of the depth.
+            assert!(highest - lowest < 0.03 * depth_m, "{what}: {lowest} to {highest}, depth {depth_m}");
+            let middle = 0.5 * (lowest + highest);
+            let rest_m = -(wall.begins_m[2] + depth_m);
+            // The field of preset full is uneven.
+            let is_there = (middle - rest_m).abs() < 0.03 * depth_m;
+            assert!(preset == "full" || is_there, "{what}: {middle}, not {rest_m}");
+        }
+    }
+}
+
+/// A cap that acts is reported before the run; a wall as the scene says is not.
+#[test]
+fn a_softer_wall_than_the_scene_says_is_reported_at_the_start() {
+    let notices = |preset| prepared(Clock::Virtual, &scene(preset, 1, 1000, 0.0, 1.0)).notices();
+    assert_eq!(notices("plain"), Vec::<String>::new());
+    let told = notices("full");
+    assert!(told.iter().any(|told| told.contains("2500 N/m instead of 7500")), "{told:?}");
+}
