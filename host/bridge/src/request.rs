@@ -111,7 +111,7 @@ impl Request {
     #[must_use]
     pub fn of_ask(ask: Ask) -> Option<Self> {
         match ask {
-            Ask::Watch { .. } | Ask::LookAway | Ask::Swap { .. } => None,
+            Ask::Watch { .. } | Ask::LookAway | Ask::Swap { .. } | Ask::MachineStop => None,
             Ask::Set { values } => Some(Request::Set { values }),
             Ask::Weight { model, weight } => Some(Request::Weight { model, weight }),
             Ask::Stop => Some(Request::Stop),

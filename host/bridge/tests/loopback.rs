@@ -138,7 +138,7 @@ fn requests_reach_the_host_and_its_message_come_back() {
     assert_eq!(errand.run(set("gamma")), Err("no parameter `gamma`; did you mean `gamma_n`?".to_owned()));
     assert_eq!(errand.run(Request::EmergencyStop), Ok(()));
     let asked = host.asked.0.lock().unwrap().clone();
-    assert!(matches!(asked.as_slice(), [Ask::Set { .. }, Ask::Set { .. }, Ask::EmergencyStop]), "{asked:?}");
+    assert!(matches!(asked.as_slice(), [Ask::Set { .. }, Ask::Set { .. }, Ask::MachineStop]), "{asked:?}");
     // Starting is the owner's, and this bridge does not let anybody.
     let refused = errand.run(Request::Start).unwrap_err();
     assert!(refused.contains("does not take `start`"), "{refused}");
@@ -218,7 +218,7 @@ fn a_flood_of_requests_is_cut_short_and_the_emergency_stop_gets_past() {
         assert_eq!(remote.errand().run(Request::EmergencyStop), Ok(()));
     });
     let asked = host.asked.0.lock().unwrap();
-    assert!(asked.contains(&Ask::EmergencyStop) && asked.len() < 64, "{} requests", asked.len());
+    assert!(asked.contains(&Ask::MachineStop) && asked.len() < 64, "{} requests", asked.len());
 }
 
 #[test]

@@ -8,7 +8,7 @@ use common::process::Owned;
 use common::{FakeHost, tools, wait_until};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
-use flotor_live::Ask;
+use flotor_live::{Ask, LatchState};
 use std::collections::BTreeSet;
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
@@ -136,13 +136,13 @@ fn by_default_another_user_can_do_nothing_and_this_one_can() {
     });
     assert!(!stranger.forges(&endpoint), "it has no session");
     assert_eq!(asked(), [], "the host heard of none of it");
-    assert_eq!(host.directory.latch().state().presses, 0);
+    assert_eq!(host.directory.latch().state(), LatchState::default());
 
     let does = |ask: &[&str]| is_done(bridge(&runtime).args(["ask", "lab"]).args(ask));
     for ask in [&["set", "spring.gamma_n=30"][..], &["stop"], &["emergency-stop"]] {
         assert!(does(ask), "{ask:?}");
     }
-    assert!(matches!(&asked()[..], [Ask::Set { .. }, Ask::Stop, Ask::EmergencyStop]), "{:?}", asked());
+    assert!(matches!(&asked()[..], [Ask::Set { .. }, Ask::Stop, Ask::MachineStop]), "{:?}", asked());
     // Who is let in may forge nothing either: `loopback` has that test; here, that the forger can get in at all.
     assert!(is_done(
         quiet(Command::new(std::env::current_exe().unwrap()), &runtime)

@@ -1,12 +1,13 @@
 //! Where running hosts are found: one socket a run, in a folder that belongs to the user alone.
 
 use crate::platform::{
-    Listening, Stream, accept, is_ours, is_ours_alone, make_folder, remove_if_over, run_folder,
+    Listening, Stream, is_ours, is_ours_alone, is_same_file, make_folder, remove_if_dead, run_folder,
 };
 use std::ffi::OsStr;
-use std::fs::DirEntry;
+use std::fs::{DirEntry, Metadata};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::SystemTime;
 
@@ -80,18 +81,35 @@ impl Directory {
     /// The files in it; none in a folder of another user.
     #[must_use]
     pub fn files(&self) -> Vec<DirEntry> {
-        let entries = self.is_ours().then(|| std::fs::read_dir(&self.path).ok()).flatten();
-        entries.into_iter().flatten().flatten().collect()
+        self.list().unwrap_or_default()
     }
 
-    /// Runs of processes that live, the newest first. Sockets of dead ones are removed on the way.
+    /// The files in it; none if there is no folder.
+    fn list(&self) -> io::Result<Vec<DirEntry>> {
+        match std::fs::symlink_metadata(&self.path) {
+            Ok(attributes) if is_ours(&attributes) => std::fs::read_dir(&self.path)?.collect(),
+            Ok(_) => Err(io::ErrorKind::PermissionDenied.into()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Runs whose sockets are open, the newest first; none where they cannot be listed. Removes the files of the other sockets.
     #[must_use]
     pub fn runs(&self) -> Vec<Found> {
-        let mut runs: Vec<Found> = (self.files().into_iter())
+        self.try_runs().unwrap_or_default()
+    }
+
+    /// As [`Directory::runs`].
+    ///
+    /// # Errors
+    /// [`DirectoryError::Unusable`]: the folder cannot be read, or is another user's.
+    pub fn try_runs(&self) -> Result<Vec<Found>, DirectoryError> {
+        let mut runs: Vec<Found> = (self.list().map_err(unusable(&self.path))?.into_iter())
             .filter_map(|entry| {
                 let path = entry.path();
                 let process = process_of(&path)?;
-                if remove_if_over(&path, process) {
+                if remove_if_dead(&path) {
                     return None;
                 }
                 let since = entry.metadata().ok()?.modified().ok()?;
@@ -99,7 +117,7 @@ impl Directory {
             })
             .collect();
         runs.sort_by(|a, b| (b.since, &b.path).cmp(&(a.since, &a.path)));
-        runs
+        Ok(runs)
     }
 
     /// Makes the folder if need be, for this user alone.
@@ -117,27 +135,36 @@ impl Directory {
     pub fn listen(&self) -> Result<Listener, DirectoryError> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         private(&self.path)?;
-        let _ = self.runs(); // cleans up
-        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-        let path = self.path.join(format!("{}-{number}.{SUFFIX}", std::process::id()));
-        // A process of this number may have died without cleaning up.
-        let _ = std::fs::remove_file(&path);
-        let socket = Listening::bind(&path).map_err(unusable(&path))?;
-        Ok(Listener { socket, path })
+        let _ = self.runs(); // removes what is dead
+        loop {
+            let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+            let path = self.path.join(format!("{}-{number}.{SUFFIX}", std::process::id()));
+            match Listening::bind(&path) {
+                Ok(socket) => {
+                    let file = std::fs::symlink_metadata(&path).ok();
+                    return Ok(Listener { socket: Arc::new(socket), path, file });
+                }
+                // A run of the same process number, in another container.
+                Err(error) if error.kind() == io::ErrorKind::AddrInUse => {}
+                Err(error) => return Err(unusable(&path)(error)),
+            }
+        }
     }
 }
 
 /// A socket that others can find; gone when dropped.
 #[derive(Debug)]
 pub struct Listener {
-    socket: Listening,
+    socket: Arc<Listening>,
     path: PathBuf,
+    /// Its file as it was made.
+    file: Option<Metadata>,
 }
 
 impl Listener {
     /// The socket.
     #[must_use]
-    pub(crate) fn socket(&self) -> &Listening {
+    pub(crate) fn socket(&self) -> &Arc<Listening> {
         &self.socket
     }
 
@@ -146,7 +173,7 @@ impl Listener {
     /// # Errors
     /// The error of the system; `Interrupted` for a client that was turned away.
     pub fn accept(&self) -> io::Result<Stream> {
-        accept(&self.socket)
+        self.socket.accept()?.ok_or_else(|| io::ErrorKind::NotConnected.into())
     }
 
     /// Its file.
@@ -158,7 +185,11 @@ impl Listener {
 
 impl Drop for Listener {
     fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.path);
+        let there = std::fs::symlink_metadata(&self.path);
+        let is_own = there.is_ok_and(|there| self.file.as_ref().is_some_and(|own| is_same_file(own, &there)));
+        if is_own {
+            let _ = std::fs::remove_file(&self.path);
+        }
     }
 }
 

@@ -1,28 +1,45 @@
 //! The latch of a machine: an emergency stop that stays, whoever ran and whoever pressed it.
 //!
-//! A file in the folder of the run sockets, to which lines are only ever appended: a press, or a release of all presses up to a
-//! number. So neither needs a lock, a release never undoes a press that it did not see, and no restart changes anything. What
-//! cannot be read counts as a press. Not real-time.
+//! A file in the folder of the run sockets with room for two entries: the last press, and the last release, which names the press
+//! that it releases. A press overwrites the one and a release the other, each with one write. So neither needs a lock, a release
+//! never undoes a press that it did not see, and no restart changes anything. What cannot be read counts as a press.
+//!
+//! A run opens the file and takes its room before it energises a device. From then on a press needs neither a free descriptor nor
+//! room, and no permission of the folder. Not real-time.
 
 use crate::Directory;
 use crate::directory::{DirectoryError, unusable};
-use crate::platform::private_file;
+use crate::platform::{is_same_file, private_file, read_at, write_all_at};
 use serde::{Deserialize, Serialize};
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Its file.
 const FILE: &str = "latch";
-/// Longest name of who presses, characters: a line stays so short that it is written as one.
+/// Room of an entry, bytes: more than the longest one takes.
+const ENTRY_BYTES: usize = 1024;
+/// Longest name of who presses, characters.
 const LONGEST_NAME: usize = 120;
+/// Descriptors that are reserved for an emergency stop: to list the other runs, and to connect to some of them.
+const SPARE_DESCRIPTORS: usize = 4;
 
 /// Stops every run of this user on this machine until it is released.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Latch {
     directory: Directory,
     path: PathBuf,
+    kept: Arc<Kept>,
+}
+
+/// The file as it was opened.
+#[derive(Debug)]
+struct Kept {
+    file: Option<File>,
+    problem: Option<DirectoryError>,
+    spare: Mutex<Vec<File>>,
 }
 
 /// Who pressed the emergency stop, and when.
@@ -37,26 +54,58 @@ pub struct Pressed {
 /// What the latch says.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LatchState {
-    /// How often it was ever pressed. A run that began before a press is stopped by it even if the release came before the look.
-    pub presses: u64,
-    /// The first press that is not released; nothing may be energised while there is one.
+    /// Numbers of the last presses, released or not: of the file that was opened, and of one that has taken its place.
+    presses: Vec<u64>,
+    /// The press that is not released; nothing may be energised while there is one.
     pub pressed: Option<Pressed>,
 }
 
-/// A line of the file.
+/// The places of the file.
+#[derive(Clone, Copy)]
+enum Place {
+    Press,
+    Release,
+}
+
+/// What stands at a place.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 enum Entry {
-    Press { who: String, at_s: u64 },
-    Release { up_to: u64, who: String, at_s: u64 },
+    /// `number` is the time in ns since 1970, and larger than that of the press before.
+    Press { number: u64, who: String },
+    /// `press` is the number of the one that is released.
+    Release { press: u64, who: String },
 }
 
 impl Directory {
-    /// The latch of the runs whose sockets are in this folder.
+    /// Opens the latch of the runs whose sockets are in this folder, and takes its room. Makes the folder if need be.
     #[must_use]
     pub fn latch(&self) -> Latch {
-        Latch { directory: self.clone(), path: self.path().join(FILE) }
+        let path = self.path().join(FILE);
+        let problem = self.make().err();
+        // A folder that others may enter is still this user's.
+        let writable = if self.is_ours() { Some(open(&path)) } else { None };
+        let (file, unwritable) = match writable {
+            Some(Ok(file)) => (Some(file), None),
+            Some(Err(error)) => (File::open(&path).ok(), Some(error)),
+            None => (None, None),
+        };
+        let kept = Kept { file, problem: problem.or(unwritable), spare: Mutex::default() };
+        let latch = Latch { directory: self.clone(), path, kept: Arc::new(kept) };
+        latch.reserve_descriptors();
+        latch
     }
+}
+
+/// Opens the file with its room. Only ever lengthens it, so that no press is overwritten.
+fn open(path: &Path) -> Result<File, DirectoryError> {
+    let open = || {
+        let mut file = private_file(OpenOptions::new().append(true).create(true)).open(path)?;
+        let length = usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
+        file.write_all(&vec![b' '; (2 * ENTRY_BYTES).saturating_sub(length)])?;
+        OpenOptions::new().read(true).write(true).open(path)
+    };
+    open().map_err(unusable(path))
 }
 
 impl Latch {
@@ -66,53 +115,55 @@ impl Latch {
         &self.path
     }
 
-    /// Length of the file, bytes: a watcher reads it again when this changes. Nothing without a file.
+    /// Why an emergency stop cannot be kept here, if so: known before anything is energised.
     #[must_use]
-    pub fn length(&self) -> Option<u64> {
-        std::fs::metadata(&self.path).ok().map(|attributes| attributes.len())
+    pub fn problem(&self) -> Option<&DirectoryError> {
+        self.kept.problem.as_ref()
+    }
+
+    /// Frees the descriptors that were reserved for an emergency stop.
+    pub(crate) fn free_descriptors(&self) {
+        self.kept.spare.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+
+    /// Reserves descriptors for an emergency stop.
+    pub(crate) fn reserve_descriptors(&self) {
+        let file = self.kept.file.iter().cycle().take(SPARE_DESCRIPTORS);
+        let spare = file.flat_map(File::try_clone).collect();
+        *self.kept.spare.lock().unwrap_or_else(PoisonError::into_inner) = spare;
+    }
+
+    /// The folder of the runs that it stops.
+    pub(crate) fn directory(&self) -> &Directory {
+        &self.directory
     }
 
     /// What it says now. In a folder of another user there is none: others could press it, and nothing can be pressed there.
     #[must_use]
     pub fn state(&self) -> LatchState {
-        if !self.directory.is_ours() {
-            return LatchState::default();
+        let mut state = LatchState::default();
+        if let Some(file) = &self.kept.file {
+            self.add(file, &mut state);
         }
-        let bytes = match std::fs::read(&self.path) {
-            Ok(bytes) => bytes,
-            Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
-                return LatchState::default();
-            }
-            Err(error) => format!("cannot be read: {error}").into_bytes(),
-        };
-        let (mut state, mut open) = (LatchState::default(), Vec::new());
-        for line in String::from_utf8_lossy(&bytes).lines() {
-            match serde_json::from_str(line) {
-                Ok(Entry::Release { up_to, .. }) => open.retain(|(number, _)| *number > up_to),
-                read => {
-                    let (who, at_s) = match read {
-                        Ok(Entry::Press { who, at_s }) => (who, at_s),
-                        _ => (format!("an unreadable line of {}", self.path.display()), 0),
-                    };
-                    state.presses += 1;
-                    let at = UNIX_EPOCH.checked_add(Duration::from_secs(at_s)).unwrap_or(UNIX_EPOCH);
-                    open.push((state.presses, Pressed { who, at }));
-                }
+        if self.directory.is_ours() && !self.is_kept() {
+            match File::open(&self.path) {
+                Ok(file) => self.add(&file, &mut state),
+                Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {}
+                Err(error) => state.add(0, format!("{} cannot be read: {error}", self.path.display())),
             }
         }
-        state.pressed = open.into_iter().next().map(|(_, pressed)| pressed);
         state
     }
 
     /// Presses it. One that is pressed stays as it is.
     ///
     /// # Errors
-    /// [`DirectoryError`]: the folder is not usable, or not ours alone; other runs learn nothing.
+    /// [`DirectoryError`]: what is written does not reach every run, or no later start.
     pub fn press(&self, who: &str) -> Result<(), DirectoryError> {
         if self.state().pressed.is_some() {
             return Ok(());
         }
-        self.append(&Entry::Press { who: short(who), at_s: now_s() })
+        self.write_each(|file| press(file, who))
     }
 
     /// Releases what is pressed now; who had pressed it, if anybody.
@@ -122,17 +173,114 @@ impl Latch {
     pub fn release(&self, who: &str) -> Result<Option<Pressed>, DirectoryError> {
         let LatchState { presses, pressed } = self.state();
         if pressed.is_some() {
-            self.append(&Entry::Release { up_to: presses, who: short(who), at_s: now_s() })?;
+            self.write_each(|file| match last_press(file) {
+                Some((press, _)) if presses.contains(&press) => {
+                    write(file, Place::Release, &Entry::Release { press, who: short(who) })
+                }
+                _ => Ok(()),
+            })?;
         }
         Ok(pressed)
     }
 
-    fn append(&self, entry: &Entry) -> Result<(), DirectoryError> {
-        self.directory.make()?;
-        // Neither word nor number of it fails to become JSON.
-        let line = serde_json::to_string(entry).unwrap_or_default() + "\n";
-        let file = private_file(OpenOptions::new().append(true).create(true)).open(&self.path);
-        file.and_then(|mut file| file.write_all(line.as_bytes())).map_err(unusable(&self.path))
+    /// Whether the path still leads to the file that was opened.
+    fn is_kept(&self) -> bool {
+        let kept = self.kept.file.as_ref().and_then(|file| file.metadata().ok());
+        let there = std::fs::metadata(&self.path);
+        kept.zip(there.ok()).is_some_and(|(kept, there)| is_same_file(&kept, &there))
+    }
+
+    /// Writes to the file that was opened, which the runs of that time read, and to one that has taken its place, which later ones do.
+    fn write_each(&self, write: impl Fn(&File) -> std::io::Result<()>) -> Result<(), DirectoryError> {
+        let to_kept = self.kept.file.as_ref().map(|file| write(file).map_err(unusable(&self.path)));
+        if matches!(to_kept, Some(Ok(()))) && self.is_kept() {
+            return Ok(());
+        }
+        if !self.directory.is_ours() {
+            self.directory.make()?;
+        }
+        write(&open(&self.path)?).map_err(unusable(&self.path))?;
+        if self.is_kept() { Ok(()) } else { to_kept.unwrap_or(Ok(())) }
+    }
+
+    /// Adds what a file says.
+    fn add(&self, file: &File, state: &mut LatchState) {
+        let Some((number, who)) = last_press(file) else { return };
+        let who = who
+            .unwrap_or_else(|problem| format!("an unreadable press in {}: {problem}", self.path.display()));
+        let released = match read(file, Place::Release).map(|text| serde_json::from_str(&text)) {
+            Ok(Ok(Entry::Release { press, .. })) => Some(press),
+            _ => None,
+        };
+        if released == Some(number) {
+            state.presses.push(number);
+        } else {
+            state.add(number, who);
+        }
+    }
+}
+
+impl LatchState {
+    /// Whether it was pressed after an earlier state, even if it is released by now.
+    #[must_use]
+    pub fn was_pressed_after(&self, earlier: &Self) -> bool {
+        self.presses.iter().any(|press| !earlier.presses.contains(press))
+    }
+
+    /// Adds a press that is not released.
+    fn add(&mut self, number: u64, who: String) {
+        self.presses.push(number);
+        self.pressed.get_or_insert(Pressed { who, at: UNIX_EPOCH + Duration::from_nanos(number) });
+    }
+}
+
+/// Overwrites the last press of a file.
+fn press(file: &File, who: &str) -> std::io::Result<()> {
+    let before = last_press(file).and_then(|(number, who)| who.is_ok().then_some(number));
+    let number = now_ns().max(before.map_or(0, |before| before.saturating_add(1)));
+    write(file, Place::Press, &Entry::Press { number, who: short(who) })
+}
+
+/// The number of the last press of a file, and who it was; one that cannot be read has a number of its own.
+fn last_press(file: &File) -> Option<(u64, Result<String, String>)> {
+    let text = match read(file, Place::Press) {
+        Ok(text) if text.is_empty() => return None,
+        Ok(text) => text,
+        Err(error) => return Some((0, Err(error.to_string()))),
+    };
+    match serde_json::from_str(&text) {
+        Ok(Entry::Press { number, who }) => Some((number, Ok(who))),
+        _ => Some((fingerprint(&text), Err("not an entry".to_owned()))),
+    }
+}
+
+/// A number that differs between different texts (FNV-1a), small enough to be a time of long ago.
+fn fingerprint(text: &str) -> u64 {
+    let hash = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, hash) >> 8
+}
+
+/// The text at a place, without the blanks about it; nothing beyond the end of the file.
+fn read(file: &File, place: Place) -> std::io::Result<String> {
+    let mut bytes = [b' '; ENTRY_BYTES];
+    read_at(file, &mut bytes, place.offset())?;
+    Ok(String::from_utf8_lossy(&bytes).trim().to_owned())
+}
+
+/// Overwrites a place, with one call of the system.
+fn write(file: &File, place: Place, entry: &Entry) -> std::io::Result<()> {
+    let mut bytes = serde_json::to_vec(entry)?;
+    bytes.resize(ENTRY_BYTES - 1, b' ');
+    bytes.push(b'\n');
+    write_all_at(file, &bytes, place.offset())
+}
+
+impl Place {
+    fn offset(self) -> u64 {
+        match self {
+            Self::Press => 0,
+            Self::Release => ENTRY_BYTES as u64,
+        }
     }
 }
 
@@ -152,63 +300,10 @@ fn short(who: &str) -> String {
     who.chars().filter(|c| !c.is_control()).take(LONGEST_NAME).collect()
 }
 
-fn now_s() -> u64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
+fn now_ns() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn latch() -> (tempfile::TempDir, Latch) {
-        let scratch = tempfile::tempdir().unwrap();
-        let latch = Directory::at(scratch.path().join("runs")).latch();
-        (scratch, latch)
-    }
-
-    #[test]
-    fn a_press_stays_until_it_is_released_and_is_never_forgotten() {
-        let (_scratch, latch) = latch();
-        assert_eq!(latch.state(), LatchState::default());
-        assert_eq!(latch.release("nobody").unwrap(), None);
-        latch.press("first").unwrap();
-        latch.press("second").unwrap();
-        let state = latch.state();
-        assert_eq!((state.presses, state.pressed.unwrap().who.as_str()), (1, "first"));
-        assert_eq!(latch.release("owner").unwrap().unwrap().who, "first");
-        assert_eq!(latch.state(), LatchState { presses: 1, pressed: None });
-        latch.press("third").unwrap();
-        assert_eq!(latch.state().presses, 2);
-        assert!(latch.state().pressed.unwrap().to_string().starts_with("third, 0 s ago"));
-    }
-
-    #[test]
-    fn a_release_undoes_no_press_that_it_did_not_see() {
-        let (_scratch, latch) = latch();
-        latch.press("seen").unwrap();
-        let seen = latch.state().presses;
-        latch.append(&Entry::Press { who: "unseen".to_owned(), at_s: 0 }).unwrap();
-        latch.append(&Entry::Release { up_to: seen, who: "owner".to_owned(), at_s: 0 }).unwrap();
-        assert_eq!(latch.state().pressed.unwrap().who, "unseen");
-    }
-
-    #[test]
-    fn what_cannot_be_read_is_a_press_and_can_be_released() {
-        let (_scratch, latch) = latch();
-        latch.press("first").unwrap();
-        latch.release("owner").unwrap();
-        for nonsense in ["\n", "{", "{\"press\":{}}\n", "{\"lift\":{}}\n"] {
-            let before = latch.state().presses;
-            let mut file = OpenOptions::new().append(true).open(latch.path()).unwrap();
-            file.write_all(nonsense.as_bytes()).unwrap();
-            assert!(latch.state().pressed.is_some() && latch.state().presses > before, "{nonsense:?}");
-            latch.release("owner").unwrap();
-            if nonsense.ends_with('\n') {
-                assert_eq!(latch.state().pressed, None, "{nonsense:?}");
-            }
-        }
-        let long = "x".repeat(10_000) + "\n";
-        latch.append(&Entry::Press { who: short(&long), at_s: u64::MAX }).unwrap();
-        assert!(latch.length().unwrap() < 1000);
-    }
-}
+mod tests;

@@ -45,7 +45,7 @@
 //! # The latch
 //!
 //! An emergency stop of any run stops every run of the folder and refuses new ones until it is released: [`Latch`], a file beside
-//! the sockets.
+//! the sockets, and a request to each socket, which confirms it.
 //!
 //! # Couplings
 //!
@@ -62,6 +62,7 @@ mod message;
 mod peer_socket;
 mod platform;
 mod server;
+mod stop;
 
 pub use client::{Asker, Client, Event, LiveError};
 pub use directory::{Directory, DirectoryError, Found, Listener};

@@ -203,7 +203,7 @@ impl Request {
         let read = || {
             let request = Self::deserialize(&said)?;
             let unknown = unknown_key(&said, &serde_json::to_value(&request)?);
-            match unknown.filter(|_| request.ask != Ask::EmergencyStop) {
+            match unknown.filter(|_| !matches!(request.ask, Ask::EmergencyStop | Ask::MachineStop)) {
                 Some(key) => Err(serde::de::Error::custom(format!("unknown key `{key}`"))),
                 None => Ok(request),
             }
@@ -268,6 +268,8 @@ pub enum Ask {
     Stop,
     /// The emergency stop: no force at once, and the run is over.
     EmergencyStop,
+    /// The emergency stop of another run of the machine: the same, and is not passed on.
+    MachineStop,
 }
 
 /// A new value for a parameter.

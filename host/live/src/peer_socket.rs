@@ -10,7 +10,7 @@
 
 use crate::Directory;
 use crate::directory::{DirectoryError, private};
-use crate::platform::{Datagrams, remove_if_over};
+use crate::platform::{Datagrams, remove_if_dead};
 use flotor_core::peer::{Dispatch, InvalidDispatch};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -66,7 +66,7 @@ impl Directory {
                 let ending = path.extension()?.to_str()?;
                 let (process, name) = path.file_stem()?.to_str()?.split_once('-')?;
                 let (process, name) = (process.parse().ok()?, name.to_owned());
-                if [HOST, JOINED].contains(&ending) && remove_if_over(&path, process) {
+                if [HOST, JOINED].contains(&ending) && remove_if_dead(&path) {
                     return None;
                 }
                 (ending == HOST).then_some(FoundCoupling { name, process, path })
@@ -104,8 +104,8 @@ impl PeerSocket {
     }
 
     fn bind(path: PathBuf) -> Result<Self, (PathBuf, io::Error)> {
-        // A process of this number may have died without cleaning up.
-        let _ = std::fs::remove_file(&path);
+        // A process that died without removing it.
+        remove_if_dead(&path);
         match Datagrams::bind(&path) {
             Ok(socket) => Ok(Self { socket, path, peers: Vec::new() }),
             Err(cause) => Err((path, cause)),

@@ -35,6 +35,6 @@ pub use estimates::estimates;
 pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue, Observer,
-    Outcome, PluginReport, Remains, RunError, RunOptions, Session, Steps, Strength, StrongDevice, Tap,
-    prepare_model,
+    Outcome, PluginReport, Remains, RunError, RunOptions, Session, Steps, StopReach, Strength, StrongDevice,
+    Tap, prepare_model,
 };

@@ -15,17 +15,16 @@ use flotor_command::{
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_coupling::Line;
-use flotor_live::{Directory, EndKind, Latch};
+use flotor_live::{Directory, EndKind};
 use flotor_record::{Note, Recorder, Severity, TraceDigest};
-use flotor_servo::RunEnd;
-use flotor_servo::{Clock, Core};
+use flotor_servo::{Clock, Core, EmergencySource, RunEnd};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary, Tally};
 use flotor_session::telemetry::{LinkCounts, PeerLink, Watched, publish, start_peer_link};
 use flotor_session::{
-    Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session, stop_waits_with,
+    LatchGuard, Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session, stop_waits_with,
 };
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
@@ -134,7 +133,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     };
     let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
     let mut watched = Watched { observer: watchers, publication };
-    let latch = session.latch().map(|guard| guard.latch().clone());
+    let latch = session.latch().cloned();
     let outcome = session.run(&mut watched, &stop);
     drop(keys);
     let Watched { observer: Watchers { tally, digest, mut recording, plot, progress }, publication } =
@@ -193,9 +192,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let printed = print_result(arguments.json.file(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
     outcome.later_warnings().iter().for_each(note);
-    if let (RunEnd::EmergencyStop(_), Some(latch)) = (outcome.end, latch) {
-        note_latch(&latch);
-    }
+    latch.and_then(|latch| stop_note(outcome.end, &latch)).into_iter().for_each(note);
     let verdict = verdict(&outcome, &plugins, &summary);
     // Last of all: the code of a plugin may hang, or end the process.
     let Outcome { unresponsive, remains, .. } = outcome;
@@ -226,14 +223,11 @@ fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
     notes
 }
 
-/// What an emergency stop means for other runs of this machine.
-fn note_latch(latch: &Latch) {
-    match latch.length() {
-        Some(_) => note("all runs of this machine are stopped, and none starts until `flotor release`"),
-        None => {
-            let path = latch.path().display();
-            note(format_args!("the emergency stop is of this run only: {path} cannot be written"));
-        }
+/// Reports what an emergency stop of this run has reached, or who pressed that of another.
+fn stop_note(end: RunEnd, latch: &LatchGuard) -> Option<String> {
+    match end {
+        RunEnd::EmergencyStop(EmergencySource::Latch) => latch.check().err().map(|error| error.to_string()),
+        _ => latch.reach().map(|reach| reach.to_string()),
     }
 }
 

@@ -51,6 +51,7 @@ mod scene_test;
 #[cfg(feature = "drop-ins")]
 mod services;
 mod simulated;
+mod stop_delivery;
 mod study;
 mod study_file;
 mod study_scripts;

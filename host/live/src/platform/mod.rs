@@ -1,4 +1,4 @@
-//! What differs between systems: the sockets of a run, who may enter their folder, and which run is over.
+//! What differs between systems: the sockets of a run, who may enter their folder, and which socket is dead.
 //!
 //! Each system has one module with the same items.
 
@@ -9,11 +9,11 @@ mod windows;
 
 #[cfg(not(windows))]
 pub(crate) use unix::{
-    Datagrams, Listening, Stream, accept, connect, is_ours, is_ours_alone, make_folder, private_file,
-    remove_if_over, run_folder,
+    Datagrams, Listening, Stream, connect, connect_now, has_left, is_ours, is_ours_alone, is_same_file,
+    make_folder, private_file, read_at, remove_if_dead, run_folder, write_all_at,
 };
 #[cfg(windows)]
 pub(crate) use windows::{
-    Datagrams, Listening, Stream, accept, connect, is_ours, is_ours_alone, make_folder, private_file,
-    remove_if_over, run_folder,
+    Datagrams, Listening, Stream, connect, connect_now, has_left, is_ours, is_ours_alone, is_same_file,
+    make_folder, private_file, read_at, remove_if_dead, run_folder, write_all_at,
 };

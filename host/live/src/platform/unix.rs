@@ -1,17 +1,19 @@
-//! Unix: sockets that are files, permissions, processes by their number.
+//! Unix: sockets that are files, and permissions.
 
-use rustix::io::Errno;
-use rustix::process::{Pid, getuid, test_kill_process};
-use std::fs::{DirBuilder, Metadata, OpenOptions};
-use std::io;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::net::{AddressFamily, RecvFlags, SocketAddrUnix, SocketType, recv};
+use rustix::process::getuid;
+use std::fs::{DirBuilder, File, Metadata, OpenOptions};
+use std::io::{self, ErrorKind};
+use std::net::Shutdown;
+use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt};
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Where a datagram comes from.
 pub(crate) use std::os::unix::net::SocketAddr as Address;
-/// Where connections come in.
-pub(crate) use std::os::unix::net::UnixListener as Listening;
+use std::os::unix::net::UnixListener;
 /// A connection.
 pub(crate) use std::os::unix::net::UnixStream as Stream;
 
@@ -43,14 +45,31 @@ pub(crate) fn private_file(options: &mut OpenOptions) -> &mut OpenOptions {
     options.mode(0o600)
 }
 
-/// Removes the file of a run whose process is no more; true if that is so. One of somebody else's process counts as one that is.
-pub(crate) fn remove_if_over(path: &Path, process: u32) -> bool {
-    let process = i32::try_from(process).ok().and_then(Pid::from_raw);
-    let is_over = process.is_none_or(|process| test_kill_process(process) == Err(Errno::SRCH));
-    if is_over {
-        let _ = std::fs::remove_file(path); // somebody else may have been faster
+/// Removes the file of a socket that no process has open; true if there was none. A process number says nothing: containers that
+/// share the folder each have their own.
+pub(crate) fn remove_if_dead(path: &Path) -> bool {
+    // Finds the socket whatever its type, and makes no connection to one that listens.
+    let probed = UnixDatagram::unbound().and_then(|probe| probe.connect(path));
+    let is_dead = probed.is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused);
+    if is_dead {
+        let _ = std::fs::remove_file(path); // another process may have been faster
     }
-    is_over
+    is_dead
+}
+
+/// Reads from a place of a file; what is beyond its end stays as it was.
+pub(crate) fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<usize> {
+    FileExt::read_at(file, bytes, offset)
+}
+
+/// Overwrites a place of a file.
+pub(crate) fn write_all_at(file: &File, bytes: &[u8], offset: u64) -> io::Result<()> {
+    FileExt::write_all_at(file, bytes, offset)
+}
+
+/// Whether both are one file.
+pub(crate) fn is_same_file(one: &Metadata, other: &Metadata) -> bool {
+    (one.dev(), one.ino()) == (other.dev(), other.ino())
 }
 
 /// Connects to the run behind a file.
@@ -58,9 +77,68 @@ pub(crate) fn connect(path: &Path) -> io::Result<Stream> {
     Stream::connect(path)
 }
 
-/// Waits for the next connection.
-pub(crate) fn accept(socket: &Listening) -> io::Result<Stream> {
-    socket.accept().map(|(stream, _)| stream)
+/// The same without waiting for a run that accepts nothing; the connection waits for nothing either.
+pub(crate) fn connect_now(path: &Path) -> io::Result<Stream> {
+    let socket = rustix::net::socket(AddressFamily::UNIX, SocketType::STREAM, None)?;
+    let stream = Stream::from(socket);
+    stream.set_nonblocking(true)?;
+    rustix::net::connect(&stream, &SocketAddrUnix::new(path)?)?;
+    Ok(stream)
+}
+
+/// Accepts the connections of clients until it is closed.
+#[derive(Debug)]
+pub(crate) struct Listening {
+    socket: UnixListener,
+    /// Readable once it is closed.
+    closed: Stream,
+    close: Stream,
+    /// Reserves a descriptor for a client of a process that has none left.
+    spare: Mutex<Option<UnixListener>>,
+}
+
+impl Listening {
+    /// Makes the socket and its file.
+    pub(crate) fn bind(path: &Path) -> io::Result<Self> {
+        let (closed, close) = Stream::pair()?;
+        let socket = UnixListener::bind(path)?;
+        socket.set_nonblocking(true)?;
+        Ok(Self { socket, closed, close, spare: Mutex::default() })
+    }
+
+    /// Ends every [`accept`](Self::accept), now and later.
+    pub(crate) fn close(&self) {
+        let _ = self.close.shutdown(Shutdown::Both);
+    }
+
+    /// Waits for the next client; `None` once closed.
+    pub(crate) fn accept(&self) -> io::Result<Option<Stream>> {
+        let mut spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner);
+        if spare.is_none() {
+            *spare = self.socket.try_clone().ok();
+        }
+        loop {
+            let mut ready =
+                [PollFd::new(&self.closed, PollFlags::IN), PollFd::new(&self.socket, PollFlags::IN)];
+            poll(&mut ready, None)?;
+            if !ready[0].revents().is_empty() {
+                return Ok(None);
+            }
+            match self.socket.accept() {
+                Ok((stream, _)) => return stream.set_nonblocking(false).map(|()| Some(stream)),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                // Again with the descriptor that was reserved.
+                Err(_) if spare.take().is_some() => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
+
+/// Whether the client has closed its end without a request.
+pub(crate) fn has_left(stream: &Stream) -> bool {
+    let peeked = recv(stream, &mut [0; 1], RecvFlags::PEEK | RecvFlags::DONTWAIT);
+    peeked.is_ok_and(|(_, available)| available == 0)
 }
 
 /// A socket for datagrams, with the name of a file.
@@ -89,6 +167,46 @@ mod tests {
     use super::*;
     use crate::{Directory, DirectoryError};
     use std::os::unix::fs::PermissionsExt;
+    use std::path::PathBuf;
+
+    /// Two containers with one folder: each run is process 1 of its own, and no process of the other exists.
+    #[test]
+    fn a_socket_lives_as_long_as_a_process_has_it_open_whatever_its_number() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path());
+        let mut child = std::process::Command::new("true").spawn().unwrap();
+        child.wait().unwrap();
+        let of_no_process = scratch.path().join(format!("{}-0.run", child.id()));
+        let of_this_process = scratch.path().join(format!("{}-7.run", std::process::id()));
+        let alive = UnixListener::bind(&of_no_process).unwrap();
+        drop(UnixListener::bind(&of_this_process).unwrap());
+        let found = || directory.runs().into_iter().map(|run| run.path).collect::<Vec<PathBuf>>();
+        assert_eq!(found(), [of_no_process.as_path()]);
+        assert!(!of_this_process.exists());
+        drop(alive);
+        assert!(found().is_empty() && !of_no_process.exists());
+    }
+
+    #[test]
+    fn a_run_takes_no_socket_away_from_another_of_its_number() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path().join("runs"));
+        let other = directory.listen().unwrap();
+        let next = |number: u32| scratch.path().join(format!("runs/{}-{number}.run", std::process::id()));
+        let name = other.path().file_stem().unwrap().to_str().unwrap().to_owned();
+        let number: u32 = name.split_once('-').unwrap().1.parse().unwrap();
+        let of_another: Vec<_> =
+            (number + 1..number + 40).map(|n| UnixListener::bind(next(n)).unwrap()).collect();
+        let listener = directory.listen().unwrap();
+        assert_eq!(directory.runs().len(), 2 + of_another.len());
+        // The file of a socket that was replaced belongs to whoever made it.
+        std::fs::remove_file(listener.path()).unwrap();
+        let path = listener.path().to_path_buf();
+        let replaced = UnixListener::bind(&path).unwrap();
+        drop(listener);
+        assert!(path.exists());
+        drop(replaced);
+    }
 
     #[test]
     fn what_the_dead_left_behind_is_removed_and_nothing_else() {
@@ -119,7 +237,7 @@ mod tests {
         let directory = Directory::at(scratch.path().join("flotor"));
         let run = directory.listen().unwrap();
         let peer = scratch.path().join(format!("flotor/{}-pair.peer", std::process::id()));
-        std::fs::write(peer, "").unwrap();
+        let coupling = Datagrams::bind(&peer).unwrap();
         directory.latch().press("a stranger").unwrap();
         let seen = |directory: &Directory| {
             let pressed = directory.latch().state().pressed.is_some();
@@ -135,6 +253,6 @@ mod tests {
         let link = Directory::at(scratch.path().join("link"));
         std::os::unix::fs::symlink(directory.path(), link.path()).unwrap();
         assert_eq!(seen(&link), (0, 0, false));
-        drop(run);
+        drop((run, coupling));
     }
 }

@@ -11,7 +11,7 @@
 mod outbox;
 mod watcher;
 
-use crate::platform::{self, Listening, Stream};
+use crate::platform::{Listening, Stream, has_left};
 use crate::{
     Ask, ChangeMessage, Directory, DirectoryError, End, EndKind, Greeting, Kind, Listener, RefusalCause,
     frame,
@@ -22,7 +22,7 @@ use flotor_record::RunDescription;
 use outbox::Outbox;
 use std::io::{self, ErrorKind};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -35,8 +35,12 @@ const MOST_WATCHERS: usize = 16;
 const MOST_CONNECTIONS: usize = MOST_WATCHERS + 8;
 /// Stack of the threads here, bytes. With locked memory every page of it is real.
 const STACK_BYTES: usize = 256 * 1024;
+/// Time for a client to read the end of a run, and for its requests to be answered.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// Limit on the end of all connections together, beyond the time of the clients.
+const END_WAIT: Duration = Duration::from_millis(1000);
 /// Pause after a connection that failed for lack of something (descriptors, mostly).
-const BREATH: Duration = Duration::from_millis(100);
+const BREATH: Duration = Duration::from_millis(10);
 
 /// Why a run cannot be watched.
 #[derive(Debug, thiserror::Error)]
@@ -75,7 +79,6 @@ struct Shared {
     greeting: Mutex<Greeting>,
     run: Vec<u8>,
     host: Arc<dyn Serve>,
-    is_over: AtomicBool,
     started: Instant,
 }
 
@@ -97,10 +100,9 @@ impl Publication {
             greeting: Mutex::new(greeting),
             run: run.to_bytes(),
             host,
-            is_over: AtomicBool::new(false),
             started: Instant::now(),
         });
-        let (socket, for_acceptor) = (listener.socket().try_clone()?, Arc::clone(&shared));
+        let (socket, for_acceptor) = (Arc::clone(listener.socket()), Arc::clone(&shared));
         let acceptor = thread("flotor-live").spawn(move || accept(&socket, &for_acceptor))?;
         Ok(Self { shared, acceptor: Some(acceptor), listener })
     }
@@ -142,16 +144,14 @@ impl Publication {
 
 impl Drop for Publication {
     fn drop(&mut self) {
-        self.shared.is_over.store(true, Ordering::Relaxed);
-        // The acceptor sits in a call of the system; a connection wakes it up. Without one it ends with the process.
-        let woken = platform::connect(self.listener.path());
-        if let (Ok(_), Some(acceptor)) = (woken, self.acceptor.take()) {
-            let _ = acceptor.join();
+        self.listener.socket().close();
+        if let Some(acceptor) = self.acceptor.take() {
+            join_until(acceptor, Instant::now() + PATIENCE);
         }
         let watchers = std::mem::take(&mut *self.shared.watchers());
-        // All at once, so that their patience runs side by side.
         watchers.iter().for_each(|watcher| watcher.outbox.close());
-        watchers.into_iter().for_each(Watcher::dismiss);
+        let until = Instant::now() + END_WAIT;
+        watchers.into_iter().for_each(|watcher| watcher.finish(until));
     }
 }
 
@@ -189,53 +189,61 @@ impl Shared {
 
 /// Lets watchers in until the run is over.
 fn accept(socket: &Listening, shared: &Arc<Shared>) {
-    while !shared.is_over.load(Ordering::Relaxed) {
-        match platform::accept(socket) {
-            Ok(_) if shared.is_over.load(Ordering::Relaxed) => {}
-            Ok(stream) => welcome(stream, shared),
+    loop {
+        match socket.accept() {
+            Ok(None) => return,
+            Ok(Some(stream)) => welcome(stream, shared),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(_) => std::thread::sleep(BREATH),
+            Err(_) => {
+                // A client that asks for nothing may hold the descriptor that is missing.
+                evict_longest_silent(&mut shared.watchers());
+                std::thread::sleep(BREATH);
+            }
         }
     }
 }
 
-/// Serves a connection. A watcher who cannot be served is turned away: the connection closes.
+/// Serves a connection. A watcher who cannot be served is turned away: the connection closes. Waits for no other client: the
+/// threads of those that left end by themselves.
 fn welcome(stream: Stream, shared: &Arc<Shared>) {
-    sweep(shared);
+    if has_left(&stream) {
+        return;
+    }
     let mut watchers = shared.watchers();
-    let evicted = if watchers.len() >= MOST_CONNECTIONS {
-        let idle = watchers.iter().enumerate().filter(|(_, watcher)| !watcher.outbox.wants_ticks());
-        let longest = idle.min_by_key(|(_, watcher)| watcher.heard_ms()).map(|(place, _)| place);
-        let Some(place) = longest else { return };
-        Some(watchers.remove(place))
-    } else {
-        None
-    };
+    watchers.retain(|watcher| !watcher.is_gone());
+    shared.count(&watchers);
+    if watchers.len() >= MOST_CONNECTIONS && !evict_longest_silent(&mut watchers) {
+        return;
+    }
     let outbox = Arc::new(Outbox::default());
     let Ok(greeting) = serde_json::to_vec(&*shared.greeting()) else { return };
     outbox.push(frame(Kind::Greeting, &greeting));
     outbox.push(frame(Kind::Run, &shared.run));
     // With the list locked, so that no change is told between greeting and list.
     watchers.extend(Watcher::start(stream, outbox, shared));
-    drop(watchers);
-    if let Some(evicted) = evicted {
-        evicted.evict();
-    }
 }
 
-/// Drops disconnected clients.
-fn sweep(shared: &Shared) {
-    let gone: Vec<Watcher> = {
-        let mut watchers = shared.watchers();
-        let (gone, here) = std::mem::take(&mut *watchers).into_iter().partition(Watcher::is_gone);
-        *watchers = here;
-        shared.count(&watchers);
-        gone
-    };
-    gone.into_iter().for_each(Watcher::dismiss);
+/// Closes the connection of the client that watches nothing and was silent for longest; false if there is none.
+fn evict_longest_silent(watchers: &mut Vec<Watcher>) -> bool {
+    let idle = watchers.iter().enumerate().filter(|(_, watcher)| !watcher.outbox.wants_ticks());
+    let longest = idle.min_by_key(|(_, watcher)| watcher.heard_ms()).map(|(place, _)| place);
+    longest.map(|place| watchers.remove(place).evict()).is_some()
+}
+
+/// Waits for the end of a thread until then; one that goes on is left to itself.
+fn join_until(thread: JoinHandle<()>, until: Instant) {
+    while !thread.is_finished() && Instant::now() < until {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    if thread.is_finished() {
+        let _ = thread.join();
+    }
 }
 
 /// A thread of this module.
 fn thread(name: &str) -> std::thread::Builder {
     std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_BYTES)
 }
+
+#[cfg(test)]
+mod tests;

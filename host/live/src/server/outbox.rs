@@ -4,6 +4,7 @@ use crate::{ChangeMessage, Kind, frame, ticks_to_payload};
 use flotor_core::trace::{Events, TickRecord};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// Ticks that wait at most: four seconds at 1 kHz.
 const MOST_TICKS: usize = 4096;
@@ -136,6 +137,12 @@ impl Outbox {
 
     pub(super) fn is_closed(&self) -> bool {
         self.lock().is_closed
+    }
+
+    /// Waits for this long, or until it is closed.
+    pub(super) fn pause(&self, period: Duration) {
+        let state = self.lock();
+        let _ = self.changed.wait_timeout_while(state, period, |state| !state.is_closed);
     }
 
     /// Waits for something to send, and takes all of it; `None` when closed and empty.

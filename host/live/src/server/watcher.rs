@@ -1,7 +1,7 @@
 //! One watcher: a thread that writes what waits, a thread that reads what is asked for.
 
 use super::outbox::Outbox;
-use super::{Shared, thread};
+use super::{PATIENCE, Shared, join_until, thread};
 use crate::platform::Stream;
 use crate::{Answer, Ask, Frames, Kind, RefusalCause, Request, frame};
 use std::io::{ErrorKind, Write};
@@ -15,14 +15,13 @@ use std::time::{Duration, Instant};
 const BATCH_PERIOD: Duration = Duration::from_millis(10);
 /// How long a write may wait before the writer looks whether the run is over.
 const WRITE_WAIT: Duration = Duration::from_millis(100);
-/// How long a watcher may take to read the end of a run.
-const PATIENCE: Duration = Duration::from_millis(500);
 /// Pause after each request: a flood is throttled to a thousand a second and holds up only its sender.
 const REQUEST_PERIOD: Duration = Duration::from_millis(1);
 
 pub(super) struct Watcher {
     pub(super) outbox: Arc<Outbox>,
-    stream: Stream,
+    /// Shared with its threads: one descriptor for each client.
+    stream: Arc<Stream>,
     writer: JoinHandle<()>,
     reader: JoinHandle<()>,
     /// When it came or asked for something last, ms.
@@ -33,13 +32,14 @@ impl Watcher {
     /// Serves a connection; `None` if there is no thread to be had.
     pub(super) fn start(stream: Stream, outbox: Arc<Outbox>, shared: &Arc<Shared>) -> Option<Self> {
         stream.set_write_timeout(Some(WRITE_WAIT)).ok()?;
-        let (to_write, to_read) = (stream.try_clone().ok()?, stream.try_clone().ok()?);
+        let stream = Arc::new(stream);
+        let (to_write, to_read) = (Arc::clone(&stream), Arc::clone(&stream));
         let (for_writer, for_reader, of_run) = (Arc::clone(&outbox), Arc::clone(&outbox), Arc::clone(shared));
-        let writer = thread("flotor-live-out").spawn(move || write(to_write, &for_writer)).ok()?;
+        let writer = thread("flotor-live-out").spawn(move || write(&to_write, &for_writer)).ok()?;
         let heard_ms = Arc::new(AtomicU64::new(shared.now_ms()));
         let heard = Arc::clone(&heard_ms);
         let reader = thread("flotor-live-in").spawn(move || {
-            read(to_read, &for_reader, &of_run, &heard);
+            read(&to_read, &for_reader, &of_run, &heard);
             // The watcher has gone or talks nonsense: the writer ends, too.
             for_reader.want_ticks(0);
             for_reader.close();
@@ -63,37 +63,27 @@ impl Watcher {
         self.heard_ms.load(Ordering::Relaxed)
     }
 
-    /// Closes the connection, whatever waits.
+    /// Takes no further request; its threads end by themselves, after those that have arrived are answered.
     pub(super) fn evict(self) {
-        let _ = self.stream.shutdown(Shutdown::Both);
-        self.dismiss();
+        let _ = self.stream.shutdown(Shutdown::Read);
     }
 
-    /// Sends what waits to whoever reads it within some patience, and ends.
-    pub(super) fn dismiss(self) {
-        self.outbox.close();
-        let _ = self.writer.join();
+    /// Sends what waits to a client that reads it within [`PATIENCE`], and closes the connection.
+    pub(super) fn finish(self, until: Instant) {
+        join_until(self.writer, until);
         let _ = self.stream.shutdown(Shutdown::Both);
-        // It may be at a request whose answer takes its time; nobody waits for that any more.
-        let since = Instant::now();
-        while !self.reader.is_finished() && since.elapsed() < PATIENCE {
-            std::thread::sleep(BATCH_PERIOD);
-        }
-        if self.reader.is_finished() {
-            let _ = self.reader.join();
-        }
+        // It may be at a request whose answer takes its time.
+        join_until(self.reader, until.min(Instant::now() + PATIENCE));
     }
 }
 
 /// Writes until the outbox is closed and empty, or nobody reads.
-fn write(mut stream: Stream, outbox: &Outbox) {
+fn write(stream: &Stream, outbox: &Outbox) {
     while let Some(bytes) = outbox.take() {
-        if !write_whole(&mut stream, &bytes, outbox) {
+        if !write_whole(stream, &bytes, outbox) {
             break;
         }
-        if !outbox.is_closed() {
-            std::thread::sleep(BATCH_PERIOD);
-        }
+        outbox.pause(BATCH_PERIOD);
     }
     outbox.want_ticks(0);
     // A reader sees the end when it has read all of it.
@@ -101,7 +91,7 @@ fn write(mut stream: Stream, outbox: &Outbox) {
 }
 
 /// True when all is written; a frozen watcher is waited for as long as the run lasts, and a little longer.
-fn write_whole(stream: &mut Stream, mut bytes: &[u8], outbox: &Outbox) -> bool {
+fn write_whole(mut stream: &Stream, mut bytes: &[u8], outbox: &Outbox) -> bool {
     let mut closed_since: Option<Instant> = None;
     while !bytes.is_empty() {
         match stream.write(bytes) {
@@ -119,7 +109,7 @@ fn write_whole(stream: &mut Stream, mut bytes: &[u8], outbox: &Outbox) -> bool {
 }
 
 /// Does what is asked for until the watcher goes.
-fn read(mut stream: Stream, outbox: &Outbox, shared: &Shared, heard_ms: &AtomicU64) {
+fn read(mut stream: &Stream, outbox: &Outbox, shared: &Shared, heard_ms: &AtomicU64) {
     let mut frames = Frames::default();
     loop {
         match frames.fill(&mut stream) {

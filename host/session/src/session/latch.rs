@@ -4,25 +4,38 @@
 use super::RunError;
 use flotor_live::{Directory, Latch, LatchState, Pressed};
 use flotor_servo::{EmergencySource, StopSwitch};
+use std::fmt::{self, Display, Formatter};
 use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Why there is no run without a thread that watches.
 pub(super) const NO_WATCH: &str = "got no watch over the emergency stop of the machine";
 /// Pause between two looks at the latch.
 const LOOK_PERIOD: Duration = Duration::from_millis(5);
+/// Time in which the other runs confirm an emergency stop.
+const CONFIRM_WAIT: Duration = Duration::from_secs(2);
 
 /// The latch as it was when a run began to load.
 #[derive(Clone, Debug)]
 pub struct LatchGuard {
     latch: Latch,
-    presses: u64,
-    /// Whether it was pressed then. A second press adds no line to the file: who pressed while the run began would not be seen
-    /// behind a release.
-    was_pressed: bool,
+    /// A second press changes nothing while the first is not released: who pressed while the run began would not be seen behind a
+    /// release.
+    at_start: LatchState,
+    /// What the emergency stop of this run has reached, once it was pressed.
+    reach: Arc<Mutex<Option<StopReach>>>,
+}
+
+/// What an emergency stop of this run has reached beyond it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StopReach {
+    /// Why a later run may start, if so.
+    unkept: Option<String>,
+    /// The processes of the runs that have not confirmed it, or why the runs are not known.
+    unconfirmed: Result<Vec<u32>, String>,
 }
 
 impl LatchGuard {
@@ -30,8 +43,8 @@ impl LatchGuard {
     #[must_use]
     pub fn of(directory: &Directory) -> Self {
         let latch = directory.latch();
-        let LatchState { presses, pressed } = latch.state();
-        Self { latch, presses, was_pressed: pressed.is_some() }
+        let at_start = latch.state();
+        Self { latch, at_start, reach: Arc::default() }
     }
 
     /// Of the folder in which runs of this user are found. Not real-time.
@@ -40,10 +53,11 @@ impl LatchGuard {
         Self::of(&Directory::of_this_user())
     }
 
-    /// The latch.
+    /// What an emergency stop of this run will not reach, if so: for people, before anything is energised.
     #[must_use]
-    pub fn latch(&self) -> &Latch {
-        &self.latch
+    pub fn warning(&self) -> Option<String> {
+        let problem = self.latch.problem()?;
+        Some(format!("an emergency stop does not outlast this run and may reach no other run: {problem}"))
     }
 
     /// To be called right before a device is energised, after [`LatchGuard::watch`]. Not real-time.
@@ -51,12 +65,12 @@ impl LatchGuard {
     /// # Errors
     /// [`RunError::Latched`].
     pub fn check(&self) -> Result<(), RunError> {
-        match self.latch.state() {
-            LatchState { pressed: Some(pressed), .. } => Err(RunError::Latched(Some(pressed))),
-            LatchState { presses, .. } if self.was_pressed || presses > self.presses => {
-                Err(RunError::Latched(None))
-            }
-            _ => Ok(()),
+        let now = self.latch.state();
+        let was_pressed = self.at_start.pressed.is_some() || now.was_pressed_after(&self.at_start);
+        match now.pressed {
+            Some(pressed) => Err(RunError::Latched(Some(pressed))),
+            None if was_pressed => Err(RunError::Latched(None)),
+            None => Ok(()),
         }
     }
 
@@ -73,13 +87,26 @@ impl LatchGuard {
         Ok(LatchWatch { is_over, thread: Some(thread) })
     }
 
-    /// Presses for an emergency stop of this process, unless the latch was its cause. Not real-time.
-    pub fn press(&self, source: EmergencySource) -> Option<String> {
-        if source == EmergencySource::Latch {
-            return None;
-        }
-        let who = format!("emergency stop ({}) of process {}", source.word(), std::process::id());
-        self.latch.press(&who).err().map(|error| error.to_string())
+    /// Presses for an emergency stop of this process, and asks the other runs to stop. Once only: whoever calls again gets what
+    /// the first call has reached. Not real-time: waits for the other runs, 2 s at most.
+    pub fn press(&self, source: EmergencySource) -> StopReach {
+        let mut reach = self.reach.lock().unwrap_or_else(PoisonError::into_inner);
+        let reach = reach.get_or_insert_with(|| {
+            let who = format!("emergency stop ({}) of process {}", source.word(), std::process::id());
+            let pressed = self.latch.press(&who);
+            let asked = self.latch.stop_runs(Instant::now() + CONFIRM_WAIT);
+            StopReach {
+                unkept: pressed.err().map(|error| error.to_string()),
+                unconfirmed: asked.map_err(|error| error.to_string()),
+            }
+        });
+        reach.clone()
+    }
+
+    /// What the emergency stop of this run has reached; nothing before, and if it came from another run. Not real-time.
+    #[must_use]
+    pub fn reach(&self) -> Option<StopReach> {
+        self.reach.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Checks once, and watches until the watch is dropped: for what moves a device without [`Session::run`](super::Session::run).
@@ -93,27 +120,51 @@ impl LatchGuard {
     }
 
     fn attend(&self, stop: &StopSwitch, is_over: &AtomicBool) {
-        let (mut length, mut has_pressed) = (None, false);
         loop {
             let is_last = is_over.load(Ordering::Relaxed);
             match stop.emergency() {
-                None => {
-                    let now = self.latch.length();
-                    if now != length {
-                        length = now;
-                        if self.check().is_err() {
-                            stop.press(EmergencySource::Latch);
-                        }
-                    }
+                None if self.check().is_err() => stop.press(EmergencySource::Latch),
+                None => {}
+                Some(EmergencySource::Latch) => return,
+                Some(source) => {
+                    self.press(source);
+                    return;
                 }
-                // A folder that cannot be used is reported when the run is over.
-                Some(source) if !has_pressed => has_pressed = self.press(source).is_none(),
-                Some(_) => {}
             }
             if is_last {
                 return;
             }
             std::thread::sleep(LOOK_PERIOD);
+        }
+    }
+}
+
+impl StopReach {
+    /// Why the stop has not reached every run, now and later; nothing if it has.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let unconfirmed = match &self.unconfirmed {
+            Ok(processes) if processes.is_empty() => None,
+            Ok(processes) => {
+                let processes: Vec<String> = processes.iter().map(u32::to_string).collect();
+                Some(format!("not confirmed by process {}: switch its device off", processes.join(", ")))
+            }
+            Err(cause) => {
+                Some(format!("the other runs cannot be asked: {cause}; check that each has stopped"))
+            }
+        };
+        let unkept = self.unkept.as_ref().map(|cause| format!("a later run is not refused: {cause}"));
+        let problems: Vec<String> = unconfirmed.into_iter().chain(unkept).collect();
+        (!problems.is_empty()).then(|| problems.join("; "))
+    }
+}
+
+impl Display for StopReach {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        match self.problem() {
+            None => formatter
+                .write_str("all runs of this machine are stopped, and none starts until `flotor release`"),
+            Some(problem) => write!(formatter, "the emergency stop is certain for this run only: {problem}"),
         }
     }
 }
@@ -172,5 +223,22 @@ mod tests {
         stop.press(EmergencySource::Key);
         drop(watch);
         assert!(directory.latch().state().pressed.is_some());
+    }
+
+    #[test]
+    fn a_stop_that_reaches_no_other_run_says_so_before_and_after() {
+        let scratch = tempfile::tempdir().unwrap();
+        let file = scratch.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        let apart = LatchGuard::of(&Directory::at(file.join("runs")));
+        assert!(apart.warning().unwrap().contains("does not outlast this run"));
+        assert!(apart.press(EmergencySource::Key).to_string().contains("a later run is not refused"));
+        let usual = LatchGuard::of(&Directory::at(scratch.path().join("runs")));
+        assert_eq!(usual.warning(), None);
+        assert_eq!(usual.reach(), None);
+        let silent = Directory::at(scratch.path().join("runs")).listen().unwrap();
+        assert!(usual.press(EmergencySource::Key).to_string().contains("not confirmed by process"));
+        assert_eq!(usual.reach(), Some(usual.press(EmergencySource::Key)));
+        drop(silent);
     }
 }

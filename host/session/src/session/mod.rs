@@ -13,7 +13,7 @@ mod unguarded;
 
 pub use ceiling::{Strength, StrongDevice};
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
-pub use latch::{LatchGuard, LatchWatch};
+pub use latch::{LatchGuard, LatchWatch, StopReach};
 pub use lockstep::Lockstep;
 pub use prepare::prepare_model;
 pub use remains::Remains;
@@ -226,7 +226,8 @@ pub struct Session {
     watchdog_process: Option<WatchdogProcess>,
     /// The run ends without that.
     requires_independent_stop: bool,
-    latch: LatchGuard,
+    /// None on the virtual clock, where no hand is held.
+    latch: Option<LatchGuard>,
     taps: TapEnds,
     capabilities: Vec<Capabilities>,
 }
@@ -342,7 +343,7 @@ impl Session {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
         let duration_ns = (scene.duration_s * 1.0e9).round() as u64;
         let config = LoopConfig { period_ns, seed: options.seed };
-        let latch = LatchGuard::of_this_user();
+        let latch = (options.clock == Clock::Real).then(LatchGuard::of_this_user);
 
         let mut plugins = Vec::new();
         let mut opened = Vec::new();
@@ -379,6 +380,7 @@ impl Session {
             .zip(&opened)
             .filter_map(|(number, opened)| prepare::without_torque(scene, number, &opened.capabilities));
         warnings.extend(torqueless);
+        warnings.extend(latch.as_ref().and_then(LatchGuard::warning));
         let watchdog_process = match options.clock {
             Clock::Real => prepare::watchdog_process(scene, &opened, &mut warnings)?,
             Clock::Virtual => None,
@@ -511,13 +513,13 @@ impl Session {
     /// The same with the latch of another folder than that of this user's runs, from now on.
     #[must_use]
     pub fn latched_in(self, directory: &Directory) -> Self {
-        Self { latch: LatchGuard::of(directory), ..self }
+        Self { latch: self.latch.as_ref().map(|_| LatchGuard::of(directory)), ..self }
     }
 
     /// The latch that stops this run and that it presses; none on the virtual clock, where no hand is held.
     #[must_use]
     pub fn latch(&self) -> Option<&LatchGuard> {
-        (self.clock == Clock::Real).then_some(&self.latch)
+        self.latch.as_ref()
     }
 
     /// The loop itself, its devices energised, for whoever paces it differently; the stoppers must be used before it is
@@ -660,7 +662,8 @@ impl Session {
         let watchdog_process = watchdog_process.map(Arc::new);
         let mut guardian = Guardian::of(watchdog_process.as_ref(), requires_independent_stop);
         // Before the look at the latch that counts: a press after that is seen here.
-        let _watch = latch.watch(stop).map_err(|_| RunError::Thread(latch::NO_WATCH))?;
+        let watch = latch.as_ref().map(|latch| latch.watch(stop)).transpose();
+        let _watch = watch.map_err(|_| RunError::Thread(latch::NO_WATCH))?;
         let mut look = |record: TickRecord| {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(&record);
@@ -688,7 +691,7 @@ impl Session {
             };
             // Last of all that takes time.
             let stoppers = standby.stoppers();
-            loop_latch.check()?;
+            loop_latch.as_ref().map_or(Ok(()), LatchGuard::check)?;
             let servo = activate_here(standby, &loop_plugins, &loop_progress)?;
             let schedule = match spin {
                 Some(window) => Schedule::start_real(period_ns, window),

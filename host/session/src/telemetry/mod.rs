@@ -161,9 +161,15 @@ fn refused(error: &ControlError) -> (RefusalCause, String) {
 /// Only this run stops.
 pub fn emergency_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) -> Result<(), (RefusalCause, String)> {
     stop.press(EmergencySource::Watcher);
-    let problem = latch.and_then(|latch| latch.press(EmergencySource::Watcher));
-    problem
-        .map_or(Ok(()), |problem| Err((RefusalCause::Other, format!("this run stops, no other: {problem}"))))
+    let problem = latch.and_then(|latch| latch.press(EmergencySource::Watcher).problem());
+    problem.map_or(Ok(()), |problem| Err((RefusalCause::Other, format!("this run stops; {problem}"))))
+}
+
+/// The emergency stop of another run of the machine, for a run that has its latch.
+pub fn machine_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) {
+    if latch.is_some() {
+        stop.press(EmergencySource::Latch);
+    }
 }
 
 impl Serve for Host {
@@ -187,6 +193,7 @@ impl Serve for Host {
             }
             Ask::Stop => stop.stop(),
             Ask::EmergencyStop => return emergency_stop(stop, latch.as_ref()),
+            Ask::MachineStop => machine_stop(stop, latch.as_ref()),
         }
         Ok(())
     }

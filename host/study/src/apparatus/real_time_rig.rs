@@ -12,7 +12,7 @@ use crate::trial::Trial;
 use flotor_live::{Ask, Directory, EndKind, RefusalCause, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, RunEnd, StopSwitch};
-use flotor_session::telemetry::{Watched, announce, emergency_stop};
+use flotor_session::telemetry::{Watched, announce, emergency_stop, machine_stop};
 use flotor_session::{
     ControlError, Controls, LatchGuard, Outcome, RunError, RunOptions, RunRecording, Session,
 };
@@ -49,6 +49,7 @@ impl Serve for OnlyStop {
             Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
             Ask::Stop => self.stop.stop(),
             Ask::EmergencyStop => return emergency_stop(&self.stop, self.latch.as_ref()),
+            Ask::MachineStop => machine_stop(&self.stop, self.latch.as_ref()),
             Ask::Set { .. } | Ask::Weight { .. } | Ask::Swap { .. } => {
                 let words = "an experiment is under way: what is felt is its own to change";
                 return Err((RefusalCause::Other, words.to_owned()));

@@ -8,7 +8,8 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// A connection.
@@ -21,14 +22,12 @@ const MOST_PENDING: usize = 16;
 /// Pause between two reads from the clients without the secret.
 const POLL_PERIOD: Duration = Duration::from_millis(2);
 
-/// Where connections come in.
-#[derive(Clone, Debug)]
-pub(crate) struct Listening(Arc<Shared>);
-
+/// Accepts the connections of clients until it is closed.
 #[derive(Debug)]
-struct Shared {
+pub(crate) struct Listening {
     socket: TcpListener,
     secret: String,
+    is_closed: AtomicBool,
     /// Locked by the thread that accepts: one at a time.
     pending: Mutex<Vec<Pending>>,
     /// Keeps the file from being removed while the run lives.
@@ -58,13 +57,55 @@ impl Listening {
         let socket = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
         let announced = Announced::new(socket.local_addr()?.port())?;
         let _file = announced.write(path)?;
-        Ok(Self(Arc::new(Shared { socket, secret: announced.secret, pending: Mutex::default(), _file })))
+        let is_closed = AtomicBool::new(false);
+        Ok(Self { socket, secret: announced.secret, is_closed, pending: Mutex::default(), _file })
     }
 
-    /// A second handle.
-    #[allow(clippy::unnecessary_wraps)] // elsewhere a system makes it
-    pub(crate) fn try_clone(&self) -> io::Result<Self> {
-        Ok(self.clone())
+    /// Ends every [`accept`](Self::accept), now and later.
+    pub(crate) fn close(&self) {
+        self.is_closed.store(true, Ordering::Relaxed);
+        // Wakes the thread that waits; the port is this socket's own for as long as it is open.
+        let _ = self.socket.local_addr().and_then(Stream::connect);
+    }
+
+    /// Waits for the next client that sends the secret; `None` once closed, `Interrupted` when a client was rejected.
+    pub(crate) fn accept(&self) -> io::Result<Option<Stream>> {
+        let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            // Without a pending client there is nothing to do but to wait for one.
+            self.socket.set_nonblocking(!pending.is_empty())?;
+            let accepted = self.socket.accept();
+            if self.is_closed.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            match accepted {
+                Ok((stream, _)) => {
+                    let is_full = pending.len() >= MOST_PENDING;
+                    if is_full {
+                        pending.remove(0);
+                    }
+                    pending.extend(Pending::new(stream));
+                    if is_full {
+                        return Err(ErrorKind::Interrupted.into());
+                    }
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(POLL_PERIOD),
+                // The client left before it was accepted.
+                Err(error) if is_by_client(error.kind()) => return Err(ErrorKind::Interrupted.into()),
+                Err(error) => return Err(error),
+            }
+            let decided =
+                pending.iter_mut().enumerate().find_map(|(place, one)| match one.read_secret(&self.secret) {
+                    Check::Incomplete => None,
+                    check => Some((place, check)),
+                });
+            if let Some((place, check)) = decided {
+                let Pending { stream, .. } = pending.remove(place);
+                let is_accepted = matches!(check, Check::Passed)
+                    && stream.set_nonblocking(false).and_then(|()| stream.set_nodelay(true)).is_ok();
+                return if is_accepted { Ok(Some(stream)) } else { Err(ErrorKind::Interrupted.into()) };
+            }
+        }
     }
 }
 
@@ -77,40 +118,16 @@ pub(crate) fn connect(path: &Path) -> io::Result<Stream> {
     Ok(stream)
 }
 
-/// Waits for the next client that sends the secret; `Interrupted` when one was rejected.
-pub(crate) fn accept(Listening(shared): &Listening) -> io::Result<Stream> {
-    let mut pending = shared.pending.lock().unwrap_or_else(PoisonError::into_inner);
-    loop {
-        // Without a pending client there is nothing to do but to wait for one.
-        shared.socket.set_nonblocking(!pending.is_empty())?;
-        match shared.socket.accept() {
-            Ok((stream, _)) => {
-                let is_full = pending.len() >= MOST_PENDING;
-                if is_full {
-                    pending.remove(0);
-                }
-                pending.extend(Pending::new(stream));
-                if is_full {
-                    return Err(ErrorKind::Interrupted.into());
-                }
-            }
-            Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(POLL_PERIOD),
-            // The client left before it was accepted.
-            Err(error) if is_by_client(error.kind()) => return Err(ErrorKind::Interrupted.into()),
-            Err(error) => return Err(error),
-        }
-        let decided =
-            pending.iter_mut().enumerate().find_map(|(place, one)| match one.read_secret(&shared.secret) {
-                Check::Incomplete => None,
-                check => Some((place, check)),
-            });
-        if let Some((place, check)) = decided {
-            let Pending { stream, .. } = pending.remove(place);
-            let is_accepted = matches!(check, Check::Passed)
-                && stream.set_nonblocking(false).and_then(|()| stream.set_nodelay(true)).is_ok();
-            return if is_accepted { Ok(stream) } else { Err(ErrorKind::Interrupted.into()) };
-        }
-    }
+/// The same; the connection waits for nothing afterwards.
+pub(crate) fn connect_now(path: &Path) -> io::Result<Stream> {
+    let stream = connect(path)?;
+    stream.set_nonblocking(true).map(|()| stream)
+}
+
+/// Whether the client has closed its end without a request.
+pub(crate) fn has_left(stream: &Stream) -> bool {
+    let peeked = stream.set_nonblocking(true).and_then(|()| stream.peek(&mut [0; 1]));
+    stream.set_nonblocking(false).is_err() || peeked.is_ok_and(|available| available == 0)
 }
 
 fn is_by_client(kind: ErrorKind) -> bool {
@@ -149,8 +166,8 @@ mod tests {
     fn accept_one(listening: &Listening) -> (Stream, usize) {
         let mut rejected = 0;
         loop {
-            match accept(listening) {
-                Ok(stream) => return (stream, rejected),
+            match listening.accept() {
+                Ok(stream) => return (stream.expect("it is open"), rejected),
                 Err(error) => {
                     assert_eq!(error.kind(), ErrorKind::Interrupted);
                     rejected += 1;
@@ -209,7 +226,7 @@ mod tests {
         let listening = Listening::bind(&path).unwrap();
         let mut silent = without_secret(&path);
         silent.write_all(b"0").unwrap();
-        assert_eq!(accept(&listening).unwrap_err().kind(), ErrorKind::Interrupted);
+        assert_eq!(listening.accept().unwrap_err().kind(), ErrorKind::Interrupted);
         let crowd: Vec<Stream> = (0..=MOST_PENDING).map(|_| without_secret(&path)).collect();
         let client = connect(&path).unwrap();
         let _ = accept_one(&listening);

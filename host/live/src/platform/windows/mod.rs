@@ -8,11 +8,12 @@ mod announced;
 mod connections;
 mod datagrams;
 
-pub(crate) use connections::{Listening, Stream, accept, connect};
+pub(crate) use connections::{Listening, Stream, connect, connect_now, has_left};
 pub(crate) use datagrams::Datagrams;
 
-use std::fs::{Metadata, OpenOptions};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io;
+use std::os::windows::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 /// The folder of the runs of this user.
@@ -42,6 +43,22 @@ pub(crate) fn private_file(options: &mut OpenOptions) -> &mut OpenOptions {
 }
 
 /// Removes the file of a run whose process is no more; true if that is so. The file of one that lives cannot be removed.
-pub(crate) fn remove_if_over(path: &Path, _: u32) -> bool {
+pub(crate) fn remove_if_dead(path: &Path) -> bool {
     std::fs::remove_file(path).is_ok() || !path.exists()
+}
+
+/// True: the system keeps a file that is open from being replaced.
+pub(crate) fn is_same_file(_: &Metadata, _: &Metadata) -> bool {
+    true
+}
+
+/// Reads from a place of a file; what is beyond its end stays as it was.
+pub(crate) fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<usize> {
+    file.seek_read(bytes, offset)
+}
+
+/// Overwrites a place of a file.
+pub(crate) fn write_all_at(file: &File, bytes: &[u8], offset: u64) -> io::Result<()> {
+    let written = file.seek_write(bytes, offset)?;
+    if written == bytes.len() { Ok(()) } else { Err(io::ErrorKind::WriteZero.into()) }
 }

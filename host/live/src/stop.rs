@@ -1,0 +1,92 @@
+//! The second way of an emergency stop, beside the latch: over the sockets of the other runs, which confirm it.
+//!
+//! One thread asks all of them and waits for none in particular. Not real-time.
+
+use crate::frame::{Frames, Kind, frame};
+use crate::message::{Answer, Ask, Request};
+use crate::platform::{Stream, connect_now};
+use crate::{DirectoryError, Found, Latch};
+use std::io::{ErrorKind, Write};
+use std::time::{Duration, Instant};
+
+/// Pause between two looks at those that have not confirmed.
+const LOOK_PERIOD: Duration = Duration::from_millis(2);
+
+impl Latch {
+    /// Asks each run of the folder to stop, and waits until all have confirmed or are over, at most until then; the processes of
+    /// those that have not.
+    ///
+    /// # Errors
+    /// [`DirectoryError`]: the runs cannot be listed.
+    pub fn stop_runs(&self, until: Instant) -> Result<Vec<u32>, DirectoryError> {
+        self.free_descriptors();
+        let unconfirmed = self.unconfirmed(until);
+        self.reserve_descriptors();
+        unconfirmed
+    }
+
+    fn unconfirmed(&self, until: Instant) -> Result<Vec<u32>, DirectoryError> {
+        let runs = self.directory().try_runs()?;
+        let mut open: Vec<Stopping> =
+            runs.into_iter().map(|run| Stopping { run, connection: None }).collect();
+        loop {
+            open.retain_mut(|stopping| !stopping.is_done());
+            if open.is_empty() || Instant::now() >= until {
+                return Ok(open.into_iter().map(|stopping| stopping.run.process).collect());
+            }
+            std::thread::sleep(LOOK_PERIOD);
+        }
+    }
+}
+
+/// A run that has not confirmed yet.
+struct Stopping {
+    run: Found,
+    connection: Option<(Stream, Frames)>,
+}
+
+impl Stopping {
+    /// Whether the run has confirmed, or is over.
+    fn is_done(&mut self) -> bool {
+        let (stream, frames) = match &mut self.connection {
+            Some(connection) => connection,
+            none => match ask(&self.run) {
+                Ok(stream) => none.insert((stream, Frames::default())),
+                Err(kind) => return matches!(kind, ErrorKind::ConnectionRefused | ErrorKind::NotFound),
+            },
+        };
+        loop {
+            match frames.fill(stream) {
+                Ok(length) if length > 0 => {}
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return false,
+                // Over, or evicted in favour of another client: the next connection decides.
+                _ => {
+                    self.connection = None;
+                    return false;
+                }
+            }
+            while let Ok(Some((kind, payload))) = frames.take() {
+                let has_stopped = match kind {
+                    Kind::Answer => {
+                        serde_json::from_slice::<Answer>(payload).is_ok_and(|a| a.refused.is_none())
+                    }
+                    Kind::End => true,
+                    _ => false,
+                };
+                if has_stopped {
+                    return true;
+                }
+            }
+        }
+    }
+}
+
+/// Connects and sends the request.
+fn ask(run: &Found) -> Result<Stream, ErrorKind> {
+    let mut stream = connect_now(&run.path).map_err(|error| error.kind())?;
+    let request = Request { number: 0, ask: Ask::MachineStop };
+    let request = serde_json::to_vec(&request).map_err(|_| ErrorKind::InvalidData)?;
+    stream.write_all(&frame(Kind::Request, &request)).map_err(|error| error.kind())?;
+    Ok(stream)
+}
