@@ -6,11 +6,12 @@
 //! is back on it.
 //!
 //! ```text
-//! F = max(K d - B v_n, 0) n + K t,    |t| <= mu d
+//! F = F_n n + K t,    F_n = max(K d - B v_n, 0),    K |t| <= mu F_n
 //! ```
 //!
 //! with depth `d` and displacement `t` of the proxy from the handle, along and across the outward normal `n`.
 //!
+//! - [`surface`]: stiffness, damping, friction.
 //! - [`shape`]: plane, sphere, box: normals, and sliding on the surface.
 //! - [`proxy`]: contact, stick and slip.
 //! - `plugin`: parameters and the contract.
@@ -18,5 +19,6 @@
 mod plugin;
 pub mod proxy;
 pub mod shape;
+pub mod surface;
 
 pub use plugin::{FLOTOR_ENTRY, Wall};

@@ -1,7 +1,8 @@
 //! The wall as a plugin: parameters, and one handle's history.
 
-use crate::proxy::{Proxy, Surface};
+use crate::proxy::Proxy;
 use crate::shape::Shape;
+use crate::surface::Surface;
 use flotor_hal::{
     self as hal, ActiveRegion, ActiveRegionModel, Choices, DQuat, DVec3, Demand, ForceModel, Form, Input,
     Memory, ModelInfo, OutOfRange, Output, Parameter, Part, Pose, Primitive, Refusal, Settings, ShapeModel,

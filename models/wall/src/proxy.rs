@@ -1,18 +1,8 @@
 //! Contact, stick and slip: the proxy on the surface, and the pull between it and the handle.
 
 use crate::shape::{Place, Shape};
+use crate::surface::Surface;
 use flotor_hal::DVec3;
-
-/// How hard the surface is and how rough.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surface {
-    /// Stiffness `K`, N/m.
-    pub stiffness_n_per_m: f64,
-    /// Damping `B` of a movement along the normal, while in contact, N s/m.
-    pub damping_ns_per_m: f64,
-    /// Coefficient of friction `mu`.
-    pub friction: f64,
-}
 
 /// What is felt.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,23 +48,15 @@ impl Proxy {
             return Pull::default();
         }
         let before = self.contact.unwrap_or_else(|| shape.entry(self.outside_m, handle_m));
-        let proxy = shape.slide(&before, handle_m, surface.friction);
+        let proxy = shape.slide(&before, surface, handle_m, velocity_m_per_s);
         self.contact = Some(proxy);
 
         let stretch_m = proxy.point_m - handle_m;
         let depth_m = stretch_m.dot(proxy.normal);
         let along_m = stretch_m - proxy.normal * depth_m;
-        // A wall never pulls: where damping would, it is left out.
-        let outwards_m_per_s = velocity_m_per_s.dot(proxy.normal);
-        let normal_n =
-            (surface.stiffness_n_per_m * depth_m - surface.damping_ns_per_m * outwards_m_per_s).max(0.0);
-        let mut along_n = along_m * surface.stiffness_n_per_m;
-        if normal_n < surface.stiffness_n_per_m * depth_m {
-            // Damping relieves a handle that leaves; the cone is that of the force it feels.
-            along_n = along_n.clamp_length_max(surface.friction * normal_n);
-        }
+        let normal_n = surface.normal_force_n(depth_m, velocity_m_per_s.dot(proxy.normal));
         Pull {
-            force_n: proxy.normal * normal_n + along_n,
+            force_n: proxy.normal * normal_n + along_m * surface.stiffness_n_per_m,
             energy_j: 0.5 * surface.stiffness_n_per_m * stretch_m.length_squared(),
         }
     }

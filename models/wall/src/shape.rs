@@ -1,5 +1,6 @@
 //! The solids: convex, with their top at the origin and the rest below.
 
+use crate::surface::Surface;
 use flotor_hal::DVec3;
 use flotor_hal::math;
 
@@ -71,28 +72,43 @@ impl Shape {
         }
     }
 
-    /// Slides a proxy on the surface towards the place nearest to the handle, just as far as friction `mu` lets it:
-    /// to where the pull of the handle lies on Coulomb's cone, `|t| = mu d`. Real-time: bounded, no allocation.
+    /// Slides a proxy on the surface towards the place nearest to the handle, as far as Coulomb's friction requires: until
+    /// the spring along the surface pulls with no more than `mu` times the felt normal force, `K |t| <= mu F_n`. What
+    /// the spring loses on the way is dissipated. Real-time: bounded, no allocation.
     #[must_use]
-    pub fn slide(&self, proxy: &Place, handle_m: DVec3, mu: f64) -> Place {
+    pub fn slide(&self, proxy: &Place, surface: &Surface, handle_m: DVec3, velocity_m_per_s: DVec3) -> Place {
         let nearest = self.nearest(handle_m, proxy.normal);
+        if surface.friction == 0.0 {
+            return nearest;
+        }
+        let stretch_m = proxy.point_m - handle_m;
+        let depth_m = stretch_m.dot(proxy.normal);
+        let normal_n = surface.normal_force_n(depth_m, velocity_m_per_s.dot(proxy.normal));
+        let held_n = surface.friction * normal_n;
+        let along_n = (stretch_m - proxy.normal * depth_m).length() * surface.stiffness_n_per_m;
+        if along_n <= held_n {
+            return *proxy;
+        }
         match *self {
             Self::Plane | Self::Cube { .. } => {
-                let depth_m = (nearest.point_m - handle_m).dot(nearest.normal);
-                let lag_m = (proxy.point_m - nearest.point_m).clamp_length_max(mu * depth_m);
-                Place { point_m: nearest.point_m + lag_m, normal: nearest.normal }
+                let lag_m = proxy.point_m - nearest.point_m;
+                Place { point_m: nearest.point_m + lag_m * (held_n / along_n), normal: nearest.normal }
             }
             Self::Sphere { radius_m } => {
-                // r sin(a) = mu (R - r cos(a)) for the angle a between proxy and handle, seen from the centre.
-                let share = (handle_m - self.centre_m()).length() / radius_m;
-                let sine = mu / (share * math::hypot(mu, 1.0));
-                let sticks_up_to_rad =
-                    if sine < 1.0 { math::asin(sine) - math::atan(mu) } else { f64::INFINITY };
-                let angle_rad = proxy.normal.angle_between(nearest.normal);
-                if angle_rad <= sticks_up_to_rad {
-                    return *proxy;
-                }
-                let normal = nearest.normal.slerp(proxy.normal, sticks_up_to_rad / angle_rad).normalize();
+                let lag = proxy.normal - nearest.normal * proxy.normal.dot(nearest.normal);
+                let aside = lag.try_normalize().unwrap_or(DVec3::ZERO);
+                // K r sin(a) = mu F_n = mu (K (R - r cos(a)) - B (v_r cos(a) + v_t sin(a))) for the angle a between proxy
+                // and handle, seen from the centre; v_r away from the centre, v_t towards the proxy.
+                let Surface { stiffness_n_per_m, damping_ns_per_m, friction } = *surface;
+                let spring_n = stiffness_n_per_m * (handle_m - self.centre_m()).length();
+                let damper_n = damping_ns_per_m * velocity_m_per_s;
+                let sine_n = spring_n + friction * damper_n.dot(aside);
+                let cosine_n = friction * (spring_n + damper_n.dot(nearest.normal));
+                let sine = friction * stiffness_n_per_m * radius_m / math::hypot(sine_n, cosine_n);
+                // Where even the place nearest to the handle would feel no normal force, the proxy slips up to there.
+                let angle_rad = (math::asin(sine.min(1.0)) - math::atan2(cosine_n, sine_n)).max(0.0);
+                let normal =
+                    (nearest.normal * math::cos(angle_rad) + aside * math::sin(angle_rad)).normalize();
                 Place { point_m: self.centre_m() + normal * radius_m, normal }
             }
         }

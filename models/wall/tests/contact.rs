@@ -1,8 +1,9 @@
 //! The wall against closed forms: depth, cone of friction, work in a loop, and what a wall never does.
 
 use flotor_hal::DVec3;
-use flotor_wall::proxy::{Proxy, Pull, Surface};
+use flotor_wall::proxy::{Proxy, Pull};
 use flotor_wall::shape::Shape;
+use flotor_wall::surface::Surface;
 use proptest::prelude::*;
 
 const SMOOTH: Surface = Surface { stiffness_n_per_m: 2000.0, damping_ns_per_m: 0.0, friction: 0.0 };
@@ -104,6 +105,119 @@ fn a_loop_on_smooth_ground_costs_nothing_and_on_rough_ground_it_costs_the_rubbin
     let closing_j = 0.5 * 2000.0 * 0.001 * 0.001;
     // The cone closes along a line of 300 steps of 10 µm: the trapezoidal rule errs by a few thousandths of that part.
     assert!((work_j + rubbed_j + closing_j).abs() < 0.01 * closing_j, "{work_j}");
+}
+
+/// A closed lap of straight legs, each at a speed of its own.
+struct Lap {
+    corners_m: Vec<DVec3>,
+    speeds_m_per_s: Vec<f64>,
+}
+
+impl Lap {
+    /// Returns the work that two laps do on the handle after a first one, and the work exchanged, J: the midpoint rule over
+    /// the force at the moving handle, `steps` of them to a leg.
+    fn work_j(&self, shape: &Shape, surface: &Surface, steps: u32) -> (f64, f64) {
+        let mut proxy = Proxy::default();
+        let _ = proxy.follow(shape, surface, DVec3::Z * 0.001, DVec3::ZERO);
+        let (mut made_j, mut exchanged_j) = (0.0, 0.0);
+        for round in 0..3 {
+            for (leg, &speed_m_per_s) in self.speeds_m_per_s.iter().enumerate() {
+                let from_m = self.corners_m[leg];
+                let step_m = (self.corners_m[(leg + 1) % self.corners_m.len()] - from_m) / f64::from(steps);
+                let velocity_m_per_s = step_m.normalize_or_zero() * speed_m_per_s;
+                for step in 0..steps {
+                    let here_m = from_m + step_m * (f64::from(step) + 0.5);
+                    let pull = proxy.follow(shape, surface, here_m, velocity_m_per_s);
+                    if round > 0 {
+                        let work_j = pull.force_n.dot(step_m);
+                        (made_j, exchanged_j) = (made_j + work_j, exchanged_j + work_j.abs());
+                    }
+                }
+            }
+        }
+        (made_j, exchanged_j)
+    }
+
+    /// Asserts that a lap makes no more than the midpoint rule errs by: at a jump of the force by half a step's work, which
+    /// halves with the step, so twice the difference between two steps bounds what is left.
+    fn assert_passive(&self, shape: Shape, surface: Surface) {
+        let (coarse_j, _) = self.work_j(&shape, &surface, 500);
+        let (fine_j, exchanged_j) = self.work_j(&shape, &surface, 1000);
+        let error_j = 2.0 * (coarse_j - fine_j).abs() + 1.0e-12 * exchanged_j;
+        assert!(fine_j <= error_j, "{shape:?} {surface:?}: {fine_j} J of {exchanged_j} J, error {error_j} J");
+    }
+}
+
+/// Press in, fast up and sideways while damping takes the normal force, slowly back to above the proxy, and down again.
+#[test]
+fn a_lap_that_leaves_fast_and_returns_slowly_gains_nothing() {
+    for (stiffness_n_per_m, damping_ns_per_m, friction, depth_m, speed_m_per_s) in [
+        (2000.0, 100.0, 1.0, 5.0e-3, 0.5),
+        (2000.0, 20.0, 1.0, 1.0e-3, 0.5),
+        (2000.0, 20.0, 1.0, 2.0e-3, 0.5),
+        (2000.0, 50.0, 0.5, 2.0e-3, 0.5),
+        (2000.0, 2.0, 0.3, 2.0e-3, 0.5),
+        (2000.0, 15.0, 0.8, 1.0e-3, 0.3),
+        (10_000.0, 30.0, 1.0, 0.5e-3, 0.3),
+    ] {
+        // Outwards as fast as damping needs to take all of the normal force, or over nine tenths of the depth.
+        let aside_m = friction * depth_m * 0.98;
+        let outwards_m_per_s: f64 = 1.02 * stiffness_n_per_m * depth_m / damping_ns_per_m;
+        let up_m = (outwards_m_per_s * aside_m / speed_m_per_s).min(0.9 * depth_m);
+        let aside_m = friction * (depth_m - up_m) * 0.98;
+        let lap = Lap {
+            corners_m: vec![
+                DVec3::Z * -depth_m,
+                DVec3::new(aside_m, 0.0, up_m - depth_m),
+                DVec3::Z * (up_m - depth_m),
+            ],
+            speeds_m_per_s: vec![outwards_m_per_s.hypot(speed_m_per_s), 0.02, 0.02],
+        };
+        for shape in [Shape::Plane, BALL, CUBE] {
+            lap.assert_passive(shape, Surface { stiffness_n_per_m, damping_ns_per_m, friction });
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Laps that stay inside, so that no sudden contact is part of them.
+    #[test]
+    fn no_lap_with_friction_damping_and_velocity_makes_energy(
+        corners in prop::collection::vec((-0.003..0.003_f64, -0.003..0.003_f64, -0.004..-0.0005_f64), 3..7),
+        speeds in prop::collection::vec(0.01..1.0_f64, 7),
+        damping_ns_per_m in 1.0..100.0_f64,
+        friction in 0.1..1.5_f64,
+        solid in 0..3_usize,
+    ) {
+        let corners_m: Vec<_> = corners.into_iter().map(|(x, y, z)| DVec3::new(x, y, z)).collect();
+        let speeds_m_per_s = speeds[..corners_m.len()].to_vec();
+        let surface = Surface { damping_ns_per_m, friction, ..SMOOTH };
+        Lap { corners_m, speeds_m_per_s }.assert_passive([Shape::Plane, BALL, CUBE][solid], surface);
+    }
+
+    /// The pull of a sliding proxy lies on the cone of the felt normal force, at any velocity.
+    #[test]
+    fn the_cone_is_that_of_the_felt_force_on_every_solid(
+        aside_m in 0.001..0.006_f64,
+        velocity in (-0.5..0.5_f64, -0.5..0.5_f64, -0.5..0.5_f64),
+        damping_ns_per_m in 0.0..50.0_f64,
+        friction in 0.05..1.5_f64,
+        solid in 0..3_usize,
+    ) {
+        let shape = [Shape::Plane, BALL, CUBE][solid];
+        let surface = Surface { damping_ns_per_m, friction, ..SMOOTH };
+        let mut proxy = Proxy::default();
+        let _ = proxy.follow(&shape, &surface, DVec3::Z * -0.003, DVec3::ZERO);
+        let here_m = DVec3::new(aside_m, 0.0, -0.003);
+        let pull = proxy.follow(&shape, &surface, here_m, DVec3::from(velocity));
+        let normal = proxy.contact().expect("it is inside").normal;
+        let pressed_n = pull.force_n.dot(normal);
+        let rubbed_n = (pull.force_n - normal * pressed_n).length();
+        // Lengths of 1e-2 m rounded to 1e-18 m, times 2000 N/m, through one arc sine.
+        prop_assert!(rubbed_n <= friction * pressed_n + 1.0e-11, "{rubbed_n} {pressed_n}");
+    }
 }
 
 proptest! {
