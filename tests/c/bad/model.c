@@ -127,6 +127,11 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
         output->wrench.force_n[axis] += 5.0 * velocity_m_per_s[axis];
     }
 #endif
+#ifdef FORCE_BY_DEMAND
+    if (!(input->demand.bits & FLOTOR_DEMAND_TORQUE)) {
+        output->wrench.force_n[2] *= 1.001;
+    }
+#endif
 #ifdef DAMPING
     for (int axis = 0; axis < 3; axis++) {
         output->wrench.force_n[axis] -= 5.0 * velocity_m_per_s[axis];

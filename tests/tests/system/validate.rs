@@ -62,6 +62,7 @@ fn every_mistake_of_a_model_is_found_under_its_rule() {
         ("NAN_IN_MOTION", "live-parameters", "NaN"),
         ("CRASHES_IN_MOTION", "finite-in-motion", "by signal 11"),
         ("INTEGRATES", "reset-repeats", "another answer after reset"),
+        ("FORCE_BY_DEMAND", "demand", "with force alone"),
         ("LIVE_WITHOUT_SETTER", "live-parameters", "the plugin has no `set_parameter`"),
         ("ABORTS_WHEN_SET", "live-parameters", "by signal 6"),
         ("REFUSES_WHEN_SET", "live-parameters", "refuses every live parameter"),

@@ -36,6 +36,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
     let of_model = |check: fn(&mut Model) -> Result<(), String>| check(&mut subject.prepared_model()?);
     match wanted {
         Check::FiniteInMotion => of_model(model::finite_in_motion)?,
+        Check::Demand => of_model(model::demand)?,
         Check::LiveParameters => live_parameters::live_parameters(&subject)?,
         Check::Activity => of_model(model::activity)?,
         Check::Passive => return Ok(passive::passive(&mut subject.prepared_model()?)?),

@@ -32,6 +32,52 @@ pub(super) fn finite_in_motion(model: &mut Model) -> Result<(), String> {
     Ok(())
 }
 
+/// Compares the answers on a path with everything demanded, to those with less demanded, and to those with a demand that
+/// changes from step to step, as of a viewer that comes and goes.
+pub(super) fn demand(model: &mut Model) -> Result<(), String> {
+    let all = demanded(model, |_| Demand::ALL)?;
+    let fewer: [(&str, fn(u64) -> Demand); 4] = [
+        ("force alone", |_| Demand::FORCE),
+        ("force and torque", |_| Demand::WRENCH),
+        ("force and energy", |_| Demand::FORCE.with(Demand::ENERGY)),
+        ("everything in every other step", |tick| if tick % 2 == 0 { Demand::ALL } else { Demand::FORCE }),
+    ];
+    for (what, of) in fewer {
+        let less = demanded(model, of)?;
+        let other = (0..).zip(all.iter().zip(&less)).find(|(tick, (all, less))| {
+            let (has_torque, [all_of, less_of]) =
+                (of(*tick).contains(Demand::TORQUE), [all, less].map(|o| o.wrench));
+            is_other(all_of.force_n, less_of.force_n)
+                || all.status() != less.status()
+                || has_torque && is_other(all_of.torque_nm, less_of.torque_nm)
+        });
+        if let Some((tick, (all, less))) = other {
+            let [with, without] = [all, less].map(|output| output.wrench.force_n);
+            return Err(format!(
+                "step {tick} of a path gave the force {with:?} N with everything demanded, and {without:?} N with {what}"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// True if a number differs; one NaN is like another, and found by another rule.
+fn is_other(first: [f64; 3], second: [f64; 3]) -> bool {
+    first.into_iter().zip(second).any(|(a, b)| a != b && !(a.is_nan() && b.is_nan()))
+}
+
+/// The answers on a path from the start, with a demand for each step.
+fn demanded(model: &mut Model, of: impl Fn(u64) -> Demand) -> Result<Vec<Output>, String> {
+    match model.reset() {
+        CallStatus::Ok => {}
+        other => return Err(format!("reset returned {other:?}")),
+    }
+    let serves = model.serves();
+    walk(500)
+        .map(|input| step(model, &Input { demand: of(input.tick).limited_to(serves), ..input }))
+        .collect()
+}
+
 pub(super) fn not_finite(model: &mut Model) -> Result<(), String> {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for axis in 0..7 {

@@ -10,6 +10,8 @@ pub enum Check {
     Contract(Rule),
     /// A handle that moves gets finite numbers as well.
     FiniteInMotion,
+    /// The force of a model is the same whatever else is demanded.
+    Demand,
     /// Live parameters can be set, answer in time and are reported back.
     LiveParameters,
     /// Outside the region that a model declares it does nothing.
@@ -22,8 +24,14 @@ pub enum Check {
 
 impl Check {
     /// What this host checks beside the contract's list, in this order.
-    const OF_THE_HOST: [Self; 5] =
-        [Self::FiniteInMotion, Self::LiveParameters, Self::Activity, Self::Passive, Self::SystemCalls];
+    const OF_THE_HOST: [Self; 6] = [
+        Self::FiniteInMotion,
+        Self::Demand,
+        Self::LiveParameters,
+        Self::Activity,
+        Self::Passive,
+        Self::SystemCalls,
+    ];
 
     /// Everything, in the order it is checked.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -36,6 +44,7 @@ impl Check {
         match self {
             Self::Contract(rule) => rule.id(),
             Self::FiniteInMotion => "finite-in-motion",
+            Self::Demand => "demand",
             Self::LiveParameters => "live-parameters",
             Self::Activity => "activity",
             Self::Passive => "passive",
@@ -49,6 +58,9 @@ impl Check {
         match self {
             Self::Contract(rule) => rule.text(),
             Self::FiniteInMotion => "the wrench is finite while the handle moves, slowly and fast",
+            Self::Demand => {
+                "force and status do not depend on the other outputs that are demanded, nor torque on energy"
+            }
             Self::LiveParameters => "live parameters can be set in time and report their value",
             Self::Activity => "outside the active region, wrench and energy are zero",
             Self::Passive => {
