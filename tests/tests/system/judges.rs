@@ -119,7 +119,7 @@ fn a_call_that_does_not_return_is_named_and_the_score_goes_on() {
     }
     let measures = measures(
         &library(),
-        &["--set", "defect=endless-slab", "--timeout", "1s", "--only", "M0", "--only", "M5", "--only", "M10"],
+        &["--set", "defect=endless-slab", "--timeout", "1s", "--only", "M0", "--only", "M8", "--only", "M10"],
     );
     let stuck = &measures[0];
     assert_eq!(stuck["verdict"], "fail");

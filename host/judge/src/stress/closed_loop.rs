@@ -15,7 +15,7 @@
 //! at which it does is reported beside the rule's.
 
 use super::jacobian::Jacobian;
-use super::measure::{Measure, Verdict};
+use super::measure::{Measure, NO_ANSWER, Verdict};
 use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, PERIOD_S, Setup};
 use crate::PERIOD_NS;
@@ -322,7 +322,7 @@ fn limits(setup: &Setup<'_>) -> Result<Vec<(String, f64, f64)>, LoadError> {
 
 /// The stiffness at home times the gain at which the loop starts to grow, N/m; nothing without a stiffness.
 fn limit(subject: &mut Subject<'_>, clean: Loop, start: Pose) -> Option<f64> {
-    let stiffness = Jacobian::at(subject, Pose::HOME)?.stiffness();
+    let stiffness = Jacobian::at(subject, Pose::HOME)?.gain();
     let rule = clean.stiffest_n_per_m();
     if stiffness <= 0.0 {
         return None;
@@ -356,8 +356,10 @@ fn judge(rows: &[Row]) -> Measure {
             (Verdict::Fail, format!("{uphill} releases came to rest with more energy than they started with"))
         }
         (1.., _) => (Verdict::Fail, "diverges although nowhere stiffer than the stability limit".to_owned()),
-        (0, 0) if carried_off > 0 => (Verdict::Note, "no release has an equilibrium to settle at".to_owned()),
-        (0, 0) => (Verdict::Note, "stiffer than the stability limit everywhere: nothing to judge".to_owned()),
+        (0, 0) if carried_off > 0 => {
+            (Verdict::NothingToJudge, "no release has an equilibrium to settle at".to_owned())
+        }
+        (0, 0) => (Verdict::NothingToJudge, "no release is below the stability limit all the way".to_owned()),
         _ if elsewhere > 0 => {
             let text =
                 format!("{foretold} releases had to settle and settled, {elsewhere} of them away from home");
@@ -373,7 +375,7 @@ fn judge(rows: &[Row]) -> Measure {
         .count("releases carried off", carried_off)
         .count("releases at rest away from home", elsewhere)
         .count("releases driven uphill", uphill)
-        .unless_unanswered(answered);
+        .unless_empty(answered, NO_ANSWER);
     let largest = |is: &dyn Fn(&Row) -> bool, pick: fn(&Release) -> f64| {
         let releases = rows.iter().filter(|row| is(row)).filter_map(|row| row.release.as_ref());
         releases.map(pick).fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) })

@@ -7,7 +7,7 @@
 //! is above the bound is timed up to ten times more: an interruption does not come back, a slow call does. That a call
 //! allocates nothing cannot be seen from outside the plugin; the plugin's own tests have to say it.
 
-use super::measure::Measure;
+use super::measure::{Measure, NO_ANSWER};
 use super::poses::mixed;
 use super::{Setup, WIDER};
 use crate::call_timer::{net_ns, overhead_ns};
@@ -137,5 +137,6 @@ impl Stopwatch {
             .with("max, interruptions included", self.calls.max() as f64, "ns")
             .count("calls", self.calls.len())
             .with("clock, taken off", self.overhead_ns, "ns")
+            .unless_empty(self.calls.len(), NO_ANSWER)
     }
 }

@@ -3,7 +3,7 @@
 //! From a second instance, after a reset, and through the batch call. The digest of all answers is printed,
 //! so that runs on two machines or of two builds can be compared by eye.
 
-use super::measure::Measure;
+use super::measure::{Measure, NO_ANSWER};
 use super::poses::mixed;
 use super::sweep::sweep;
 use super::{Setup, WIDER};
@@ -141,5 +141,5 @@ fn judge(total: &Tally) -> Measure {
     for (way, count) in AGAIN.iter().zip(total.differing) {
         measure = measure.count(format!("differing, {way}"), count);
     }
-    measure.unless_unanswered(total.compared)
+    measure.unless_empty(total.compared, NO_ANSWER)
 }

@@ -25,12 +25,49 @@ fn size_n(wrench: &Wrench) -> f64 {
     wrench.force().length() + wrench.torque().length() / LEVER_M
 }
 
+/// Largest central difference along each coordinate, of any step, N/m. Each is a gain that was seen, whether or not there
+/// is a derivative.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Chords {
+    /// Change of the wrench over the motion.
+    gains: [f64; 6],
+    /// Change of its component against the motion.
+    against: [f64; 6],
+}
+
+impl Chords {
+    fn include(&mut self, differences: &Matrix) {
+        for (column, entries) in transposed(differences).iter().enumerate() {
+            let gain = entries.iter().map(|entry| entry * entry).sum::<f64>().sqrt();
+            self.gains[column] = self.gains[column].max(gain);
+            self.against[column] = self.against[column].max(-entries[column]);
+        }
+    }
+
+    /// The largest gain.
+    pub(super) fn gain(&self) -> f64 {
+        self.gains.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The largest stiffness along a coordinate; 0 where the wrench opposes no motion.
+    pub(super) fn stiffness(&self) -> f64 {
+        self.against.into_iter().fold(0.0, f64::max)
+    }
+
+    /// Bound of gain and stiffness in every direction, if the gains add at most: their Frobenius norm.
+    pub(super) fn bound(&self) -> f64 {
+        self.gains.into_iter().map(|gain| gain * gain).sum::<f64>().sqrt()
+    }
+}
+
 /// The derivative at a pose.
 pub(super) struct Jacobian {
     /// Row: component of force, then torque; column: shift, then turn; N/m at the lever arm.
     pub(super) entries: Matrix,
-    /// Estimated error, Frobenius norm, N/m.
+    /// Estimated error, Frobenius norm, N/m; infinite where the answer depends on the way to the pose.
     pub(super) error: f64,
+    /// The differences themselves.
+    pub(super) chords: Chords,
     /// Wrench at the pose itself.
     pub(super) wrench: Wrench,
 }
@@ -41,13 +78,15 @@ impl Jacobian {
     pub(super) fn at(subject: &mut Subject<'_>, pose: Pose) -> Option<Self> {
         let wrench = subject.ask(pose).ok()?.wrench;
         let (mut tried, mut apart_n) = (Vec::with_capacity(STEPS_M.len()), 0.0);
+        let mut chords = Chords::default();
         for step_m in STEPS_M {
             let coarse = central(subject, pose, step_m)?;
             let fine = central(subject, pose, 0.5 * step_m)?;
+            [coarse, fine].iter().for_each(|differences| chords.include(differences));
             // Richardson: the error of second order cancels, and what it was bounds what is left.
             let entries = combine(&fine, 4.0 / 3.0, &coarse, -1.0 / 3.0);
             let error = norm(&combine(&entries, 1.0, &fine, -1.0));
-            tried.push((step_m, Self { entries, error, wrench }));
+            tried.push((step_m, Self { entries, error, chords, wrench }));
             let again = subject.ask(pose).ok()?.wrench;
             apart_n = f64::max(apart_n, size_n(&(again - wrench)));
         }
@@ -56,7 +95,7 @@ impl Jacobian {
         let with_noise = |(step_m, jacobian): (f64, Self)| {
             // What a solver leaves open of an answer is, over the step, as uncertain in each of the columns.
             let noise = if is_one_answer { COLUMNS * apart_n / step_m } else { f64::INFINITY };
-            Self { error: jacobian.error + noise, ..jacobian }
+            Self { error: jacobian.error + noise, chords, ..jacobian }
         };
         tried.into_iter().map(with_noise).min_by(|a, b| a.error.total_cmp(&b.error))
     }
@@ -83,8 +122,15 @@ impl Jacobian {
     }
 
     /// Largest gain, N/m: the largest singular value.
-    pub(super) fn stiffness(&self) -> f64 {
+    pub(super) fn gain(&self) -> f64 {
         largest_singular_value(&self.entries)
+    }
+
+    /// Largest stiffness in any direction, N/m: the largest eigenvalue of the symmetric part of `-J`; 0 where the wrench
+    /// opposes no motion. Turns that do not commute add to the antisymmetric part only.
+    pub(super) fn stiffness(&self) -> f64 {
+        let symmetric = combine(&self.entries, -0.5, &transposed(&self.entries), -0.5);
+        largest_eigenvalue(symmetric).max(0.0)
     }
 
     /// Largest gain of one block (0 linear, 1 angular), N/m at the lever arm.
@@ -132,19 +178,23 @@ fn norm(matrix: &Matrix) -> f64 {
     matrix.iter().flatten().map(|entry| entry * entry).sum::<f64>().sqrt()
 }
 
-/// Eigenvalues of `A^T A` by Jacobi's rotations: a dozen sweeps leave nothing off the diagonal.
 fn largest_singular_value(matrix: &Matrix) -> f64 {
-    let mut square: Matrix = std::array::from_fn(|i| {
+    let square: Matrix = std::array::from_fn(|i| {
         std::array::from_fn(|j| (0..6).map(|row| matrix[row][i] * matrix[row][j]).sum())
     });
+    largest_eigenvalue(square).max(0.0).sqrt()
+}
+
+/// By Jacobi's rotations: a dozen sweeps leave nothing off the diagonal.
+fn largest_eigenvalue(mut symmetric: Matrix) -> f64 {
     for _ in 0..12 {
         for p in 0..6 {
             for q in p + 1..6 {
-                rotate(&mut square, p, q);
+                rotate(&mut symmetric, p, q);
             }
         }
     }
-    (0..6).map(|i| square[i][i]).fold(0.0, f64::max).sqrt()
+    (0..6).map(|i| symmetric[i][i]).fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// One rotation of Jacobi's method (Golub and Van Loan, section 8.5).

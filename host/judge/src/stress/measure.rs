@@ -5,15 +5,23 @@ use flotor_hal::{Pose, rotation_vector};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::borrow::Cow;
 
-/// Judgement of one measure.
+/// Judgement of one measure, the gravest last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Within the bound.
+    #[serde(rename = "pass")]
     Pass,
-    /// Beyond the bound, short of what is felt or unsafe; or there is no bound to judge by.
+    /// Beyond the bound, short of what is felt or unsafe.
+    #[serde(rename = "note")]
     Note,
+    /// The sample has nothing that the bound applies to.
+    #[serde(rename = "nothing to judge")]
+    NothingToJudge,
+    /// The uncertainty of the measurement exceeds the bound.
+    #[serde(rename = "not resolved")]
+    NotResolved,
     /// Beyond what is acceptable.
+    #[serde(rename = "fail")]
     Fail,
 }
 
@@ -24,6 +32,8 @@ impl Verdict {
         match self {
             Verdict::Pass => "pass",
             Verdict::Note => "note",
+            Verdict::NothingToJudge => "nothing to judge",
+            Verdict::NotResolved => "not resolved",
             Verdict::Fail => "fail",
         }
     }
@@ -154,14 +164,27 @@ impl Measure {
         Self { bound: None, pose, ..Self::of([id, name, ""], &nothing, [0.0, 0.0], why) }
     }
 
-    /// A measure that got no answer from the model has shown nothing: a note, whatever the number.
+    /// Replaces the number and the judgement of a measure whose sample is empty.
     #[must_use]
-    pub(super) fn unless_unanswered(mut self, answered: u64) -> Self {
-        if answered == 0 {
-            self.value = f64::NAN;
-            self.verdict = Verdict::Note;
-            "the model gave no answer to judge".clone_into(&mut self.comment);
+    pub(super) fn unless_empty(mut self, sample: u64, why: &str) -> Self {
+        if sample == 0 {
+            (self.value, self.verdict, self.pose) = (f64::NAN, Verdict::NothingToJudge, None);
+            why.clone_into(&mut self.comment);
+        }
+        self
+    }
+
+    /// Replaces a pass by "not resolved" where the number may be as large as `possible`, beyond the bound.
+    #[must_use]
+    pub(super) fn unless_uncertain(mut self, possible: f64, why: impl FnOnce() -> String) -> Self {
+        // Written so that NaN is beyond it too.
+        let is_within = self.bound.is_some_and(|bound| possible <= bound);
+        if self.verdict == Verdict::Pass && !is_within {
+            (self.verdict, self.comment) = (Verdict::NotResolved, why());
         }
         self
     }
 }
+
+/// The reason of an empty sample where every call failed.
+pub(super) const NO_ANSWER: &str = "the model gave no answer to judge";

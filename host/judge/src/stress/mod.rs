@@ -7,8 +7,8 @@
 //! | M1 `continuity` | does the wrench jump? | bisection down to 1e-8 mm |
 //! | M2 `stiffness` | how steep is it, where may a loop render it? | `K <= 2 b / T`, Colgate and Schenkel 1997 |
 //! | M3 `stiffness` | is its derivative symmetric? | Maxwell's reciprocity |
-//! | M4 `energy` | do closed motions cost nothing? | |
-//! | M5 `energy` | what does holding a force for a period give away? | passivity observer, Ryu et al. 2004 |
+//! | M4 `energy` | do closed motions generate no energy, at rest and in motion? | |
+//! | M5 `stiffness` | which damping dissipates what the zero-order hold generates? | `K T / 2`, Colgate and Schenkel 1997 |
 //! | M6 `closed_loop` | does a released device settle where theory says it must? | Gil et al. 2009 |
 //! | M7 `cost` | how long does a call take? | a tenth of a 1 kHz tick |
 //! | M8 `determinism` | same poses, same bits? | |
@@ -29,6 +29,7 @@ mod determinism;
 mod energy;
 mod jacobian;
 mod measure;
+mod motion;
 mod parts;
 mod picture;
 mod poses;
@@ -62,6 +63,9 @@ const DAMPINGS_NS_PER_M: [f64; 2] = [0.5, 2.0];
 /// Lever arm at which the device resists rotation as it resists translation, m: drag spread evenly over a
 /// hemisphere of 115 mm radius, `sqrt(2/3) R`. Angles times this are lengths, torques over this are forces.
 const LEVER_M: f64 = 0.0939;
+/// Share of a sample that stands for all of it: of a law that is only here and there too stiff for a device with heavy
+/// damping, or only here and there not resolved.
+const MOSTLY: f64 = 0.9;
 /// How much wider than the workspace the model is asked: a hand overshoots, a sensor lies.
 const WIDER: f64 = 1.5;
 

@@ -25,12 +25,10 @@ pub enum Part {
     Totality,
     /// M1.
     Continuity,
-    /// M2 and M3.
+    /// M2, M3 and M5.
     Stiffness,
     /// M4.
     Loops,
-    /// M5.
-    Observer,
     /// M6.
     ClosedLoop,
     /// M7.
@@ -44,12 +42,15 @@ pub enum Part {
 }
 
 /// Each with its word and its measures.
-const PARTS: [(Part, &str, &[[&str; 2]]); 10] = [
+const PARTS: [(Part, &str, &[[&str; 2]]); 9] = [
     (Part::Totality, "totality", &[["M0", "totality"]]),
     (Part::Continuity, "continuity", &[["M1", "continuity"]]),
-    (Part::Stiffness, "stiffness", &[["M2", "Lipschitz constant"], ["M3", "reciprocity"]]),
+    (
+        Part::Stiffness,
+        "stiffness",
+        &[["M2", "Lipschitz constant"], ["M3", "reciprocity"], ["M5", "sampled energy"]],
+    ),
     (Part::Loops, "loops", &[["M4", "loop energy"]]),
-    (Part::Observer, "observer", &[["M5", "sampled energy"]]),
     (Part::ClosedLoop, "closed-loop", &[["M6", "closed loop"]]),
     (Part::Cost, "cost", &[["M7", "cost of a call"]]),
     (Part::Determinism, "determinism", &[["M8", "determinism"]]),
@@ -124,14 +125,13 @@ pub(super) fn measure(setup: &Setup<'_>, part: Part) -> Result<Found, LoadError>
             Found { measures: vec![measure], spread: Distributions { jumps, ..none } }
         }
         Part::Stiffness => {
-            let (lipschitz, reciprocity, gains_n_per_m) = stiffness::measure(setup)?;
-            Found { measures: vec![lipschitz, reciprocity], spread: Distributions { gains_n_per_m, ..none } }
+            let (measures, gains_n_per_m) = stiffness::measure(setup)?;
+            Found { measures: measures.into(), spread: Distributions { gains_n_per_m, ..none } }
         }
         Part::Loops => {
             let (measure, loop_energies) = energy::measure_loops(setup)?;
             Found { measures: vec![measure], spread: Distributions { loop_energies, ..none } }
         }
-        Part::Observer => Found::of(energy::measure_observer(setup)?),
         Part::ClosedLoop => Found::of(closed_loop::measure(setup)?),
         Part::Cost => {
             let (measure, calls_ns) = cost::measure(setup)?;

@@ -44,7 +44,9 @@ pub struct Distributions {
 }
 
 impl StressReport {
-    pub(super) fn new(setup: &Setup<'_>, measures: Vec<Measure>, distributions: Distributions) -> Self {
+    pub(super) fn new(setup: &Setup<'_>, mut measures: Vec<Measure>, distributions: Distributions) -> Self {
+        // "M2" before "M10".
+        measures.sort_by_key(|measure| (measure.id.len(), measure.id.clone()));
         let schema = setup.plugin.parameters();
         let named = |setting: &flotor_hal::abi::loader::Setting| {
             let parameter = schema.get(setting.index())?;
@@ -82,25 +84,27 @@ impl StressReport {
     /// The table for people.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let mut lines: Vec<String> = self.measures.iter().flat_map(rows).collect();
+        let width = self.measures.iter().map(|measure| measure.verdict.word().len()).fold(5, usize::max);
+        let mut lines: Vec<String> = self.measures.iter().flat_map(|measure| rows(measure, width)).collect();
         let count = |verdict| self.measures.iter().filter(|measure| measure.verdict == verdict).count();
         lines.push(format!(
-            "  score {:.2}: {} passed, {} noted, {} failed",
+            "  score {:.2}: {} passed, {} noted, {} failed, {} not judged",
             self.score,
             count(Verdict::Pass),
             count(Verdict::Note),
-            count(Verdict::Fail)
+            count(Verdict::Fail),
+            count(Verdict::NothingToJudge) + count(Verdict::NotResolved)
         ));
         lines.join("\n")
     }
 }
 
-fn rows(measure: &Measure) -> Vec<String> {
+fn rows(measure: &Measure, width: usize) -> Vec<String> {
     let bound = measure.bound.map_or(String::new(), |bound| format!("<= {}", number(bound, &measure.unit)));
     let value = number(measure.value, &measure.unit);
     let Measure { id, name, verdict, comment, pose, .. } = measure;
     let mut rows =
-        vec![format!("  {:<5} {id}  {name:<19} {value:>15}  {bound:<18} {comment}", verdict.word())];
+        vec![format!("  {:<width$} {id}  {name:<19} {value:>15}  {bound:<18} {comment}", verdict.word())];
     // Where to look is only worth a line when there is something to look at.
     if let (Some(pose), true) = (pose, *verdict != Verdict::Pass) {
         rows.push(format!("            worst at {}", place(pose)));

@@ -5,10 +5,13 @@
 //! the best is varied at random, what is better replaces it, and the size of the variations follows the share that is (a
 //! (1+1) evolution strategy with the rule of one success in five; Rechenberg, *Evolutionsstrategie*, 1973).
 //!
-//! Three goals, each from several starts with seeds of their own:
+//! Four goals, each from several starts with seeds of their own:
 //! - *step*: what stands out along a short line, in pieces of 1, 0.1 and 0.01 mm; then closed in on as in M1, to 1e-8 mm;
 //! - *energy*: the work of a small closed ellipse in any two of all directions, over the most that forces as large could
-//!   have done on it;
+//!   have done on it, at rest in each of its poses;
+//! - *energy in motion*: the work of a triangle, over all work exchanged: out along the force and sideways in one fast
+//!   motion, sideways back, and in again slowly. What friction, damping or a clamp takes off a force that gives way must be
+//!   gone when the handle is back.
 //! - *size*: the largest wrench, next to which numbers stop being finite.
 //!
 //! It stays in the workspace, and where the model says it ends: what that does not mean to answer is nobody's to find.
@@ -16,21 +19,23 @@
 //! What lies alone in a flat field, as a hole of a tenth of a millimetre does, no search can find faster than chance.
 
 use super::continuity::{FELT_N, FELT_NM, HARMLESS, Jumps, Line, PIECES_MM, changes, close_in, standing_out};
-use super::energy::{CONSERVATIVE, Lap, samples};
+use super::energy::{CONSERVATIVE, Dissipation, Lap, samples};
 use super::measure::{Measure, PoseRecord, Verdict};
+use super::motion::Triangle;
 use super::poses::Reach;
 use super::sweep::sweep;
 use super::{LEVER_M, Setup};
+use crate::PERIOD_NS;
 use crate::sampling::Random;
 use crate::subject::Subject;
 use crate::tally::{Worst, tally};
 use crate::trajectory::{Series, Trajectory};
 use flotor_hal::abi::loader::LoadError;
-use flotor_hal::{DVec3, Memory, Pose, WorkspaceBounds, rotation_vector};
+use flotor_hal::{DVec3, Memory, Pose, Twist, WorkspaceBounds, math, rotation_vector};
 use std::array::from_fn;
 
 const NAME: &str = "search";
-/// Numbers of a point: a pose, and two directions.
+/// Numbers of a point: a pose, and two directions or a direction, two sizes and a speed.
 const NUMBERS: usize = 18;
 /// Variations of a start; a model with memory, which is walked to each, gets fewer.
 const TRIES: usize = 240;
@@ -47,6 +52,15 @@ const PIECES: usize = 12;
 /// Samples of an ellipse, and its largest half axis, of the workspace.
 const SAMPLES: usize = 64;
 const ELLIPSE: f64 = 0.1;
+/// Samples of an edge of a triangle, first and of the best; its longest sides, of the workspace, how much shorter they may
+/// be, and the speeds, m/s.
+const EDGE_SAMPLES: usize = 64;
+const EDGE_SAMPLES_OF_THE_BEST: usize = 1024;
+const SIDE: f64 = 0.25;
+const SIDE_RATIO: f64 = 30.0;
+const FASTEST_M_PER_S: f64 = 1.0;
+const SPEED_RATIO: f64 = 20.0;
+const SLOW_M_PER_S: f64 = 0.02;
 
 /// Coordinates from -1 to 1.
 type Point = [f64; NUMBERS];
@@ -56,6 +70,9 @@ tally! {
         tries: u64,
         jumps: Jumps,
         energy: Worst,
+        energy_in_motion: Worst,
+        /// Laps where the energy is known to the bound.
+        laps_resolved: u64,
         size: Worst,
         troubles: u64,
         trouble_at: Option<Pose>,
@@ -159,12 +176,12 @@ impl Opponent<'_, '_> {
         }
     }
 
-    /// What a lap of an ellipse makes, of the most that its forces could have done.
-    fn made(&mut self, point: &Point) -> f64 {
+    /// An ellipse about the point's pose, in the directions of its further twelve numbers.
+    fn ellipse(&self, point: &Point) -> Trajectory {
         let pose = self.pose(point);
         let [_, _, _, _, _, _, x, y, z, rx, ry, rz, u, v, w, ru, rv, rw] = *point;
         let [position_m, rotation_rad] = self.reach.sizes().map(|size| ELLIPSE * size);
-        let path = Trajectory {
+        Trajectory {
             position: Series::ellipse(
                 pose.position(),
                 DVec3::new(x, y, z) * position_m,
@@ -175,21 +192,63 @@ impl Opponent<'_, '_> {
                 DVec3::new(rx, ry, rz) * rotation_rad,
                 DVec3::new(ru, rv, rw) * rotation_rad,
             ),
-        };
+        }
+    }
+
+    /// Energy that a lap of an ellipse generates, of the most that its forces could have done.
+    fn made(&mut self, point: &Point) -> f64 {
+        let path = self.ellipse(point);
         let memory = self.subject.memory();
         if memory == Memory::PathDependent && samples(self.subject, &path, SAMPLES).is_none() {
             return 0.0;
         }
         let Some(samples) = samples(self.subject, &path, SAMPLES) else { return 0.0 };
-        let lap = Lap::from_samples(&samples, memory);
+        let (lap, dissipation) = (Lap::from_samples(&samples, memory), Dissipation::at_rest(memory));
         let most_j = samples.iter().map(|sample| sample.most_j).sum::<f64>() / SAMPLES as f64;
-        if most_j > 0.0 { lap.made_j(memory) / most_j } else { 0.0 }
+        if most_j <= 0.0 {
+            return 0.0;
+        }
+        self.tally.laps_resolved += u64::from(lap.is_resolved(dissipation));
+        lap.made_j(dissipation) / most_j
     }
 
     fn energy(&mut self) {
         let (best, made) = self.climb(None, Self::made);
         let pose = self.pose(&best);
         self.tally.energy.offer(made, pose);
+    }
+
+    /// A triangle from the point's pose; nothing where there is no force to give way to.
+    fn triangle(&mut self, point: &Point) -> Option<Triangle> {
+        let pose = self.pose(point);
+        // Not walked to: friction would turn the force.
+        self.subject.restart();
+        let there = self.subject.advance(pose, Twist::ZERO, PERIOD_NS).ok()?;
+        let out = there.wrench.force().try_normalize()?;
+        let [_, _, _, _, _, _, x, y, z, height, width, speed, ..] = *point;
+        let aside = DVec3::new(x, y, z).reject_from_normalized(out).try_normalize()?;
+        let below = |largest: f64, ratio: f64, number: f64| largest * math::pow(ratio, 0.5 * (number - 1.0));
+        let [position_m, _] = self.reach.sizes();
+        let up = out * below(SIDE * position_m, SIDE_RATIO, height);
+        let side = aside * below(SIDE * position_m, SIDE_RATIO, width);
+        let speeds = [below(FASTEST_M_PER_S, SPEED_RATIO, speed), SLOW_M_PER_S, SLOW_M_PER_S];
+        Some(Triangle { start: pose, ways_m: [up + side, -side, -up], speeds_m_per_s: speeds })
+    }
+
+    fn energy_in_motion(&mut self) {
+        self.tries = TRIES;
+        // The least that is dissipated shows the way to what is generated; without force there is nothing to climb.
+        let (best, _) = self.climb(None, |own, point| {
+            let lap = own.triangle(point).and_then(|triangle| triangle.lap(own.subject, EDGE_SAMPLES));
+            lap.filter(|lap| lap.gross_j > 0.0).map_or(f64::NEG_INFINITY, |lap| lap.net_j / lap.gross_j)
+        });
+        let triangle = self.triangle(&best);
+        let lap = triangle.and_then(|triangle| triangle.lap(self.subject, EDGE_SAMPLES_OF_THE_BEST));
+        if let Some(lap) = lap.filter(|lap| lap.gross_j > 0.0) {
+            self.tally.laps_resolved += u64::from(lap.is_resolved(Dissipation::Allowed));
+            let pose = self.pose(&best);
+            self.tally.energy_in_motion.offer(lap.made_j(Dissipation::Allowed) / lap.gross_j, pose);
+        }
     }
 
     fn size(&mut self) {
@@ -210,7 +269,7 @@ impl Opponent<'_, '_> {
 }
 
 /// Goals of an opponent.
-const GOALS: u64 = 3;
+const GOALS: u64 = 4;
 
 /// Sends an opponent for each goal from several starts.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
@@ -226,6 +285,7 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
         match block % GOALS {
             0 => opponent.step(),
             1 => opponent.energy(),
+            2 => opponent.energy_in_motion(),
             _ => opponent.size(),
         }
         opponent.tally
@@ -251,6 +311,12 @@ fn judge(total: &Tally) -> Measure {
             Verdict::of(total.energy.value, CONSERVATIVE, CONSERVATIVE),
             "energy of a lap",
         ),
+        (
+            total.energy_in_motion,
+            CONSERVATIVE,
+            Verdict::of(total.energy_in_motion.value, CONSERVATIVE, CONSERVATIVE),
+            "energy of a lap in motion",
+        ),
     ];
     let (worst, bound, _, what) = graded
         .into_iter()
@@ -271,8 +337,12 @@ fn judge(total: &Tally) -> Measure {
         .with("largest force step over 1e-8 mm", force.value, "N")
         .with("largest torque step over 1e-8 mm", torque.value, "N·m")
         .with("largest energy of a lap, of what its forces could do", total.energy.value, "")
+        .with("largest energy of a lap in motion, of all work exchanged", total.energy_in_motion.value, "")
+        .count("laps known to the bound", total.laps_resolved)
         .with("largest wrench", total.size.value, "N");
+    let possible = if total.laps_resolved > 0 { value.value } else { f64::INFINITY };
     Measure { verdict, pose: pose.map(PoseRecord::from), ..measure }
+        .unless_uncertain(possible, || "no lap of the search is known to the bound".to_owned())
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! must be the image of the answer: a mirror turns a force as it turns a position, and a torque as it turns a rotation,
 //! the other way round in the plane of the mirror.
 
-use super::measure::{Measure, Verdict};
+use super::measure::{Measure, NO_ANSWER, Verdict};
 use super::sweep::sweep;
 use super::{LEVER_M, Setup, WIDER};
 use crate::sampling::{Random, Sobol};
@@ -88,6 +88,8 @@ tally! {
     struct Tally {
         poses: u64,
         unanswered: u64,
+        /// Poses with a wrench there or at the image.
+        comparable: u64,
         difference: Worst,
     }
 }
@@ -119,10 +121,12 @@ pub(super) fn measure(setup: &Setup<'_>, symmetry: Symmetry) -> Result<Measure, 
                 continue;
             };
             let largest_n = size_n(here).max(size_n(there)).max(NOTHING_N);
+            tally.comparable += u64::from(largest_n > NOTHING_N);
             tally.difference.offer(size_n(there + map.wrench(here) * -1.0) / largest_n, pose);
         }
         tally
     })?;
+    let why = if total.unanswered == total.poses { NO_ANSWER } else { "the wrench is zero at every pose" };
     let comment = match Verdict::of(total.difference.value, SYMMETRIC, SYMMETRIC) {
         Verdict::Pass => format!("{} poses and their images", total.poses),
         _ => "the answer at the image of this pose is not the image of the answer".to_owned(),
@@ -130,7 +134,8 @@ pub(super) fn measure(setup: &Setup<'_>, symmetry: Symmetry) -> Result<Measure, 
     Ok(Measure::of(["M10", NAME, ""], &total.difference, [SYMMETRIC; 2], comment)
         .count("poses", total.poses)
         .count("poses without answer", total.unanswered)
-        .unless_unanswered(total.poses - total.unanswered))
+        .count("poses with a wrench", total.comparable)
+        .unless_empty(total.comparable, why))
 }
 
 #[cfg(test)]

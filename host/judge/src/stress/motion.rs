@@ -1,0 +1,142 @@
+//! Closed motions of a hand in time, with the velocity that damping and friction depend on.
+//!
+//! A hand hurries on one part of a lap and dawdles on another: what is lost on the fast part of a law with friction and
+//! damping need not come back on the slow one, and a law may confuse the two.
+
+use super::energy::Lap;
+use crate::sampling::Random;
+use crate::subject::Subject;
+use crate::trajectory::Trajectory;
+use flotor_hal::{DVec3, Memory, Pose, Twist, math};
+use std::f64::consts::TAU;
+
+/// Shortest time of a lap, s, and how many times longer the longest is.
+const SHORTEST_LAP_S: f64 = 0.05;
+const LAP_RATIO: f64 = 20.0;
+/// The most uneven pace: 39 times faster at one end of the lap than at the other.
+const MOST_UNEVEN: f64 = 0.95;
+/// Laps after the first, which starts with another history.
+const LATER_LAPS: usize = 2;
+
+/// A closed path and its pace.
+pub(super) struct Motion {
+    path: Trajectory,
+    lap_s: f64,
+    /// From 0 for an even pace to 1 for a stop.
+    unevenness: f64,
+    /// Part of the lap of the fastest point, as an angle, rad.
+    phase_rad: f64,
+}
+
+impl Motion {
+    pub(super) fn random(path: Trajectory, random: &mut Random) -> Self {
+        let lap_s = SHORTEST_LAP_S * math::pow(LAP_RATIO, random.unit());
+        Self { path, lap_s, unevenness: MOST_UNEVEN * random.unit(), phase_rad: TAU * random.unit() }
+    }
+
+    /// Pose, motion and turn over a lap, at a part of its time.
+    fn at(&self, part: f64) -> (Pose, DVec3, DVec3) {
+        let angle = TAU * part + self.phase_rad;
+        let place = part + self.unevenness / TAU * math::sin(angle);
+        let pace = 1.0 + self.unevenness * math::cos(angle);
+        let (pose, motion_m, turn_rad) = self.path.at(place);
+        (pose, motion_m * pace, turn_rad * pace)
+    }
+
+    /// The work of a lap.
+    pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
+        subject.restart();
+        if subject.memory() == Memory::PathDependent {
+            subject.ask(self.at(0.0).0).ok()?;
+        }
+        least_of_later_laps(|| Some(Lap::from_powers(&self.powers(subject, samples)?)))
+    }
+
+    /// Power on the hand at evenly spaced times of a lap, J per lap.
+    fn powers(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Vec<f64>> {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most two seconds
+        let dt_ns = (self.lap_s * 1.0e9 / samples as f64).round() as u64;
+        let power = |index: usize| {
+            let (pose, motion_m, turn_rad) = self.at(index as f64 / samples as f64);
+            let twist = Twist::new(motion_m / self.lap_s, turn_rad / self.lap_s);
+            let wrench = subject.advance(pose, twist, dt_ns).ok()?.wrench;
+            Some(wrench.force().dot(motion_m) + wrench.torque().dot(turn_rad))
+        };
+        (0..samples).map(power).collect()
+    }
+}
+
+/// Of the laps after the first that which generates least: a model in motion may return in one what it stored before.
+fn least_of_later_laps(mut lap: impl FnMut() -> Option<Lap>) -> Option<Lap> {
+    lap()?;
+    let mut least = lap()?;
+    for _ in 1..LATER_LAPS {
+        let other = lap()?;
+        if other.net_j < least.net_j {
+            least = other;
+        }
+    }
+    Some(least)
+}
+
+/// A closed path of three straight edges, each at a speed of its own.
+pub(super) struct Triangle {
+    pub(super) start: Pose,
+    /// They add up to nothing.
+    pub(super) ways_m: [DVec3; 3],
+    pub(super) speeds_m_per_s: [f64; 3],
+}
+
+impl Triangle {
+    /// The work of a lap, with half of the samples of each edge and with all: the difference bounds what is left.
+    pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
+        let coarse = self.sampled(subject, samples / 2)?;
+        let fine = self.sampled(subject, samples)?;
+        Some(Lap { uncertain_j: 2.0 * (fine.net_j - coarse.net_j).abs(), ..fine })
+    }
+
+    fn sampled(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
+        subject.restart();
+        if subject.memory() == Memory::PathDependent {
+            subject.ask(self.start).ok()?;
+        }
+        least_of_later_laps(|| {
+            let (mut corner_m, mut net_j, mut gross_j) = (self.start.position(), 0.0, 0.0);
+            for (way_m, speed_m_per_s) in self.ways_m.into_iter().zip(self.speeds_m_per_s) {
+                for work_j in self.edge(subject, corner_m, way_m, speed_m_per_s, samples)? {
+                    (net_j, gross_j) = (net_j + work_j, gross_j + work_j.abs());
+                }
+                corner_m += way_m;
+            }
+            Some(Lap { net_j, gross_j, uncertain_j: 0.0, mismatch: 0.0 })
+        })
+    }
+
+    /// Work on the hand between the samples of an edge, by the trapezoidal rule, J.
+    fn edge(
+        &self,
+        subject: &mut Subject<'_>,
+        from_m: DVec3,
+        way_m: DVec3,
+        speed_m_per_s: f64,
+        samples: usize,
+    ) -> Option<Vec<f64>> {
+        let duration_s = way_m.length() / speed_m_per_s;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a second
+        let dt_ns = (duration_s * 1.0e9 / samples as f64).round() as u64;
+        let twist = Twist::new(way_m / duration_s, DVec3::ZERO);
+        let mut force_n = |index: usize| {
+            let position_m = from_m + way_m * (index as f64 / samples as f64);
+            let pose = Pose::new(position_m, self.start.orientation());
+            Some(subject.advance(pose, twist, dt_ns).ok()?.wrench.force())
+        };
+        let mut before_n = force_n(0)?;
+        let step_m = way_m / samples as f64;
+        let work_j = |index: usize| {
+            let here_n = force_n(index)?;
+            let mean_n = (std::mem::replace(&mut before_n, here_n) + here_n) * 0.5;
+            Some(mean_n.dot(step_m))
+        };
+        (1..=samples).map(work_j).collect()
+    }
+}
