@@ -5,6 +5,7 @@
 
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
+use flotor_record::RecordError;
 use flotor_servo::{EmergencySource, Place, Stuck};
 use flotor_session::registry::LookupError;
 use flotor_session::{Call, CallError, RunError};
@@ -84,7 +85,7 @@ pub enum CommandError {
     },
     /// A recording could not be written or read.
     #[error(transparent)]
-    Record(#[from] flotor_record::RecordError),
+    Record(#[from] RecordError),
     /// A recording could not be replayed.
     #[error(transparent)]
     Read(#[from] flotor_record::ReadError),
@@ -116,7 +117,7 @@ impl CommandError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_) | Self::Read(_) | Self::NotPaced => 2,
+            Self::Usage(_) | Self::Read(_) | Self::Record(RecordError::Exists { .. }) | Self::NotPaced => 2,
             Self::Run(error) => match error {
                 wrong if wrong.is_configuration() => 2,
                 // Nobody knows whether it exerts a force.

@@ -35,6 +35,7 @@
 mod container;
 mod coupling;
 mod digest;
+mod file;
 mod files;
 mod messages;
 mod reader;
@@ -47,6 +48,7 @@ mod tests;
 
 pub use container::Damage;
 pub use digest::{Coverage, TraceDigest};
+pub use file::FileError;
 pub use files::NamedFile;
 pub use messages::{NoMessage, TickMessages, change_from_bytes, change_to_bytes, tick_from_messages};
 pub use reader::{Ending, ReadError, Recording};

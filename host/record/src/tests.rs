@@ -1,3 +1,4 @@
+use super::file::NewFile;
 use super::schema::{DESCRIPTOR_SET, ENCODING, FORMAT, Topic};
 use super::*;
 use flotor_core::Clock;
@@ -106,6 +107,11 @@ fn read(path: &Path) -> (Vec<TickRecord>, Result<Ending, ReadError>) {
 
 fn words(ticks: &[TickRecord]) -> Vec<[u64; RECORD_WORDS]> {
     ticks.iter().map(Words::to_words).collect()
+}
+
+/// Asserts that a text contains all parts.
+fn holds(text: &str, parts: &[&str]) {
+    parts.iter().for_each(|part| assert!(text.contains(part), "{text}"));
 }
 
 /// Ticks of 100 ms: a chunk holds three of them.
@@ -376,8 +382,6 @@ fn missing_ticks_are_damage() {
 #[test]
 fn other_files_are_refused_with_name_reason_and_remedy() {
     let refusal = |path: &Path| read(path).1.unwrap_err().to_string();
-    let holds =
-        |text: &str, parts: &[&str]| parts.iter().for_each(|part| assert!(text.contains(part), "{text}"));
 
     let nowhere = Path::new("/nowhere/run.mcap");
     for path in [nowhere, &std::env::temp_dir()] {
@@ -415,7 +419,8 @@ fn other_files_are_refused_with_name_reason_and_remedy() {
 fn a_full_disk_is_told_with_the_name_of_the_file() {
     let full = Path::new("/dev/full");
     if full.is_absolute() {
-        let Err(error) = Recorder::create(full, &run()) else { panic!("the disk is full") };
+        let file = NewFile::over(File::options().write(true).open(full).unwrap());
+        let Err(error) = Recorder::begin(full, file, &run()) else { panic!("the disk is full") };
         let text = error.to_string();
         assert!(text.contains("`/dev/full`") && text.contains("No space left"), "{text}");
     } else {
@@ -425,6 +430,50 @@ fn a_full_disk_is_told_with_the_name_of_the_file() {
         panic!("no such folder")
     };
     assert!(error.to_string().contains("`/nowhere/run.mcap`"), "{error}");
+}
+
+#[test]
+fn a_recording_never_replaces_anything() {
+    let file = TestFile::new("exists");
+    write(&file.0, &[tick(0, 1)]);
+    let before = fs::read(&file.0).unwrap();
+    let Err(error) = Recorder::create(&file.0, &run()) else { panic!("the file exists") };
+    holds(&error.to_string(), &["exists", "not overwritten", "exists.mcap"]);
+    assert_eq!(fs::read(&file.0).unwrap(), before);
+}
+
+#[test]
+fn a_discarded_recording_leaves_room_for_the_next() {
+    let file = TestFile::new("discarded");
+    Recorder::create(&file.0, &run()).unwrap().discard();
+    write(&file.0, &[tick(0, 1)]);
+    assert_eq!(read(&file.0).0.len(), 1);
+}
+
+#[test]
+fn a_recording_that_another_program_removes_replaces_or_cuts_is_an_error() {
+    let file = TestFile::new("lost");
+    let damaged = |damage: &dyn Fn(&Path), then: &[TickRecord]| {
+        let mut recorder = Recorder::create(&file.0, &run()).unwrap();
+        recorder.record(&tick(0, 1)).unwrap();
+        damage(&file.0);
+        let recorded = then.iter().try_for_each(|tick| recorder.record(tick));
+        let error = recorded.and_then(|()| recorder.finish()).expect_err("the file is damaged").to_string();
+        let _ = fs::remove_file(&file.0);
+        error
+    };
+    let remove = |path: &Path| fs::remove_file(path).unwrap();
+    let replace = |path: &Path| {
+        fs::remove_file(path).unwrap();
+        fs::write(path, "another").unwrap();
+    };
+    let cut = |path: &Path| File::options().write(true).open(path).unwrap().set_len(9).unwrap();
+    holds(&damaged(&remove, &[]), &["lost.mcap", "removed or replaced", "record again"]);
+    holds(&damaged(&replace, &[]), &["lost.mcap", "removed or replaced"]);
+    holds(&damaged(&cut, &[]), &["lost.mcap", "to 9 bytes"]);
+    // The recording goes on after the cut: the next chunk finds it.
+    let chunk: Vec<TickRecord> = (1..3).map(|index| tick(index, 1_000_000_000)).collect();
+    holds(&damaged(&cut, &chunk), &["lost.mcap", "to 9 bytes"]);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Writes a recording: a chunk at a time, whole, at least every quarter of a second.
 
+use crate::file::{FileError, NewFile};
 use crate::schema::{Change as ChangeMessage, DESCRIPTOR_SET, ENCODING, FrameTransform, Log, Tick, Topic};
 use crate::{Note, RunDescription};
 use flotor_core::Change;
@@ -8,8 +9,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, McapResult, WriteOptions};
 use prost::Message;
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Recorded time that a killed process may lose, ns.
@@ -21,16 +21,26 @@ const RUN_METADATA: &str = "flotor.run";
 /// Key of the tick channel's metadata that names the bits of `events`, lowest first.
 const EVENT_BITS: &str = "events";
 
-/// Why a recording was not begun or does not go on.
+/// Error of beginning or continuing a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// The file could not be made.
+    /// Something of that name exists: recordings are never overwritten.
+    #[error(
+        "the recording `{}` exists already, and recordings are not overwritten; name another file, or remove \
+         this one",
+        path.display()
+    )]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file could not be created.
     #[error("cannot make the recording `{}`: {cause}; name a file in a folder you may write to", path.display())]
     Create {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Message of the system.
         #[source]
         cause: io::Error,
     },
@@ -43,9 +53,18 @@ pub enum RecordError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Message of the system.
         #[source]
         cause: io::Error,
+    },
+    /// Another program removed, replaced or shortened the file during the run.
+    #[error("the recording `{}` is lost or damaged: {damage}; record again", path.display())]
+    Lost {
+        /// The file.
+        path: PathBuf,
+        /// What happened to the file.
+        #[source]
+        damage: FileError,
     },
 }
 
@@ -54,7 +73,7 @@ pub enum RecordError {
 /// Dropped without [`Recorder::finish`] it still closes the file properly, but errors are lost.
 pub struct Recorder {
     path: PathBuf,
-    file: mcap::Writer<BufWriter<File>>,
+    file: mcap::Writer<NewFile>,
     /// Of each device, filled anew for each tick.
     poses: Vec<FrameTransform>,
     /// One encoded message; keeps its memory.
@@ -66,13 +85,20 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Makes the file, replacing one of that name, and puts the description of the run in it. Not real-time.
+    /// Creates the file and writes the description of the run to it. Not real-time.
     ///
     /// # Errors
-    /// [`RecordError`]: the file cannot be made or written to.
+    /// [`RecordError`]: the file exists, or cannot be created or written to.
     pub fn create(path: &Path, run: &RunDescription) -> Result<Self, RecordError> {
-        let file = File::create(path).map_err(|cause| RecordError::Create { path: path.into(), cause })?;
-        let file = begin(file, run).map_err(|cause| write_error(path, cause))?;
+        let file = NewFile::create(path).map_err(|cause| match cause.kind() {
+            io::ErrorKind::AlreadyExists => RecordError::Exists { path: path.into() },
+            _ => RecordError::Create { path: path.into(), cause },
+        })?;
+        Self::begin(path, file, run)
+    }
+
+    pub(crate) fn begin(path: &Path, file: NewFile, run: &RunDescription) -> Result<Self, RecordError> {
+        let file = write_head(file, run).map_err(|cause| write_error(path, cause))?;
         let names: Vec<&str> = run.devices().map(|device| device.name.as_str()).collect();
         let poses = match names.as_slice() {
             [] | [_] => vec![FrameTransform::of_handle()],
@@ -113,14 +139,21 @@ impl Recorder {
             .map_err(|cause| write_error(&self.path, cause))
     }
 
-    /// Writes what is left and the index, and closes the file. Not real-time.
+    /// Writes the last chunk and the index, and closes the file. Not real-time.
     ///
     /// # Errors
-    /// [`RecordError::Write`]: the index may be missing, what was flushed before can be read.
+    /// [`RecordError::Write`]: the index may be missing, chunks flushed before can be read. [`RecordError::Lost`]:
+    /// the file at the path is not the one written.
     pub fn finish(self) -> Result<(), RecordError> {
         let Self { path, mut file, .. } = self;
-        let finished = file.finish().and_then(|_| Ok(file.into_inner().flush()?));
+        let finished = file.finish().and_then(|_| Ok(file.into_inner().close(&path)?));
         finished.map_err(|cause| write_error(&path, cause))
+    }
+
+    /// Closes the file and removes it: there was nothing to record. Not real-time.
+    pub fn discard(self) {
+        let Self { path, file, .. } = self;
+        file.into_inner().remove(&path);
     }
 
     fn try_record(&mut self, record: &TickRecord) -> McapResult<()> {
@@ -165,8 +198,8 @@ impl Recorder {
     }
 }
 
-/// Writes what a file begins with: who wrote it, how, and the schemas and channels of all messages.
-fn begin(file: File, run: &RunDescription) -> McapResult<mcap::Writer<BufWriter<File>>> {
+/// Writes the head of the file: its library, the metadata of the run, and schemas and channels of all messages.
+fn write_head(file: NewFile, run: &RunDescription) -> McapResult<mcap::Writer<NewFile>> {
     let options = WriteOptions::new()
         .library(format!("flotor/{}", run.flotor_version))
         .compression(None)
@@ -174,7 +207,7 @@ fn begin(file: File, run: &RunDescription) -> McapResult<mcap::Writer<BufWriter<
         .chunk_size(None)
         // Gathers a chunk in memory: the file never holds one whose length is yet to be filled in.
         .disable_seeking(true);
-    let mut file = options.create(BufWriter::new(file))?;
+    let mut file = options.create(file)?;
     file.write_metadata(&Metadata { name: RUN_METADATA.to_owned(), metadata: run.to_metadata() })?;
     let event_bits = BTreeMap::from([(EVENT_BITS.to_owned(), Events::NAMES.join(" "))]);
     let nothing = BTreeMap::new();
@@ -197,5 +230,9 @@ fn write_error(path: &Path, cause: McapError) -> RecordError {
         McapError::Io(cause) => cause,
         other => io::Error::other(other),
     };
-    RecordError::Write { path: path.into(), cause }
+    let path = path.to_path_buf();
+    match cause.downcast::<FileError>() {
+        Ok(damage) => RecordError::Lost { path, damage },
+        Err(cause) => RecordError::Write { path, cause },
+    }
 }

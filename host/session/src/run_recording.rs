@@ -10,13 +10,14 @@ use flotor_record::{Note, RecordError, Recorder};
 pub struct RunRecording {
     recorder: Option<Recorder>,
     failure: Option<RecordError>,
+    has_ticks: bool,
 }
 
 impl RunRecording {
     /// Into this file; without one nothing is recorded.
     #[must_use]
     pub fn new(recorder: Option<Recorder>) -> Self {
-        Self { recorder, failure: None }
+        Self { recorder, failure: None, has_ticks: false }
     }
 
     /// Whether it has begun and is not finished.
@@ -25,13 +26,18 @@ impl RunRecording {
         self.recorder.is_some()
     }
 
-    /// Ends it, with these notes.
+    /// Finishes the recording with these notes. Removes the file where the run ended before its first tick: the next
+    /// run can then record under the same name.
     ///
     /// # Errors
-    /// What ended it before, or ends it now.
+    /// The error that ended the recording, during the run or now.
     pub fn finish(&mut self, notes: &[Note]) -> Result<(), RecordError> {
         let Some(mut recorder) = self.recorder.take() else { return Ok(()) };
         self.failure.take().map_or(Ok(()), Err)?;
+        if !self.has_ticks {
+            recorder.discard();
+            return Ok(());
+        }
         notes.iter().try_for_each(|note| recorder.note(note))?;
         recorder.finish()
     }
@@ -51,6 +57,7 @@ impl Observer for RunRecording {
     }
 
     fn observe(&mut self, record: &TickRecord) {
+        self.has_ticks = true;
         self.write(|recorder| recorder.record(record));
     }
 }

@@ -95,7 +95,7 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
         match client.next(LOOK_PERIOD) {
             // There is only the request to watch.
             Ok(Some(Event::Answer(Answer { refused: Some(reason), .. }))) => {
-                recorder.finish()?;
+                recorder.discard();
                 return Err(CommandError::Failed(reason));
             }
             Ok(None | Some(Event::Answer(_))) => {}

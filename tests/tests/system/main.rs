@@ -40,6 +40,7 @@ mod physics;
 mod planted;
 mod plugins;
 mod reach;
+mod recording_files;
 mod reference;
 mod refusal;
 mod replay;

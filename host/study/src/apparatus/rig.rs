@@ -138,7 +138,7 @@ impl<'a> Rig<'a> {
     ) -> Result<Exploration, OutsideError> {
         if let (Kinematics::Full, Some(files)) = (self.kinematics, &self.files) {
             let run = self.apparatus.describe(&self.scene, Clock::Virtual, self.seed);
-            self.watch.recording = RunRecording::new(Some(Recorder::create(&files.of(trial), &run)?));
+            self.watch.recording = RunRecording::new(Some(Recorder::create(&files.next_of(trial), &run)?));
         }
         let mut exploration = Exploration::default();
         for value in trial.presented.values() {

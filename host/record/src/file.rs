@@ -1,0 +1,119 @@
+//! The file of a recording while it is written: created by its one writer, and checked against changes by other
+//! programs.
+
+use same_file::Handle;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::Path;
+
+/// Change of a recording's file by another program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FileError {
+    /// The file is shorter or longer than its writer made it.
+    #[error("another program changed the length of the file from {written} to {found} bytes")]
+    Length {
+        /// Bytes written.
+        written: u64,
+        /// Bytes in the file.
+        found: u64,
+    },
+    /// The path names no file, or another one.
+    #[error("the file was removed or replaced during the run")]
+    Replaced,
+}
+
+/// A buffered file that did not exist before.
+///
+/// Only one program can create the file of one name, so two writers never share one.
+pub(crate) struct NewFile {
+    buffer: BufWriter<LengthChecked>,
+}
+
+impl NewFile {
+    /// Creates the file.
+    ///
+    /// # Errors
+    /// The system's; of kind `AlreadyExists` where anything of that name exists, a link or a pipe included.
+    pub(crate) fn create(path: &Path) -> io::Result<Self> {
+        Ok(Self::over(File::options().write(true).create_new(true).open(path)?))
+    }
+
+    /// Wraps an open, empty file.
+    pub(crate) fn over(file: File) -> Self {
+        Self { buffer: BufWriter::new(LengthChecked { file, written: 0 }) }
+    }
+
+    /// Writes buffered bytes and closes the file, which has to be the one at the path, in full length.
+    ///
+    /// # Errors
+    /// The system's, or one around a [`FileError`].
+    pub(crate) fn close(mut self, path: &Path) -> io::Result<()> {
+        self.buffer.flush()?;
+        let checked = self.buffer.get_ref();
+        checked.check().map_err(io::Error::other)?;
+        if checked.is_at(path) { Ok(()) } else { Err(io::Error::other(FileError::Replaced)) }
+    }
+
+    /// Removes the file, unless the path names another one by now.
+    pub(crate) fn remove(self, path: &Path) {
+        if self.buffer.get_ref().is_at(path) {
+            let _ = fs::remove_file(path);
+        }
+    }
+}
+
+impl Write for NewFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.buffer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.buffer.flush()
+    }
+}
+
+impl Seek for NewFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.buffer.seek(to)
+    }
+}
+
+/// A file written from front to back, whose length is compared with the bytes written before each further write.
+struct LengthChecked {
+    file: File,
+    written: u64,
+}
+
+impl LengthChecked {
+    fn check(&self) -> Result<(), FileError> {
+        // A file without readable metadata is judged by its next write.
+        let found = self.file.metadata().map_or(self.written, |metadata| metadata.len());
+        if found == self.written { Ok(()) } else { Err(FileError::Length { written: self.written, found }) }
+    }
+
+    /// Returns whether the path names this file.
+    fn is_at(&self, path: &Path) -> bool {
+        let written = self.file.try_clone().and_then(Handle::from_file);
+        matches!((written, Handle::from_path(path)), (Ok(written), Ok(named)) if written == named)
+    }
+}
+
+impl Write for LengthChecked {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.check().map_err(io::Error::other)?;
+        let count = self.file.write(bytes)?;
+        self.written += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for LengthChecked {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
