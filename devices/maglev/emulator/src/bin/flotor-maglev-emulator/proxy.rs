@@ -5,8 +5,12 @@ use super::{Arguments, ProtocolOption, plant};
 use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Axes, Capabilities, Refusal};
 use flotor_maglev::ml_api::PORT;
+use rustix::fs::{MemfdFlags, memfd_create};
 use std::error::Error;
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Write as _;
+use std::os::fd::AsRawFd;
 use std::os::unix::process::CommandExt;
 use std::process::Command;
 
@@ -15,13 +19,21 @@ pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box
     if arguments.protocol != ProtocolOption::MlApi {
         return Err(Refusal::parameter("--device needs --protocol ml-api").into());
     }
-    let file = std::env::temp_dir().join(format!("flotor-ml-api-{}.toml", std::process::id()));
-    std::fs::write(&file, scene(device, arguments)?)
-        .map_err(|error| format!("{}: {error}", file.display()))?;
+    let scene = anonymous_file(&scene(device, arguments)?)?;
+    // The descriptor stays open across `exec`: its path names the file for this process alone.
+    let file = format!("/dev/fd/{}", scene.as_raw_fd());
     let host = std::env::current_exe()?.with_file_name(format!("flotor{}", std::env::consts::EXE_SUFFIX));
     let record = &arguments.ml_api.record;
     let error = Command::new(&host).arg("run").arg(&file).arg("--record").arg(record).exec();
     Err(format!("{}: {error}; `cargo build --release` makes it", host.display()).into())
+}
+
+/// Writes a text to a file without a name: nobody else can put another one in its place, and it ends with the last process that
+/// has it open.
+fn anonymous_file(text: &str) -> std::io::Result<File> {
+    let mut file = File::from(memfd_create("flotor-scene", MemfdFlags::empty())?);
+    file.write_all(text.as_bytes())?;
+    Ok(file)
 }
 
 fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> {
