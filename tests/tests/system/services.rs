@@ -57,8 +57,11 @@ impl Service {
     fn http(&self, method: &str, path: &str, body: &str) -> (String, Value) {
         let mut stream = TcpStream::connect(&self.simulation).expect("it listens");
         let length = body.len();
-        write!(stream, "{method} {path} HTTP/1.1\r\nHost: x\r\nContent-Length: {length}\r\n\r\n{body}")
-            .expect("it reads");
+        write!(
+            stream,
+            "{method} {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {length}\r\n\r\n{body}"
+        )
+        .expect("it reads");
         let mut answer = String::new();
         stream.read_to_string(&mut answer).expect("it answers and closes");
         let (head, body) = answer.split_once("\r\n\r\n").expect("it is an answer by HTTP");
@@ -88,7 +91,7 @@ impl Client {
         let key = "dGhlIHNhbXBsZSBub25jZQ==";
         write!(
             stream,
-            "GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: {key}\r\n\
+            "GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: {key}\r\n\
              Sec-WebSocket-Version: 13\r\n\r\n"
         )
         .expect("it reads");
@@ -169,6 +172,41 @@ fn state(message: &Value) -> &Value {
 
 /// Ticks until force has faded in.
 const RAMP: usize = 220;
+
+#[test]
+fn a_web_page_and_a_foreign_name_are_refused_and_settings_have_a_bound() {
+    let service = Service::start(&["--pace", "lockstep"]);
+    for port in [&service.simulation, &service.events] {
+        for headers in
+            ["Host: localhost\r\nOrigin: http://evil.example\r\n", "Host: rebound.evil.example\r\n"]
+        {
+            let mut stream = TcpStream::connect(port).expect("it listens");
+            let upgrade =
+                "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZQ==\r\n";
+            write!(stream, "GET / HTTP/1.1\r\n{headers}{upgrade}\r\n").expect("it reads");
+            let mut answer = String::new();
+            stream.read_to_string(&mut answer).expect("it answers and closes");
+            assert!(answer.starts_with("HTTP/1.1 403 "), "{answer}");
+        }
+    }
+    let setting = format!("\"{}\"", "x".repeat(60_000));
+    let kept = (0..40).map(|number| service.http("POST", &format!("/settings/{number}"), &setting).0);
+    let refused = kept.filter(|status| status.contains(" 507 ")).count();
+    assert_eq!(refused, 40 - (1 << 20) / 60_010, "settings have 1 MB together");
+    let _ = service.end();
+}
+
+#[test]
+fn a_port_beyond_this_machine_needs_consent() {
+    let program =
+        build_folder().join(format!("flotor-haply-service-emulator{}", std::env::consts::EXE_SUFFIX));
+    let output = Command::new(program).args(["--listen", "0.0.0.0:0"]).output().expect("it starts");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.code() == Some(exit_code::CONFIGURATION) && text.contains("--allow-remote"),
+        "{text}"
+    );
+}
 
 #[test]
 fn a_client_gets_an_inventory_then_one_state_for_each_message_and_its_force_with_those_of_others() {

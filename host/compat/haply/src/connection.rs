@@ -1,15 +1,19 @@
 //! One port for two protocols: a connection says in its first lines whether it wants a WebSocket or an answer by HTTP.
 
+use crate::access::Access;
 use crate::http;
 use crate::service::Service;
 use crate::session;
-use std::io::{self, Read, Write};
+use std::io::{self, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
-use std::time::Duration;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
 
-/// How long a client may take for its first lines, or to take an answer.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Time-out of a whole request, and of each write of an answer.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(5);
+/// Connections of a port served at the same time; more are closed at once. Each has a thread.
+const MOST_CONNECTIONS: usize = 128;
 /// Longest head and body of a request, bytes.
 const LONGEST_HEAD: usize = 16 << 10;
 const LONGEST_BODY: usize = 64 << 10;
@@ -31,6 +35,10 @@ pub(crate) struct Head {
     request: Request,
     /// Key of a client that wants a WebSocket.
     key: Option<String>,
+    /// Site of the web page that opened the connection.
+    origin: Option<String>,
+    /// Name under which the client reached the service.
+    host: Option<String>,
     length: usize,
     rest: Vec<u8>,
 }
@@ -53,14 +61,23 @@ pub(crate) fn accept(
     serve: impl Fn(TcpStream) -> io::Result<()> + Copy + Send + 'static,
 ) -> io::Result<()> {
     let accept = move || {
+        // Each connection's thread has a copy.
+        let served = Arc::new(());
         loop {
             let Ok((stream, _)) = listener.accept() else {
                 std::thread::sleep(PAUSE);
                 continue;
             };
+            if Arc::strong_count(&served) > MOST_CONNECTIONS {
+                continue;
+            }
+            let place = Arc::clone(&served);
             let thread = std::thread::Builder::new().name("flotor-client".to_owned());
-            // Without a thread the connection is closed; a client that goes away while it is served is nobody's problem.
-            let _ = thread.spawn(move || serve(stream));
+            // Without a thread the connection is closed; a client that disconnects while it is served is no error.
+            let _ = thread.spawn(move || {
+                let _place = place;
+                serve(stream)
+            });
         }
     };
     std::thread::Builder::new().name(name.to_owned()).spawn(accept)?;
@@ -68,36 +85,57 @@ pub(crate) fn accept(
 }
 
 fn serve_one(service: &Service, mut stream: TcpStream) -> io::Result<()> {
-    let Some(mut head) = prepared(&mut stream)? else { return Ok(()) };
+    let deadline = Instant::now() + PATIENCE;
+    let Some(mut head) = prepared(&mut stream, &service.access, deadline)? else { return Ok(()) };
     match upgraded(&mut stream, &head)? {
         true => session::serve(service, session::socket(stream, head.rest)),
         false => {
-            read_body(&mut stream, &mut head)?;
+            read_body(&mut stream, &mut head, deadline)?;
             stream.write_all(http::answer(service, &head.request).as_bytes())?;
         }
     }
     Ok(())
 }
 
-/// Reads the first lines of a connection.
-pub(crate) fn prepared(stream: &mut TcpStream) -> io::Result<Option<Head>> {
+/// Reads the first lines of a connection, and refuses one without access; `None` where there is nothing to serve.
+pub(crate) fn prepared(
+    stream: &mut TcpStream,
+    access: &Access,
+    deadline: Instant,
+) -> io::Result<Option<Head>> {
     stream.set_nodelay(true)?;
-    stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let mut bytes = Vec::new();
     let mut buffer = [0; 2048];
     while bytes.len() < LONGEST_HEAD {
-        let count = stream.read(&mut buffer)?;
+        let count = read_before(stream, deadline, &mut buffer)?;
         if count == 0 {
             return Ok(None);
         }
         bytes.extend_from_slice(buffer.get(..count).unwrap_or_default());
         if let Some(end) = bytes.windows(4).position(|window| window == b"\r\n\r\n") {
             let rest = bytes.split_off(end + 4);
-            return Ok(Head::read(&String::from_utf8_lossy(&bytes), rest));
+            let Some(head) = Head::read(&String::from_utf8_lossy(&bytes), rest) else { return Ok(None) };
+            return match access.check(head.origin.as_deref(), head.host.as_deref()) {
+                Ok(()) => Ok(Some(head)),
+                Err(forbidden) => {
+                    stream.write_all(http::refusal(&forbidden).as_bytes())?;
+                    Ok(None)
+                }
+            };
         }
     }
     Ok(None)
+}
+
+/// Reads what is there before a deadline.
+fn read_before(stream: &mut TcpStream, deadline: Instant, buffer: &mut [u8]) -> io::Result<usize> {
+    let remaining = deadline.saturating_duration_since(Instant::now());
+    if remaining.is_zero() {
+        return Err(io::ErrorKind::TimedOut.into());
+    }
+    stream.set_read_timeout(Some(remaining))?;
+    stream.read(buffer)
 }
 
 /// Lets a client that wants a WebSocket go on; whether it does.
@@ -117,12 +155,16 @@ pub(crate) fn rest(head: Head) -> Vec<u8> {
     head.rest
 }
 
-fn read_body(stream: &mut TcpStream, head: &mut Head) -> io::Result<()> {
+fn read_body(stream: &mut TcpStream, head: &mut Head, deadline: Instant) -> io::Result<()> {
     let length = head.length.min(LONGEST_BODY);
     let mut body = std::mem::take(&mut head.rest);
-    if body.len() < length {
-        let missing = length - body.len();
-        stream.take(missing as u64).read_to_end(&mut body)?;
+    let mut buffer = [0; 2048];
+    while body.len() < length {
+        let count = read_before(stream, deadline, &mut buffer)?;
+        if count == 0 {
+            break;
+        }
+        body.extend_from_slice(buffer.get(..count).unwrap_or_default());
     }
     body.truncate(length);
     head.request.body = String::from_utf8_lossy(&body).into_owned();
@@ -145,6 +187,8 @@ impl Head {
             match name.trim().to_ascii_lowercase().as_str() {
                 "upgrade" => wants_socket = value.eq_ignore_ascii_case("websocket"),
                 "sec-websocket-key" => key = Some(value.to_owned()),
+                "origin" => head.origin = Some(value.to_owned()),
+                "host" => head.host = Some(value.to_owned()),
                 "content-length" => head.length = value.parse().unwrap_or(0),
                 _ => {}
             }

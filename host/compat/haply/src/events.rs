@@ -1,6 +1,6 @@
 //! The events channel: a WebSocket that sends each event to all its clients and reads nothing.
 
-use crate::connection::{accept, prepared, rest, upgraded};
+use crate::connection::{PATIENCE, accept, prepared, rest, upgraded};
 use crate::service::{Service, inverse_id};
 use crate::session::socket;
 use serde_json::{Value, json};
@@ -8,6 +8,7 @@ use std::io;
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 use tungstenite::Message;
 
 /// Events that wait for a slow client at most; more are lost for it.
@@ -56,7 +57,8 @@ pub(crate) fn serve(service: &'static Service, listener: TcpListener) -> io::Res
 }
 
 fn tell(service: &Service, mut stream: TcpStream) -> io::Result<()> {
-    let Some(head) = prepared(&mut stream)? else { return Ok(()) };
+    let deadline = Instant::now() + PATIENCE;
+    let Some(head) = prepared(&mut stream, &service.access, deadline)? else { return Ok(()) };
     if !upgraded(&mut stream, &head)? {
         return Ok(());
     }

@@ -1,5 +1,6 @@
 //! HTTP requests: version, devices, sessions, and the settings of a device.
 
+use crate::access::Forbidden;
 use crate::connection::Request;
 use crate::message::set;
 use crate::service::{Service, Session, Shared, grip_id, inverse_id, kept_at_first};
@@ -19,7 +20,15 @@ pub(crate) fn answer(service: &Service, request: &Request) -> String {
     let (path, query) = request.target.split_once('?').unwrap_or((&request.target, ""));
     let parts: Vec<&str> = path.split('/').filter(|part| !part.is_empty()).collect();
     let body: Value = serde_json::from_str(&request.body).unwrap_or(Value::Null);
-    let (status, told) = route(service, &request.method, &parts, query, &body);
+    written(route(service, &request.method, &parts, query, &body))
+}
+
+/// The whole answer to a connection without access.
+pub(crate) fn refusal(forbidden: &Forbidden) -> String {
+    written(failed(403, &forbidden.to_string()))
+}
+
+fn written((status, told): Answer) -> String {
     let reason = if status == 200 { "OK" } else { "Error" };
     let text = told.to_string();
     format!(
@@ -57,8 +66,9 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
         ("GET", ["settings"]) => done(json!(service.shared().settings)),
         ("POST", ["settings"]) => match body {
             Value::Object(settings) => {
-                service.shared().settings.extend(settings.clone());
-                (200, json!({ "ok": true }))
+                let mut shared = service.shared();
+                let all = settings.iter().all(|(key, value)| shared.keep_setting(key, value));
+                if all { (200, json!({ "ok": true })) } else { no_room() }
             }
             _ => failed(400, "settings are an object"),
         },
@@ -72,6 +82,10 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
         }
         _ => failed(404, "there is no such route"),
     }
+}
+
+fn no_room() -> Answer {
+    failed(507, "there is no room for more settings; delete some")
 }
 
 fn version() -> Value {
@@ -118,8 +132,11 @@ fn setting(service: &Service, method: &str, key: &str, body: &Value) -> Answer {
             None => failed(404, "there is no such setting"),
         },
         "POST" => {
-            shared.settings.insert(key.to_owned(), body.clone());
-            (200, json!({ "ok": true }))
+            if shared.keep_setting(key, body) {
+                (200, json!({ "ok": true }))
+            } else {
+                no_room()
+            }
         }
         "DELETE" => {
             shared.settings.remove(key);

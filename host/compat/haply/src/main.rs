@@ -5,6 +5,7 @@
 //!          <- one state for each message                 <- newest tick <---------------------------------------------+
 //! ```
 //!
+//! - [`access`]: which connections are answered: no web page's, no foreign name.
 //! - [`connection`]: one port for the simulation channel and for HTTP; a thread for each connection.
 //! - [`session`]: a client of the simulation channel, its pace and its answers.
 //! - [`message`]: what a client's message says. [`state`]: what is answered.
@@ -15,6 +16,7 @@
 //! m, velocities in m/s, forces in N, joint angles in degrees; x right, y away from the user, z up. Not real-time: the loop has a
 //! thread of its own.
 
+mod access;
 mod connection;
 mod events;
 mod force;
@@ -25,6 +27,7 @@ mod session;
 mod state;
 mod view;
 
+use access::Access;
 use clap::{Parser, ValueEnum};
 use flotor_command::options::{PluginPathOption, arguments, json_file, mcap_file, whole};
 use flotor_command::stopping::stop_on_signals;
@@ -32,7 +35,7 @@ use flotor_command::{CommandError, exit_code_of, say};
 use flotor_compat::{Pace, Settings, prepare};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use service::Service;
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -53,6 +56,12 @@ struct Arguments {
     /// Where to listen for the events channel (port 0: any free one)
     #[arg(long, default_value = "127.0.0.1:10020", value_name = "HOST:PORT")]
     events: String,
+    /// Listen beyond this machine: anybody who reaches the port can then push the handle, within the scene's limits
+    #[arg(long)]
+    allow_remote: bool,
+    /// Let web pages of this origin connect, for example http://localhost:3000 (repeatable; default: no page)
+    #[arg(long, value_name = "ORIGIN")]
+    allow_origin: Vec<String>,
     /// Who makes time go on
     #[arg(long, value_enum, value_name = "WHO")]
     pace: Option<PaceOption>,
@@ -109,13 +118,15 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     if settings.report.is_none() {
         settings.report = Some("-".into());
     }
-    let (simulation, simulation_at) = listen("--listen", &arguments.listen)?;
-    let (events, events_at) = listen("--events", &arguments.events)?;
+    let reach = if arguments.allow_remote { Reach::AnyMachine } else { Reach::ThisMachine };
+    let (simulation, simulation_at) = listen("--listen", &arguments.listen, reach)?;
+    let (events, events_at) = listen("--events", &arguments.events, reach)?;
+    let access = Access::new(arguments.allow_origin, simulation_at);
     let host = prepare(settings, &stop).map_err(CommandError::Usage)?;
     if (0..host.stations().len()).any(|number| !host.open(number)) {
         return Err(CommandError::Failed("the run did not begin".to_owned()));
     }
-    let service = Service::leak(host);
+    let service = Service::leak(host, access);
     let started = service.follow().and_then(|()| events::serve(service, events));
     started
         .and_then(|()| connection::serve(service, simulation))
@@ -134,15 +145,29 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     }
 }
 
-/// A port, and its address.
-fn listen(option: &str, at: &str) -> Result<(TcpListener, String), CommandError> {
+/// Machines whose programs may connect.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reach {
+    ThisMachine,
+    AnyMachine,
+}
+
+/// Binds a port; returns the listener and its address.
+fn listen(option: &str, at: &str, reach: Reach) -> Result<(TcpListener, SocketAddr), CommandError> {
     let bound = TcpListener::bind(at).and_then(|listener| {
-        let address = listener.local_addr()?.to_string();
+        let address = listener.local_addr()?;
         Ok((listener, address))
     });
-    bound.map_err(|cause| {
+    let (listener, address) = bound.map_err(|cause| {
         CommandError::Usage(format!(
             "cannot listen at {at}: {cause}; Haply's own service may be running; `{option} 127.0.0.1:0` takes any port"
         ))
-    })
+    })?;
+    if reach == Reach::ThisMachine && !address.ip().is_loopback() {
+        return Err(CommandError::Usage(format!(
+            "{option} {at} listens beyond this machine, and anybody who reaches the port can push the handle; \
+             use 127.0.0.1, or add --allow-remote"
+        )));
+    }
+    Ok((listener, address))
 }

@@ -1,5 +1,6 @@
 //! State that all connections share: the run, its devices, the sessions and their settings.
 
+use crate::access::Access;
 use crate::events::{Events, Level};
 use crate::force::{Domain, Forces, Wanted};
 use crate::view::View;
@@ -19,6 +20,7 @@ const MOST_SESSIONS: usize = 64;
 pub(crate) struct Service {
     pub(crate) host: &'static Host,
     pub(crate) events: Events,
+    pub(crate) access: Access,
     shared: Mutex<Shared>,
     /// Something is to be followed.
     following: Condvar,
@@ -47,6 +49,23 @@ pub(crate) struct Shared {
     pub(crate) settings: BTreeMap<String, Value>,
 }
 
+/// Bytes of all settings of the service together, keys and values as JSON.
+const MOST_SETTINGS_BYTES: usize = 1 << 20;
+
+impl Shared {
+    /// Keeps a setting of the service; returns whether there was room for it.
+    pub(crate) fn keep_setting(&mut self, key: &str, value: &Value) -> bool {
+        let size = |key: &str, value: &Value| key.len() + value.to_string().len();
+        let others = self.settings.iter().filter(|(other, _)| *other != key);
+        let kept: usize = others.map(|(key, value)| size(key, value)).sum();
+        let has_room = kept + size(key, value) <= MOST_SETTINGS_BYTES;
+        if has_room {
+            self.settings.insert(key.to_owned(), value.clone());
+        }
+        has_room
+    }
+}
+
 /// Settings of a device that belong to no session, and what they are at first.
 pub(crate) fn kept_at_first() -> BTreeMap<&'static str, Value> {
     BTreeMap::from([
@@ -59,7 +78,7 @@ pub(crate) fn kept_at_first() -> BTreeMap<&'static str, Value> {
 
 impl Service {
     /// The service of this process, for as long as that lives.
-    pub(crate) fn leak(host: &'static Host) -> &'static Self {
+    pub(crate) fn leak(host: &'static Host, access: Access) -> &'static Self {
         let devices = host.stations().len();
         let shared = Shared {
             forces: std::iter::repeat_with(Forces::default).take(devices).collect(),
@@ -69,6 +88,7 @@ impl Service {
         Box::leak(Box::new(Self {
             host,
             events: Events::default(),
+            access,
             shared: Mutex::new(shared),
             following: Condvar::new(),
             next_session: AtomicU64::new(1),

@@ -8,6 +8,7 @@ use flotor_compat::{Pace, Turn};
 use rustix::net::{RecvFlags, recv};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
+use std::time::Duration;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message, WebSocket};
 
@@ -15,6 +16,9 @@ use tungstenite::{Error, Message, WebSocket};
 const LONGEST: usize = 1 << 20;
 /// Room for what a client sends in one go, bytes.
 const ROOM: usize = 16 << 10;
+
+/// Silence after which a session of a service in real time ends, so that clients that never speak lock nobody out.
+const LONGEST_SILENCE: Duration = Duration::from_secs(20);
 
 /// A connection that may be asked whether something is there.
 pub(crate) struct Link {
@@ -59,6 +63,9 @@ pub(crate) fn serve(service: &Service, mut socket: WebSocket<Link>) {
         let _ = socket.close(None);
         return;
     };
+    if service.host.pace() == Pace::Real {
+        let _ = socket.get_ref().stream.set_read_timeout(Some(LONGEST_SILENCE));
+    }
     let ended = answer(service, session, &mut socket);
     service.leave(session);
     if let Err(Error::Capacity(_) | Error::Utf8(_) | Error::Protocol(_)) = &ended {
