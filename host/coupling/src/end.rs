@@ -2,10 +2,10 @@
 
 use super::brake::Brake;
 use super::{CouplingConfig, PassivityMode, Pull, Tank};
-use crate::port_energy::{Controller, Expected, PortObserver};
+use crate::port_energy::{Controller, PortObserver};
 use flotor_core::mapping::{Mapping, MappingConfig};
 use flotor_core::peer::PeerState;
-use flotor_hal::{DVec3, DeviceState, Pose, Twist, Wrench, rotation_vector};
+use flotor_hal::{DVec3, DeviceState, Pose, Wrench, rotation_vector};
 
 /// Energy that is never counted on, J: what a surprise of 20 µm costs at 1 N. With it in hand, a hand that starts faster
 /// than expected does not take the tank below zero.
@@ -23,7 +23,6 @@ pub struct End {
     mapping: Mapping,
     observer: PortObserver,
     controller: Controller,
-    calm: Calm,
     tank: Tank,
     bounce: Bounce,
     partner: Option<PeerState>,
@@ -39,17 +38,16 @@ impl End {
     pub fn new(config: &CouplingConfig, mapping: &MappingConfig, period_s: f64) -> Self {
         let mapping = Mapping::new(mapping);
         // The damping of the coupling, as the hand feels it: what the pair is built to stand.
-        let controller = Controller {
-            damping_ns_per_m: config.damping_ns_per_m * mapping.stiffness_scale(),
-            damping_nms_per_rad: config.damping_nms_per_rad * mapping.energy_scale(),
+        let controller = Controller::new(
+            config.damping_ns_per_m * mapping.stiffness_scale(),
+            config.damping_nms_per_rad * mapping.energy_scale(),
             period_s,
-        };
+        );
         Self {
             config: *config,
             mapping,
             observer: PortObserver::default(),
             controller,
-            calm: Calm::new(period_s),
             tank: Tank::default(),
             bounce: Bounce::default(),
             partner: None,
@@ -65,7 +63,7 @@ impl End {
         let gone_in_j = self.observer.gone_in_j(&state.pose, held);
         self.tank.book(gone_in_j / self.mapping.energy_scale());
         self.bounce.follow(&state.pose, held);
-        self.calm.follow(&state.twist);
+        self.controller.follow(&state.twist);
     }
 
     /// What the partner is to know, with a part of the energy that is here. Once a tick. Real-time: bounded, no
@@ -163,11 +161,10 @@ impl End {
     /// As much of a wrench as the tank has the energy for, and no more than has come back of it yet.
     #[inline]
     fn affordable(&mut self, whole: &Wrench, state: &DeviceState) -> Wrench {
-        let part = (self.part + self.controller.period_s / RETURN_S).min(1.0);
+        let part = (self.part + self.controller.period_s() / RETURN_S).min(1.0);
         let asked = *whole * part;
         let available_j = DRAWN * (self.tank.level_j() - SURPRISE_J) * self.mapping.energy_scale();
-        let expected = self.calm.expected_with(&(asked - self.bounce.asked));
-        let less = self.controller.keep_within(available_j, &asked, &state.twist, expected);
+        let less = self.controller.keep_within(available_j, &asked, &self.bounce.asked, &state.twist);
         self.part = less.map_or(part, |less| part * part_along(&less, &asked));
         less.unwrap_or(asked)
     }
@@ -218,65 +215,5 @@ impl Bounce {
         let is_nothing =
             beyond.force().length() < Self::NOTHING_N && beyond.torque().length() < 0.1 * Self::NOTHING_N;
         self.stored_j = if is_nothing { 0.0 } else { (self.stored_j + gone_in_j).max(0.0) };
-    }
-}
-
-/// How steadily a handle has moved of late: what is to be expected of its next sample.
-///
-/// A hand that rests or draws slowly can only feel a coupling whose tank is still empty if a small surprise is
-/// expected of it; one that shakes is expected to go on.
-struct Calm {
-    period_s: f64,
-    last: Option<Twist>,
-    expected: Expected,
-}
-
-impl Calm {
-    /// What is expected of the calmest handle: twice the acceleration of tremor, 0.1 mm at 10 Hz, and the same at a lever
-    /// of a tenth of a metre.
-    const CALMEST: Expected = Expected { acceleration_m_per_s2: 0.8, acceleration_rad_per_s2: 8.0 };
-    /// The lightest handle and hand, kg and kg m²: a fifth and a tenth of the flotor alone (0.58 kg, 1e-3 kg m²).
-    const LIGHTEST_KG: f64 = 0.1;
-    const LIGHTEST_KG_M2: f64 = 1.0e-4;
-    /// How much more than of late may come at once.
-    const MORE: f64 = 2.0;
-    /// Time after which a third is left of what was seen, s.
-    const MEMORY_S: f64 = 0.05;
-
-    fn new(period_s: f64) -> Self {
-        Self { period_s, last: None, expected: Self::CALMEST }
-    }
-
-    #[inline]
-    fn follow(&mut self, twist: &Twist) {
-        let Some(last) = self.last.replace(*twist) else { return };
-        let Self { period_s, expected, .. } = self;
-        let kept = 1.0 - (*period_s / Self::MEMORY_S).min(1.0);
-        let after = |before: f64, change: DVec3, calmest: f64| {
-            (before * kept).max(Self::MORE * change.length() / *period_s).max(calmest)
-        };
-        *expected = Expected {
-            acceleration_m_per_s2: after(
-                expected.acceleration_m_per_s2,
-                twist.linear() - last.linear(),
-                Self::CALMEST.acceleration_m_per_s2,
-            ),
-            acceleration_rad_per_s2: after(
-                expected.acceleration_rad_per_s2,
-                twist.angular() - last.angular(),
-                Self::CALMEST.acceleration_rad_per_s2,
-            ),
-        };
-    }
-
-    /// With what a change of the wrench itself does to the handle.
-    #[inline]
-    fn expected_with(&self, change: &Wrench) -> Expected {
-        let Expected { acceleration_m_per_s2, acceleration_rad_per_s2 } = self.expected;
-        Expected {
-            acceleration_m_per_s2: acceleration_m_per_s2 + change.force().length() / Self::LIGHTEST_KG,
-            acceleration_rad_per_s2: acceleration_rad_per_s2
-                + change.torque().length() / Self::LIGHTEST_KG_M2,
-        }
     }
 }

@@ -6,10 +6,10 @@
 //! A spring, a damper, a wall of stored or dissipated energy never gives back more than it got. A loop that does is
 //! active: its model creates energy, or sampling does.
 //!
-//! The controller takes away what the next period could bring out beyond what is there: first by damping along the
-//! motion (the impedance form of the same paper); where that is not
-//! enough, because the handle hardly moves, by scaling the wrench down (the energy tank of Franken and others,
-//! IEEE Trans. Robotics 27(4), 2011, section IV).
+//! The controller predicts the energy that the port may give until the next sample, from the velocity and from the accelerations of
+//! the recent past, and lets pass the share of the wrench for which the energy is there (the energy tank of Franken and others,
+//! IEEE Trans. Robotics 27(4), 2011, section IV). In place of the rest it injects damping along the motion (the impedance form of the
+//! first paper), unless the handle hardly moves.
 //!
 //! The envelope guards each device's port with it, a [coupling](crate::Coupling) each of its ends.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
@@ -17,7 +17,25 @@
 
 use flotor_hal::{DQuat, DVec3, Pose, Twist, Wrench};
 
-/// Measures what crosses a port.
+/// Displacement of a handle between two samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Displacement {
+    /// Translation, m.
+    pub linear: DVec3,
+    /// Rotation vector, rad.
+    pub angular: DVec3,
+}
+
+impl Displacement {
+    /// Returns the work of a constant wrench on the handle, J. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn work_j(&self, wrench: &Wrench) -> f64 {
+        wrench.force().dot(self.linear) + wrench.torque().dot(self.angular)
+    }
+}
+
+/// Poses of a handle from sample to sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PortObserver {
     /// Pose at the last sample; `None` before the first.
@@ -25,42 +43,96 @@ pub struct PortObserver {
 }
 
 impl PortObserver {
-    /// Energy that has gone in since the last sample, while `held` was applied, J; negative: it came out.
+    /// Returns the displacement since the last sample; zero at the first. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn moved(&mut self, pose: &Pose) -> Displacement {
+        let now = (pose.position(), pose.orientation());
+        let Some((position_m, orientation)) = self.last.replace(now) else { return Displacement::default() };
+        Displacement { linear: now.0 - position_m, angular: small_rotation(now.1 * orientation.conjugate()) }
+    }
+
+    /// Returns the energy that has gone into the port since the last sample, while `held` was applied, J; negative: the
+    /// hand received energy.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
     pub fn gone_in_j(&mut self, pose: &Pose, held: &Wrench) -> f64 {
-        let now = (pose.position(), pose.orientation());
-        let Some((position_m, orientation)) = self.last.replace(now) else { return 0.0 };
-        let moved = now.0 - position_m;
-        let turned = small_rotation(now.1 * orientation.conjugate());
-        -(held.force().dot(moved) + held.torque().dot(turned))
+        -self.moved(pose).work_j(held)
     }
 }
 
-/// How far from a steady motion a handle may be at the next sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Expected {
-    /// Acceleration that is no surprise, m/s².
-    pub acceleration_m_per_s2: f64,
-    /// Angular acceleration that is no surprise, rad/s².
-    pub acceleration_rad_per_s2: f64,
+/// Accelerations of a handle in the recent past: a bound of the one until the next sample.
+///
+/// A calm handle is assumed to remain calm, so that a hand that presses slowly feels a force from the first energy that it puts in;
+/// a handle that shakes is assumed to go on.
+#[derive(Clone, Copy, Debug)]
+struct RecentMotion {
+    last: Option<Twist>,
+    /// m/s² and rad/s².
+    acceleration: [f64; 2],
 }
 
-/// Keeps energy from coming out that is not there.
+impl RecentMotion {
+    /// Acceleration that is assumed of the calmest handle: twice that of tremor, 0.1 mm at 10 Hz, and the same at a lever of a tenth
+    /// of a metre, m/s² and rad/s².
+    const CALMEST: [f64; 2] = [0.8, 8.0];
+    /// Mass and moment of inertia of the lightest handle and hand, kg and kg m²: a fifth and a tenth of the flotor alone (0.58 kg,
+    /// 1e-3 kg m²).
+    const LIGHTEST: [f64; 2] = [0.1, 1.0e-4];
+    /// Ratio of an acceleration that may come at once to that of the last period.
+    const MORE: f64 = 2.0;
+    /// Time constant with which an acceleration is forgotten, s.
+    const MEMORY_S: f64 = 0.05;
+
+    const NONE: Self = Self { last: None, acceleration: Self::CALMEST };
+
+    /// Takes in the velocity at a sample.
+    #[inline]
+    fn follow(&mut self, twist: &Twist, period_s: f64) {
+        let Some(last) = self.last.replace(*twist) else { return };
+        let kept = 1.0 - (period_s / Self::MEMORY_S).min(1.0);
+        let after = |before: f64, change: DVec3, calmest: f64| {
+            (before * kept).max(Self::MORE * change.length() / period_s).max(calmest)
+        };
+        let [linear, angular] = self.acceleration;
+        self.acceleration = [
+            after(linear, twist.linear() - last.linear(), Self::CALMEST[0]),
+            after(angular, twist.angular() - last.angular(), Self::CALMEST[1]),
+        ];
+    }
+}
+
+/// Keeps energy from coming out of a port beyond what is available: of a device's port, and of each end of a coupling.
 #[derive(Clone, Copy, Debug)]
 pub struct Controller {
-    /// Most damping it injects, N·s/m.
-    pub damping_ns_per_m: f64,
-    /// Most damping of rotation it injects, N·m·s/rad.
-    pub damping_nms_per_rad: f64,
-    /// Time a wrench is held, s.
-    pub period_s: f64,
+    damping_ns_per_m: f64,
+    damping_nms_per_rad: f64,
+    period_s: f64,
+    motion: RecentMotion,
 }
 
 impl Controller {
-    /// The wrench with as much taken away as it takes to bring out no more than `available_j` by the next sample;
-    /// `None` if that is nothing.
+    /// A controller of wrenches that are held for `period_s` seconds; it injects at most this damping, N·s/m and N·m·s/rad.
+    /// Not real-time.
+    #[must_use]
+    pub fn new(damping_ns_per_m: f64, damping_nms_per_rad: f64, period_s: f64) -> Self {
+        Self { damping_ns_per_m, damping_nms_per_rad, period_s, motion: RecentMotion::NONE }
+    }
+
+    /// Returns the time for which a wrench is held, s.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// Takes in the velocity at a sample; once a tick. Real-time: bounded, no allocation.
+    #[inline]
+    pub fn follow(&mut self, twist: &Twist) {
+        self.motion.follow(twist, self.period_s);
+    }
+
+    /// Returns the share of the wrench, and damping for the rest, with which the port gives at most `available_j` until the next
+    /// sample, after `held` over the last period; `None` if all of the wrench does.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -69,69 +141,99 @@ impl Controller {
         &self,
         available_j: f64,
         wrench: &Wrench,
+        held: &Wrench,
         twist: &Twist,
-        expected: Expected,
     ) -> Option<Wrench> {
+        let [linear, angular] = self.motion.acceleration;
         let half_period_squared = 0.5 * self.period_s * self.period_s;
-        let force = Side {
-            effort: wrench.force(),
-            way: twist.linear() * self.period_s,
-            surprise: expected.acceleration_m_per_s2 * half_period_squared,
-            damping: self.damping_ns_per_m / self.period_s,
+        let side = |effort, held, velocity: DVec3, acceleration: f64, lightest: f64, damping: f64| {
+            Side {
+                effort,
+                held,
+                way: velocity * self.period_s,
+                surprise: acceleration * half_period_squared,
+                way_per_effort: half_period_squared / lightest,
+                floor: DVec3::ZERO,
+            }
+            .with_floor(velocity * -damping)
         };
-        let torque = Side {
-            effort: wrench.torque(),
-            way: twist.angular() * self.period_s,
-            surprise: expected.acceleration_rad_per_s2 * half_period_squared,
-            damping: self.damping_nms_per_rad / self.period_s,
-        };
+        let [lightest_kg, lightest_kg_m2] = RecentMotion::LIGHTEST;
+        let force =
+            side(wrench.force(), held.force(), twist.linear(), linear, lightest_kg, self.damping_ns_per_m);
+        let torque = side(
+            wrench.torque(),
+            held.torque(),
+            twist.angular(),
+            angular,
+            lightest_kg_m2,
+            self.damping_nms_per_rad,
+        );
         let available_j = available_j.max(0.0);
-        let asked_j = force.may_cost_j() + torque.may_cost_j();
-        if asked_j <= available_j {
+        let is_within = |share: f64| {
+            force.may_cost_j(force.part(share)) + torque.may_cost_j(torque.part(share)) <= available_j
+        };
+        if is_within(1.0) {
             return None;
         }
-        // Each side gives up its share of what is too much; a side that only takes energy gives up nothing.
-        let drawn_j = force.may_cost_j().max(0.0) + torque.may_cost_j().max(0.0);
-        let excess = ((asked_j - available_j) / drawn_j).clamp(0.0, 1.0);
-        Some(Wrench::new(force.within(excess), torque.within(excess)))
+        let (mut within, mut beyond) = (0.0, 1.0);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (within + beyond);
+            if is_within(middle) {
+                within = middle;
+            } else {
+                beyond = middle;
+            }
+        }
+        Some(Wrench::new(force.part(within), torque.part(within)))
     }
 }
+
+/// Bisections of the share of a wrench that passes: to 1 mN of 60 N.
+const BISECTIONS: u32 = 16;
 
 /// Translation or rotation over the next period: effort in N or N·m, way in m or rad.
 struct Side {
     effort: DVec3,
-    /// Way the handle goes if nothing happens.
+    /// Effort over the last period.
+    held: DVec3,
+    /// Way of the handle at its present velocity.
     way: DVec3,
-    /// How far from that it may end.
+    /// Way that an acceleration of the recent past may add.
     surprise: f64,
-    /// Most damping, per period: effort per way.
-    damping: f64,
+    /// Way that a change of the effort adds to the lightest handle.
+    way_per_effort: f64,
+    /// Effort of which the port surely gives nothing: the damping that is injected, or zero.
+    floor: DVec3,
 }
 
 impl Side {
-    /// Most energy that the effort may bring out by the next sample, J; negative if it surely takes some in.
-    fn may_cost_j(&self) -> f64 {
-        self.effort.dot(self.way) + self.effort.length() * self.surprise
+    /// Injects damping where it surely takes energy: not in a handle that hardly moves.
+    #[inline]
+    fn with_floor(self, damping: DVec3) -> Self {
+        if self.may_cost_j(damping) < 0.0 { Self { floor: damping, ..self } } else { self }
     }
 
-    /// The effort changed so that it brings out less, by this part of what it may cost.
-    fn within(&self, excess: f64) -> DVec3 {
-        let cost_j = self.may_cost_j();
-        if cost_j <= 0.0 {
+    /// Returns the most energy that the port may give until the next sample, J; negative if it surely receives some.
+    ///
+    /// An effort against the motion is not assumed to reverse the handle by itself: where that is too much, the loop is unstable, and an
+    /// effort withheld from a handle that goes deeper into a wall comes back larger.
+    #[inline]
+    fn may_cost_j(&self, effort: DVec3) -> f64 {
+        let along_j = effort.dot(self.way);
+        let steady_j = along_j + effort.length() * self.surprise;
+        if along_j < 0.0 {
+            return steady_j;
+        }
+        steady_j + (effort - self.held).dot(effort).max(0.0) * self.way_per_effort
+    }
+
+    /// Returns this share of the effort, 0 to 1, and damping for the rest; all of an effort that surely takes energy.
+    #[inline]
+    fn part(&self, share: f64) -> DVec3 {
+        if share >= 1.0 || self.may_cost_j(self.effort) <= 0.0 {
             return self.effort;
         }
-        let allowed_j = cost_j * (1.0 - excess);
-        let way = self.way.length();
-        // Damping takes `d way²` and, by making the effort longer, may cost `d way surprise`.
-        let taken_per_damping = way * (way - self.surprise);
-        let damping = if taken_per_damping > 0.0 {
-            ((cost_j - allowed_j) / taken_per_damping).min(self.damping)
-        } else {
-            0.0
-        };
-        let damped = Self { effort: self.effort - self.way * damping, ..*self };
-        let left_j = damped.may_cost_j();
-        if left_j <= allowed_j { damped.effort } else { damped.effort * (allowed_j / left_j) }
+        self.floor + (self.effort - self.floor) * share
     }
 }
 

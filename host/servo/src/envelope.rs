@@ -5,11 +5,12 @@
 //! -> [damping of an oscillation](flotor_core::oscillation) -> [passivity](super::passivity), and the limits once more if it took something
 //! away -> slew limit.
 //!
-//! The slew limit is last, so that no fault upstream, not even a model that vanishes, makes the force jump; the limits
-//! hold after it too, because the limited [regions](region) are convex and the slew limit only moves along the line from the
-//! last wrench, which was inside, to the new one, which is.
+//! The [slew limit](slew) is last, so that no fault upstream, not even a model that vanishes, makes the force jump, unless the part
+//! that accelerates the handle falls. The limits hold after it too: where the slew limit changes the wrench, the limited
+//! [regions](region) do once more.
 
 mod region;
+mod slew;
 
 use super::boundary::BoundaryWall;
 use super::passivity::Passivity;
@@ -18,9 +19,28 @@ use flotor_core::limits::{Bound, Boundary, Limits};
 use flotor_core::oscillation::Oscillation;
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::Events;
-use flotor_coupling::port_energy::Controller;
+use flotor_coupling::port_energy::{Controller, PortObserver};
 use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench};
 use region::Region;
+use slew::SlewLimit;
+
+/// Effect of a stage of the envelope over a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageEffect {
+    /// Time in which the stage changed the wrench, ns.
+    pub active_ns: u64,
+    /// Work of the change on the hand, J; negative: the stage removed energy.
+    pub work_j: f64,
+}
+
+/// Effects of the stages that store or remove energy.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnvelopeEffects {
+    /// The passivity controller.
+    pub passivity: StageEffect,
+    /// The slew limit.
+    pub slew: StageEffect,
+}
 
 /// Limits of force, torque and their change, and a wall at the edge of the range.
 pub struct Envelope {
@@ -30,10 +50,11 @@ pub struct Envelope {
     /// Velocity (m/s, rad/s) above which force components along it are scaled down.
     velocity: Region,
     spin: Region,
-    /// Fastest change of force (N/s) and torque (N·m/s), as norms.
-    slew_per_s: [f64; 2],
+    slew: SlewLimit,
     wall: BoundaryWall,
+    motion: PortObserver,
     passivity: Passivity,
+    effects: EnvelopeEffects,
     oscillation: Oscillation,
     period_ns: u64,
     last: Wrench,
@@ -51,21 +72,20 @@ impl Envelope {
             torque: Region::of(torque_nm),
             velocity: Region::of(limits.velocity_m_per_s),
             spin: Region::of(limits.angular_velocity_rad_per_s),
-            slew_per_s: [
-                limits.force_slew_n_per_s.min(device.max_force_slew_n_per_s),
-                limits.torque_slew_nm_per_s.min(device.max_torque_slew_nm_per_s),
-            ],
+            slew: SlewLimit::new(limits, device),
             wall: BoundaryWall::new(&RenderedBoundary::new(boundary, device, &force_n, period_ns)),
             // Damping the device is known to stand: that of its boundary.
             passivity: Passivity::new(
                 limits.passivity,
-                Controller {
-                    damping_ns_per_m: boundary.damping_ns_per_m,
-                    damping_nms_per_rad: boundary.damping_nms_per_rad,
-                    period_s: period_ns as f64 * 1.0e-9,
-                },
+                Controller::new(
+                    boundary.damping_ns_per_m,
+                    boundary.damping_nms_per_rad,
+                    period_ns as f64 * 1.0e-9,
+                ),
                 most,
             ),
+            motion: PortObserver::default(),
+            effects: EnvelopeEffects::default(),
             oscillation: Oscillation::NONE,
             period_ns,
             last: Wrench::ZERO,
@@ -88,7 +108,7 @@ impl Envelope {
         tick: &Tick,
         events: &mut Events,
     ) -> Wrench {
-        self.passivity.observe(state, &self.last);
+        self.observe(state);
         let guarded = guard(request, events);
         let gated = guarded * gate.models;
         let driven = self.limit_velocity(gated, state, events);
@@ -96,8 +116,8 @@ impl Envelope {
         // Before passivity: what cannot be sent anyway may be too large to be squared.
         let bounded = self.limit_wrench(walled, events);
         let calmed = self.limit_oscillation(bounded, state, tick, events);
-        let passive = self.limit_energy(calmed, state, events);
-        let sent = self.limit_slew(passive, tick, events);
+        let passive = self.limit_energy(calmed, state, tick, events);
+        let sent = self.limit_slew(passive, state, tick, events);
         self.last = sent;
         sent
     }
@@ -107,6 +127,20 @@ impl Envelope {
     #[must_use]
     pub fn port_energy_j(&self) -> f64 {
         self.passivity.energy_j()
+    }
+
+    /// Returns what the stages that store or remove energy did so far. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn effects(&self) -> EnvelopeEffects {
+        self.effects
+    }
+
+    /// Books the energy that crossed the port since the last sample.
+    #[inline]
+    fn observe(&mut self, state: &DeviceState) {
+        let moved = self.motion.moved(&state.pose);
+        self.effects.passivity.work_j -= self.passivity.observe(&moved, &self.last);
+        self.effects.slew.work_j += self.slew.observe(&moved, &self.last);
     }
 
     /// Whether the force swung between its limits and went on when it was damped: the run has to end. Real-time: bounded, no
@@ -175,32 +209,45 @@ impl Envelope {
         bounded * gain
     }
 
-    /// Takes away what would bring out more energy than there is, if the scene asks for that.
+    /// Removes the energy that the port does not have, if the scene has a passivity controller.
     #[inline]
-    fn limit_energy(&self, wrench: Wrench, state: &DeviceState, events: &mut Events) -> Wrench {
-        let Some(damped) = self.passivity.guard(&wrench, state) else { return wrench };
+    fn limit_energy(
+        &mut self,
+        wrench: Wrench,
+        state: &DeviceState,
+        tick: &Tick,
+        events: &mut Events,
+    ) -> Wrench {
+        let Some(damped) = self.passivity.limit(&wrench, &self.last, state) else { return wrench };
         events.insert(Events::PASSIVITY_DAMPED);
+        self.effects.passivity.active_ns += self.slew_time_ns(tick);
         // Damping may be more than an axis can give.
         self.limit_wrench(damped, events)
     }
 
-    /// Moves force and torque from those of the last tick no farther than the slew limit allows. A tick after missed ones
-    /// may change them no more than one on time: the hand felt nothing in between.
+    /// Limits the change of force and torque since the last tick.
     #[inline]
-    fn limit_slew(&self, wrench: Wrench, tick: &Tick, events: &mut Events) -> Wrench {
-        let dt_ns = if tick.dt_ns == 0 { self.period_ns } else { tick.dt_ns.min(self.period_ns) };
-        let dt_s = dt_ns as f64 * 1.0e-9;
-        let [force_n, torque_nm] = self.slew_per_s.map(|per_s| per_s * dt_s);
-        let force = step_short_of(self.last.force(), wrench.force(), force_n);
-        let torque = step_short_of(self.last.torque(), wrench.torque(), torque_nm);
-        if force.is_some() || torque.is_some() {
-            events.insert(Events::SLEW_LIMITED);
-        }
-        // A rounding on the way may leave the region.
-        Wrench::new(
-            force.map_or(wrench.force(), |force| self.force.shrink(force)),
-            torque.map_or(wrench.torque(), |torque| self.torque.shrink(torque)),
-        )
+    fn limit_slew(
+        &mut self,
+        wrench: Wrench,
+        state: &DeviceState,
+        tick: &Tick,
+        events: &mut Events,
+    ) -> Wrench {
+        let dt_ns = self.slew_time_ns(tick);
+        let limited = self.slew.limit(&wrench, &self.last, &state.twist, dt_ns as f64 * 1.0e-9);
+        let Some(limited) = limited else { return wrench };
+        events.insert(Events::SLEW_LIMITED);
+        self.effects.slew.active_ns += dt_ns;
+        // A force without its part along the motion, and a rounding on the way, may be outside of the region.
+        Wrench::new(self.force.shrink(limited.force()), self.torque.shrink(limited.torque()))
+    }
+
+    /// Returns the time that a change of the wrench may take, ns: a tick after missed ones may change it no more than one on time,
+    /// because the hand felt nothing in between.
+    #[inline]
+    fn slew_time_ns(&self, tick: &Tick) -> u64 {
+        if tick.dt_ns == 0 { self.period_ns } else { tick.dt_ns.min(self.period_ns) }
     }
 }
 
@@ -221,15 +268,6 @@ fn without_drive(force: DVec3, velocity: DVec3, excess: f64) -> DVec3 {
     let drive = force.dot(along).max(0.0);
     let left = force - along * (drive * (excess - 1.0).clamp(0.0, 1.0));
     if left.is_finite() { left } else { DVec3::ZERO }
-}
-
-/// The point `most` from `from` on the way to `to`; `None` if `to` is no farther than that.
-fn step_short_of(from: DVec3, to: DVec3, most: f64) -> Option<DVec3> {
-    let way = to - from;
-    if way.length_squared() <= most * most {
-        return None;
-    }
-    Some(from + way * (most / way.length()))
 }
 
 #[cfg(test)]

@@ -38,7 +38,7 @@ pub use budget::TimeBudget;
 pub use clock::{Clock, SpinWindow};
 pub use clock::{Due, PaceLost, Schedule, monotonic_ns, sleep_until};
 pub use engine::{Engine, Stepped};
-pub use envelope::Envelope;
+pub use envelope::{Envelope, EnvelopeEffects, StageEffect};
 pub use forces::CouplingOutcome;
 pub use forces::{Coupled, Forces, Port};
 pub use hot_swap::{HostSwaps, LoopSwaps, swap_queues};

@@ -1,59 +1,78 @@
 //! The envelope's stage for energy: the energy balance of a device's port, and the passivity controller that a scene
 //! may add.
 //!
-//! What crosses a port and how the controller removes it: [`flotor_coupling::port_energy`].
+//! The energy at a port, and the controller that ports and couplings share: [`flotor_coupling::port_energy`].
 
 use flotor_core::coupling::PassivityMode;
-use flotor_coupling::port_energy::{Controller, Expected, PortObserver};
+use flotor_coupling::port_energy::{Controller, Displacement};
 use flotor_hal::{DVec3, DeviceState, Twist, Wrench};
 
-/// Accelerations that a handle may have without its next sample being a surprise: 40 N on 0.58 kg are 69 m/s², and
-/// a hand in between takes most of it; for rotation the same at a lever of a tenth of a metre.
-const EXPECTED: Expected = Expected { acceleration_m_per_s2: 50.0, acceleration_rad_per_s2: 500.0 };
+/// Acceleration of a handle from rest that the reserve is for, m/s²: 40 N on 0.58 kg are 69 m/s², and a hand in between takes most
+/// of it.
+const RESERVE_ACCELERATION_M_PER_S2: f64 = 50.0;
+/// Stiffness that the reserve is for, N/m.
+const RESERVE_STIFFNESS_N_PER_M: f64 = 100.0;
 
-/// Watches, and on request guards, the energy at one port.
+/// Returns the energy that the port may give beyond what it received, J: that of a spring of 100 N/m over the way of a handle with 50
+/// m/s² in a period, `K a² T⁴ / 8`. With none at all, a port that is empty could never exert a force. Not real-time.
+fn reserve_j(period_s: f64) -> f64 {
+    let way_m = 0.5 * RESERVE_ACCELERATION_M_PER_S2 * period_s * period_s;
+    0.5 * RESERVE_STIFFNESS_N_PER_M * way_m * way_m
+}
+
+/// Observes, and on request limits, the energy at one port.
 pub(super) struct Passivity {
     mode: PassivityMode,
-    observer: PortObserver,
     controller: Controller,
+    reserve_j: f64,
     /// 1 for each axis of force and torque that is driven, 0 for the others.
     driven: [DVec3; 2],
     energy_j: f64,
+    /// Change of the last wrench by the controller.
+    change: Option<Wrench>,
 }
 
 impl Passivity {
     /// For a port at which at most this force and torque may be sent. Not real-time.
     pub(super) fn new(mode: PassivityMode, controller: Controller, most: [DVec3; 2]) -> Self {
         let driven = most.map(|most| DVec3::select(most.cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO));
-        Self { mode, observer: PortObserver::default(), controller, driven, energy_j: 0.0 }
+        let reserve_j = reserve_j(controller.period_s());
+        Self { mode, controller, reserve_j, driven, energy_j: 0.0, change: None }
     }
 
-    /// Books what has crossed the port since the last sample, while `held` was applied. Real-time: bounded, no
-    /// allocation.
+    /// Books the displacement since the last sample, while `held` was applied; the energy that the controller removed from the
+    /// port over it, J.
+    ///
+    /// Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn observe(&mut self, state: &DeviceState, held: &Wrench) {
-        self.energy_j += self.observer.gone_in_j(&state.pose, held);
+    pub(super) fn observe(&mut self, moved: &Displacement, held: &Wrench) -> f64 {
+        self.energy_j -= moved.work_j(held);
+        self.change.take().map_or(0.0, |change| -moved.work_j(&change))
     }
 
-    /// Energy the hand has put into the port so far less what has come out, J. Real-time: bounded, no allocation.
+    /// Returns the energy that the hand has put into the port so far less what it has received, J. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub(super) fn energy_j(&self) -> f64 {
         self.energy_j
     }
 
-    /// The wrench with as much taken away as it takes to keep the energy from becoming negative by the next sample,
-    /// if that is anything. Only motion along driven axes counts: along the others nothing can be damped, and damping
-    /// that was counted on there would be missed.
+    /// Returns the wrench changed so that the port gives no more energy than it has, with the reserve; `None` if the wrench may pass.
+    /// Only motion along driven axes counts: along the others a force damps nothing.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn guard(&self, wrench: &Wrench, state: &DeviceState) -> Option<Wrench> {
+    pub(super) fn limit(&mut self, wrench: &Wrench, held: &Wrench, state: &DeviceState) -> Option<Wrench> {
         match self.mode {
             PassivityMode::Observe => None,
             PassivityMode::Control => {
                 let [linear, angular] = self.driven;
-                let slowed = Twist::new(state.twist.linear() * linear, state.twist.angular() * angular);
-                self.controller.keep_within(self.energy_j, wrench, &slowed, EXPECTED)
+                let twist = Twist::new(state.twist.linear() * linear, state.twist.angular() * angular);
+                self.controller.follow(&twist);
+                let available_j = self.energy_j + self.reserve_j;
+                let limited = self.controller.keep_within(available_j, wrench, held, &twist)?;
+                self.change = Some(limited - *wrench);
+                Some(limited)
             }
         }
     }

@@ -1,6 +1,6 @@
 //! One device of a loop, with the check of its samples and the envelope that guards it.
 
-use super::envelope::Envelope;
+use super::envelope::{Envelope, EnvelopeEffects};
 use super::forces::Port;
 use super::state::{Cause, Gate, RunEvent};
 use flotor_core::plausibility::{
@@ -30,7 +30,7 @@ pub struct Station {
 }
 
 /// What a run knows of a device beside what the device says.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reported {
     /// The first fault, of the device or found by the host.
     pub fault: Option<Fault>,
@@ -40,6 +40,8 @@ pub struct Reported {
     pub implausible: ImplausibleSamples,
     /// Commands in a row that it had not taken at the end.
     pub untaken: u32,
+    /// Effects of the envelope's passivity controller and slew limit.
+    pub effects: EnvelopeEffects,
 }
 
 impl Reported {
@@ -145,6 +147,7 @@ impl Station {
             is_own_fault: self.is_own_fault,
             implausible: self.plausibility.found(),
             untaken: self.untaken_ticks,
+            effects: self.envelope.effects(),
         }
     }
 

@@ -156,8 +156,12 @@ fn a_program_drives_a_device_without_a_changed_line_and_in_lockstep_bit_for_bit(
 }
 
 /// What the device of the scene below may be told: its own share of each axis, under one norm for all.
-const ALLOWED: Allowed =
-    Allowed { norm: [MOST_N, 0.5], axes: [[MOST_N; 3], [0.5; 3]], slew_per_s: [5_000.0, 500.0] };
+const ALLOWED: Allowed = Allowed {
+    norm: [MOST_N, 0.5],
+    axes: [[MOST_N; 3], [0.5; 3]],
+    slew_per_s: [5_000.0, 500.0],
+    rise_per_s: [5_000.0, 500.0],
+};
 
 /// A scene of a device that writes down what it is told (`tests/c/campaign/device.c`).
 fn with_a_log(scratch: &Scratch, device: &Path, log: &Path, name: &str) -> PathBuf {

@@ -570,6 +570,11 @@ fn pump(limits: &str) -> String {
     )
 }
 
+/// Energy of a spring over the way of one period from rest with 50 m/s², J: the most that a port may give beyond what it received.
+fn reserve_j(stiffness_n_per_m: f64, rate_hz: f64) -> f64 {
+    stiffness_n_per_m * 2500.0 / (8.0 * rate_hz.powi(4))
+}
+
 fn lowest_port_energy_j(run: &Watched) -> f64 {
     run.records.iter().map(|record| record.port_energy_j).fold(0.0, f64::min)
 }
@@ -584,7 +589,8 @@ fn a_model_that_creates_energy_is_seen_and_with_the_controller_gets_none_out() {
     let damped =
         guarded.records.iter().filter(|record| record.events.intersects(Events::PASSIVITY_DAMPED)).count();
     assert!(damped > 100, "{damped} ticks");
-    assert_eq!(lowest_port_energy_j(&guarded), 0.0, "never negative");
+    let lowest_j = lowest_port_energy_j(&guarded);
+    assert!(lowest_j >= -reserve_j(2000.0, 1000.0), "no more than the reserve: {lowest_j} J");
 }
 
 #[test]
@@ -597,7 +603,8 @@ fn a_spring_that_is_too_stiff_for_its_rate_is_seen_and_kept_passive() {
     let free = lowest_port_energy_j(&stiff("ramp_s = 0"));
     let guarded = lowest_port_energy_j(&stiff("ramp_s = 0\npassivity = \"control\""));
     assert!(free < -1.0e-3, "sampling creates energy: {free} J");
-    assert_eq!(guarded, 0.0, "and none of it comes out");
+    // Eight times the 1.13 N/mm of the demo.
+    assert!(guarded >= -reserve_j(8.0 * 1130.0, 100.0), "no more than the reserve: {guarded} J");
 }
 
 // ---------------------------------------------------------------- wild models
@@ -623,8 +630,10 @@ fn assert_no_limit_is_passed(run: &Watched) {
         assert!(sent.is_finite(), "{record:?}");
         assert!(sent.force().abs().cmple(most_n * slack).all(), "{record:?}");
         assert!(sent.torque().abs().cmple(most_nm * slack).all(), "{record:?}");
-        assert!((sent.force() - last.force()).length() <= 3.0 * slack, "{last:?} {record:?}");
-        assert!((sent.torque() - last.torque()).length() <= 0.2 * slack, "{last:?} {record:?}");
+        // But for the fall of a part of the last one: those fill the ball between the last one and zero.
+        let rise = |sent: DVec3, last: DVec3| (sent - last * 0.5).length() - last.length() * 0.5;
+        assert!(rise(sent.force(), last.force()) <= 3.0 * slack, "{last:?} {record:?}");
+        assert!(rise(sent.torque(), last.torque()) <= 0.2 * slack, "{last:?} {record:?}");
         last = sent;
     }
     assert!(run.records.iter().any(|record| record.events.intersects(Events::FORCE_LIMITED)));

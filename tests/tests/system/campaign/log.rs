@@ -42,12 +42,14 @@ pub(crate) fn read(path: &Path) -> Vec<Entry> {
     bytes.chunks_exact(ENTRY).skip(1).take(count).filter_map(parse).collect()
 }
 
-/// What may reach a hand at a device: norms, shares of the axes, and the fastest change; of force (N), then of torque (N·m).
+/// What may reach a hand at a device: norms, shares of the axes, the fastest change, and the fastest change that is not the fall of a
+/// part; of force (N), then of torque (N·m).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Allowed {
     pub(crate) norm: [f64; 2],
     pub(crate) axes: [[f64; 3]; 2],
     pub(crate) slew_per_s: [f64; 2],
+    pub(crate) rise_per_s: [f64; 2],
 }
 
 /// What was seen of a device.
@@ -93,6 +95,13 @@ pub(crate) fn check(log: &[Entry], allowed: &Allowed) -> Seen {
                     if step > allowed.slew_per_s[part] * period_s * (1.0 + ROUNDING_OF_A_STEP) {
                         violated("a jump");
                     }
+                    // Forces that lack a part of the last one, in whichever direction, fill the ball between the last one and zero.
+                    let beyond = norm(std::array::from_fn(|axis| told[part][axis] - 0.5 * last[part][axis]))
+                        - 0.5 * norm(last[part]);
+                    let rise = allowed.rise_per_s[part] * period_s;
+                    if beyond > rise + ROUNDING_OF_A_STEP * (rise + norm(last[part])) {
+                        violated("a jump that is no fall");
+                    }
                 }
                 last = told;
                 seen.commands += 1;
@@ -117,7 +126,12 @@ fn norm(vector: [f64; 3]) -> f64 {
     vector.iter().map(|number| number * number).sum::<f64>().sqrt()
 }
 
-const BOUNDS: Allowed = Allowed { norm: [5.0, 1.0], axes: [[4.0; 3], [0.9; 3]], slew_per_s: [600.0, 100.0] };
+const BOUNDS: Allowed = Allowed {
+    norm: [5.0, 1.0],
+    axes: [[4.0; 3], [0.9; 3]],
+    slew_per_s: [600.0, 100.0],
+    rise_per_s: [600.0, 100.0],
+};
 
 /// A run in which everything is as it should be: force grows along a diagonal to the limit.
 fn honest() -> Vec<Entry> {
@@ -141,11 +155,12 @@ type Planted = (&'static str, fn(&mut Vec<Entry>));
 fn what_must_not_be_in_a_log_is_seen() {
     let seen = check(&honest(), &BOUNDS);
     assert_eq!((seen.commands, seen.felt, seen.violations.len()), (12, 10, 0), "{seen:?}");
-    let planted: [Planted; 8] = [
+    let planted: [Planted; 9] = [
         ("longer than the norm", |log| log[11] = Entry::Commanded([2.9; 3], [0.5, 0.0, 0.0])),
         ("longer than the norm", |log| log[11] = Entry::Commanded([2.8; 3], [0.6, 0.6, 0.6])),
         ("more than an axis may have", |log| log[11] = Entry::Commanded([4.1, 0.0, 0.0], [0.5, 0.0, 0.0])),
         ("a jump", |log| log[5] = log[4]),
+        ("a jump that is no fall", |log| log[5] = log[4]),
         ("not finite", |log| log[11] = Entry::Commanded([0.0, f64::NAN, 0.0], [0.0; 3])),
         ("force while it is stopped", |log| log[14] = Entry::Commanded([1.0e-9, 0.0, 0.0], [0.0; 3])),
         ("not told to stop before its end", |log| log.retain(|entry| *entry != Entry::Stopped)),

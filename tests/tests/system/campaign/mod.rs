@@ -72,6 +72,7 @@ fn sum(seed: u64, drawn: &Drawn, ran: &Ran) -> Sum {
             norm: allowed.norm.map(|most| 0.9 * most),
             axes: allowed.axes.map(|part| part.map(|most| 0.9 * most)),
             slew_per_s: allowed.slew_per_s.map(|most| 0.9 * most),
+            rise_per_s: allowed.rise_per_s.map(|most| 0.9 * most),
         };
         sum.close += usize::from(!check(&log, &nine_tenths).violations.is_empty());
         (sum.commands, sum.felt) = (sum.commands + commands, sum.felt + felt);

@@ -142,7 +142,8 @@ pub(super) fn draw(
         let allowed = Allowed {
             norm: [force.norm.min(ceiling[0]), torque.norm.min(ceiling[1])],
             axes: [axes_of(own_n, &force, 0), axes_of(own_nm, &torque, 3)],
-            slew_per_s: [
+            slew_per_s: [slew, slew * 0.1],
+            rise_per_s: [
                 slews[0].unwrap_or(f64::INFINITY).min(slew),
                 slews[1].unwrap_or(f64::INFINITY).min(slew * 0.1),
             ],

@@ -1,0 +1,146 @@
+//! The envelope's last stage: a limit of the change of force and torque from tick to tick.
+//!
+//! A limited force lags behind the requested one: it brakes a moving handle too little and would push it back with all of the
+//! requested force, a loop that generates energy. So the part of a force that accelerates the handle falls as fast as the device
+//! permits, and the stage keeps a ledger: the energy that the requested force would have taken from the hand, and how much less the limited
+//! force took. Until the difference is paid back, a force along the motion is scaled by the ratio of what was taken to what would
+//! have been, so that a spring returns exactly what it received.
+
+use flotor_core::limits::Limits;
+use flotor_coupling::port_energy::Displacement;
+use flotor_hal::{Capabilities, DVec3, Twist, Wrench};
+
+/// A limit of the change of a wrench.
+pub(super) struct SlewLimit {
+    force: Side,
+    torque: Side,
+    /// The wrench that was requested last, if the hand got another one.
+    requested: Option<Wrench>,
+}
+
+impl SlewLimit {
+    /// The limits of the scene and those of the device. Not real-time.
+    pub(super) fn new(limits: &Limits, device: &Capabilities) -> Self {
+        let side = |scene: f64, device: f64| Side {
+            most_per_s: scene.min(device),
+            most_fall_per_s: device,
+            ledger: Ledger::SETTLED,
+        };
+        Self {
+            force: side(limits.force_slew_n_per_s, device.max_force_slew_n_per_s),
+            torque: side(limits.torque_slew_nm_per_s, device.max_torque_slew_nm_per_s),
+            requested: None,
+        }
+    }
+
+    /// Books the displacement since the last sample, while `held` was applied; the energy that the limit generated, J.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn observe(&mut self, moved: &Displacement, held: &Wrench) -> f64 {
+        if self.requested.is_none() && self.force.is_settled() && self.torque.is_settled() {
+            return 0.0;
+        }
+        let requested = self.requested.unwrap_or(*held);
+        self.force.ledger.book(requested.force(), held.force(), moved.linear)
+            + self.torque.ledger.book(requested.torque(), held.torque(), moved.angular)
+    }
+
+    /// Moves force and torque from those that are held no farther in `dt_s` seconds than the limits allow; `None` if the request is
+    /// within them and nothing is to be paid back.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    pub(super) fn limit(
+        &mut self,
+        request: &Wrench,
+        held: &Wrench,
+        twist: &Twist,
+        dt_s: f64,
+    ) -> Option<Wrench> {
+        let force = self.force.limit(request.force(), held.force(), twist.linear(), dt_s);
+        let torque = self.torque.limit(request.torque(), held.torque(), twist.angular(), dt_s);
+        if force.is_none() && torque.is_none() {
+            self.requested = None;
+            return None;
+        }
+        self.requested = Some(*request);
+        Some(Wrench::new(force.unwrap_or(request.force()), torque.unwrap_or(request.torque())))
+    }
+}
+
+/// The limit of force or torque.
+struct Side {
+    /// Norm of the fastest change, per second.
+    most_per_s: f64,
+    /// The same with a fall of the part that accelerates the handle: what the device can do.
+    most_fall_per_s: f64,
+    ledger: Ledger,
+}
+
+impl Side {
+    #[inline]
+    fn is_settled(&self) -> bool {
+        self.ledger.generated_j <= 0.0
+    }
+
+    #[inline]
+    fn limit(&self, request: DVec3, held: DVec3, velocity: DVec3, dt_s: f64) -> Option<DVec3> {
+        let most = self.most_per_s * dt_s;
+        if self.is_settled() && (request - held).length_squared() <= most * most {
+            return None;
+        }
+        let along = velocity.normalize_or_zero();
+        let drive = request.dot(along).max(0.0);
+        let allowed = drive * self.ledger.share();
+        let target = request - along * (drive - allowed);
+        let fallen = held - along * (held.dot(along) - allowed).max(0.0);
+        let wanted = step_short_of(fallen, target, most).unwrap_or(target);
+        let sent = step_short_of(held, wanted, self.most_fall_per_s * dt_s).unwrap_or(wanted);
+        (sent != request).then_some(sent)
+    }
+}
+
+/// Energies since the limited force last differed from the requested one for nothing.
+struct Ledger {
+    /// Energy that the requested force would have taken from the hand, J.
+    requested_j: f64,
+    /// How much less the limited force took, J: the limit generated it.
+    generated_j: f64,
+}
+
+impl Ledger {
+    /// Nothing to be paid back.
+    const SETTLED: Self = Self { requested_j: 0.0, generated_j: 0.0 };
+
+    /// Books a displacement; the energy that the limit generated over it, J.
+    fn book(&mut self, requested: DVec3, held: DVec3, moved: DVec3) -> f64 {
+        let generated_j = (held - requested).dot(moved);
+        self.generated_j += generated_j;
+        self.requested_j -= requested.dot(moved);
+        if self.generated_j <= 0.0 {
+            *self = Self::SETTLED;
+        }
+        generated_j
+    }
+
+    /// Returns the share of a force along the motion that gives the hand no more than the limited force took, 0 to 1.
+    fn share(&self) -> f64 {
+        if self.generated_j <= 0.0 {
+            return 1.0;
+        }
+        if self.requested_j > self.generated_j { 1.0 - self.generated_j / self.requested_j } else { 0.0 }
+    }
+}
+
+/// The point `most` from `from` on the way to `to`; `None` if `to` is no farther than that.
+fn step_short_of(from: DVec3, to: DVec3, most: f64) -> Option<DVec3> {
+    let way = to - from;
+    if way.length_squared() <= most * most {
+        return None;
+    }
+    Some(from + way * (most / way.length()))
+}
+
+#[cfg(test)]
+mod tests;
