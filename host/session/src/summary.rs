@@ -2,14 +2,16 @@
 
 use crate::feel::Feel;
 use crate::telemetry::LinkCounts;
-use crate::{Misbehaved, Observer, Outcome, PluginReport};
+use crate::{DeviceOutcome, Misbehaved, Observer, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_coupling::Hearing;
 use flotor_hal::{DVec3, EnergyLedger};
 use flotor_servo::RunEnd;
-use flotor_servo::{CouplingOutcome, ModelHealth, Overrun, Percentiles, Stage, Timing};
+use flotor_servo::{
+    CouplingOutcome, EnvelopeEffects, ModelHealth, Overrun, Percentiles, Stage, StageEffect, Timing,
+};
 use serde::Serialize;
 
 /// Collects over a run what can only be seen tick by tick.
@@ -140,6 +142,8 @@ pub struct RunSummary {
     pub settled_after_s: f64,
     /// Energy tanks, all devices together.
     pub energy: EnergySummary,
+    /// Effects of the envelope's passivity controller and slew limit, all devices together.
+    pub envelope: EnvelopeSummary,
     /// Each device.
     pub devices: Vec<DeviceSummary>,
     /// Each coupling between devices.
@@ -188,6 +192,60 @@ pub struct DeviceSummary {
     pub port_lowest_j: f64,
     /// Energy at its port at the end, J.
     pub port_end_j: f64,
+    /// Effects of its passivity controller and slew limit.
+    pub envelope: EnvelopeSummary,
+}
+
+/// Effects of the stages of the envelope that change the energy at a port.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct EnvelopeSummary {
+    /// Time in which the passivity controller changed the wrench, s.
+    pub passivity_active_s: f64,
+    /// Energy that the passivity controller removed from the port, J.
+    pub passivity_removed_j: f64,
+    /// Time in which the slew limit changed the wrench, s.
+    pub slew_active_s: f64,
+    /// Energy that the slew limit generated at the port, J; negative: the slew limit removed energy.
+    pub slew_generated_j: f64,
+}
+
+impl EnvelopeSummary {
+    fn of(EnvelopeEffects { passivity, slew }: EnvelopeEffects) -> Self {
+        let seconds = |effect: StageEffect| effect.active_ns as f64 * 1.0e-9;
+        Self {
+            passivity_active_s: seconds(passivity),
+            passivity_removed_j: 0.0 - passivity.work_j, // not -0
+            slew_active_s: seconds(slew),
+            slew_generated_j: slew.work_j,
+        }
+    }
+
+    fn sum(self, other: Self) -> Self {
+        Self {
+            passivity_active_s: self.passivity_active_s + other.passivity_active_s,
+            passivity_removed_j: self.passivity_removed_j + other.passivity_removed_j,
+            slew_active_s: self.slew_active_s + other.slew_active_s,
+            slew_generated_j: self.slew_generated_j + other.slew_generated_j,
+        }
+    }
+
+    /// Returns the effect of each stage that was active, for people.
+    fn rows(&self) -> impl Iterator<Item = (&'static str, String)> {
+        let Self { passivity_active_s, passivity_removed_j, slew_active_s, slew_generated_j } = *self;
+        let removed_mj = passivity_removed_j * 1.0e3;
+        let generated_mj = slew_generated_j * 1.0e3;
+        [
+            (
+                "passivity",
+                passivity_active_s,
+                format!("removed {removed_mj:.3} mJ in {passivity_active_s:.3} s"),
+            ),
+            ("slew limit", slew_active_s, format!("generated {generated_mj:+.3} mJ in {slew_active_s:.3} s")),
+        ]
+        .into_iter()
+        .filter(|(_, active_s, _)| *active_s > 0.0)
+        .map(|(stage, _, text)| (stage, text))
+    }
 }
 
 /// One coupling of a run: the energy tanks of its ends, in the frame they share.
@@ -385,7 +443,12 @@ impl RunSummary {
                 port_lowest_j: tally.port_lowest_j,
                 port_end_j: tally.devices.iter().map(DeviceTally::port_energy_j).sum(),
             },
-            devices: facts.plugins.iter().zip(&tally.devices).map(device_summary).collect(),
+            envelope: (outcome.devices.iter())
+                .map(|device| EnvelopeSummary::of(device.effects))
+                .fold(EnvelopeSummary::default(), EnvelopeSummary::sum),
+            devices: (facts.plugins.iter().zip(&tally.devices).enumerate())
+                .map(|(number, device)| device_summary(device, outcome.devices.get(number)))
+                .collect(),
             couplings: (facts.couplings.iter().zip(&outcome.couplings))
                 .map(|(coupling, outcome)| coupling_summary(coupling, outcome, facts.carried))
                 .collect(),
@@ -446,8 +509,9 @@ impl RunSummary {
         let [lowest_mj, end_mj] =
             [self.energy.port_lowest_j, self.energy.port_end_j].map(|joule| joule * 1.0e3);
         row("port", format!("{end_mj:+.3} mJ at the end, {lowest_mj:+.3} mJ at the lowest"));
+        self.envelope.rows().for_each(|(stage, text)| row(stage, text));
         if self.devices.len() > 1 {
-            for DeviceSummary { name, peak_force_n, peak_torque_nm, port_lowest_j, port_end_j } in
+            for DeviceSummary { name, peak_force_n, peak_torque_nm, port_lowest_j, port_end_j, .. } in
                 &self.devices
             {
                 let [lowest_mj, end_mj] = [port_lowest_j, port_end_j].map(|joule| joule * 1.0e3);
@@ -502,13 +566,17 @@ fn relative_residual(ledger: EnergyLedger) -> f64 {
     if ledger.peak_j > 0.0 { ledger.residual_j() / ledger.peak_j } else { ledger.residual_j() }
 }
 
-fn device_summary((plugin, tally): (&PluginReport, &DeviceTally)) -> DeviceSummary {
+fn device_summary(
+    (plugin, tally): (&PluginReport, &DeviceTally),
+    outcome: Option<&DeviceOutcome>,
+) -> DeviceSummary {
     DeviceSummary {
         name: plugin.name.clone(),
         peak_force_n: tally.peak_force_n,
         peak_torque_nm: tally.peak_torque_nm,
         port_lowest_j: tally.port_lowest_j,
         port_end_j: tally.port_energy_j(),
+        envelope: outcome.map(|device| EnvelopeSummary::of(device.effects)).unwrap_or_default(),
     }
 }
 

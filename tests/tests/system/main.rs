@@ -36,6 +36,7 @@ mod maglev;
 mod maglev_api;
 mod oracle;
 mod parsers;
+mod passivity;
 mod physics;
 mod planted;
 mod plugins;

@@ -91,9 +91,9 @@ fn deactivate(
     });
     let problem = reported.problem();
     let found = problem.clone().filter(|_| !reported.is_own_fault);
-    let Reported { fault, implausible, .. } = reported;
+    let Reported { fault, implausible, effects, .. } = reported;
     let words = found.unwrap_or(words);
-    (DeviceOutcome { fault, implausible, problem, ledger, words, float_changes }, opened)
+    (DeviceOutcome { fault, implausible, effects, problem, ledger, words, float_changes }, opened)
 }
 
 /// Layers, each with the number of its model.

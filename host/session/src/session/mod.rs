@@ -40,9 +40,9 @@ use flotor_live::{Directory, Pressed, WrenchLimits};
 use flotor_servo::last_stop::TakenSignals;
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
-    Clock, Core, Coupled, CouplingOutcome, Envelope, Forces, Guarded, Loop, ModelHealth, ParameterQueue,
-    Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby, StopSwitch, Stuck,
-    Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
+    Clock, Core, Coupled, CouplingOutcome, Envelope, EnvelopeEffects, Forces, Guarded, Loop, ModelHealth,
+    ParameterQueue, Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby,
+    StopSwitch, Stuck, Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
 };
 use prepare::{Scheduled, activate, activate_here};
 use std::sync::Arc;
@@ -310,6 +310,8 @@ pub struct DeviceOutcome {
     pub fault: Option<Fault>,
     /// Its samples that cannot be.
     pub implausible: ImplausibleSamples,
+    /// Effects of the envelope's passivity controller and slew limit.
+    pub effects: EnvelopeEffects,
     /// What the host has found of its samples, or of how it takes commands.
     pub problem: Option<String>,
     /// Its own energy balance, where it keeps one.
