@@ -235,11 +235,12 @@ impl Envelope {
         events: &mut Events,
     ) -> Wrench {
         let dt_ns = self.slew_time_ns(tick);
-        let limited = self.slew.limit(&wrench, &self.last, &state.twist, dt_ns as f64 * 1.0e-9);
+        let regions = [&self.force, &self.torque];
+        let limited = self.slew.limit(&wrench, &self.last, &state.twist, dt_ns as f64 * 1.0e-9, regions);
         let Some(limited) = limited else { return wrench };
         events.insert(Events::SLEW_LIMITED);
         self.effects.slew.active_ns += dt_ns;
-        // A force without its part along the motion, and a rounding on the way, may be outside of the region.
+        // A rounding on the way may leave the region.
         Wrench::new(self.force.shrink(limited.force()), self.torque.shrink(limited.torque()))
     }
 

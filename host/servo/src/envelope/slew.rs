@@ -6,6 +6,7 @@
 //! force took. Until the difference is paid back, a force along the motion is scaled by the ratio of what was taken to what would
 //! have been, so that a spring returns exactly what it received.
 
+use super::region::Region;
 use flotor_core::limits::Limits;
 use flotor_coupling::port_energy::Displacement;
 use flotor_hal::{Capabilities, DVec3, Twist, Wrench};
@@ -46,8 +47,8 @@ impl SlewLimit {
             + self.torque.ledger.book(requested.torque(), held.torque(), moved.angular)
     }
 
-    /// Moves force and torque from those that are held no farther in `dt_s` seconds than the limits allow; `None` if the request is
-    /// within them and nothing is to be paid back.
+    /// Moves force and torque, within the regions of both, from those that are held no farther in `dt_s` seconds than the limits
+    /// allow; `None` if the request is within them and nothing is to be paid back. Held and request are within the regions.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -57,9 +58,10 @@ impl SlewLimit {
         held: &Wrench,
         twist: &Twist,
         dt_s: f64,
+        [forces, torques]: [&Region; 2],
     ) -> Option<Wrench> {
-        let force = self.force.limit(request.force(), held.force(), twist.linear(), dt_s);
-        let torque = self.torque.limit(request.torque(), held.torque(), twist.angular(), dt_s);
+        let force = self.force.limit(request.force(), held.force(), twist.linear(), dt_s, forces);
+        let torque = self.torque.limit(request.torque(), held.torque(), twist.angular(), dt_s, torques);
         if force.is_none() && torque.is_none() {
             self.requested = None;
             return None;
@@ -85,7 +87,14 @@ impl Side {
     }
 
     #[inline]
-    fn limit(&self, request: DVec3, held: DVec3, velocity: DVec3, dt_s: f64) -> Option<DVec3> {
+    fn limit(
+        &self,
+        request: DVec3,
+        held: DVec3,
+        velocity: DVec3,
+        dt_s: f64,
+        region: &Region,
+    ) -> Option<DVec3> {
         let most = self.most_per_s * dt_s;
         if self.is_settled() && (request - held).length_squared() <= most * most {
             return None;
@@ -95,7 +104,8 @@ impl Side {
         let allowed = drive * self.ledger.share();
         let target = request - along * (drive - allowed);
         let fallen = held - along * (held.dot(along) - allowed).max(0.0);
-        let wanted = step_short_of(fallen, target, most).unwrap_or(target);
+        // A force without its part along the motion may be outside of the region; a shorter one of its direction is a fall, too.
+        let wanted = region.shrink(step_short_of(fallen, target, most).unwrap_or(target));
         let sent = step_short_of(held, wanted, self.most_fall_per_s * dt_s).unwrap_or(wanted);
         (sent != request).then_some(sent)
     }

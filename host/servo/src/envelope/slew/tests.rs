@@ -1,4 +1,5 @@
 use super::*;
+use flotor_core::limits::Bound;
 
 const PERIOD_S: f64 = 1.0e-3;
 /// Mass of the flotor and the drag on it.
@@ -26,7 +27,7 @@ fn slide(slew_n_per_s: f64, start_m: f64, weight_n: f64, request_n: impl Fn(f64)
         generated_j += limit.observe(&moved, &held);
         let request = Wrench::from_force(DVec3::Z * request_n(z_m));
         let twist = Twist::new(DVec3::Z * velocity, DVec3::ZERO);
-        held = limit.limit(&request, &held, &twist, PERIOD_S).unwrap_or(request);
+        held = limited(&mut limit, &request, &held, &twist).unwrap_or(request);
         let rest_velocity = (held.force().z + weight_n) / DRAG_NS_PER_M;
         let kept = (-DRAG_NS_PER_M / MASS_KG * PERIOD_S).exp();
         let way_m =
@@ -78,6 +79,12 @@ fn a_handle_that_falls_on_a_wall_with_a_slow_force_comes_to_rest_as_without_the_
     }
 }
 
+/// Applies a limit where force and torque have none.
+fn limited(limit: &mut SlewLimit, request: &Wrench, held: &Wrench, twist: &Twist) -> Option<Wrench> {
+    let endless = Region::of(Bound::NONE);
+    limit.limit(request, held, twist, PERIOD_S, [&endless; 2])
+}
+
 fn sides(force_n_per_s: f64) -> SlewLimit {
     let side = |most_per_s| Side { most_per_s, most_fall_per_s: f64::INFINITY, ledger: Ledger::SETTLED };
     SlewLimit { force: side(force_n_per_s), torque: side(f64::INFINITY), requested: None }
@@ -89,7 +96,7 @@ fn the_part_of_a_force_that_accelerates_the_handle_falls_at_once_and_the_rest_by
         (Wrench::from_force(DVec3::new(5.0, 0.0, 8.0)), Twist::new(DVec3::Z * 0.1, DVec3::ZERO));
     let falls = |request: DVec3| {
         let request = Wrench::from_force(request);
-        sides(1000.0).limit(&request, &held, &twist, PERIOD_S).unwrap_or(request).force()
+        limited(&mut sides(1000.0), &request, &held, &twist).unwrap_or(request).force()
     };
     assert_eq!(falls(DVec3::new(5.0, 0.0, 2.0)), DVec3::new(5.0, 0.0, 2.0), "along the motion");
     assert_eq!(falls(DVec3::new(0.0, 0.0, 8.0)), DVec3::new(4.0, 0.0, 8.0), "across it");
@@ -100,7 +107,7 @@ fn the_part_of_a_force_that_accelerates_the_handle_falls_at_once_and_the_rest_by
     );
     let back = Twist::new(DVec3::Z * -0.1, DVec3::ZERO);
     let request = Wrench::from_force(DVec3::new(5.0, 0.0, 2.0));
-    let braking = sides(1000.0).limit(&request, &held, &back, PERIOD_S).expect("a change of 6 N");
+    let braking = limited(&mut sides(1000.0), &request, &held, &back).expect("a change of 6 N");
     assert_eq!(braking.force(), DVec3::new(5.0, 0.0, 7.0), "a force that brakes falls by the limit");
 }
 
@@ -109,7 +116,7 @@ fn a_fall_is_no_faster_than_the_device_permits() {
     let mut limit = sides(1000.0);
     limit.force.most_fall_per_s = 3000.0;
     let (held, twist) = (Wrench::from_force(DVec3::Z * 8.0), Twist::new(DVec3::Z * 0.1, DVec3::ZERO));
-    let fallen = limit.limit(&Wrench::ZERO, &held, &twist, PERIOD_S).expect("a change of 8 N");
+    let fallen = limited(&mut limit, &Wrench::ZERO, &held, &twist).expect("a change of 8 N");
     assert_eq!(fallen.force(), DVec3::Z * 5.0);
 }
 
@@ -124,7 +131,7 @@ fn what_the_limit_generates_is_paid_back_on_the_way_out() {
     for way_m in ways.into_iter().flat_map(|(ticks, way_m)| std::iter::repeat_n(way_m, ticks)) {
         let request = Wrench::from_force(DVec3::Z * (-stiffness_n_per_m * z_m));
         let twist = Twist::new(DVec3::Z * (way_m / PERIOD_S), DVec3::ZERO);
-        held = limit.limit(&request, &held, &twist, PERIOD_S).unwrap_or(request);
+        held = limited(&mut limit, &request, &held, &twist).unwrap_or(request);
         let moved = Displacement { linear: DVec3::Z * way_m, angular: DVec3::ZERO };
         limit.observe(&moved, &held);
         z_m += way_m;
@@ -135,4 +142,20 @@ fn what_the_limit_generates_is_paid_back_on_the_way_out() {
     let held_force_j = 0.5 * stiffness_n_per_m * (60.0 * 1.0e-8 + 300.0 * 4.0e-10);
     assert!(lowest_j >= -held_force_j, "{lowest_j} J, by a held force {held_force_j} J");
     assert!(held.force().length() < 0.05, "{held:?} at {z_m} m");
+}
+
+#[test]
+fn a_fall_at_the_edge_of_the_limits_is_no_jump_of_the_device() {
+    let mut limit = sides(10.0);
+    limit.force.most_fall_per_s = 100.0;
+    let region = Region::of(Bound::box_of([1.0, 10.0, 10.0]));
+    // Without its part along the motion the held force is beyond the limit of x, in the other direction than the request.
+    let held = Wrench::from_force(DVec3::new(-1.0, 5.0, 0.0));
+    let request = Wrench::from_force(DVec3::new(1.0, 0.0, 0.0));
+    let twist = Twist::new(DVec3::new(0.1, 0.1, 0.0), DVec3::ZERO);
+    let sent = limit.limit(&request, &held, &twist, PERIOD_S, [&region; 2]);
+    let sent = sent.expect("a change of 5 N").force();
+    assert!(region.holds(sent), "{sent}");
+    let step_n = (sent - held.force()).length();
+    assert!((0.05..=0.1 * (1.0 + 1.0e-12)).contains(&step_n), "{step_n} N");
 }
