@@ -64,7 +64,7 @@ static uint32_t capabilities(FlotorInstance instance, FlotorCapabilities *out) {
         .max_torque_nm = {0.5, 0.5, 0.5},
         .max_force_slew_n_per_s = 20.0e3,
         .max_torque_slew_nm_per_s = 1.0e3,
-        .max_stiffness_n_per_m = 5.0e3,
+        .max_stiffness_n_per_m = 1.0e4,
         .rate_hz = {100.0, 10000.0},
     };
     return FlotorCallStatus_Ok;

@@ -46,7 +46,7 @@ impl Device for YourName {
             max_torque_nm: [0.5; 3],
             max_force_slew_n_per_s: 20.0e3,
             max_torque_slew_nm_per_s: 1.0e3,
-            max_stiffness_n_per_m: 5.0e3,
+            max_stiffness_n_per_m: 1.0e4,
             rate_hz: [100.0, 10_000.0],
             latency_s: 0.0,
         }
