@@ -607,6 +607,7 @@ typedef struct FlotorCapabilities {
     // Fastest change of torque the device accepts, N·m/s.
     double max_torque_slew_nm_per_s;
     // Largest stiffness the device renders stably at its nominal rate, with the damping it recommends, N/m; 0: unknown.
+    // [`SampledLoop::largest_stiffness`](crate::SampledLoop::largest_stiffness) computes one.
     double max_stiffness_n_per_m;
     // Slowest and fastest loop the device runs at, Hz.
     double rate_hz[2];

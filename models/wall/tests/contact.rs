@@ -184,7 +184,7 @@ proptest! {
 
     /// Laps that stay inside, so that no sudden contact is part of them.
     #[test]
-    fn no_lap_with_friction_damping_and_velocity_makes_energy(
+    fn no_lap_with_friction_damping_and_velocity_generates_energy(
         corners in prop::collection::vec((-0.003..0.003_f64, -0.003..0.003_f64, -0.004..-0.0005_f64), 3..7),
         speeds in prop::collection::vec(0.01..1.0_f64, 7),
         damping_ns_per_m in 1.0..100.0_f64,

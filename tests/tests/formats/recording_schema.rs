@@ -280,8 +280,9 @@ fn expected_run() -> Vec<String> {
     .map(str::to_owned)
     .into();
     lines.extend(plugin(0, "left"));
+    lines.push("plugins[0].latency_s = 0.001".to_owned());
     lines.extend(plugin(1, "right"));
-    lines.push("plugins[1].device = 1".to_owned());
+    lines.extend(["device = 1", "latency_s = 0.001"].map(|line| format!("plugins[1].{line}")));
     lines.extend(plugin(2, "spring"));
     let mapping = [
         "rotation.x = 0.5".to_owned(),

@@ -2,6 +2,8 @@
 //! its last one, and in between nothing drops.
 
 use flotor_core::Change;
+use flotor_core::limits::{Bound, Boundary};
+use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::{Entry, device_entry};
 use flotor_hal::{
@@ -157,6 +159,13 @@ fn a_run_whose_time_is_over_fades_out_and_does_not_drop() {
     assert!(force_n(last) > 0.5 && !last.events.intersects(Events::RELEASING), "{last:?}");
 }
 
+/// Height at which the boundary wall of the simulated flotor begins, mm: 12 mm of range, and a limit of force far above 5 N.
+fn wall_mm(rate_hz: u64) -> f64 {
+    let flotor = Capabilities { range_m: [0.012; 3], max_force_n: [50.0; 3], ..Capabilities::UNDRIVEN };
+    let wall = RenderedBoundary::new(&Boundary::default(), &flotor, &Bound::NONE, 1_000_000_000 / rate_hz);
+    wall.begins_m[2] * 1.0e3
+}
+
 /// A free flotor that leans on the wall at the edge of its range with a third of a newton, where no damping but the wall's own
 /// holds it.
 #[test]
@@ -165,7 +174,8 @@ fn the_boundary_holds_and_creates_no_energy_at_any_rate() {
     for rate_hz in [100, 200, 300, 1000, 10_000] {
         let scene = format!(
             "rate_hz = {rate_hz}\nduration_s = 3\n[device]\nplugin = \"simulated\"\n[device.parameters]\n\
-             hand = \"open\"\nfeedforward_n = 6\nstart_z_mm = 11.4\n"
+             hand = \"open\"\nfeedforward_n = 6\nstart_z_mm = {}\n",
+            wall_mm(rate_hz)
         );
         let run = watch(&scene);
         assert_eq!(run.outcome.end, RunEnd::Finished, "{rate_hz} Hz");

@@ -41,6 +41,7 @@ fn run(scratch: &Scratch, scene: &str, clock: &str) -> Ran {
     let path = |name: &str| scratch.path().join(name).display().to_string();
     let scene = scratch.file("scene.toml", scene).display().to_string();
     let (recording, json) = (path("run.mcap"), path("run.json"));
+    let _ = std::fs::remove_file(&recording); // of the run before
     let arguments = ["run", &scene, "--clock", clock, "--record", &recording, "--json", &json];
     Flotor::with(arguments).env("FLOTOR_CALL_LIMIT_S", "1").run()
 }

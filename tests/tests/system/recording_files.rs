@@ -69,7 +69,6 @@ fn a_run_that_is_refused_leaves_no_file_behind_and_takes_none_away() {
     assert_eq!(whole_ticks(&scratch.path().join("run.mcap")), 100);
 }
 
-#[cfg(unix)]
 #[test]
 fn a_recording_that_vanishes_during_the_run_is_an_error() {
     let scratch = Scratch::default();
@@ -87,7 +86,6 @@ fn a_recording_that_vanishes_during_the_run_is_an_error() {
     assert!(ran.stdout.contains("digest"), "the run itself is whole: {}", ran.stdout);
 }
 
-#[cfg(unix)]
 #[test]
 fn a_pipe_a_device_file_and_a_dangling_link_are_refused_at_once() {
     let scratch = Scratch::default();

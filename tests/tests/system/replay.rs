@@ -54,6 +54,7 @@ fn copy(
     let mut whole = Recording::open(recording).expect("it was just recorded");
     let mut run = whole.run().clone();
     describe(&mut run);
+    let _ = std::fs::remove_file(&copy); // of the edit before
     let mut recorder = Recorder::create(&copy, &run).expect("scratch can be written");
     while let Some(record) = whole.next() {
         let record = record.expect("it is whole");

@@ -334,6 +334,7 @@ fn an_emergency_stop_has_its_exit_code_also_where_nobody_reads_the_summary() {
         assert_eq!(last_line(&ran), format!("code {}", exit_code::DEVICE_FAULT), "{ran:?}");
         assert!(ran.stderr.contains("error: emergency stop (the device's own)"), "{ran:?}");
         assert_eq!(recorded(&scratch).len(), 51);
+        std::fs::remove_file(recording_in(&scratch)).expect("it was recorded");
     }
 }
 
