@@ -32,11 +32,14 @@ pub(super) fn finite_in_motion(model: &mut Model) -> Result<(), String> {
     Ok(())
 }
 
+/// Demand in each tick of a path.
+type DemandOfTick = fn(u64) -> Demand;
+
 /// Compares the answers on a path with everything demanded, to those with less demanded, and to those with a demand that
 /// changes from step to step, as of a viewer that comes and goes.
 pub(super) fn demand(model: &mut Model) -> Result<(), String> {
     let all = demanded(model, |_| Demand::ALL)?;
-    let fewer: [(&str, fn(u64) -> Demand); 4] = [
+    let fewer: [(&str, DemandOfTick); 4] = [
         ("force alone", |_| Demand::FORCE),
         ("force and torque", |_| Demand::WRENCH),
         ("force and energy", |_| Demand::FORCE.with(Demand::ENERGY)),
