@@ -34,9 +34,10 @@ impl Emergency {
 
     /// Before anything else the latch: a run that is not yet to be seen looks at it before it energises a device.
     pub(super) fn press(&self, who: &str, query: Query) {
-        let problem = self.latch.press(who).err().map(|error| {
-            format!("the emergency stop does not stay: a later run is not refused: {error}")
-        });
+        let problem =
+            self.latch.press(who).err().map(|error| {
+                format!("the emergency stop does not stay: a later run is not refused: {error}")
+            });
         let _ = self.pressed.try_send((query, problem));
     }
 }
