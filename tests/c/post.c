@@ -9,6 +9,10 @@
 FLOTOR_METADATA("kind = \"device\"\nid = \"fixture-c-post\"\nname = \"Post\"\ndoc = \"A handle that does not move, in C\"\n"
                 "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_post\"\n");
 
+#ifndef ORIENTATION_W
+#define ORIENTATION_W 1.0
+#endif
+
 typedef struct {
     FlotorWrench held;
     atomic_bool stopped;
@@ -65,7 +69,7 @@ static uint32_t read_post(FlotorInstance instance, const FlotorTick *tick, Floto
     const Post *post = instance;
     memset(state, 0, sizeof *state);
     state->pose.position_m[2] = -0.001;
-    state->pose.orientation_xyzw[3] = 1.0;
+    state->pose.orientation_xyzw[3] = ORIENTATION_W;
     state->sampled_ns = tick->time_ns;
     if (!atomic_load(&post->stopped)) {
         state->delivered = post->held;

@@ -11,9 +11,10 @@
 
 use flotor_hal::{Axes, Capabilities, Conditions, DQuat, DVec3, DeviceState, Pose, Tick, Twist};
 
-/// How far the length of a quaternion may be from one: what single precision and a sloppy normalisation leave is a
-/// hundred times less.
+/// Largest error of the length of a quaternion: a hundred times that of six decimals, and too small to be another number.
 const LENGTH_TOLERANCE: f64 = 1.0e-3;
+/// Largest error of the squared length of a quaternion of length one: the rounding of its four numbers and of the sum.
+const LENGTH_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// How many times its range a device may report: it is asked where a handle is that has left it.
 const RANGES: f64 = 2.0;
 /// Where a handle may be along an axis whose device says no range, m: a room.
@@ -356,11 +357,25 @@ pub fn stale_ticks_limit(period_ns: u64) -> u32 {
     u32::try_from(ticks).unwrap_or(u32::MAX)
 }
 
-/// True if a quaternion has the length of one. Real-time: bounded, no allocation.
+/// Returns true if the length of a quaternion is one within 1e-3: the one tolerance for orientations of devices, peers and
+/// scenes. Real-time: bounded, no allocation.
 #[inline]
 #[must_use]
 pub fn is_rotation(quaternion: DQuat) -> bool {
     (quaternion.length_squared() - 1.0).abs() <= 2.0 * LENGTH_TOLERANCE // false for NaN
+}
+
+/// Returns an accepted pose with an orientation of length one; a model may refuse any other. An orientation of length one
+/// within rounding, and one that [`is_rotation`] refuses, keeps its bits. Real-time: bounded, no allocation.
+#[inline]
+#[must_use]
+pub fn normalised(pose: &Pose) -> Pose {
+    let orientation = pose.orientation();
+    let squared = orientation.length_squared();
+    if (squared - 1.0).abs() <= LENGTH_ROUNDING || !is_rotation(orientation) {
+        return *pose;
+    }
+    Pose::new(pose.position(), orientation / squared.sqrt())
 }
 
 /// True if no handle moves like that, or a number is NaN. Real-time: bounded, no allocation.

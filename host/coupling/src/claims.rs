@@ -8,7 +8,7 @@
 use flotor_core::coupling::CouplingConfig;
 use flotor_core::mapping::Mapping;
 use flotor_core::peer::PeerState;
-use flotor_core::plausibility::{is_rotation, is_too_fast};
+use flotor_core::plausibility::{is_rotation, is_too_fast, normalised};
 use flotor_hal::{DVec3, DeviceState, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 
 /// How far the device here reaches, device frame: semi-axes of an ellipsoid of positions (m) and of one of rotation vectors (rad).
@@ -190,9 +190,9 @@ impl Claims {
             *way = (*way - *moved).max(0.0);
         }
         self.last = Some(believed);
-        // What is believed as it was claimed stays so to the bit.
+        // A pose that is used as claimed keeps its bits, if its orientation has length one.
         let pose = if believed == claimed {
-            peer.pose
+            normalised(&peer.pose)
         } else {
             let pose = Pose::new(believed[0], orientation_from_rotation_vector(believed[1]));
             mapping.pose_to_model(&pose)

@@ -4,7 +4,7 @@ use super::envelope::{Envelope, EnvelopeEffects};
 use super::forces::Port;
 use super::state::{Cause, Gate, RunEvent};
 use flotor_core::plausibility::{
-    Implausible, ImplausibleSamples, PlausibilityCheck, Trust, stale_ticks_limit,
+    Implausible, ImplausibleSamples, PlausibilityCheck, Trust, normalised, stale_ticks_limit,
 };
 use flotor_core::trace::Events;
 use flotor_hal::abi::loader::ActiveDevice;
@@ -73,7 +73,8 @@ impl Station {
         }
     }
 
-    /// Newest sample into the port; an old one stays, one that cannot be is never used. What it means for the run.
+    /// Reads the newest sample into the port, its orientation normalised, and returns the consequence for the run. A stale or
+    /// implausible sample leaves the port as it was.
     ///
     /// Real-time: bounded by the device, no allocation.
     pub(super) fn read(&mut self, tick: &Tick, port: &mut Port) -> RunEvent {
@@ -82,6 +83,7 @@ impl Station {
             Cycle::Fresh => match self.plausibility.check(tick, &port.state) {
                 Ok(()) => {
                     self.stale_ticks = 0;
+                    port.state.pose = normalised(&port.state.pose);
                     if port.state.conditions.contains(Conditions::SATURATED) {
                         port.events.insert(Events::SATURATED);
                     }

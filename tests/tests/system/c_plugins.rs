@@ -44,6 +44,36 @@ fn device_and_model_in_c_run_a_scene() {
     }
 }
 
+/// A device of another maker rounds its orientation to six decimals or to single precision: its models must not answer zero.
+#[test]
+fn an_orientation_that_the_host_accepts_has_the_force_of_one_of_length_one() {
+    let scratch = Scratch::default();
+    let run_with = |length: &str| {
+        let post = compiled(&scratch, "post", &[&format!("ORIENTATION_W={length}")]);
+        watch(&format!(
+            "duration_s = 0.05\n[device]\nplugin = {post:?}\n[[model]]\nplugin = \"spring\"\n[limits]\nramp_s = 0\n"
+        ))
+    };
+    let peak_n = |run: &Watched| run.records.iter().fold(0.0_f64, |peak, r| peak.max(r.commanded.force_n[2]));
+    let exact = run_with("1.0");
+    let expected_n = peak_n(&exact);
+    // Spring 1 has 679 N/m at home; a millimetre of compression adds less than a percent.
+    assert!((expected_n - 0.679).abs() < 0.01, "{expected_n} N");
+    for length in ["0.9991", "0.99999", "1.000001", "1.00001", "1.0009"] {
+        let run = run_with(length);
+        assert_eq!(run.records.len(), exact.records.len());
+        assert!(
+            run.records.iter().all(|record| !record.events.intersects(Events::MODEL_DEGRADED)),
+            "length {length}"
+        );
+        // Normalisation rounds.
+        assert!((peak_n(&run) - expected_n).abs() < 1.0e-12, "length {length}: {} N", peak_n(&run));
+    }
+    let refused = run_with("1.0011");
+    assert_eq!(peak_n(&refused), 0.0);
+    assert!(refused.records.iter().all(|record| record.events.intersects(Events::IMPLAUSIBLE_SAMPLE)));
+}
+
 /// A recording knows a plugin by its id, not by where its file was: that is another place tomorrow.
 #[test]
 fn a_recording_of_plugins_named_by_their_files_replays_where_their_folder_is_told() {

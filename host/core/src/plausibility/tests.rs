@@ -1,6 +1,7 @@
 //! The check of samples: what hands do passes at every rate, and everything else has its reason.
 
 use super::*;
+use crate::random::Random;
 use flotor_hal::orientation_from_rotation_vector;
 use std::f64::consts::TAU;
 
@@ -208,5 +209,31 @@ fn a_sensor_without_a_pose_may_leave_it_as_it_likes() {
         let mut sample = at(DVec3::ONE * (index as f64 * 1.0e6), 0);
         sample.pose.orientation_xyzw = [0.0; 4];
         assert_eq!(check.check(&tick(index, PERIOD_NS), &sample), Ok(()));
+    }
+}
+
+/// A unit quaternion in six decimals or in single precision is a rotation, and a model gets it with length one.
+#[test]
+fn an_accepted_orientation_has_length_one_and_a_unit_quaternion_keeps_its_bits() {
+    let mut random = Random::new(1, 0);
+    for _ in 0..10_000 {
+        let exact = orientation_from_rotation_vector(random.vector() * 3.0);
+        let pose = Pose::new(DVec3::X, exact);
+        assert_eq!(normalised(&pose), pose);
+        for scale in [0.999_01, 1.0 - 1.0e-6, 1.0 + 1.0e-6, 1.000_9] {
+            let accepted = exact * scale;
+            assert!(is_rotation(accepted));
+            let unit = normalised(&Pose::new(DVec3::X, accepted));
+            // Rounding of a product, a root and a quotient.
+            assert!((unit.orientation() - exact).length() < 1.0e-15, "{scale} {exact}");
+            assert_eq!(normalised(&unit), unit, "once is enough");
+        }
+    }
+    for refused in [0.0, 0.9989, 1.0011, 1.0e200, f64::NAN] {
+        let pose = Pose::new(DVec3::X, DQuat::from_xyzw(0.0, 0.0, 0.0, refused));
+        assert_eq!(
+            normalised(&pose).orientation_xyzw.map(f64::to_bits),
+            pose.orientation_xyzw.map(f64::to_bits)
+        );
     }
 }

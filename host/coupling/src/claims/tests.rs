@@ -48,6 +48,21 @@ fn an_honest_partner_is_believed_to_the_bit() {
 }
 
 #[test]
+fn an_orientation_that_is_accepted_is_normalised() {
+    let mapping = Mapping::new(&MappingConfig::default());
+    let claim = swing(30);
+    for length in [0.9991, 0.999_99, 1.000_001, 1.0009] {
+        let orientation = claim.pose.orientation() * length;
+        let told = PeerState { pose: Pose::new(claim.pose.position(), orientation), ..claim };
+        let mut claims = Claims::new(&CouplingConfig::default(), &mapping, Reach::default(), 1.0e-3);
+        assert!(claims.can_be(&told, &mapping), "length {length}");
+        let believed = claims.believe(&told, &DeviceState::HOME, &mapping, 1.0e-3).pose.orientation();
+        // Four roundings.
+        assert!((believed - claim.pose.orientation()).length() < 1.0e-15, "length {length}: {believed}");
+    }
+}
+
+#[test]
 fn a_partner_is_heard_where_a_device_can_be() {
     assert!(can_be(1.0, -1.0, 1.0));
     let far = [-2.1, -1.0e30, f64::MAX, f64::NAN].map(|z_m| (z_m, 0.0));

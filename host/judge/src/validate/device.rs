@@ -1,6 +1,7 @@
 //! Rules of a device: its description, its life cycle, and its stop.
 
 use super::path::CONFIG;
+use flotor_core::plausibility::is_rotation;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Fault, Tick, Wrench};
 use flotor_session::LatchGuard;
@@ -10,9 +11,6 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Time between two ticks that wait for something, roughly.
 const TICK: Duration = Duration::from_millis(1);
-
-/// How far the length of a quaternion may be from one: rounding in single precision, ten times.
-const QUATERNION_TOLERANCE: f64 = 1.0e-6;
 
 /// How often a device is asked what it can do, before it is energised and after.
 const ASKED: usize = 10;
@@ -223,9 +221,9 @@ impl Running {
         if sampled != Cycle::Fresh || self.told.sensed == Axes::NONE {
             return Ok(());
         }
-        let length = state.pose.orientation().length();
-        if (length - 1.0).abs() > QUATERNION_TOLERANCE {
-            return Err(format!("a quaternion of length {length}, not 1"));
+        let orientation = state.pose.orientation();
+        if !is_rotation(orientation) {
+            return Err(format!("a quaternion of length {}, not 1", orientation.length()));
         }
         let (position_m, range_m) = (state.pose.position(), DVec3::from_array(self.told.range_m));
         let is_far = position_m.abs().cmpgt(range_m * FARTHEST) & range_m.cmpgt(DVec3::ZERO);

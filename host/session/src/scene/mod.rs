@@ -14,11 +14,12 @@ pub use devices::{is_named, without_device};
 use flotor_core::coupling::{CouplingDescription, PassivityMode};
 use flotor_core::limits::{Boundary, Limits};
 use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+use flotor_core::plausibility::is_rotation;
 pub use reader::{Location, SceneError};
 pub use reference::{KeyReference, SectionReference, reference};
 pub use setting::{KeyValue, PluginKeyValue};
 
-use flotor_hal::{TextProblem, read_text};
+use flotor_hal::{DQuat, TextProblem, read_text};
 use reader::{Section, Source, Value};
 pub use reader::{did_you_mean, nearest};
 use std::path::{Path, PathBuf};
@@ -342,13 +343,14 @@ fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneErr
     let rotation =
         section.take("rotation_xyzw").map(|value| (value.numbers::<4>(), value)).map(|(numbers, value)| {
             let numbers = numbers?;
-            let norm = numbers.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if (norm - 1.0).abs() > 1.0e-6 {
+            let rotation = DQuat::from_array(numbers);
+            if !is_rotation(rotation) {
                 return Err(value.problem(format!(
-                    "a rotation is a unit quaternion [x, y, z, w]; this one has length {norm}"
+                    "a rotation is a unit quaternion [x, y, z, w]; this one has length {}",
+                    rotation.length()
                 )));
             }
-            Ok(numbers.map(|x| x / norm))
+            Ok((rotation / rotation.length()).to_array())
         });
     Ok(MappingConfig {
         rotation_xyzw: rotation.transpose()?.unwrap_or(default.rotation_xyzw),
