@@ -60,6 +60,9 @@ pub struct CouplingEnd {
     pub mapping: MappingConfig,
 }
 
+/// Largest error of the gain of a coupling whose scales cancel: three quotients of numbers in decimal round less.
+const GAIN_ROUNDING: f64 = 1.0e-12;
+
 /// Where the ends of a coupling are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CouplingEnds {
@@ -70,6 +73,23 @@ pub enum CouplingEnds {
 }
 
 impl CouplingEnds {
+    /// Returns the largest ratio of the energy that one hand gets to the energy that the other has put in: 1 if the coupling
+    /// amplifies nothing, and never less.
+    ///
+    /// An end turns one joule of the shared frame into `force_scale / motion_scale` joules at its hand. A tank limits the energy of the
+    /// shared frame, so energy that crosses the coupling is scaled by the ratio of both ends, up in one direction if they differ. The
+    /// scales of a remote end are unknown here: the ratio is that to an end without scales. Not real-time.
+    #[must_use]
+    pub fn energy_gain(&self) -> f64 {
+        let scale = |end: &CouplingEnd| end.mapping.force_scale / end.mapping.motion_scale;
+        let (first, second) = match self {
+            CouplingEnds::Here([first, second]) => (scale(first), scale(second)),
+            CouplingEnds::Remote(end) => (scale(end), 1.0),
+        };
+        let gain = (first / second).max(second / first);
+        if gain <= 1.0 + GAIN_ROUNDING { 1.0 } else { gain }
+    }
+
     /// Those in this run.
     #[must_use]
     pub fn here(&self) -> &[CouplingEnd] {
@@ -89,4 +109,33 @@ pub struct CouplingDescription {
     pub config: CouplingConfig,
     /// What it holds together.
     pub ends: CouplingEnds,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn end(motion_scale: f64, force_scale: f64) -> CouplingEnd {
+        let mapping = MappingConfig { motion_scale, force_scale, ..MappingConfig::default() };
+        CouplingEnd { device: 0, mapping }
+    }
+
+    #[test]
+    fn a_coupling_amplifies_where_the_energy_scales_of_its_ends_differ() {
+        let plain = end(1.0, 1.0);
+        for (motion_scale, force_scale, gain) in
+            [(1.0, 1.0, 1.0), (0.5, 0.5, 1.0), (0.5, 2.0, 4.0), (2.0, 0.5, 4.0), (0.1, 10.0, 100.0)]
+        {
+            let scaled = end(motion_scale, force_scale);
+            for ends in [
+                CouplingEnds::Here([plain, scaled]),
+                CouplingEnds::Here([scaled, plain]),
+                CouplingEnds::Remote(scaled),
+            ] {
+                assert_eq!(ends.energy_gain(), gain, "{ends:?}");
+            }
+        }
+        // Joules of the shared frame are another unit at both hands, and the same one: 0.3 / 0.1 is not 3 in binary.
+        assert_eq!(CouplingEnds::Here([end(0.1, 0.3), end(1.0, 3.0)]).energy_gain(), 1.0);
+    }
 }

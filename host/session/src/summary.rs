@@ -253,6 +253,8 @@ impl EnvelopeSummary {
 pub struct CouplingSummary {
     /// Name in the scene.
     pub name: String,
+    /// Largest ratio of the energy that one hand gets to the energy that the other puts in, by the scales of the ends.
+    pub energy_gain: f64,
     /// The lowest the tank of each end ever was, J: below zero, more has come out there than this end had and was told of. That of an
     /// end on another host is what that host says of itself, and proves nothing.
     pub lowest_j: [f64; 2],
@@ -603,6 +605,7 @@ fn coupling_summary(
     };
     CouplingSummary {
         name: coupling.name.clone(),
+        energy_gain: coupling.ends.energy_gain(),
         lowest_j: each(|tank| tank.lowest_j),
         gone_in_j: each(|tank| tank.gone_in_j),
         given_up_j: each(|tank| tank.given_up_j),

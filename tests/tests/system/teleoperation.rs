@@ -247,6 +247,47 @@ fn without_the_controller_a_long_way_generates_energy_and_with_it_none() {
     assert!(kept.records.iter().any(|record| record.events.intersects(Events::PASSIVITY_DAMPED)));
 }
 
+/// A scene of a hand that moves and a relaxed one, the second end scaled.
+fn scaled_pair(motion_scale: f64, force_scale: f64, key: &str) -> String {
+    format!(
+        "duration_s = 3\n{}{}[[coupling]]\n{key}\ndelay_ticks = 20\nend = [{{ device = \"left\" }}, {{ device = \"right\", \
+         mapping = {{ motion_scale = {motion_scale}, force_scale = {force_scale} }} }}]\n",
+        device("left", "hand = \"oscillate\"\nhand_grip = \"firm\""),
+        device("right", "hand = \"hold\"\nhand_grip = \"relaxed\"")
+    )
+}
+
+#[test]
+fn a_coupling_that_amplifies_needs_consent_and_reports_its_gain() {
+    const CONSENT: &str = "allow_amplification = true";
+    for (motion_scale, force_scale, gain) in [(0.5, 2.0, 4.0), (2.0, 0.5, 4.0), (0.1, 10.0, 100.0)] {
+        let without = scaled_pair(motion_scale, force_scale, "");
+        let refused = Scene::parse(Path::new("scene.toml"), &without).expect_err("no consent").to_string();
+        let expected = format!("one hand may get {gain:.4} times the energy that the other puts in");
+        assert!(refused.contains(&expected) && refused.contains(CONSENT), "{refused}");
+
+        let run = watch(&scaled_pair(motion_scale, force_scale, CONSENT));
+        assert!(run.outcome.warnings.iter().any(|warning| warning.contains(&expected)), "{motion_scale}");
+        // Both hands together get energy that neither has put in, which is why it needs consent; in the frame of the coupling none is
+        // generated.
+        assert!(lowest_sum_of_ports_j(&run) < -1.0e-4, "{} J", lowest_sum_of_ports_j(&run));
+        let scale = [1.0, motion_scale / force_scale];
+        let shared = run.records.chunks(2).map(|tick| -> f64 {
+            tick.iter().zip(scale).map(|(record, scale)| record.port_energy_j * scale).sum()
+        });
+        let lowest_j = shared.fold(0.0, f64::min);
+        assert!(lowest_j >= -1.0e-12, "{motion_scale}, {force_scale}: {lowest_j} J in the shared frame");
+    }
+    let needless = scaled_pair(0.5, 0.5, CONSENT);
+    let refused = Scene::parse(Path::new("scene.toml"), &needless).expect_err("no effect").to_string();
+    assert!(refused.contains("`allow_amplification = true` has no effect"), "{refused}");
+    assert!(Scene::parse(Path::new("scene.toml"), &scaled_pair(0.5, 0.5, "")).is_ok());
+    let apart = "[[device]]\nname = \"left\"\nplugin = \"simulated\"\n[[coupling]]\nname = \"pair\"\npartner = \"elsewhere\"\n\
+                 end = [{ device = \"left\", mapping = { motion_scale = 0.5, force_scale = 2 } }]\n";
+    let refused = Scene::parse(Path::new("scene.toml"), apart).expect_err("no consent").to_string();
+    assert!(refused.contains("4.0000 times"), "{refused}");
+}
+
 #[test]
 fn a_recording_of_a_pair_replays_bit_for_bit_and_keeps_both_handles() {
     let scratch = Scratch::default();

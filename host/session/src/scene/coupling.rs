@@ -46,6 +46,8 @@ fn coupling(
         },
         passivity: section.take("passivity").map(passivity).transpose()?.unwrap_or(default.passivity),
     };
+    let may_amplify =
+        section.take("allow_amplification").map(|value| value.truth()).transpose()?.unwrap_or(false);
     let ends = section.sections("end")?;
     section.finish()?;
     let ends = ends.into_iter().map(|section| end(section, devices)).collect::<Result<Vec<_>, _>>()?;
@@ -67,6 +69,19 @@ fn coupling(
             ));
         }
     };
+    let gain = ends.energy_gain();
+    if gain > 1.0 && !may_amplify {
+        return Err(wrong(&format!(
+            "the coupling amplifies: one hand may get {gain:.4} times the energy that the other puts in, because `force_scale` / \
+             `motion_scale` differ between its ends; make these quotients equal, or write `allow_amplification = true` if nobody \
+             can be hurt"
+        )));
+    }
+    if gain <= 1.0 && may_amplify {
+        return Err(wrong(
+            "`allow_amplification = true` has no effect: `force_scale` / `motion_scale` are equal at both ends; remove the key",
+        ));
+    }
     if limits.passivity == PassivityMode::Control {
         return Err(wrong(
             "`limits.passivity = \"control\"` would remove the energy that comes from the other device; remove the \

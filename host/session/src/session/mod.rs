@@ -382,6 +382,7 @@ impl Session {
             .zip(&opened)
             .filter_map(|(number, opened)| prepare::without_torque(scene, number, &opened.capabilities));
         warnings.extend(torqueless);
+        warnings.extend(prepare::amplifications(scene));
         warnings.extend(latch.as_ref().and_then(LatchGuard::warning));
         let watchdog_process = match options.clock {
             Clock::Real => prepare::watchdog_process(scene, &opened, &mut warnings)?,

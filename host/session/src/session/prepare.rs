@@ -119,6 +119,17 @@ pub(super) fn without_torque(scene: &Scene, number: u16, device: &Capabilities) 
     })
 }
 
+/// Returns a warning for each coupling that amplifies, with the scene's consent.
+pub(super) fn amplifications(scene: &Scene) -> impl Iterator<Item = String> + '_ {
+    let gains = scene.couplings.iter().map(|coupling| (&coupling.name, coupling.ends.energy_gain()));
+    gains.filter(|(_, gain)| *gain > 1.0).map(|(name, gain)| {
+        format!(
+            "the coupling `{name}` amplifies: one hand may get {gain:.4} times the energy that the other puts in \
+             (`allow_amplification`)"
+        )
+    })
+}
+
 /// Starts the process that stops devices when this one is gone, and says which devices nothing stops then. Not real-time.
 pub(super) fn watchdog_process(
     scene: &Scene,
