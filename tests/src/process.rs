@@ -5,6 +5,7 @@
 use rustix::process::{Pid, Signal, kill_process};
 use std::ops::{Deref, DerefMut};
 use std::process::{Child, Command, Output};
+use std::time::Duration;
 
 /// A process of the test's own. What has not ended when this is dropped, also by a panic, is killed: a host that hangs would else
 /// outlive the test that failed. Of a shell that is the shell, so that scripts `exec` what may hang.
@@ -32,6 +33,34 @@ impl Owned {
     #[must_use]
     pub fn pid(&self) -> Pid {
         Pid::from_child(self)
+    }
+
+    /// The process that carries out the command: the one that was started supervises it, its only child.
+    ///
+    /// # Panics
+    /// If there is none, or there are several.
+    #[must_use]
+    pub fn host(&self) -> Pid {
+        let number = self.pid().as_raw_nonzero();
+        let list = format!("/proc/{number}/task/{number}/children");
+        // It starts right after the supervisor.
+        for _ in 0..1000 {
+            let children = std::fs::read_to_string(&list).unwrap_or_default();
+            if !children.is_empty() {
+                let host = children.trim().parse().expect("one process");
+                return Pid::from_raw(host).expect("a number");
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        panic!("no process under {number}");
+    }
+
+    /// Sends a signal to the process that carries out the command.
+    ///
+    /// # Panics
+    /// As [`Owned::host`].
+    pub fn signal_host(&self, signal: Signal) {
+        kill_process(self.host(), signal).expect("it is ours");
     }
 
     /// Waits for its end, and for all it writes until then.

@@ -108,9 +108,9 @@ impl Run {
 
     /// Waits for the end, and looks at the servo's thread until then.
     fn finish(mut self) -> Ran {
-        let mut sleeps = 0;
+        let (mut sleeps, host) = (0, self.process.host().as_raw_nonzero().get());
         while self.is_on() {
-            sleeps = servo_sleeps(self.process.id()).unwrap_or(sleeps);
+            sleeps = servo_sleeps(host).unwrap_or(sleeps);
             std::thread::sleep(Duration::from_millis(10));
         }
         assert!(self.process.wait().unwrap().success(), "a run that ends in order");
@@ -121,7 +121,7 @@ impl Run {
 }
 
 /// How often the servo thread of a process has given its processor away by itself, if there is one.
-fn servo_sleeps(process: u32) -> Option<u64> {
+fn servo_sleeps(process: i32) -> Option<u64> {
     let threads = std::fs::read_dir(format!("/proc/{process}/task")).ok()?;
     let of_servo = threads.flatten().map(|thread| thread.path()).find(|thread| {
         std::fs::read_to_string(thread.join("comm")).is_ok_and(|name| name.trim() == "flotor-servo")

@@ -181,11 +181,11 @@ fn a_host_that_does_not_confirm_makes_no_done() {
     let bridge = machine.bridge("lab");
     let [frozen, other] = [machine.run(), machine.run()];
     wait_until("both run", || machine.directory().runs().len() == 2);
-    frozen.signal(rustix::process::Signal::STOP);
+    frozen.signal_host(rustix::process::Signal::STOP);
     let refused = bridge.errand.run(Request::EmergencyStop).unwrap_err();
     assert!(refused.contains(&format!("not confirmed by process {}", frozen.id())), "{refused}");
     assert_eq!(stopped(other), STOPPED);
-    frozen.signal(rustix::process::Signal::CONT);
+    frozen.signal_host(rustix::process::Signal::CONT);
     assert_eq!(stopped(frozen), STOPPED, "it sees the latch when it comes back");
 }
 
@@ -200,7 +200,7 @@ fn a_frozen_host_and_a_flood_for_it_delay_no_stop() {
     wait_until("the bridge carries it", || carried() == frozen.id());
     let other = machine.run();
     wait_until("both run", || machine.directory().runs().len() == 2);
-    frozen.signal(rustix::process::Signal::STOP);
+    frozen.signal_host(rustix::process::Signal::STOP);
     let is_over = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let values =
@@ -220,7 +220,7 @@ fn a_frozen_host_and_a_flood_for_it_delay_no_stop() {
         assert!(refused.contains(&format!("not confirmed by process {}", frozen.id())), "{refused}");
     });
     assert_eq!(stopped(other), STOPPED);
-    frozen.signal(rustix::process::Signal::CONT);
+    frozen.signal_host(rustix::process::Signal::CONT);
     assert_eq!(stopped(frozen), STOPPED);
 }
 
@@ -232,7 +232,7 @@ fn of_two_bridges_of_one_name_both_have_to_confirm() {
     let bridges = machines.each_ref().map(|machine| machine.bridge("lab"));
     let [frozen, other] = machines.each_ref().map(Machine::run);
     wait_until("both run", || machines.iter().all(|machine| !machine.directory().runs().is_empty()));
-    frozen.signal(rustix::process::Signal::STOP);
+    frozen.signal_host(rustix::process::Signal::STOP);
     let connect = bridges.iter().map(|bridge| bridge.endpoint.clone()).collect();
     let link = open(&LinkOptions { connect, ..LinkOptions::default() }, End::Visiting).unwrap();
     let remote = Remote::listen(&link, &Name::new("lab").unwrap()).unwrap();
@@ -240,6 +240,6 @@ fn of_two_bridges_of_one_name_both_have_to_confirm() {
     wait_until("both are seen", seen);
     assert!(remote.errand().run(Request::EmergencyStop).is_err());
     assert_eq!(stopped(other), STOPPED);
-    frozen.signal(rustix::process::Signal::CONT);
+    frozen.signal_host(rustix::process::Signal::CONT);
     assert_eq!(stopped(frozen), STOPPED);
 }

@@ -4,6 +4,7 @@
 //! - [`options`]: options several commands have, and how they are read.
 //! - [`say!`], [`print_result`], [`write_json`], [`write_text`]: results for people and for machines.
 //! - [`tables`]: results as tables.
+//! - [`supervised`]: a command in a process of its own, whose end never passes for success.
 //! - [`stopping`]: signals and keys that end a run.
 //! - [`separate`]: programs beside this one that carry out a command.
 //! - [`reference()`]: every command with its arguments, for the book.
@@ -19,6 +20,7 @@ mod reference;
 pub mod separate;
 pub mod stopping;
 pub mod style;
+mod supervision;
 pub mod tables;
 
 pub use error::{CommandError, before_advice};
@@ -28,3 +30,4 @@ pub use output::{
 };
 pub use progress::{progress_bar, while_preparing};
 pub use reference::reference;
+pub use supervision::supervised;

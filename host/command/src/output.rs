@@ -2,6 +2,7 @@
 
 use crate::platform::results_apart;
 use crate::{CommandError, style};
+use flotor_servo::last_stop::{ReportedEnd, leave_process, report_end};
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
@@ -14,7 +15,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::print_line(format_args!($($text)*)) };
 }
 
-/// The exit code of a command; its error is printed. Ends the process itself where code of a plugin has not returned: what a
+/// The exit code of a command; its error is printed, and its end reported to the supervisor. Ends the process itself where code of a plugin has not returned: what a
 /// process does at its end might wait for it. Not real-time.
 pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     let code = match result {
@@ -24,9 +25,10 @@ pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
             error.exit_code()
         }
     };
+    let _ = std::io::stdout().flush();
+    report_end(ReportedEnd::Code(code));
     if flotor_session::is_left_behind() {
-        let _ = std::io::stdout().flush();
-        flotor_servo::last_stop::leave_process(code.into());
+        leave_process(code.into());
     }
     ExitCode::from(code)
 }
@@ -60,8 +62,9 @@ fn write_line(line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
 /// What `say!` does.
 pub fn print_line(line: std::fmt::Arguments<'_>) {
     if let Err(error) = write_line(line) {
-        let gone = error.kind() == std::io::ErrorKind::BrokenPipe;
-        std::process::exit(if gone { 0 } else { 1 });
+        let code = if error.kind() == std::io::ErrorKind::BrokenPipe { 0 } else { 1 };
+        report_end(ReportedEnd::Code(code));
+        std::process::exit(code.into());
     }
 }
 

@@ -7,7 +7,7 @@
 //! handlers or blocks signals takes none of them away. On Windows they are events of the console, and Ctrl-Break ends a run at once.
 
 use super::note;
-use crate::platform::{INTERRUPTED, KeyTerminal, Request, Requests, outlive_requests};
+use crate::platform::{INTERRUPTED, KeyTerminal, Request, Requests, is_orphaned, outlive_requests};
 use flotor_servo::last_stop::{leave_process, stop_all, was_armed};
 use flotor_servo::{EmergencySource, StopSwitch, enter_guard_priority};
 use std::io::{self, Read, stdin};
@@ -75,7 +75,8 @@ fn attend(requests: &Requests, first: First, stop: &StopSwitch) {
     let mut insistence = Insistence::default();
     loop {
         let Some(request) = requests.next(LAST_PATIENCE) else {
-            if insistence.is_out_of_patience(Instant::now()) {
+            // An orphan was asked to end when its supervisor ended.
+            if insistence.is_out_of_patience(Instant::now()) || is_orphaned() {
                 leave();
             }
             continue;

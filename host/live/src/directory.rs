@@ -52,6 +52,23 @@ pub enum DirectoryError {
     },
 }
 
+/// Number set for this process; 0 if none is.
+static PROCESS_NUMBER: AtomicU32 = AtomicU32::new(0);
+
+/// Gives this process the number of the process that started it and ends with it: users know that one. Not real-time.
+pub fn set_process_number(number: u32) {
+    PROCESS_NUMBER.store(number, Ordering::Relaxed);
+}
+
+/// Returns the number by which others know this process. Not real-time.
+#[must_use]
+pub fn process_number() -> u32 {
+    match PROCESS_NUMBER.load(Ordering::Relaxed) {
+        0 => std::process::id(),
+        number => number,
+    }
+}
+
 impl Directory {
     /// `$XDG_RUNTIME_DIR/flotor`, else `/tmp/flotor-UID`; on Windows `%LOCALAPPDATA%\\flotor\\run`.
     #[must_use]
@@ -138,7 +155,7 @@ impl Directory {
         let _ = self.runs(); // removes what is dead
         loop {
             let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-            let path = self.path.join(format!("{}-{number}.{SUFFIX}", std::process::id()));
+            let path = self.path.join(format!("{}-{number}.{SUFFIX}", process_number()));
             match Listening::bind(&path) {
                 Ok(socket) => {
                     let file = std::fs::symlink_metadata(&path).ok();

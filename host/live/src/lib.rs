@@ -65,7 +65,7 @@ mod server;
 mod stop;
 
 pub use client::{Asker, Client, Event, LiveError};
-pub use directory::{Directory, DirectoryError, Found, Listener};
+pub use directory::{Directory, DirectoryError, Found, Listener, process_number, set_process_number};
 pub use frame::{Frames, Kind, LongFrame, MOST_PAYLOAD, frame, ticks_from_payload, ticks_to_payload};
 pub use latch::{Latch, LatchState, Pressed};
 pub use message::{

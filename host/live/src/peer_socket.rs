@@ -9,7 +9,7 @@
 //! joined tells so again every [`CALL_PERIOD`]; a host forgets who has not for a while. Not real-time.
 
 use crate::Directory;
-use crate::directory::{DirectoryError, private};
+use crate::directory::{DirectoryError, private, process_number};
 use crate::platform::{Datagrams, remove_if_dead};
 use flotor_core::peer::{Dispatch, InvalidDispatch};
 use std::io::{self, ErrorKind};
@@ -84,7 +84,7 @@ impl PeerSocket {
     /// [`DirectoryError`]: the folder is not usable, or not ours alone.
     pub fn listen(directory: &Directory, coupling: &str) -> Result<Self, DirectoryError> {
         private(directory.path())?;
-        let path = directory.path().join(format!("{}-{coupling}.{HOST}", std::process::id()));
+        let path = directory.path().join(format!("{}-{coupling}.{HOST}", process_number()));
         Self::bind(path).map_err(|(path, cause)| DirectoryError::Unusable { path, cause })
     }
 
@@ -96,7 +96,7 @@ impl PeerSocket {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         private(directory.path())?;
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-        let file = format!("{}-{}-{number}.{JOINED}", std::process::id(), coupling.name);
+        let file = format!("{}-{}-{number}.{JOINED}", process_number(), coupling.name);
         let joined = Self::bind(directory.path().join(file));
         let mut joined = joined.map_err(|(path, cause)| DirectoryError::Unusable { path, cause })?;
         joined.peers.push(Peer { path: coupling.path.clone(), called: None });

@@ -15,11 +15,11 @@ mod view;
 mod watchdog;
 mod worker;
 
-use crate::platform::lend;
+use crate::platform::{end_with_parent, lend};
 use bridge::BRIDGE;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use flotor_command::separate::{Built, SeparateProgram};
-use flotor_command::{exit_code_of, options, say};
+use flotor_command::{CommandError, exit_code_of, options, say, supervised};
 use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::LazyLock;
@@ -155,40 +155,52 @@ pub fn command_names() -> Vec<String> {
 pub fn main() -> ExitCode {
     let arguments = options::arguments::<Arguments>();
     flotor_session::tell_notices(|notice| flotor_command::note(notice));
-    let result = match arguments.command {
-        None => run::run(run::RunArguments::default()),
-        Some(Command::Run(arguments)) => run::run(arguments),
-        Some(Command::Replay(separate)) => LAB.carry_out("replay", &separate.arguments),
-        Some(Command::View(arguments)) => view::run(&arguments),
-        Some(Command::Eval(separate)) => LAB.carry_out("eval", &separate.arguments),
-        Some(Command::Plugins(arguments)) => plugins::run(&arguments),
-        Some(Command::Validate(separate)) => LAB.carry_out("validate", &separate.arguments),
-        Some(Command::New(arguments)) => new::run(&arguments),
-        Some(Command::Test(separate)) => TEST.carry_out("test", &separate.arguments),
-        Some(Command::Jitter(separate)) => LAB.carry_out("jitter", &separate.arguments),
-        Some(Command::Stability(separate)) => LAB.carry_out("stability", &separate.arguments),
-        Some(Command::Bench(separate)) => LAB.carry_out("bench", &separate.arguments),
-        Some(Command::Stress(separate)) => LAB.carry_out("stress", &separate.arguments),
-        Some(Command::Record(arguments)) => record::run(&arguments),
-        Some(Command::Swap(arguments)) => swap::run(&arguments),
-        Some(Command::Release(arguments)) => release::run(&arguments),
-        Some(Command::Bridge(separate)) => BRIDGE.become_with(&separate.arguments),
-        Some(Command::Sweep(separate)) => SWEEP.become_with(&separate.arguments),
-        Some(Command::Study(separate)) => STUDY.carry_out("study", &separate.arguments),
-        Some(Command::Analyse(separate)) => STUDY.carry_out("analyse", &separate.arguments),
-        Some(Command::Calibrate(separate)) => CALIBRATION.carry_out("calibrate", &separate.arguments),
-        Some(Command::Emulate(arguments)) => emulate::run(&arguments),
-        Some(Command::Lend(arguments)) => lend::run(arguments),
-        Some(Command::Doctor(arguments)) => doctor::run(&arguments),
-        Some(Command::Worker(arguments)) => worker::run(arguments),
-        Some(Command::Watchdog(arguments)) => watchdog::run(arguments),
-        Some(Command::Completions { shell }) => {
+    let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::default()));
+    if let Command::Run(arguments) = &command
+        && arguments.is_lent()
+    {
+        end_with_parent();
+    }
+    // The others run no code of plugins in this process.
+    match matches!(command, Command::Run(_) | Command::Doctor(_)) {
+        true => supervised(|| carry_out(command)),
+        false => exit_code_of(carry_out(command)),
+    }
+}
+
+fn carry_out(command: Command) -> Result<(), CommandError> {
+    match command {
+        Command::Run(arguments) => run::run(arguments),
+        Command::Replay(separate) => LAB.carry_out("replay", &separate.arguments),
+        Command::View(arguments) => view::run(&arguments),
+        Command::Eval(separate) => LAB.carry_out("eval", &separate.arguments),
+        Command::Plugins(arguments) => plugins::run(&arguments),
+        Command::Validate(separate) => LAB.carry_out("validate", &separate.arguments),
+        Command::New(arguments) => new::run(&arguments),
+        Command::Test(separate) => TEST.carry_out("test", &separate.arguments),
+        Command::Jitter(separate) => LAB.carry_out("jitter", &separate.arguments),
+        Command::Stability(separate) => LAB.carry_out("stability", &separate.arguments),
+        Command::Bench(separate) => LAB.carry_out("bench", &separate.arguments),
+        Command::Stress(separate) => LAB.carry_out("stress", &separate.arguments),
+        Command::Record(arguments) => record::run(&arguments),
+        Command::Swap(arguments) => swap::run(&arguments),
+        Command::Release(arguments) => release::run(&arguments),
+        Command::Bridge(separate) => BRIDGE.become_with(&separate.arguments),
+        Command::Sweep(separate) => SWEEP.become_with(&separate.arguments),
+        Command::Study(separate) => STUDY.carry_out("study", &separate.arguments),
+        Command::Analyse(separate) => STUDY.carry_out("analyse", &separate.arguments),
+        Command::Calibrate(separate) => CALIBRATION.carry_out("calibrate", &separate.arguments),
+        Command::Emulate(arguments) => emulate::run(&arguments),
+        Command::Lend(arguments) => lend::run(arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
+        Command::Worker(arguments) => worker::run(arguments),
+        Command::Watchdog(arguments) => watchdog::run(arguments),
+        Command::Completions { shell } => {
             // Into memory first: the generator panics where its reader goes away.
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut script);
             say!("{}", String::from_utf8_lossy(&script).trim_end());
             Ok(())
         }
-    };
-    exit_code_of(result)
+    }
 }

@@ -1,6 +1,6 @@
 //! `flotor run`: a scene in the servo loop, with its observers.
 
-use crate::platform::{end_with_parent, most_open_files};
+use crate::platform::most_open_files;
 use crate::run_picture::RunPicture;
 use clap::Args;
 use flotor_command::options::{
@@ -74,20 +74,23 @@ pub(crate) struct RunArguments {
     strength: StrengthOption,
 }
 
+impl RunArguments {
+    /// Whether `flotor lend` has started this run, with which it ends: nobody else would end it.
+    pub(crate) fn is_lent(&self) -> bool {
+        self.ml_api.is_some()
+    }
+}
+
 /// The scene of that model, with a device that stands for the first one.
 const ML_API: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"ml-api\"\n";
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // First of all: a signal during loading ends the run, too. One that serves a program ends with a summary, however short the
     // program was.
-    let stop = if arguments.ml_api.is_some() { stop_on_signals() } else { stop_run_on_signals() };
+    let stop = if arguments.is_lent() { stop_on_signals() } else { stop_run_on_signals() };
     stop_waits_with(&stop);
     if arguments.json.is_on_standard_output() {
         keep_results_apart()?;
-    }
-    if arguments.ml_api.is_some() {
-        // `flotor lend` started this: nobody else would end it. Without it, this one would only go on for longer.
-        end_with_parent();
     }
     let scene = scene(&arguments)?;
     if matches!(arguments.clock, ClockOption::Real) {
@@ -106,7 +109,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let registry = Registry::search(&scene.plugin_folders);
     let session = while_preparing(&scene.title, || Session::prepare(&scene, &registry, &options))?;
     let mut session = session.with_strength(arguments.strength.strength()).on_core(arguments.core);
-    if arguments.ml_api.is_none() {
+    if !arguments.is_lent() {
         session.notices().into_iter().for_each(note);
     }
     session.warnings().iter().for_each(note);

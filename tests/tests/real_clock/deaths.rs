@@ -112,9 +112,17 @@ fn an_exception_in_cpp_that_nobody_catches_takes_the_force_along() {
 #[test]
 fn a_death_that_cannot_be_caught_leaves_it_to_the_watchdog_process() {
     let _turn = crate::alone();
-    show_each(&[("_exit", Some(0)), ("exec", Some(0)), ("kill", None)], |(death, code)| {
+    let refused = exit_code::PLUGIN_REFUSED;
+    let deaths = [
+        ("_exit", refused, "exit code 0"),
+        ("exec", refused, "exit code 0"),
+        ("kill", exit_code::OTHER, "SIGKILL"),
+    ];
+    show_each(&deaths, |(death, code, words)| {
         let (_board, scratch, ran) = died(death, dies());
-        assert_eq!(ran.code, *code, "{death}: {ran:?}");
+        assert_eq!(ran.code, Some(*code), "{death}: {ran:?}");
+        let is_named = |line: &str| line.starts_with("error: ") && line.contains(words);
+        assert!(ran.stderr.lines().any(is_named), "{death}: {ran:?}");
         let told = "flotor watchdog: the host is gone; stopped `device`";
         assert!(ran.stderr.lines().any(|line| line == told), "{death}: {ran:?}");
         assert!(recorded_ticks(&scratch) > 0, "{death}");
@@ -129,14 +137,37 @@ fn a_host_that_is_killed_from_outside_leaves_no_force_and_no_process_behind() {
         let run = run_on(&board, &scratch, dies(), *place);
         let running = run.env("FIXTURE_DEATH", "loop-in-step").start();
         wait_until("the model loops", || mark_in(&scratch).exists());
-        let children = children_of(running.pid());
+        let children = children_of(running.host());
         assert_eq!(children.len(), *processes, "{children:?}");
-        running.signal(Signal::KILL);
+        running.signal_host(Signal::KILL);
         let ran = running.wait();
-        assert_eq!(ran.code, None, "{ran:?}");
+        assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:?}");
+        assert!(ran.stderr.contains("error: signal 9 (SIGKILL"), "{ran:?}");
         let _ = board.assert_stopped("killed");
         for child in children {
             wait_until("its processes are gone", || test_kill_process(child).is_err());
+        }
+    });
+}
+
+#[test]
+fn a_supervisor_that_is_killed_takes_the_run_along() {
+    let _turn = crate::alone();
+    show_each(&["none", "loop-in-step"], |death| {
+        let (board, scratch) = (Board::start(), Scratch::default());
+        let running = run_on(&board, &scratch, dies(), Where::InTheHost).env("FIXTURE_DEATH", death).start();
+        match *death {
+            "none" => board.wait_for_force(PAST),
+            _ => wait_until("the model loops", || mark_in(&scratch).exists()),
+        }
+        let host = running.host();
+        let processes = [children_of(host), vec![host]].concat();
+        assert_eq!(processes.len(), 2, "the host and its watchdog process: {processes:?}");
+        running.signal(Signal::KILL);
+        assert_eq!(running.wait().code, None, "{death}");
+        let _ = board.assert_stopped(death);
+        for process in processes {
+            wait_until("its processes are gone", || test_kill_process(process).is_err());
         }
     });
 }
@@ -162,7 +193,7 @@ fn a_model_in_a_process_of_its_own_dies_alone() {
         let running = run.env("FIXTURE_DEATH", death).start();
         board.wait_for_force(0);
         // The host goes on without force, and is told to end.
-        wait_until(&format!("{death}: the host has lost it"), || children_of(running.pid()).len() == 1);
+        wait_until(&format!("{death}: the host has lost it"), || children_of(running.host()).len() == 1);
         wait_until(&format!("{death}: the force is gone"), || board.force_n() == 0.0);
         running.signal(Signal::INT);
         let ran = running.wait();
@@ -183,7 +214,7 @@ fn a_host_notices_that_its_watchdog_process_is_gone() {
         let lines = format!("{PATIENT}\n{limits}");
         let running = run_with(&board, &scratch, dies(), Where::InTheHost, &lines).start();
         board.wait_for_force(0);
-        let watchdog = children_of(running.pid());
+        let watchdog = children_of(running.host());
         assert_eq!(watchdog.len(), 1, "{watchdog:?}");
         let _ = kill_process(watchdog[0], Signal::KILL);
         let before = board.log().len();

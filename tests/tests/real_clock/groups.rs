@@ -97,7 +97,8 @@ fn a_killed_control_group_leaves_no_force() {
         let running = run_on(&board, &scratch, dies(), Where::InTheHost).through_shell(&enter).start();
         board.wait_for_force(PAST);
         assert!(board.force_n() > FELT_N, "{:?}", board.log());
-        assert_eq!(group.processes(), [running.pid()], "only the host is in it: {}", group.0.display());
+        let processes = [running.pid(), running.host()];
+        assert_eq!(group.processes(), processes, "only the host is in it: {}", group.0.display());
         group.kill();
         let ran = running.wait();
         assert_eq!(ran.code, None, "{ran:?}");
@@ -132,11 +133,11 @@ fn a_suspended_host_loses_its_force_and_ends_when_it_goes_on() {
     let (board, scratch) = (Board::start(), Scratch::default());
     let running = run_with(&board, &scratch, dies(), Where::InTheHost, "watchdog_ms = 100").start();
     board.wait_for_force(PAST);
-    running.signal(Signal::STOP);
+    running.signal_host(Signal::STOP);
     let after = board.assert_stopped("the host is suspended");
     println!("no force {after:?} after the last request for one, load {}", load());
     let before = board.log().len();
-    running.signal(Signal::CONT);
+    running.signal_host(Signal::CONT);
     let ran = running.wait();
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
     assert!(ran.stderr.contains("flotor watchdog: the host does not run; stopped `device`"), "{ran:?}");
@@ -154,7 +155,7 @@ fn a_terminal_cannot_suspend_a_run_in_the_background() {
     let running = run_on(&board, &scratch, dies(), Where::InTheHost).start();
     board.wait_for_force(PAST);
     for signal in [Signal::TTOU, Signal::TTIN] {
-        running.signal(signal);
+        running.signal_host(signal);
         let before = board.log().len();
         wait_until("the loop goes on", || board.log().len() > before + PAST);
     }

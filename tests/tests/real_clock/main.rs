@@ -3,6 +3,7 @@
 mod board;
 mod deaths;
 mod end_of_run;
+mod first_moment;
 mod groups;
 mod jitter;
 mod lateness;

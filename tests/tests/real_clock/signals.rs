@@ -55,7 +55,7 @@ fn before_anything_is_energised_the_first_signal_ends_the_process() {
         let run = run_on(&board, &scratch, dies(), *place);
         let running = run.env("FIXTURE_DEATH", "loop-in-create").start();
         wait_until("the model is being made", || mark_in(&scratch).exists());
-        let children = children_of(running.pid());
+        let children = children_of(running.host());
         running.signal(Signal::INT);
         let ran = running.wait();
         assert_eq!(ran.code, Some(130), "{ran:?}");

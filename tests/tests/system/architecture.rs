@@ -404,6 +404,10 @@ const UNSAFE: &[(&str, &str)] = &[
         "host/python/src/rows.rs",
         "NumPy records that are the contract's structs: the layout promise, and arrays used where they lie",
     ),
+    (
+        "host/command/src/platform/unix/supervision.rs",
+        "a copy of the process, a word that both share, and signals with their sender",
+    ),
     ("host/command/src/platform/windows.rs", "modes of the console, and the function that it calls"),
     (
         "host/servo/src/platform/linux/last_stop.rs",

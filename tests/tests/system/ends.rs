@@ -311,7 +311,7 @@ fn a_model_from_outside_runs_in_a_process_of_its_own_where_a_hand_is_and_only_th
         while !holds_ticks(&recording) && started.elapsed() < Duration::from_secs(20) {
             std::thread::sleep(Duration::from_millis(10));
         }
-        children(running.id())
+        children(running.host().as_raw_nonzero().get().cast_unsigned())
     };
     assert_eq!(processes(&scene("real", "")), 1, "from outside, and felt");
     assert_eq!(processes(&scene("real", "isolation = \"none\"")), 0, "the scene decides");

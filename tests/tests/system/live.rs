@@ -400,8 +400,8 @@ fn a_recording_of_a_run_that_is_killed_is_whole_so_far_and_ends_as_cut() {
     let file = scratch.path().join("cut.mcap");
     let recording = of_user(Flotor::with(["record", "--out", &file.display().to_string()]));
     patiently(|| file.metadata().ok().filter(|file| file.len() > 200_000)); // schemas, scene, and some ticks
-    running.signal(Signal::KILL);
-    assert_eq!(running.wait().code, None, "ended by a signal");
+    running.signal_host(Signal::KILL);
+    assert_eq!(running.wait().code, Some(exit_code::OTHER), "ended by a signal");
     let recorded = recording.wait();
     assert_eq!(recorded.code, Some(exit_code::OTHER), "{recorded:?}");
     assert!(recorded.stderr.contains("connection lost before the end of the run"), "{recorded:?}");

@@ -100,7 +100,7 @@ fn a_stop_on_a_full_disk_reaches_every_run_and_stays() {
 #[test]
 fn a_run_without_a_descriptor_stops_the_others_and_claims_nothing() {
     if has_namespaces() {
-        let stopped = three("", "prlimit --pid $first --nofile=3:3");
+        let stopped = three("", "prlimit --pid $(cat /proc/$first/task/$first/children) --nofile=3:3");
         stopped.assert_reached(ONE);
         stopped.assert_later_is_refused();
     }
@@ -132,7 +132,11 @@ fn a_stop_whose_latch_cannot_be_written_reaches_the_others_by_their_sockets_and_
 #[test]
 fn a_run_that_was_suspended_is_named() {
     if has_namespaces() {
-        let stopped = three("", "kill -STOP $second; ( sleep 5; kill -CONT $second ) >/dev/null 2>&1 &");
+        let stopped = three(
+            "",
+            "host=$(cat /proc/$second/task/$second/children)
+                      kill -STOP $host; ( sleep 5; kill -CONT $host ) >/dev/null 2>&1 &",
+        );
         stopped.assert_reached("not confirmed by process ");
         stopped.assert_later_is_refused();
     }

@@ -783,7 +783,7 @@ fn peak_kb(subjects: &str, out: &Path) -> f64 {
     let together = ["--subjects", subjects, "--jobs", "2"]; // else as many as there are cores have a seat in memory
     let arguments: Vec<&str> = SMALL.into_iter().chain(together).collect();
     let running = study(&arguments, out).start();
-    let status = PathBuf::from(format!("/proc/{}/status", running.id()));
+    let status = PathBuf::from(format!("/proc/{}/status", running.host().as_raw_nonzero()));
     let mut peak = 0.0_f64;
     while let Ok(text) = std::fs::read_to_string(&status) {
         let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));

@@ -8,7 +8,7 @@ mod vertical;
 
 use crate::CalibrationError;
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use flotor_command::{CommandError, exit_code_of, options, write_text};
+use flotor_command::{CommandError, options, supervised, write_text};
 use flotor_session::calibration_file::{CalibrationFile, Provenance, Source, today};
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -37,7 +37,7 @@ pub fn command() -> clap::Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let Command::Calibrate(arguments) = options::arguments::<Arguments>().command;
-    exit_code_of(run(&arguments))
+    supervised(|| run(&arguments))
 }
 
 /// Measure the ratio of delivered to commanded vertical force, and correct it.

@@ -13,7 +13,8 @@ use unix as system;
 use windows as system;
 
 pub(crate) use system::{
-    INTERRUPTED, KeyTerminal, Requests, ask_to_end, become_program, outlive_requests, results_apart,
+    INTERRUPTED, KeyTerminal, Requests, ask_to_end, become_program, die_by, divide, is_orphaned,
+    outlive_requests, results_apart,
 };
 
 /// What asks a run to end.

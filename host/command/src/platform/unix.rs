@@ -1,5 +1,7 @@
 //! Unix: signals, terminals, descriptors.
 
+mod supervision;
+
 use super::Request;
 use flotor_servo::StopSwitch;
 use flotor_servo::platform::{block_signals, leave_sent_signals_to_the_loop, wait_for_signal};
@@ -17,6 +19,8 @@ use std::process::{Child, Command};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
+
+pub(crate) use supervision::{die_by, divide, is_orphaned};
 
 /// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as shells have it.
 pub(crate) const INTERRUPTED: i32 = 130;

@@ -2,6 +2,7 @@
 #![allow(unsafe_code)] // calls of the console, and a function that it calls; tests/tests/system/architecture.rs lists it
 
 use super::Request;
+use crate::supervision::Side;
 use flotor_servo::StopSwitch;
 use std::fs::File;
 use std::io::{self, IsTerminal, stdin};
@@ -15,6 +16,25 @@ use windows_sys::Win32::System::Console::{
     GetStdHandle, STD_ERROR_HANDLE, STD_INPUT_HANDLE, STD_OUTPUT_HANDLE, SetConsoleCtrlHandler,
     SetConsoleMode, SetStdHandle,
 };
+
+/// Leaves this process undivided: Windows cannot copy a process.
+///
+/// # Errors
+/// None.
+#[allow(clippy::unnecessary_wraps)] // as on other systems
+pub(crate) fn divide() -> io::Result<Side> {
+    Ok(Side::Undivided)
+}
+
+/// Returns false: no process has a supervisor.
+pub(crate) fn is_orphaned() -> bool {
+    false
+}
+
+/// Ends this process, which no signal does here.
+pub(crate) fn die_by(_: i32) -> ! {
+    std::process::exit(INTERRUPTED)
+}
 
 /// Exit code after a third request, when nothing else has ended the process: that of a program that Ctrl-C has ended
 /// (`STATUS_CONTROL_C_EXIT`).

@@ -31,7 +31,7 @@ use access::Access;
 use clap::{Parser, ValueEnum};
 use flotor_command::options::{PluginPathOption, arguments, json_file, mcap_file, whole};
 use flotor_command::stopping::stop_on_signals;
-use flotor_command::{CommandError, exit_code_of, say};
+use flotor_command::{CommandError, say, supervised};
 use flotor_compat::{Pace, Settings, prepare};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use service::Service;
@@ -94,16 +94,17 @@ enum PaceOption {
 const LOOK: Duration = Duration::from_millis(20);
 
 fn main() -> ExitCode {
-    exit_code_of(run(arguments::<Arguments>()))
+    let arguments = arguments::<Arguments>();
+    if arguments.lent {
+        // Without it, this one would only go on for longer.
+        let _ = set_parent_process_death_signal(Some(Signal::TERM));
+    }
+    supervised(|| run(arguments))
 }
 
 fn run(arguments: Arguments) -> Result<(), CommandError> {
     // First of all: a signal while the scene is prepared ends the run, too.
     let stop = stop_on_signals();
-    if arguments.lent {
-        // Without it, this one would only go on for longer.
-        let _ = set_parent_process_death_signal(Some(Signal::TERM));
-    }
     let mut settings = Settings::from_environment().map_err(CommandError::Usage)?.of_own_process();
     settings.scene = arguments.scene.or(settings.scene);
     settings.plugin_folders = arguments.plugin_path.folders().to_vec();

@@ -11,7 +11,7 @@ mod validate;
 use crate::Progress;
 use crate::replay::ReplayError;
 use clap::{CommandFactory, Parser, Subcommand};
-use flotor_command::{CommandError, exit_code_of, options, progress_bar};
+use flotor_command::{CommandError, exit_code_of, options, progress_bar, supervised};
 use std::process::ExitCode;
 
 /// Measure plugins, loops and recordings; `flotor COMMAND` starts this program.
@@ -43,15 +43,16 @@ pub fn command() -> clap::Command {
 #[must_use]
 pub fn main() -> ExitCode {
     flotor_session::tell_notices(|notice| flotor_command::note(notice));
-    exit_code_of(match options::arguments::<Arguments>().command {
-        Command::Replay(arguments) => replay::run(&arguments),
-        Command::Eval(arguments) => eval::run(&arguments),
-        Command::Validate(arguments) => validate::run(&arguments),
-        Command::Jitter(arguments) => jitter::run(&arguments),
-        Command::Stability(arguments) => stability::run(&arguments),
-        Command::Bench(arguments) => bench::run(&arguments),
-        Command::Stress(arguments) => stress::run(&arguments),
-    })
+    match options::arguments::<Arguments>().command {
+        Command::Replay(arguments) => supervised(|| replay::run(&arguments)),
+        Command::Eval(arguments) => supervised(|| eval::run(&arguments)),
+        Command::Jitter(arguments) => supervised(|| jitter::run(&arguments)),
+        Command::Stability(arguments) => supervised(|| stability::run(&arguments)),
+        Command::Bench(arguments) => supervised(|| bench::run(&arguments)),
+        // Judges: each starts processes of its own for the code of plugins.
+        Command::Validate(arguments) => exit_code_of(validate::run(&arguments)),
+        Command::Stress(arguments) => exit_code_of(stress::run(&arguments)),
+    }
 }
 
 impl From<ReplayError> for CommandError {

@@ -8,13 +8,15 @@
 //! a process of its own: [`crate::watchdog_process`].
 
 mod call;
+mod end_report;
 mod line;
 
 pub(crate) use crate::platform::last_stop::take_sent;
 pub use crate::platform::last_stop::{
-    SignalGuard, TakenSignals, ignore_no_signal, leave_process, spawn_unblocked,
+    SignalGuard, SignalName, TakenSignals, ignore_no_signal, spawn_unblocked,
 };
 pub use call::{enter_call, leave_call};
+pub use end_report::{ReportedEnd, report_end, report_end_to};
 
 use crate::platform::last_stop as system;
 use crate::{Heartbeat, Place, Stuck};
@@ -178,6 +180,13 @@ impl Armed {
     }
 }
 
+/// Reports this exit code and ends the process at once: nothing of what a process does at its end is done. Real-time: never
+/// returns.
+pub fn leave_process(code: i32) -> ! {
+    report_end(ReportedEnd::Code(u8::try_from(code & 0xff).unwrap_or(u8::MAX)));
+    system::leave_process(code)
+}
+
 /// Called in a signal handler or in `exit`: no lock, no allocation. Returns if no run is energised.
 pub(crate) fn end_if_armed(death: Death) {
     if is_armed() {
@@ -227,6 +236,7 @@ fn die(death: Death) -> ! {
     let mut line = Line::EMPTY;
     describe(&mut line, death, own);
     system::say(line.as_bytes());
+    report_end(ReportedEnd::Signal);
     system::end_by(death, ENDED)
 }
 
@@ -293,7 +303,7 @@ fn describe_death(line: &mut Line, death: Death) {
     use std::fmt::Write;
     let _ = match death {
         Death::Signal { signal, sender } => {
-            let told = write!(line, "{}", system::Named(signal));
+            let told = write!(line, "{}", system::SignalName(signal));
             sender.map_or(told, |sender| write!(line, ", sent by process {sender}"))
         }
         Death::Exit => write!(line, "it called `exit`"),

@@ -2,7 +2,7 @@
 //! run presses it.
 
 use super::RunError;
-use flotor_live::{Directory, Latch, LatchState, Pressed};
+use flotor_live::{Directory, Latch, LatchState, Pressed, process_number};
 use flotor_servo::{EmergencySource, StopSwitch};
 use std::fmt::{self, Display, Formatter};
 use std::io;
@@ -92,7 +92,7 @@ impl LatchGuard {
     pub fn press(&self, source: EmergencySource) -> StopReach {
         let mut reach = self.reach.lock().unwrap_or_else(PoisonError::into_inner);
         let reach = reach.get_or_insert_with(|| {
-            let who = format!("emergency stop ({}) of process {}", source.word(), std::process::id());
+            let who = format!("emergency stop ({}) of process {}", source.word(), process_number());
             let pressed = self.latch.press(&who);
             let asked = self.latch.stop_runs(Instant::now() + CONFIRM_WAIT);
             StopReach {

@@ -24,6 +24,7 @@ use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_live::{
     Ask, Directory, EndKind, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, RefusalCause, Serve,
+    process_number,
 };
 use flotor_record::RunDescription;
 use flotor_servo::{EmergencySource, StopSwitch};
@@ -61,7 +62,7 @@ pub fn announce(
     let greeting = Greeting {
         protocol: PROTOCOL,
         flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
-        process: std::process::id(),
+        process: process_number(),
         title: if scene.title.is_empty() { "untitled".to_owned() } else { scene.title.clone() },
         plugins: session.plugins().iter().map(panel).collect(),
         limits: session.limits(),

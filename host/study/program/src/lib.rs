@@ -6,7 +6,7 @@ mod platform;
 mod study;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use flotor_command::{CommandError, exit_code_of, options};
+use flotor_command::{CommandError, exit_code_of, options, supervised};
 use flotor_study::dataset::DatasetError;
 use std::process::ExitCode;
 
@@ -34,10 +34,10 @@ pub fn command() -> clap::Command {
 #[must_use]
 pub fn main() -> ExitCode {
     flotor_session::tell_notices(|notice| flotor_command::note(notice));
-    exit_code_of(match options::arguments::<Arguments>().command {
-        Command::Study(arguments) => study::run(&arguments),
-        Command::Analyse(arguments) => analyse::run(&arguments),
-    })
+    match options::arguments::<Arguments>().command {
+        Command::Study(arguments) => supervised(|| study::run(&arguments)),
+        Command::Analyse(arguments) => exit_code_of(analyse::run(&arguments)),
+    }
 }
 
 /// What cannot be done with the data of a study, with its exit code.

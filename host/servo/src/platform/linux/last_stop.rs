@@ -190,7 +190,7 @@ pub(crate) fn end_by(death: Death, code: i32) -> ! {
 }
 
 /// Ends the process at once: nothing of what a process does at its end is done. Real-time: never returns.
-pub fn leave_process(code: i32) -> ! {
+pub(crate) fn leave_process(code: i32) -> ! {
     // SAFETY: takes nothing and never returns.
     unsafe { libc::_exit(code) }
 }
@@ -230,10 +230,18 @@ pub(crate) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
     std::str::from_utf8(name.get(..length).unwrap_or_default()).unwrap_or_default()
 }
 
-/// A deadly signal, for people.
-pub(crate) struct Named(pub(crate) i32);
+/// Name of a signal that ends a process, with its cause.
+pub struct SignalName(pub i32);
 
-impl std::fmt::Display for Named {
+impl SignalName {
+    /// Whether the process itself raises this signal, as an invalid memory access or `abort` does.
+    #[must_use]
+    pub fn is_a_crash(&self) -> bool {
+        RAISED.contains(&self.0)
+    }
+}
+
+impl std::fmt::Display for SignalName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self(signal) = *self;
         write!(f, "signal {signal} ({})", signal_words(signal))
@@ -249,6 +257,7 @@ fn signal_words(signal: c_int) -> &'static str {
         libc::SIGABRT => "SIGABRT: abort, as after an uncaught exception",
         libc::SIGSYS => "SIGSYS: forbidden system call",
         libc::SIGTRAP => "SIGTRAP: breakpoint",
+        libc::SIGKILL => "SIGKILL: killed by another process, as the out-of-memory killer does",
         libc::SIGXCPU => "SIGXCPU: processor time limit",
         libc::SIGXFSZ => "SIGXFSZ: file size limit",
         libc::SIGUSR2 => "SIGUSR2",

@@ -83,7 +83,7 @@ pub(crate) fn end_by(_: Death, code: i32) -> ! {
 }
 
 /// Ends the process at once: nothing of what a process does at its end is done. Real-time: never returns.
-pub fn leave_process(code: i32) -> ! {
+pub(crate) fn leave_process(code: i32) -> ! {
     // SAFETY: the handle that means this process is always there.
     let _ = unsafe { TerminateProcess(GetCurrentProcess(), code.cast_unsigned()) };
     // It has ended, if the system lets a process end itself at all.
@@ -119,10 +119,18 @@ pub(crate) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
     std::str::from_utf8(name.get(..NAME_BYTES - left).unwrap_or_default()).unwrap_or_default()
 }
 
-/// An exception, for people.
-pub(crate) struct Named(pub(crate) i32);
+/// Name of an exception that ends a process, with its cause.
+pub struct SignalName(pub i32);
 
-impl std::fmt::Display for Named {
+impl SignalName {
+    /// Whether the process itself raises this exception: each is.
+    #[must_use]
+    pub fn is_a_crash(&self) -> bool {
+        true
+    }
+}
+
+impl std::fmt::Display for SignalName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self(code) = *self;
         let words = match code {

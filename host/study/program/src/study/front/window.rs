@@ -3,6 +3,7 @@
 use super::{JsonLines, StopKeyOption, lines_of};
 use flotor_command::CommandError;
 use flotor_command::separate::{Running, SeparateProgram};
+use flotor_live::process_number;
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::spawn_unblocked;
 use std::io::BufReader;
@@ -26,7 +27,7 @@ impl Window {
     /// There is no viewer, or it cannot open a window and has said why.
     pub(in crate::study) fn open(stop_key: StopKeyOption) -> Result<Self, CommandError> {
         let mut command = SeparateProgram::VIEWER.command()?;
-        command.arg("--sitting").arg("--run").arg(std::process::id().to_string());
+        command.arg("--sitting").arg("--run").arg(process_number().to_string());
         command.arg("--stop-key").arg(stop_key.word());
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let failed =

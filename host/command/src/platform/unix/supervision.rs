@@ -1,0 +1,210 @@
+//! A process divided in two: the child carries out the command, the parent supervises it.
+#![allow(unsafe_code)] // `fork`, the word that both share, and the sender of a signal; tests/tests/system/architecture.rs lists it
+
+use crate::supervision::{End, Side};
+use flotor_servo::enter_guard_priority;
+use flotor_servo::last_stop::ReportedEnd;
+use libc::{c_int, siginfo_t, sigset_t};
+use rustix::mm::{MapFlags, ProtFlags, mmap_anonymous};
+use rustix::process::{
+    Pid, Signal, WaitOptions, WaitStatus, getpid, getppid, kill_process, set_parent_process_death_signal,
+    waitpid,
+};
+use std::io;
+use std::mem::MaybeUninit;
+use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// Poll interval of the supervisor; signals and the end of the child wake it at once.
+const POLL: libc::timespec = libc::timespec { tv_sec: 1, tv_nsec: 0 };
+/// Time that the child may take from its report to its end: functions that plugins have registered with `atexit` run meanwhile.
+const END_PATIENCE: Duration = Duration::from_secs(5);
+/// Signals of the terminal that suspend a process in the background.
+const SUSPENDING: [c_int; 3] = [libc::SIGTSTP, libc::SIGTTIN, libc::SIGTTOU];
+
+/// Number of the supervisor in its child; 0 in a process without one.
+static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
+
+/// Divides this process, which has one thread. The parent returns once the child has ended. Process 1 stays whole: in a container
+/// its end kills all processes at once, the watchdog process too, and only the descriptors of process 1 are closed before.
+///
+/// # Errors
+/// No room for a process, or what the system says.
+pub(crate) fn divide() -> io::Result<Side> {
+    if getpid() == Pid::INIT {
+        return Ok(Side::Undivided);
+    }
+    let report = shared_word()?;
+    let parent = getpid();
+    // What a parent that ignores the end of its children has passed on: nobody would learn of it.
+    // SAFETY: the default action.
+    unsafe { libc::signal(libc::SIGCHLD, libc::SIG_DFL) };
+    // Signals wait until there is a child to forward them to.
+    let before = set_blocked(&every_signal());
+    // SAFETY: this process has one thread, so that no lock is held in the child.
+    match unsafe { libc::fork() } {
+        0 => {
+            SUPERVISOR.store(parent.as_raw_nonzero().get(), Ordering::Relaxed);
+            set_parent_process_death_signal(Some(Signal::TERM))?;
+            set_blocked(&before);
+            if is_orphaned() {
+                die_by(libc::SIGTERM);
+            }
+            Ok(Side::Child { supervisor: parent.as_raw_nonzero().get().cast_unsigned(), report })
+        }
+        child => match Pid::from_raw(child).filter(|_| child > 0) {
+            Some(child) => Ok(Side::Supervisor(supervise(child, report))),
+            None => {
+                let cause = io::Error::last_os_error();
+                set_blocked(&before);
+                Err(cause)
+            }
+        },
+    }
+}
+
+/// Whether this process had a supervisor, which is gone.
+pub(crate) fn is_orphaned() -> bool {
+    match SUPERVISOR.load(Ordering::Relaxed) {
+        0 => false,
+        supervisor => getppid() != Pid::from_raw(supervisor),
+    }
+}
+
+/// Ends this process by a signal, as its child has ended.
+pub(crate) fn die_by(signal: c_int) -> ! {
+    // SAFETY: the default action, then an initialised set, then no arguments.
+    unsafe {
+        libc::signal(signal, libc::SIG_DFL);
+        libc::raise(signal);
+    }
+    set_blocked(&no_signal());
+    std::process::exit(128 + signal)
+}
+
+/// Forwards signals to the child and waits for its end.
+fn supervise(child: Pid, report: &AtomicU32) -> End {
+    enter_guard_priority();
+    let mut reported: Option<Instant> = None;
+    loop {
+        if let Some(info) = next_signal() {
+            forward(child, &info);
+        }
+        while let Ok(Some((_, status))) = waitpid(Some(child), WaitOptions::NOHANG | WaitOptions::UNTRACED) {
+            match status.stopping_signal() {
+                Some(signal) => suspend_with(child, signal),
+                None => return end_of(status, ReportedEnd::read(report)),
+            }
+        }
+        let Some(end) = ReportedEnd::read(report) else { continue };
+        if reported.get_or_insert_with(Instant::now).elapsed() > END_PATIENCE {
+            let _ = kill_process(child, Signal::KILL);
+            let _ = waitpid(Some(child), WaitOptions::empty());
+            return match end {
+                ReportedEnd::Code(code) => End::Reported(code),
+                ReportedEnd::Signal => End::Killed(libc::SIGKILL),
+            };
+        }
+    }
+}
+
+/// Returns the end of the child from its status and its report.
+fn end_of(status: WaitStatus, report: Option<ReportedEnd>) -> End {
+    let code = status.exit_status().and_then(|code| u8::try_from(code).ok());
+    let signal = status.terminating_signal().unwrap_or_default();
+    match (report, code) {
+        (Some(ReportedEnd::Code(0)), None) => End::Killed(signal),
+        (Some(ReportedEnd::Code(reported)), _) => End::Reported(reported),
+        (Some(ReportedEnd::Signal), Some(code)) => End::Reported(code),
+        (Some(ReportedEnd::Signal), None) => End::Asked(signal),
+        (None, Some(code)) => End::Left(code),
+        (None, None) if is_request(signal) => End::Asked(signal),
+        (None, None) => End::Killed(signal),
+    }
+}
+
+/// Whether this signal asks a process to end, so that whoever sends it expects no message.
+fn is_request(signal: c_int) -> bool {
+    [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT, libc::SIGPIPE].contains(&signal)
+}
+
+/// Forwards a signal that the child has not received itself. A terminal signals the whole process group, except that its end
+/// reaches the leader of the session alone.
+fn forward(child: Pid, info: &siginfo_t) {
+    let is_of_a_process = info.si_code <= 0;
+    match info.si_signo {
+        libc::SIGCHLD => {}
+        libc::SIGCONT | libc::SIGHUP => send(child, info),
+        _ if is_of_a_process => send(child, info),
+        _ => {}
+    }
+}
+
+/// Sends a signal to the child in the name of its sender, which messages of the child name.
+fn send(child: Pid, info: &siginfo_t) {
+    let mut queued = *info;
+    queued.si_code = libc::SI_QUEUE;
+    // SAFETY: a description of a signal that is there for the call.
+    unsafe {
+        libc::syscall(
+            libc::SYS_rt_sigqueueinfo,
+            child.as_raw_nonzero().get(),
+            info.si_signo,
+            &raw const queued,
+        );
+    }
+}
+
+/// Suspends this process with a child that the terminal has suspended, as the shell expects, and continues both. A child that
+/// somebody else has stopped is continued by whoever did.
+fn suspend_with(child: Pid, signal: c_int) {
+    if SUSPENDING.contains(&signal) {
+        let _ = kill_process(getpid(), Signal::STOP);
+        let _ = kill_process(child, Signal::CONT);
+    }
+}
+
+/// Returns a word that this process shares with its children.
+fn shared_word() -> io::Result<&'static AtomicU32> {
+    let protection = ProtFlags::READ | ProtFlags::WRITE;
+    // SAFETY: a new mapping at an address of the system's choice aliases nothing.
+    let address = unsafe {
+        mmap_anonymous(std::ptr::null_mut(), size_of::<AtomicU32>(), protection, MapFlags::SHARED)
+    }?;
+    // SAFETY: mapped for as long as the process lives, aligned to a page, zero, and used as an atomic alone.
+    Ok(unsafe { &*address.cast::<AtomicU32>() })
+}
+
+/// Waits for a signal, for the poll interval at most.
+fn next_signal() -> Option<siginfo_t> {
+    let (every, poll) = (every_signal(), POLL);
+    let mut info = MaybeUninit::<siginfo_t>::zeroed();
+    // SAFETY: an initialised set and time, and memory that is there for the call.
+    let signal = unsafe { libc::sigtimedwait(&raw const every, info.as_mut_ptr(), &raw const poll) };
+    // SAFETY: plain data, all of whose bits may be zero, and written where there was a signal.
+    (signal > 0).then(|| unsafe { info.assume_init() })
+}
+
+fn every_signal() -> sigset_t {
+    let mut set = no_signal();
+    // SAFETY: an initialised set.
+    unsafe { libc::sigfillset(&raw mut set) };
+    set
+}
+
+fn no_signal() -> sigset_t {
+    let mut set = MaybeUninit::<sigset_t>::zeroed();
+    // SAFETY: memory that is there for the call, which initialises it.
+    unsafe {
+        libc::sigemptyset(set.as_mut_ptr());
+        set.assume_init()
+    }
+}
+
+/// Blocks these signals alone; returns those that were blocked before.
+fn set_blocked(set: &sigset_t) -> sigset_t {
+    let mut before = no_signal();
+    // SAFETY: initialised sets that are there for the call.
+    unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, set, &raw mut before) };
+    before
+}

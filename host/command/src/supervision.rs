@@ -1,0 +1,104 @@
+//! A command that runs the code of plugins, in a process of its own: a supervisor waits for that process and gives its exit code.
+//!
+//! A plugin can end its process without a message and with exit code 0: `_exit`, `exec`, a thread that crashes before the host's
+//! handlers stand. The supervisor runs no plugin. It forwards signals, and what ends without the report of the host
+//! ([`flotor_servo::last_stop::report_end`]) fails with a message. If the supervisor is killed, the command is asked to end.
+//!
+//! Windows has none.
+
+use crate::platform::{die_by, divide};
+use crate::{CommandError, exit_code_of, print_error_line, style};
+use flotor_servo::last_stop::{SignalName, report_end_to};
+use std::process::ExitCode;
+use std::sync::atomic::AtomicU32;
+
+/// Exit code of a plugin that failed.
+const PLUGIN_FAILED: u8 = 3;
+/// Exit code of a process that something else has killed.
+const KILLED: u8 = 1;
+
+/// The part of a process in which a call returns.
+pub(crate) enum Side {
+    /// The process is not divided.
+    Undivided,
+    /// The child, which reports its end in this word to the process of this number.
+    Child {
+        /// Number of the supervisor.
+        supervisor: u32,
+        /// Memory of the report.
+        report: &'static AtomicU32,
+    },
+    /// The supervisor of a child that has ended.
+    Supervisor(End),
+}
+
+/// End of a supervised process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum End {
+    /// With its report of this exit code.
+    Reported(u8),
+    /// By a signal that asks a process to end.
+    Asked(i32),
+    /// Without a report, with this exit code.
+    Left(u8),
+    /// By another signal, before its report or after one of success.
+    Killed(i32),
+}
+
+/// Carries out a command under a supervisor; its exit code. Called while the process has one thread. Not real-time.
+pub fn supervised(command: impl FnOnce() -> Result<(), CommandError>) -> ExitCode {
+    match divide() {
+        Ok(Side::Undivided) => exit_code_of(command()),
+        Ok(Side::Child { supervisor, report }) => {
+            report_end_to(report);
+            flotor_live::set_process_number(supervisor);
+            exit_code_of(command())
+        }
+        Ok(Side::Supervisor(end)) => ExitCode::from(code_of(end)),
+        Err(cause) => exit_code_of(Err(CommandError::Failed(format!(
+            "cannot start a process for the command: {cause}; end other programs of this user, or raise `ulimit -u`"
+        )))),
+    }
+}
+
+/// Returns the exit code of a supervised process, and prints a message on an end without a report.
+fn code_of(end: End) -> u8 {
+    let end = match end {
+        End::Reported(code) => return code,
+        End::Asked(signal) => die_by(signal),
+        End::Left(code) => Silent::Plugin(format!("exit code {code}, by `exit`, `_exit` or `exec`")),
+        End::Killed(signal) => {
+            let signal = SignalName(signal);
+            if signal.is_a_crash() { Silent::Plugin(signal.to_string()) } else { Silent::Killed(signal) }
+        }
+    };
+    print_error_line(format_args!("{} {end}", style::error("error:")));
+    end.exit_code()
+}
+
+/// End of a supervised process without a message of its own.
+enum Silent {
+    Plugin(String),
+    Killed(SignalName),
+}
+
+impl Silent {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Plugin(_) => PLUGIN_FAILED,
+            Self::Killed(_) => KILLED,
+        }
+    }
+}
+
+impl std::fmt::Display for Silent {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Plugin(how) => write!(
+                f,
+                "a plugin ended the process before the command was complete ({how}); `flotor validate` finds out which"
+            ),
+            Self::Killed(signal) => write!(f, "{signal} ended the process before the command was complete"),
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! The report of this process on its own end, in memory that its supervisor reads: an end without one was not the host's.
+
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// The memory that the supervisor reads; none in a process without a supervisor.
+static WORD: OnceLock<&'static AtomicU32> = OnceLock::new();
+
+/// Bit of a report with an exit code, which is in the lowest byte.
+const CODE: u32 = 0x100;
+/// Report of a process that ends by a signal.
+const SIGNAL: u32 = 0x200;
+
+/// End of a process as the process itself reports it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReportedEnd {
+    /// This exit code; result and errors are written.
+    Code(u8),
+    /// A signal that asks a process to end; the message is written.
+    Signal,
+}
+
+impl ReportedEnd {
+    /// Returns the report in a word; `None` if there is none yet.
+    #[must_use]
+    pub fn read(word: &AtomicU32) -> Option<Self> {
+        match word.load(Ordering::Acquire) {
+            SIGNAL => Some(Self::Signal),
+            code if code & CODE != 0 => Some(Self::Code((code & 0xff) as u8)),
+            _ => None,
+        }
+    }
+}
+
+/// Writes the report of this process to `word` from now on. Once for a process. Not real-time.
+pub fn report_end_to(word: &'static AtomicU32) {
+    let _ = WORD.set(word);
+}
+
+/// Reports the end of this process; the latest report counts. Safe in a signal handler: takes no lock, allocates nothing.
+pub fn report_end(end: ReportedEnd) {
+    if let Some(word) = WORD.get() {
+        let report = match end {
+            ReportedEnd::Code(code) => CODE | u32::from(code),
+            ReportedEnd::Signal => SIGNAL,
+        };
+        word.store(report, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_is_read_as_it_was_written() {
+        static REPORT: AtomicU32 = AtomicU32::new(0);
+        assert_eq!(ReportedEnd::read(&REPORT), None);
+        report_end_to(&REPORT);
+        for end in [ReportedEnd::Code(0), ReportedEnd::Code(130), ReportedEnd::Signal] {
+            report_end(end);
+            assert_eq!(ReportedEnd::read(&REPORT), Some(end));
+        }
+    }
+}
