@@ -3,7 +3,7 @@
 
 use same_file::Handle;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 /// Change of a recording's file by another program.
@@ -44,11 +44,11 @@ impl NewFile {
         Self { buffer: BufWriter::new(LengthChecked { file, written: 0 }) }
     }
 
-    /// Writes buffered bytes and closes the file, which has to be the one at the path, in full length.
+    /// Writes buffered bytes of the complete file, which has to be the one at the path, in full length.
     ///
     /// # Errors
     /// The system's, or one around a [`FileError`].
-    pub(crate) fn close(mut self, path: &Path) -> io::Result<()> {
+    pub(crate) fn close(&mut self, path: &Path) -> io::Result<()> {
         self.buffer.flush()?;
         let checked = self.buffer.get_ref();
         checked.check().map_err(io::Error::other)?;
@@ -56,7 +56,7 @@ impl NewFile {
     }
 
     /// Removes the file, unless the path names another one by now.
-    pub(crate) fn remove(self, path: &Path) {
+    pub(crate) fn remove(&self, path: &Path) {
         if self.buffer.get_ref().is_at(path) {
             let _ = fs::remove_file(path);
         }
@@ -70,12 +70,6 @@ impl Write for NewFile {
 
     fn flush(&mut self) -> io::Result<()> {
         self.buffer.flush()
-    }
-}
-
-impl Seek for NewFile {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.buffer.seek(to)
     }
 }
 
@@ -109,11 +103,5 @@ impl Write for LengthChecked {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
-    }
-}
-
-impl Seek for LengthChecked {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file.seek(to)
     }
 }

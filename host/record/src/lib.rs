@@ -32,6 +32,7 @@
 //!
 //! Not real-time: records reach the recorder through the queue of the trace.
 
+mod chunked;
 mod container;
 mod coupling;
 mod digest;

@@ -540,3 +540,34 @@ fn a_file_beside_a_parameter_comes_back_and_its_content_tells_it_from_another() 
     assert_ne!(NamedFile::read(&file.0).unwrap().hash, named.hash);
     assert!(NamedFile::read(&std::env::temp_dir()).is_err(), "a folder has no content");
 }
+
+/// The end of a file, as another reader of MCAP understands it: every chunk and message is listed, at its place.
+#[test]
+fn the_end_lists_every_chunk_and_message() {
+    let file = TestFile::new("end");
+    write(&file.0, &three_chunks());
+    let bytes = fs::read(&file.0).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let statistics = summary.stats.as_ref().unwrap();
+    // The run, then a pose and a tick each time; the run has a chunk of its own.
+    assert_eq!((statistics.message_count, statistics.chunk_count), (19, 4));
+    assert_eq!((statistics.message_start_time, statistics.message_end_time), (0, 800_000_000));
+    assert_eq!((summary.schemas.len(), summary.channels.len(), summary.metadata_indexes.len()), (5, 5, 1));
+    let mut listed = 0;
+    for chunk in &summary.chunk_indexes {
+        let messages: Vec<_> = summary.stream_chunk(&bytes, chunk).unwrap().map(Result::unwrap).collect();
+        let places = summary.read_message_indexes(&bytes, chunk).unwrap();
+        let entries =
+            places.iter().flat_map(|(channel, entries)| entries.iter().map(|entry| (channel.id, *entry)));
+        let before = listed;
+        for (channel, entry) in entries {
+            let found = summary.seek_message(&bytes, chunk, &entry).unwrap();
+            assert_eq!((found.channel.id, found.log_time), (channel, entry.log_time));
+            listed += 1;
+        }
+        assert_eq!(listed - before, messages.len());
+    }
+    assert_eq!(listed, 19);
+    let in_the_end = |name: &str| bytes.windows(name.len()).filter(|at| *at == name.as_bytes()).count();
+    assert_eq!(in_the_end("flotor/9.8.7"), 1, "the library stands in the head alone");
+}

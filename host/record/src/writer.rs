@@ -1,12 +1,12 @@
 //! Writes a recording: a chunk at a time, whole, at least every quarter of a second.
 
+use crate::chunked::ChunkedFile;
 use crate::file::{FileError, NewFile};
 use crate::schema::{Change as ChangeMessage, DESCRIPTOR_SET, ENCODING, FrameTransform, Log, Tick, Topic};
 use crate::{Note, RunDescription};
 use flotor_core::Change;
 use flotor_core::trace::{Events, TickRecord};
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{McapError, McapResult, WriteOptions};
+use mcap::records::{Channel, MessageHeader, Metadata, SchemaHeader};
 use prost::Message;
 use std::collections::BTreeMap;
 use std::io;
@@ -73,7 +73,7 @@ pub enum RecordError {
 /// Dropped without [`Recorder::finish`] it still closes the file properly, but errors are lost.
 pub struct Recorder {
     path: PathBuf,
-    file: mcap::Writer<NewFile>,
+    file: ChunkedFile,
     /// Of each device, filled anew for each tick.
     poses: Vec<FrameTransform>,
     /// One encoded message; keeps its memory.
@@ -98,7 +98,7 @@ impl Recorder {
     }
 
     pub(crate) fn begin(path: &Path, file: NewFile, run: &RunDescription) -> Result<Self, RecordError> {
-        let file = write_head(file, run).map_err(|cause| write_error(path, cause))?;
+        let file = write_head(path, file, run).map_err(|cause| write_error(path, cause))?;
         let names: Vec<&str> = run.devices().map(|device| device.name.as_str()).collect();
         let poses = match names.as_slice() {
             [] | [_] => vec![FrameTransform::of_handle()],
@@ -145,18 +145,17 @@ impl Recorder {
     /// [`RecordError::Write`]: the index may be missing, chunks flushed before can be read. [`RecordError::Lost`]:
     /// the file at the path is not the one written.
     pub fn finish(self) -> Result<(), RecordError> {
-        let Self { path, mut file, .. } = self;
-        let finished = file.finish().and_then(|_| Ok(file.into_inner().close(&path)?));
-        finished.map_err(|cause| write_error(&path, cause))
+        let Self { path, file, .. } = self;
+        file.finish(&path).map_err(|cause| write_error(&path, cause))
     }
 
     /// Closes the file and removes it: there was nothing to record. Not real-time.
     pub fn discard(self) {
         let Self { path, file, .. } = self;
-        file.into_inner().remove(&path);
+        file.remove(&path);
     }
 
-    fn try_record(&mut self, record: &TickRecord) -> McapResult<()> {
+    fn try_record(&mut self, record: &TickRecord) -> io::Result<()> {
         // A device the description does not have is recorded as the first, not lost.
         let device = usize::from(record.device).min(self.poses.len().saturating_sub(1));
         if let Some(pose) = self.poses.get_mut(device) {
@@ -174,62 +173,57 @@ impl Recorder {
         if end_ns.saturating_sub(start_ns) >= CHUNK_NS { self.flush() } else { Ok(()) }
     }
 
-    fn write_now(&mut self, topic: Topic, message: &impl Message, time_ns: u64) -> McapResult<()> {
+    fn write_now(&mut self, topic: Topic, message: &impl Message, time_ns: u64) -> io::Result<()> {
         encode(message, &mut self.buffer)?;
         self.write(topic, time_ns)?;
         self.flush()
     }
 
     /// Appends the message in the buffer to the chunk in memory.
-    fn write(&mut self, topic: Topic, time_ns: u64) -> McapResult<()> {
+    fn write(&mut self, topic: Topic, time_ns: u64) -> io::Result<()> {
         let header = MessageHeader {
             channel_id: topic.id(),
             sequence: self.sequence,
             log_time: time_ns,
             publish_time: time_ns,
         };
-        self.file.write_to_known_channel(&header, &self.buffer)
+        self.file.write(&header, &self.buffer)
     }
 
     /// Hands the chunk to the system, whole.
-    fn flush(&mut self) -> McapResult<()> {
+    fn flush(&mut self) -> io::Result<()> {
         self.chunk_start_ns = None;
         self.file.flush()
     }
 }
 
 /// Writes the head of the file: its library, the metadata of the run, and schemas and channels of all messages.
-fn write_head(file: NewFile, run: &RunDescription) -> McapResult<mcap::Writer<NewFile>> {
-    let options = WriteOptions::new()
-        .library(format!("flotor/{}", run.flotor_version))
-        .compression(None)
-        // Chunks close when a quarter of a second is full, not by size.
-        .chunk_size(None)
-        // Gathers a chunk in memory: the file never holds one whose length is yet to be filled in.
-        .disable_seeking(true);
-    let mut file = options.create(file)?;
-    file.write_metadata(&Metadata { name: RUN_METADATA.to_owned(), metadata: run.to_metadata() })?;
+fn write_head(path: &Path, file: NewFile, run: &RunDescription) -> io::Result<ChunkedFile> {
+    let mut file = ChunkedFile::create(file, path, format!("flotor/{}", run.flotor_version))?;
+    file.add_metadata(&Metadata { name: RUN_METADATA.to_owned(), metadata: run.to_metadata() })?;
     let event_bits = BTreeMap::from([(EVENT_BITS.to_owned(), Events::NAMES.join(" "))]);
-    let nothing = BTreeMap::new();
     for topic in Topic::ALL {
-        let metadata = if topic == Topic::Tick { &event_bits } else { &nothing };
-        file.add_schema_with_id(topic.id(), topic.schema(), ENCODING, DESCRIPTOR_SET)?;
-        file.add_channel_with_id(topic.id(), topic.id(), topic.name(), ENCODING, metadata)?;
+        let id = topic.id();
+        let schema = SchemaHeader { id, name: topic.schema().to_owned(), encoding: ENCODING.to_owned() };
+        file.add_schema(&schema, DESCRIPTOR_SET)?;
+        file.add_channel(&Channel {
+            id,
+            schema_id: id,
+            topic: topic.name().to_owned(),
+            message_encoding: ENCODING.to_owned(),
+            metadata: if topic == Topic::Tick { event_bits.clone() } else { BTreeMap::new() },
+        })?;
     }
     Ok(file)
 }
 
 /// Puts an encoded message in place of what the buffer held.
-fn encode(message: &impl Message, buffer: &mut Vec<u8>) -> McapResult<()> {
+fn encode(message: &impl Message, buffer: &mut Vec<u8>) -> io::Result<()> {
     buffer.clear();
-    Ok(message.encode(buffer).map_err(io::Error::from)?)
+    message.encode(buffer).map_err(io::Error::from)
 }
 
-fn write_error(path: &Path, cause: McapError) -> RecordError {
-    let cause = match cause {
-        McapError::Io(cause) => cause,
-        other => io::Error::other(other),
-    };
+fn write_error(path: &Path, cause: io::Error) -> RecordError {
     let path = path.to_path_buf();
     match cause.downcast::<FileError>() {
         Ok(damage) => RecordError::Lost { path, damage },
