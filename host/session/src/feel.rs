@@ -8,6 +8,8 @@ use flotor_hal::{DVec3, Pose, rotation_vector};
 const WAY_M: f64 = 1.0e-4;
 /// Turn within which a handle rests, rad.
 const TURN_RAD: f64 = 1.0e-3;
+/// Time for which a handle that moved has to rest, ns: more than a slow swing stays at its turning point.
+const REST_NS: u64 = 500_000_000;
 
 /// Sees the ticks of one device, in order. Needs no more memory after an hour than after a tick.
 #[derive(Debug, Default)]
@@ -18,11 +20,13 @@ pub(crate) struct Feel {
     rest: Option<Pose>,
     peak_stiffness_n_per_m: f64,
     settled_ns: u64,
+    newest_ns: u64,
 }
 
 impl Feel {
     pub(crate) fn observe(&mut self, record: &TickRecord) {
         self.observe_force(record);
+        self.newest_ns = record.time_ns;
         let is_near = |rest: &Pose| {
             let turn = record.pose.orientation() * rest.orientation().conjugate();
             record.pose.position().distance(rest.position()) <= WAY_M
@@ -55,9 +59,12 @@ impl Feel {
         self.peak_stiffness_n_per_m
     }
 
-    /// Time from which on the handle stayed within 0.1 mm and 1 mrad of one place, s.
-    pub(crate) fn settled_after_s(&self) -> f64 {
-        self.settled_ns as f64 * 1.0e-9
+    /// Time from which on the handle stayed within 0.1 mm and 1 mrad of one place, s; `None` for a handle that moved within the
+    /// last half second.
+    pub(crate) fn settled_after_s(&self) -> Option<f64> {
+        let never_moved = self.settled_ns == 0;
+        let rests = never_moved || self.newest_ns.saturating_sub(self.settled_ns) >= REST_NS;
+        rests.then_some(self.settled_ns as f64 * 1.0e-9)
     }
 }
 
@@ -110,9 +117,10 @@ mod tests {
 
     #[test]
     fn a_handle_has_settled_within_the_last_tenth_of_a_millimetre() {
-        // 4 mm in 400 ms are 0.1 mm in 10 ms.
-        let settled_s = felt(500.0, 4.0e-3, 400, Events::NONE).settled_after_s();
-        assert!((0.385..=0.400).contains(&settled_s), "{settled_s}");
-        assert_eq!(felt(500.0, 0.0, 400, Events::NONE).settled_after_s(), 0.0, "it never moved");
+        // 4 mm in 600 ms are 0.1 mm in 15 ms.
+        let settled_s = felt(500.0, 4.0e-3, 600, Events::NONE).settled_after_s();
+        assert!(settled_s.is_some_and(|settled_s| (0.580..=0.600).contains(&settled_s)), "{settled_s:?}");
+        assert_eq!(felt(500.0, 0.0, 400, Events::NONE).settled_after_s(), Some(0.0), "it never moved");
+        assert_eq!(felt(500.0, 4.0e-3, 400, Events::NONE).settled_after_s(), None, "it moved 0.4 s ago");
     }
 }

@@ -138,8 +138,9 @@ pub struct RunSummary {
     pub peak_torque_nm: f64,
     /// Largest rise of the force against a handle over its way, 0.1 mm at a time, while no limit and no ramp changed the force, N/m.
     pub peak_stiffness_n_per_m: f64,
-    /// Time from which on the handles stayed within 0.1 mm and 1 mrad of one place, s.
-    pub settled_after_s: f64,
+    /// Time from which on the handles stayed within 0.1 mm and 1 mrad of one place, s; `None` where one moved within the last
+    /// half second.
+    pub settled_after_s: Option<f64>,
     /// Energy tanks, all devices together.
     pub energy: EnergySummary,
     /// Effects of the envelope's passivity controller and slew limit, all devices together.
@@ -435,7 +436,9 @@ impl RunSummary {
             peak_force_n: tally.largest(|device| device.peak_force_n),
             peak_torque_nm: tally.largest(|device| device.peak_torque_nm),
             peak_stiffness_n_per_m: tally.largest(|device| device.feel.peak_stiffness_n_per_m()),
-            settled_after_s: tally.largest(|device| device.feel.settled_after_s()),
+            settled_after_s: (tally.devices.iter())
+                .map(|device| device.feel.settled_after_s())
+                .try_fold(0.0, |latest_s: f64, settled_s| Some(latest_s.max(settled_s?))),
             energy: EnergySummary {
                 device_residual_relative: ledgers()
                     .map(relative_residual)
