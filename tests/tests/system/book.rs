@@ -13,6 +13,8 @@
 //! - `<!-- test: skip, needs a GPU -->`: no test can run it;
 //! - `<!-- test: full, takes a minute -->`: it runs with `FLOTOR_TEST_SIZE=full` only;
 //! - `<!-- test: numbers, real clock -->`: they and digests differ from run to run, and only words are compared;
+//! - `<!-- test: columns mean | p99, times -->`: in tables, the columns of these headings differ from run to run; all others and
+//!   all other numbers are compared;
 //! - `<!-- test: run COMMAND -->`: this has to happen first; a block of TOML after it is what the command prints;
 //! - `<!-- test: file NAME -->`: it is that file, and the commands after it use it.
 
@@ -23,7 +25,7 @@ use flotor_tests::program::Flotor;
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tools::{Tool, required, skipped};
 use flotor_tests::{TestSize, files_under, workspace_root};
-use output::{comparable, fits};
+use output::{Noisy, all_comparable, fits};
 use rayon::prelude::*;
 use std::fmt::Write;
 use std::os::unix::fs::symlink;
@@ -42,6 +44,7 @@ enum Mark {
     Skip(String),
     Full(String),
     Numbers,
+    Columns(Vec<String>),
     Run(String),
     File(String),
 }
@@ -57,10 +60,14 @@ impl Mark {
             "skip," if rest.starts_with("needs ") => Ok(Some(Self::Skip(rest))),
             "full," if rest.starts_with("takes ") => Ok(Some(Self::Full(rest))),
             "numbers," if !rest.is_empty() => Ok(Some(Self::Numbers)),
+            "columns" if rest.contains(", ") => {
+                let headings = rest.split(", ").next().unwrap_or_default().split(" | ");
+                Ok(Some(Self::Columns(headings.map(str::to_owned).collect())))
+            }
             "run" if !rest.is_empty() => Ok(Some(Self::Run(rest))),
             "file" if !rest.is_empty() => Ok(Some(Self::File(rest))),
             _ => Err(format!(
-                "`{said}`: a marker is `skip, needs ...`, `full, takes ...`, `numbers, WHY`, `run ...`, `file ...`"
+                "`{said}`: a marker is `skip, needs ...`, `full, takes ...`, `numbers, WHY`, `columns A | B, WHY`, `run ...`, `file ...`"
             )),
         }
     }
@@ -128,7 +135,7 @@ struct Step {
     line: usize,
     command: String,
     shown: Vec<String>,
-    any_number: bool,
+    noisy: Noisy,
 }
 
 /// A chapter as a list of commands, and the files they are given, in a folder of their own.
@@ -184,12 +191,16 @@ impl Chapter {
     }
 
     fn step(&mut self, block: &Block, command: &str) {
-        let any_number = block.marks.contains(&Mark::Numbers);
+        let noisy = block.marks.iter().find_map(|mark| match mark {
+            Mark::Numbers => Some(Noisy::Numbers),
+            Mark::Columns(headings) => Some(Noisy::Columns(headings.clone())),
+            _ => None,
+        });
         self.steps.push(Step {
             line: block.line,
             command: command.to_owned(),
             shown: Vec::new(),
-            any_number,
+            noisy: noisy.unwrap_or(Noisy::Times),
         });
     }
 
@@ -323,9 +334,8 @@ impl Step {
         if refused == (code == "0") {
             return Some(format!("exit code {code}:\n{said}"));
         }
-        let same = |line: &str| comparable(line, self.any_number);
-        let shown: Vec<String> = self.shown.iter().map(|line| same(line)).collect();
-        let printed: Vec<String> = said.trim_end().lines().map(same).collect();
+        let shown = all_comparable(self.shown.iter().map(String::as_str), &self.noisy);
+        let printed = all_comparable(said.trim_end().lines(), &self.noisy);
         let end = shown.iter().rposition(|line| !line.is_empty()).map_or(0, |last| last + 1);
         if end == 0 || fits(&shown[..end], &printed) {
             return None;
@@ -448,9 +458,17 @@ fn a_wrong_line_of_a_chapter_is_found() {
 #[test]
 fn a_comment_that_means_nothing_is_refused() {
     let block = "```console\n$ false\n```\n";
-    for mark in
-        ["skip", "skip, later", "full, needs a GPU", "skipped, needs a GPU", "numbers,", "run", "file"]
-    {
+    for mark in [
+        "skip",
+        "skip, later",
+        "full, needs a GPU",
+        "skipped, needs a GPU",
+        "numbers,",
+        "columns",
+        "columns a | b",
+        "run",
+        "file",
+    ] {
         assert!(blocks(&format!("<!-- test: {mark} -->\n{block}")).is_err(), "{mark}");
     }
     assert!(

@@ -25,6 +25,8 @@ fn commands() -> Vec<String> {
 fn run(commands: &[String]) -> String {
     let commands: String = commands.iter().map(|command| format!("({command}) || exit 1\n")).collect();
     let scratch = Scratch::default();
+    // An earlier run of the page left it, and recordings are not overwritten.
+    let _ = std::fs::remove_file(workspace_root().join("target/examples/run.mcap"));
     let script = format!(
         "set -e\nexport PATH=\"${{1%/*}}:$PATH\" FLOTOR_PLUGIN_PATH=target/examples/debug\nunset CARGO_TARGET_DIR\n\
          cd '{}'\n{commands}",

@@ -49,13 +49,18 @@ impl Distance {
 
 /// Answers tick by tick, after settling at the first pose; `None` where a model has none.
 pub(super) fn walk(model: &mut Model, path: &[Pose]) -> Vec<Option<Wrench>> {
+    settle(model, path);
+    (SETTLING_TICKS..).zip(path).map(|(tick, pose)| answer(model, *pose, tick)).collect()
+}
+
+/// Resets a model and lets it converge at the first pose.
+pub(super) fn settle(model: &mut Model, path: &[Pose]) {
     model.reset();
     if let Some(first) = path.first() {
         for tick in 0..SETTLING_TICKS {
             let _ = answer(model, *first, tick);
         }
     }
-    (SETTLING_TICKS..).zip(path).map(|(tick, pose)| answer(model, *pose, tick)).collect()
 }
 
 /// The answer at a pose, if it is one.

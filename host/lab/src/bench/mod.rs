@@ -100,11 +100,13 @@ pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<
     let mut losses = Vec::new();
     if let Some(case) = reference {
         let mut exact = create(plugin, case)?;
-        progress.begin("errors", cases.len() as u64);
-        let truth = error::walk(&mut exact, &path);
+        progress.begin("errors", cases.len() as u64 + 1);
+        let truth = reach_hand::Truth::new(&mut exact, *hand, Sampling::FULL);
+        progress.advance(1);
         for ((case, model), distance) in cases.iter().zip(&mut models).zip(&mut distances) {
-            *distance = Some(Distance::between(&error::walk(model, &path), &truth));
-            losses.push((case.name.clone(), reach_hand::losses(&mut exact, model, *hand, Sampling::FULL)));
+            let (measured, lost) = truth.measure(model);
+            *distance = Some(measured);
+            losses.push((case.name.clone(), lost));
             progress.advance(1);
         }
     }

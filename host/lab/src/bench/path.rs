@@ -4,9 +4,9 @@ use flotor_hal::{DVec3, Pose};
 use flotor_judge::trajectory::{Series, Trajectory};
 use std::f64::consts::TAU;
 
-/// Amplitudes and frequencies. Within ±4 mm and ±2°, at 1 to 3 Hz: what a hand
-/// does that explores an object (the thesis's subjects moved at 1 to 3 Hz, section 4). The frequencies have no common
-/// period shorter than 100 s, so no two ticks are alike.
+/// Amplitudes and frequencies of a hand that explores an object (the thesis's subjects moved at 1 to 3 Hz, section 4): at
+/// most 3.6 mm from the middle, and 3.0° turned. The frequencies have no common period shorter than 100 s, so no two
+/// ticks are alike.
 const POSITION_M: DVec3 = DVec3::new(1.5e-3, 1.2e-3, 3.0e-3);
 const POSITION_HZ: DVec3 = DVec3::new(1.37, 2.11, 1.03);
 const ROTATION_RAD: DVec3 = DVec3::new(0.030, 0.025, 0.035);

@@ -4,19 +4,23 @@
 //! the device holds that force from a delay later until the next answer. In between the hand moves on, and the true
 //! force changes: that, too, is an error the hand feels. Each cause is measured alone, and all together; a model more
 //! exact than what sampling and sensing lose anyway buys nothing.
+//!
+//! The path is thirty periods of its slowest sine long. Within a period of the loop the square of the error is integrated by
+//! Gauss's rule of two points, exact for a force that changes linearly: a held force then errs by its rate times the
+//! period over √3, and by √(7/3) of that a period late.
 
-use super::error::answer;
+use super::error::{Distance, answer, settle, walk};
 use super::path::Hand;
 use flotor_hal::abi::loader::Model;
-use flotor_hal::{DVec3, Pose};
-use flotor_judge::trajectory::{Trajectory, sensed};
+use flotor_hal::{DVec3, Pose, Wrench};
+use flotor_judge::trajectory::sensed;
 use serde::Serialize;
 
 /// How a device samples a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sampling {
     /// Whole periods between a sample and the force that answers it.
-    pub delay_ticks: u64,
+    pub delay_ticks: usize,
     /// Step of the position sensor, m.
     pub quantum_m: f64,
     /// Step of the orientation, rad.
@@ -24,10 +28,9 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// Preset `full` of the simulated flotor: one tick, 5 µm; over an arm of 50 mm between light and axis that is
-    /// 0.1 mrad (literature A2).
-    pub const FULL: Sampling = Sampling { delay_ticks: 1, quantum_m: 5.0e-6, quantum_rad: 1.0e-4 };
-    const NONE: Sampling = Sampling { delay_ticks: 0, quantum_m: 0.0, quantum_rad: 0.0 };
+    /// Preset `full` of the simulated flotor: one tick, 2 µm; over an arm of 50 mm between light and axis that is
+    /// 0.04 mrad (literature A2).
+    pub const FULL: Sampling = Sampling { delay_ticks: 1, quantum_m: 2.0e-6, quantum_rad: 4.0e-5 };
 
     fn sees(self, pose: Pose) -> Pose {
         sensed(pose, self.quantum_m, self.quantum_rad)
@@ -49,83 +52,70 @@ pub struct Losses {
     pub all_n: f64,
 }
 
-/// Length of the path, ticks.
-const TICKS: u64 = 500;
-/// Moments within a period at which the hand feels the difference.
-const MOMENTS: u64 = 4;
+/// Length of the path, ticks: thirty periods of its slowest sine.
+const TICKS: u64 = 30_000;
+/// Period of the loop, s.
+const PERIOD_S: f64 = 1.0e-3;
+/// Gauss's points within a period, as parts of it: (1 - 1/√3)/2 and (1 + 1/√3)/2, each with half of the weight.
+const MOMENTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// Measures the causes. `exact` is the reference, `used` the model in the loop.
-pub(super) fn losses(exact: &mut Model, used: &mut Model, hand: Hand, sampling: Sampling) -> Losses {
-    let truth = Truth::new(exact, hand);
-    let none = Sampling::NONE;
-    let late = Sampling { delay_ticks: sampling.delay_ticks, ..none };
-    let coarse = Sampling { delay_ticks: 0, ..sampling };
-    Losses {
-        model_n: truth.at_samples(used, none),
-        hold_n: truth.held(exact, none),
-        delay_n: truth.held(exact, late),
-        quantum_n: truth.at_samples(exact, coarse),
-        all_n: truth.held(used, sampling),
-    }
-}
-
-/// The reference's force at every moment.
-struct Truth {
-    hand: Trajectory,
-    forces_n: Vec<Option<DVec3>>,
+/// The answers of the reference along the path, and the losses that depend on no model in the loop.
+pub(super) struct Truth {
+    path: Vec<Pose>,
+    sampling: Sampling,
+    /// At each tick.
+    at_ticks: Vec<Option<Wrench>>,
+    /// Forces between each tick and the next.
+    between: Vec<[Option<DVec3>; 2]>,
+    hold_n: f64,
+    delay_n: f64,
+    quantum_n: f64,
 }
 
 impl Truth {
-    fn new(exact: &mut Model, hand: Hand) -> Self {
-        exact.reset();
-        let hand = hand.trajectory();
-        let forces = (0..TICKS * MOMENTS).map(|moment| {
-            let time_s = moment as f64 / MOMENTS as f64 * 1.0e-3;
-            answer(exact, hand.pose(time_s), moment).map(|wrench| wrench.force())
+    /// Walks the path with the reference, of true and of sensed poses.
+    pub(super) fn new(exact: &mut Model, hand: Hand, sampling: Sampling) -> Self {
+        let trajectory = hand.trajectory();
+        let pose = |tick: u64, part: f64| trajectory.pose((tick as f64 + part) * PERIOD_S);
+        let path: Vec<Pose> = (0..TICKS).map(|tick| pose(tick, 0.0)).collect();
+        let at_ticks = walk(exact, &path);
+        settle(exact, &path);
+        let force = |pose: Pose, tick: u64| answer(exact, pose, tick).map(|wrench| wrench.force());
+        let between =
+            (0..TICKS).scan(force, |force, tick| Some(MOMENTS.map(|part| force(pose(tick, part), tick))));
+        let between = between.collect();
+        let mut truth = Self { path, sampling, at_ticks, between, hold_n: 0.0, delay_n: 0.0, quantum_n: 0.0 };
+        truth.hold_n = truth.held(&truth.at_ticks, 0);
+        truth.delay_n = truth.held(&truth.at_ticks, sampling.delay_ticks);
+        truth.quantum_n = truth.distance(&truth.sensed(exact)).force_rms_n;
+        truth
+    }
+
+    /// Measures a model: its distance from the reference at the true poses, and the losses with it in the loop.
+    pub(super) fn measure(&self, used: &mut Model) -> (Distance, Losses) {
+        let Self { sampling, hold_n, delay_n, quantum_n, .. } = *self;
+        let distance = self.distance(&walk(used, &self.path));
+        let all_n = self.held(&self.sensed(used), sampling.delay_ticks);
+        (distance, Losses { model_n: distance.force_rms_n, hold_n, delay_n, quantum_n, all_n })
+    }
+
+    fn distance(&self, answers: &[Option<Wrench>]) -> Distance {
+        Distance::between(answers, &self.at_ticks)
+    }
+
+    /// Answers of a model at the poses that a sensor shows.
+    fn sensed(&self, model: &mut Model) -> Vec<Option<Wrench>> {
+        let path: Vec<Pose> = self.path.iter().map(|pose| self.sampling.sees(*pose)).collect();
+        walk(model, &path)
+    }
+
+    /// Returns the error throughout of a force that is held for a period, from `delay_ticks` after its sample.
+    fn held(&self, answers: &[Option<Wrench>], delay_ticks: usize) -> f64 {
+        let periods = answers.iter().zip(self.between.iter().skip(delay_ticks));
+        let squares = periods.flat_map(|(wrench, truths)| {
+            truths.iter().filter_map(|truth| Some(((*wrench)?.force() - (*truth)?).length_squared()))
         });
-        let forces_n = forces.collect();
-        Self { hand, forces_n }
+        let (sum, count) = squares.fold((0.0, 0.0_f64), |(sum, count), square| (sum + square, count + 1.0));
+        (sum / count).sqrt()
     }
-
-    fn at(&self, moment: u64) -> Option<DVec3> {
-        usize::try_from(moment).ok().and_then(|moment| self.forces_n.get(moment)).copied().flatten()
-    }
-
-    /// Error at the moments of sampling themselves.
-    fn at_samples(&self, model: &mut Model, sampling: Sampling) -> f64 {
-        let answers = answers(model, &self.hand, sampling);
-        let errors =
-            (0..).zip(answers).map(|(tick, force)| Some((force? - self.at(tick * MOMENTS)?).length()));
-        root_mean_square(errors.skip(SETTLED))
-    }
-
-    /// Error at every moment, of a force that is held, from `delay_ticks` after its sample.
-    fn held(&self, model: &mut Model, sampling: Sampling) -> f64 {
-        let answers = answers(model, &self.hand, sampling);
-        let errors = (0..TICKS * MOMENTS).map(|moment| {
-            let sample = (moment / MOMENTS).checked_sub(sampling.delay_ticks)?;
-            let held = answers.get(usize::try_from(sample).ok()?).copied().flatten()?;
-            Some((held - self.at(moment)?).length())
-        });
-        #[allow(clippy::cast_possible_truncation)] // 4
-        root_mean_square(errors.skip(SETTLED * MOMENTS as usize))
-    }
-}
-
-/// Ticks at the start that are not counted: a model with memory finds its branch.
-const SETTLED: usize = 20;
-
-fn answers(model: &mut Model, hand: &Trajectory, sampling: Sampling) -> Vec<Option<DVec3>> {
-    model.reset();
-    let answers = (0..TICKS).map(|tick| {
-        let seen = sampling.sees(hand.pose(tick as f64 * 1.0e-3));
-        answer(model, seen, tick).map(|wrench| wrench.force())
-    });
-    answers.collect()
-}
-
-fn root_mean_square(errors: impl Iterator<Item = Option<f64>>) -> f64 {
-    let (sum, count) =
-        errors.flatten().fold((0.0, 0.0_f64), |(sum, count), error| (sum + error * error, count + 1.0));
-    (sum / count.max(1.0)).sqrt()
 }

@@ -1,6 +1,6 @@
 //! The measurements as a table, as CSV, as a picture.
 
-use super::{DEMANDS, Distance, Losses, Speed, SplitTimes, Times};
+use super::{DEMANDS, Distance, Losses, Sampling, Speed, SplitTimes, Times};
 use flotor_command::tables::{table, to_csv};
 use flotor_plot::{Axis, Bin, Figure, Mark, Panel, Series};
 use serde::Serialize;
@@ -114,13 +114,17 @@ impl BenchReport {
         if self.losses.is_empty() {
             return Vec::new();
         }
-        let title = "  Error of the force at the hand, rms, N: 1 kHz, one tick late, 5 µm sensor";
+        let Sampling { delay_ticks, quantum_m, .. } = Sampling::FULL;
+        let title = format!(
+            "  Error of the force at the hand, rms, N: 1 kHz, {delay_ticks} tick late, sensor in steps of {:.0} µm",
+            quantum_m * 1.0e6
+        );
         let rows = self.losses.iter().map(|(name, losses)| {
             let Losses { model_n, hold_n, delay_n, quantum_n, all_n } = *losses;
             named(name, [model_n, hold_n, delay_n, quantum_n, all_n])
         });
         let head = ["case", "model", "hold", "hold, delay", "sensor", "all"];
-        [vec![title.to_owned()], table(head, rows)].concat()
+        [vec![title], table(head, rows)].concat()
     }
 
     fn split_calls(&self) -> Vec<String> {
@@ -134,7 +138,8 @@ impl BenchReport {
             let [depth, share] = [depth_m * 1e3, apart.share * 100.0].map(|number| format!("{number:.1}"));
             [name.clone(), depth, share, mean, p99, others, others_p99]
         });
-        let title = format!("  Calls with {detail} above zero, and the others: times, ns");
+        let title =
+            format!("  Calls with {detail} above zero, and the others: of each tick the fastest call, ns");
         let head = ["case", "depth mm", "share %", "mean", "p99", "others: mean", "p99"];
         [vec![title], table(head, rows)].concat()
     }

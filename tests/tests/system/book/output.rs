@@ -9,9 +9,63 @@ pub(super) fn fits(shown: &[String], printed: &[String]) -> bool {
     }
 }
 
+/// Numbers of a command's output that differ from run to run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Noisy {
+    /// Times, versions, dates, folders and process ids alone.
+    Times,
+    /// Every number and digest.
+    Numbers,
+    /// The columns of tables with these headings, besides [`Noisy::Times`].
+    Columns(Vec<String>),
+}
+
+/// The lines without their noisy parts.
+pub(super) fn all_comparable<'t>(lines: impl Iterator<Item = &'t str>, noisy: &Noisy) -> Vec<String> {
+    let Noisy::Columns(headings) = noisy else {
+        return lines.map(|line| comparable(line, *noisy == Noisy::Numbers)).collect();
+    };
+    let mut ends = Vec::new();
+    let without_columns = |line: &str| {
+        let found = column_ends(line, headings);
+        if line.trim().is_empty() || !found.is_empty() {
+            ends = found;
+            return line.to_owned();
+        }
+        without_cells(line, &ends)
+    };
+    lines.map(without_columns).map(|line| comparable(&line, false)).collect()
+}
+
+/// Where the columns of these headings end in the head of a table, in characters. Columns are aligned to the right.
+fn column_ends(head: &str, headings: &[String]) -> Vec<usize> {
+    let is_apart = |text: &str| text.is_empty() || text.starts_with("  ");
+    let mut ends: Vec<usize> = headings
+        .iter()
+        .flat_map(|heading| head.match_indices(heading.as_str()))
+        .filter(|(at, heading)| head[..*at].ends_with("  ") && is_apart(&head[at + heading.len()..]))
+        .map(|(at, heading)| head[..at + heading.len()].chars().count())
+        .collect();
+    ends.sort_unstable();
+    ends
+}
+
+/// A row with `#` in place of the cells that end there.
+fn without_cells(row: &str, ends: &[usize]) -> String {
+    let mut cells: Vec<char> = row.chars().collect();
+    for end in ends.iter().filter(|end| **end <= row.chars().count()) {
+        let digits = cells[..*end].iter().rev().take_while(|c| !c.is_whitespace()).count();
+        cells[end - digits..*end].fill(' ');
+        if digits > 0 {
+            cells[end - 1] = '#';
+        }
+    }
+    cells.into_iter().collect()
+}
+
 /// A line without what depends on the machine and the moment: times, folders, versions, dates, process ids; without the width of
 /// columns; and without any number or digest if that is asked for.
-pub(super) fn comparable(line: &str, any_number: bool) -> String {
+fn comparable(line: &str, any_number: bool) -> String {
     let words: Vec<&str> = line.split_whitespace().collect();
     let is_time = |at: usize| {
         let unit = words.get(at + 1).map_or("", |unit| unit.trim_end_matches([',', ')', ';', '.']));
@@ -91,4 +145,20 @@ fn only_what_depends_on_machine_and_moment_is_left_out() {
     }
     assert_eq!(comparable("3 ms xxh3:0f-10", true), comparable("3 s xxh3:a-9", true));
     assert_eq!(comparable("p99 -1.3e-14 N (3) M7", true), "p99 # N (#) M7");
+}
+
+#[test]
+fn of_a_table_the_noisy_columns_alone_are_left_out() {
+    let noisy = Noisy::Columns(vec!["mean".to_owned(), "force only".to_owned()]);
+    let table = |mean: &str, share: &str, force: &str| {
+        format!(
+            "  times\n  case   mean  share  force only\n  a b   {mean:>5}  {share:>5}  {force:>10}\n\n  {mean}"
+        )
+    };
+    let left = |text: &str| all_comparable(text.lines(), &noisy);
+    let (shown, printed) = (left(&table("1.5", "0.5", "77")), left(&table("22.5", "0.5", "8")));
+    assert_eq!(shown[2], "a b # 0.5 #");
+    assert_eq!(shown[..4], printed[..4]);
+    assert_ne!(shown[4], printed[4], "a number below the table is compared");
+    assert_ne!(shown[2], left(&table("1.5", "0.6", "77"))[2], "a column that is not named is compared");
 }
