@@ -1,12 +1,14 @@
 //! The wall at the edge of a device's range: spring and damper that push back what has left it, and never pull.
 //!
 //! The range is an ellipsoid of positions and one of rotation vectors; equal semi-axes make it the sphere of the
-//! thesis's boundary (section 3.2). Nearly every tick is inside, so that is seen first, without a root or an arc.
+//! thesis's boundary (section 3.2). The spring pushes along the normal at the nearest point of the ellipsoid, by the distance
+//! from it: its force is a gradient, and no lap gains energy. Nearly every tick is inside, so that is seen first, without a
+//! root or an arc.
 //!
 //! Stiffness and place of the wall are those of a [`RenderedBoundary`].
 
 use flotor_core::rendered_boundary::RenderedBoundary;
-use flotor_hal::{DVec3, DeviceState, Wrench, rotation_vector};
+use flotor_hal::{DVec3, DeviceState, Wrench, math, rotation_vector};
 use std::f64::consts::PI;
 
 /// The wall of one device.
@@ -52,13 +54,35 @@ impl BoundaryWall {
         if !state.is_finite() {
             return None;
         }
-        let force = self.position.push(state.pose.position(), state.twist.linear());
-        let torque = self.rotation.push(rotation_vector(state.pose.orientation()), state.twist.angular());
+        let force = self.position.beyond(state.pose.position());
+        let force = force.map(|beyond| self.position.push(&beyond, state.twist.linear()));
+        let rotation_rad = rotation_vector(state.pose.orientation());
+        let torque = self.rotation.beyond(rotation_rad).map(|beyond| {
+            // Of an axis of the rotation nothing turns.
+            let is_axis = self.rotation.shape == Shape::Sphere;
+            let outward = if is_axis { beyond.outward } else { by_turning(rotation_rad, beyond.outward) };
+            self.rotation.push(&Beyond { outward, ..beyond }, state.twist.angular())
+        });
         if force.is_none() && torque.is_none() {
             return None;
         }
         Some(Wrench::new(force.unwrap_or(DVec3::ZERO), torque.unwrap_or(DVec3::ZERO)))
     }
+}
+
+/// Gradient of a function of the rotation vector by a turn about the fixed axes, from the gradient by the vector: the inverse
+/// transposed of the left Jacobian of SO(3) (Chirikjian, section 10.8.5).
+fn by_turning(rotation_rad: DVec3, gradient: DVec3) -> DVec3 {
+    let angle = rotation_rad.length();
+    let (sin, cos) = math::sin_cos(angle);
+    // (1/θ² - (1 + cos θ)/(2θ sin θ)), and its series where both terms cancel.
+    let second = if angle < 1.0e-2 {
+        1.0 / 12.0 + angle * angle / 720.0
+    } else {
+        1.0 / (angle * angle) - (1.0 + cos) / (2.0 * angle * sin)
+    };
+    let across = rotation_rad.cross(gradient);
+    gradient + across * 0.5 + rotation_rad.cross(across) * second
 }
 
 /// Where translation or rotation may be, and what it meets outside. Metres and newtons, or radians and newton metres.
@@ -67,10 +91,26 @@ struct Ellipsoid {
     semi_axes: DVec3,
     /// Their reciprocals.
     per_semi_axis: DVec3,
+    shape: Shape,
     /// Effort per way.
     stiffness: f64,
     /// Effort per speed.
     damping: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shape {
+    /// All axes with a range have the same.
+    Sphere,
+    Unequal,
+}
+
+/// Place of a point outside of an ellipsoid.
+struct Beyond {
+    /// Distance from the ellipsoid.
+    depth: f64,
+    /// Unit normal at its nearest point.
+    outward: DVec3,
 }
 
 /// Squared distance from the centre, in semi-axes, below which rounding cannot make an inside of an outside.
@@ -78,8 +118,11 @@ const SURELY_INSIDE: f64 = 1.0 - 1.0e-12;
 
 impl Ellipsoid {
     fn new(semi_axes: [f64; 3], stiffness: f64, damping: f64) -> Self {
+        let finite = || semi_axes.into_iter().filter(|axis| axis.is_finite());
+        let is_sphere = finite().all(|axis| finite().all(|other| axis.total_cmp(&other).is_eq()));
+        let shape = if is_sphere { Shape::Sphere } else { Shape::Unequal };
         let semi_axes = DVec3::from_array(semi_axes);
-        Self { semi_axes, per_semi_axis: semi_axes.recip(), stiffness, damping }
+        Self { semi_axes, per_semi_axis: semi_axes.recip(), shape, stiffness, damping }
     }
 
     /// True only inside.
@@ -88,21 +131,55 @@ impl Ellipsoid {
         (at * self.per_semi_axis).length_squared() < SURELY_INSIDE // false for NaN
     }
 
-    /// Spring and damper along the ray from the centre; `None` inside. Damping acts outwards only: the wall never
-    /// pulls.
-    fn push(&self, at: DVec3, velocity: DVec3) -> Option<DVec3> {
-        let at = DVec3::select(self.semi_axes.cmpeq(DVec3::INFINITY), DVec3::ZERO, at);
-        let beyond = (at / self.semi_axes).length();
-        if beyond.is_nan() || beyond <= 1.0 {
+    /// Place of a point outside; `None` inside.
+    fn beyond(&self, at: DVec3) -> Option<Beyond> {
+        let has_no_range = self.semi_axes.cmpeq(DVec3::INFINITY);
+        let at = DVec3::select(has_no_range, DVec3::ZERO, at);
+        let distances = (at / self.semi_axes).length();
+        if distances.is_nan() || distances <= 1.0 {
             return None;
         }
-        let distance = at.length();
-        // Depth beyond the ellipsoid along the ray; the force is k depth + b v, v outwards only.
-        let outward = at / distance;
-        let depth = distance - distance / beyond;
-        let push = (self.stiffness * depth + self.damping * velocity.dot(outward).max(0.0)).max(0.0);
-        Some(outward * -push)
+        Some(match self.shape {
+            Shape::Sphere => {
+                let distance = at.length();
+                Beyond { depth: distance - distance / distances, outward: at / distance }
+            }
+            Shape::Unequal => {
+                let semi_axes = DVec3::select(has_no_range, DVec3::ONE, self.semi_axes);
+                beyond_unequal(semi_axes * semi_axes, semi_axes * at, at)
+            }
+        })
     }
+
+    /// Spring and damper along a direction. Damping acts outwards only: the wall never pulls.
+    fn push(&self, beyond: &Beyond, velocity: DVec3) -> DVec3 {
+        let Beyond { depth, outward } = *beyond;
+        outward * -(self.stiffness * depth + self.damping * velocity.dot(outward).max(0.0)).max(0.0)
+    }
+}
+
+/// Steps of Newton's method at most: four reach rounding within a tenth of a semi-axis, twelve a hundred semi-axes away.
+const MOST_STEPS: usize = 20;
+
+/// Finds the nearest point of an ellipsoid with these squared semi-axes; `scaled` is the place times the semi-axes.
+///
+/// The nearest point is `a² p / (a² + t)` on each axis, where t makes `|a p / (a² + t)|` one (Eberly). The reciprocal of that
+/// length is concave in t, so Newton's method from t = 0 approaches from below, and takes one step on a sphere.
+fn beyond_unequal(squares: DVec3, scaled: DVec3, at: DVec3) -> Beyond {
+    let mut t = 0.0;
+    for _ in 0..MOST_STEPS {
+        let part = scaled / (squares + t);
+        let length = part.length();
+        let slope = (part * part / (squares + t)).element_sum();
+        let step = (length - 1.0) * length * length / slope;
+        if step <= t * f64::EPSILON {
+            break;
+        }
+        t += step;
+    }
+    let normal = at / (squares + t);
+    let length = normal.length();
+    Beyond { depth: t * length, outward: normal / length }
 }
 
 #[cfg(test)]
