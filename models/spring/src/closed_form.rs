@@ -15,10 +15,8 @@
 //! In the source's letters X, Z are horizontal and Y is vertical; here x = X, y = Z, z = Y. Its tilt angles
 //! enter as `psi_Uz = psi_Lz - ry` and `psi_Ux = psi_Lx + rx` with the right-handed rotation vector (rx, ry, rz).
 
-use std::f64::consts::PI;
-
 use crate::arctangent;
-use crate::beam_column::Column;
+use crate::beam_column::{Column, TRUSTED_ARGUMENT};
 use crate::pose::{Coordinates, Pose, Span};
 use crate::precision::{Binary32, Binary64, Precision, Storage};
 use crate::response::{Answer, Demand, Law, Response};
@@ -72,10 +70,11 @@ impl ClosedForm {
     ///
     /// Total over all poses:
     /// - past the solid length the law goes on, it knows no coil contact;
-    /// - upper plate not above the lower one, or beyond the first pole of the bow (`q L >= 2 pi`, where a real
-    ///   spring has buckled): the formulas are continued, [`Validity::Clamped`](crate::validity::Validity);
-    /// - exactly at a pole, plates closer than a thousandth or farther than a million free lengths: no wrench,
-    ///   [`Validity::OutOfDomain`](crate::validity::Validity);
+    /// - upper plate not above the lower one: the formulas are continued, [`Validity::Clamped`](crate::validity::Validity);
+    /// - near buckling (`G0` below 0.3) and past it: the argument is saturated short of the pole, so that the wrench stays
+    ///   bounded, [`Validity::Clamped`](crate::validity::Validity);
+    /// - elongated until no shear stiffness is left, plates closer than a thousandth or farther than a million free lengths: no
+    ///   wrench, [`Validity::OutOfDomain`](crate::validity::Validity);
     /// - NaN, infinity or a quaternion that is not of unit length: no wrench,
     ///   [`Validity::InvalidInput`](crate::validity::Validity).
     #[must_use]
@@ -97,7 +96,7 @@ impl ClosedForm {
             Form::Printed => length_m,
             Form::CurrentLength => length_m.like(self.free_length_m),
         };
-        let column = self.column.ends(axial_force_n, length_m, reference_m);
+        let column = self.column.bounded_ends(axial_force_n, length_m, reference_m);
         let (bow_nm, sway_n) = (S::store(column.bow_nm_per_rad), S::store(column.sway_n_per_rad));
         let height_m = vector_m.z;
         let planes = Planes::new::<S>(
@@ -130,14 +129,14 @@ impl ClosedForm {
         } else {
             Vector::new(zero, zero, zero)
         };
-        // Overflow beside a pole is no answer. One sum instead of six tests: it is finite only if every term is.
+        // Overflow is no answer. One sum instead of six tests: it is finite only if every term is.
         let sum = (force_n.x + force_n.y + force_n.z) + (torque_nm.x + torque_nm.y + torque_nm.z);
         Answer {
             force_n,
             torque_nm,
             energy_j: zero,
-            answered: usable & sum.finite(),
-            trusted: height_m.above(0.0) & column.argument.below(PI * PI),
+            answered: usable & column.sheared_m.above(0.0) & sum.finite(),
+            trusted: height_m.above(0.0) & column.argument.below(TRUSTED_ARGUMENT),
         }
     }
 }
@@ -211,6 +210,7 @@ mod tests {
     use crate::preset::Preset;
     use crate::validity::Validity;
     use flotor_hal::glam::DVec3;
+    use std::f64::consts::PI;
 
     fn laws() -> impl Iterator<Item = ClosedForm> {
         Preset::ALL.into_iter().flat_map(|preset| {

@@ -21,6 +21,7 @@ use std::f64::consts::PI;
 
 use flotor_hal::glam::{DQuat, DVec3};
 
+use crate::beam_column::TRUSTED_ARGUMENT;
 use crate::entire::EntireFunctions;
 use crate::pose::{Chord, Pose};
 use crate::rigidity::Spring;
@@ -32,8 +33,6 @@ const LAST_ERROR: f64 = 1.0e-3;
 /// `G0` below which the rod has a share, and below which it is alone.
 const FIRST: f64 = 0.30;
 const LAST: f64 = 0.20;
-/// Argument at which `G0` is [`FIRST`], rounded down.
-const FIRST_ARGUMENT: f64 = 5.552;
 /// Argument past that of [`LAST`], short of where `G0` is computed to rounding: from here on the rod is alone.
 const DEEP_ARGUMENT: f64 = 7.5;
 /// Argument at which the straight rod buckles.
@@ -154,7 +153,7 @@ impl ShareOfRod {
     fn is_wanted(&self, pose: &Pose) -> bool {
         let Ok(chord) = pose.chord(self.free_length_m) else { return false };
         let argument = self.argument(&chord);
-        if argument > FIRST_ARGUMENT {
+        if argument > TRUSTED_ARGUMENT {
             return true;
         }
         // |D|² = (1 - k.t)/2 and |S|² = 2 - k.e - t.e - |D|², to rounding.
@@ -291,7 +290,7 @@ impl Directions {
 
     /// The share by the length alone, and its derivative by the argument.
     fn nearness(&self) -> (f64, f64) {
-        if self.argument <= FIRST_ARGUMENT {
+        if self.argument <= TRUSTED_ARGUMENT {
             return (0.0, 0.0);
         }
         if self.argument >= DEEP_ARGUMENT {

@@ -14,6 +14,7 @@ use flotor_spring::held::HeldSpring;
 use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
+use flotor_spring::rigidity::Spring;
 use flotor_spring::rod::{Accuracy, Coils, Rod};
 use flotor_spring::rod_blend::RodBlend;
 use flotor_spring::validity::Validity;
@@ -63,6 +64,80 @@ fn formulas_answer_every_pose() {
                     }
                 }
             }
+        }
+    }
+}
+
+/// The axial load (N), the reference length and `Lam` (m), and the argument of a closed form, from the formulas of
+/// `beam_column`.
+fn column(spring: &Spring, form: Form, length_m: f64) -> [f64; 4] {
+    let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
+    let load_n = rigidities.gamma_n * (free_length_m - length_m) / free_length_m;
+    let reference_m = if form == Form::Printed { length_m } else { free_length_m };
+    let sheared_m = length_m + reference_m * load_n / rigidities.beta_n;
+    [load_n, reference_m, sheared_m, load_n * reference_m * sheared_m / (4.0 * rigidities.alpha_n_m2)]
+}
+
+/// Compares a closed form with its bound at a pose in reach; returns whether the column is near buckling there.
+fn is_bounded(spring: &Spring, form: Form, pose: &Pose) -> bool {
+    let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
+    let length_m = (pose.position_m + DVec3::Z * free_length_m).length();
+    let [load_n, reference_m, sheared_m, argument] = column(spring, form, length_m);
+    let answer = ClosedForm::new(spring, form).respond(pose, Demand::Wrench);
+
+    // x coth x stays below 1 + x in tension; C0 / G0 above -5.1 in compression, by the saturation.
+    let bow = if argument < 0.0 { 1.0 + (-argument).sqrt() } else { 5.1 };
+    let bow_nm_per_rad = bow * 2.0 * rigidities.alpha_n_m2 / reference_m;
+    let sway_n_per_rad = 0.5 * rigidities.beta_n * sheared_m / reference_m;
+    let turned = pose.rotation_vector_rad();
+    // Twice an inclination of a right angle, and the tilt; in each of two planes.
+    let (tilt_rad, ends_rad) = (turned.truncate().length(), PI + turned.truncate().length());
+    let most_n = load_n.abs() + 2.0 * ends_rad * sway_n_per_rad;
+    let most_nm = 2.0 * (ends_rad * sway_n_per_rad * length_m + tilt_rad * bow_nm_per_rad)
+        + rigidities.tau_n_m2 / free_length_m * turned.z.abs();
+    assert!(answer.force_n.length() <= most_n, "{form:?} {pose:?}: {answer:?}, at most {most_n} N");
+    assert!(answer.torque_nm.length() <= most_nm, "{form:?} {pose:?}: {answer:?}, at most {most_nm} N·m");
+
+    let half_turn = argument.max(0.0).sqrt();
+    let denominator = if half_turn > 0.0 { half_turn.sin() / half_turn } else { 1.0 };
+    let is_near = argument > 1.0 && denominator.abs() < 0.3;
+    // The bound of the law is rounded down: by less than 1e-4 of its argument.
+    assert!(!is_near || answer.validity == Validity::Clamped, "{form:?} {pose:?}: G0 = {denominator}");
+    assert!(denominator < 0.3001 || answer.validity == Validity::Ok, "{form:?} {pose:?}: G0 = {denominator}");
+    is_near
+}
+
+#[test]
+fn closed_forms_are_bounded_and_clamped_near_their_pole() {
+    /// The device's range of 12 mm scaled from spring 1, and 4 degrees.
+    const REACH: Workspace = Workspace { shear: 0.45, height: 0.75, tilt_rad: 0.07, yaw_rad: 0.07 };
+    for preset in Preset::ALL {
+        let spring = preset.spring();
+        let free_length_m = spring.geometry().free_length_m;
+        for form in [Form::Printed, Form::CurrentLength] {
+            let mut sampler = Sampler::new(31);
+            let near = (0..of(200_000))
+                .filter(|_| is_bounded(&spring, form, &REACH.pose(&mut sampler, free_length_m)))
+                .count();
+            // Straight down through the length at which the straight rod buckles, as close as numbers go.
+            let argument = |length_m: f64| column(&spring, form, length_m)[3] - PI * PI;
+            let [mut buckled_m, mut straight_m] = [0.5 * free_length_m, free_length_m];
+            if argument(buckled_m) > 0.0 {
+                for _ in 0..60 {
+                    let middle_m = 0.5 * (buckled_m + straight_m);
+                    *(if argument(middle_m) > 0.0 { &mut buckled_m } else { &mut straight_m }) = middle_m;
+                }
+            }
+            for digits in 3..16 {
+                for side in [-1.0, 1.0] {
+                    let length_m = straight_m + side * 10.0_f64.powi(-digits) * free_length_m;
+                    let position_m = DVec3::new(0.0, 0.0, length_m - free_length_m);
+                    let pose = Pose::from_rotation_vector(position_m, DVec3::new(0.05, -0.02, 0.0));
+                    let _ = is_bounded(&spring, form, &pose);
+                }
+            }
+            let buckles = matches!(preset, Preset::Thesis3 | Preset::Slender) && form == Form::CurrentLength;
+            assert!(near > 0 || !buckles, "{preset:?} {form:?}: no pose was near the pole");
         }
     }
 }
