@@ -32,6 +32,7 @@ pub mod contract;
 pub mod energy;
 pub mod entire;
 pub mod held;
+mod pace;
 mod parameters;
 mod plugin;
 pub mod pose;

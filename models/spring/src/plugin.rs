@@ -3,6 +3,7 @@
 use crate::batch::Batch;
 use crate::centerline::{Helix, Section};
 use crate::contract;
+use crate::pace::Pace;
 use crate::parameters::{Choice, SCHEMA, Switch};
 use crate::prepared::{Insight, Prepared};
 use crate::rod::Branch;
@@ -17,12 +18,13 @@ use flotor_hal::{
 pub struct SpringModel {
     choice: Choice,
     law: Prepared,
+    pace: Pace,
     batch: Batch,
 }
 
 impl SpringModel {
     fn new(choice: Choice) -> Self {
-        Self { law: Prepared::new(&choice), choice, batch: Batch::new() }
+        Self { law: Prepared::new(&choice), choice, pace: Pace::default(), batch: Batch::new() }
     }
 }
 
@@ -40,11 +42,11 @@ impl ForceModel for SpringModel {
 
     #[inline]
     fn step(&mut self, input: &Input) -> Output {
-        self.law.step(input)
+        self.law.step(input, &mut self.pace)
     }
 
     fn step_batch(&mut self, inputs: &[Input], outputs: &mut [Output]) {
-        if !self.law.respond_side_by_side(&self.batch, inputs, outputs) {
+        if !self.law.respond_side_by_side(&self.batch, &mut self.pace, inputs, outputs) {
             for (input, output) in inputs.iter().zip(outputs) {
                 *output = self.step(input);
             }
@@ -64,6 +66,7 @@ impl ForceModel for SpringModel {
 
     fn reset(&mut self) {
         self.law.reset();
+        self.pace.end();
     }
 }
 

@@ -9,6 +9,7 @@ use crate::contact::AxialContact;
 use crate::contract;
 use crate::energy::EnergyForm;
 use crate::held::{Held, HeldSpring};
+use crate::pace::Pace;
 use crate::parameters::{Choice, SeatChoice, Switch, Variant};
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
@@ -123,15 +124,16 @@ impl Prepared {
 
     /// The answer of a step. Real-time: bounded, no allocation.
     #[inline]
-    pub(crate) fn step(&mut self, input: &Input) -> Output {
+    pub(crate) fn step(&mut self, input: &Input, pace: &mut Pace) -> Output {
         match self {
             Self::ClosedForm(law) => contract::step(law, input),
             Self::Energy(held) if held.is_plain() => contract::step(&held.law, input),
             Self::RodBlend(held) if held.is_plain() && !held.law.blends(&contract::pose(input)) => {
                 held.law.leave();
+                pace.end();
                 contract::step(held.law.energy(), input)
             }
-            _ => contract::output(&self.respond(&contract::pose(input), contract::demand(input))),
+            _ => contract::output(&pace.respond(input, |pose, demand| self.respond(pose, demand))),
         }
     }
 
@@ -154,6 +156,7 @@ impl Prepared {
     pub(crate) fn respond_side_by_side(
         &mut self,
         batch: &Batch,
+        pace: &mut Pace,
         inputs: &[Input],
         outputs: &mut [Output],
     ) -> bool {
@@ -162,7 +165,7 @@ impl Prepared {
             Self::Energy(held) if held.is_plain() => batch.respond(&held.law, inputs, outputs),
             Self::RodBlend(held) if held.is_plain() => {
                 batch.respond(held.law.energy(), inputs, outputs);
-                blend_some(&mut held.law, inputs, outputs);
+                blend_some(&mut held.law, pace, inputs, outputs);
             }
             _ => return false,
         }
@@ -274,13 +277,13 @@ fn coils(choice: &Choice) -> Coils {
 }
 
 /// Asks again, in order, where the rod has a share.
-fn blend_some(law: &mut RodBlend, inputs: &[Input], outputs: &mut [Output]) {
+fn blend_some(law: &mut RodBlend, pace: &mut Pace, inputs: &[Input], outputs: &mut [Output]) {
     for (input, output) in inputs.iter().zip(outputs) {
-        let pose = contract::pose(input);
-        if law.blends(&pose) {
-            *output = contract::output(&law.respond(&pose, contract::demand(input)));
+        if law.blends(&contract::pose(input)) {
+            *output = contract::output(&pace.respond(input, |pose, demand| law.respond(pose, demand)));
         } else {
             law.leave();
+            pace.end();
         }
     }
 }

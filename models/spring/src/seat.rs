@@ -25,7 +25,7 @@
 //! so lift-off is continuous.
 //!
 //! If a spring is pressed past buckling, its base may lose contact with the ground or roll on without end. If the spring would
-//! need more energy to stand straight than it has, it falls over: wrench and energy fade together, by an equal part in each tick,
+//! need more energy to stand straight than it has, it falls over: wrench and energy fade together, by an equal part in each step,
 //! and the spring carries nothing until it is lifted. That dissipates energy, too.
 //!
 //! A tick in which the base slides ends where rolling and sliding agree: the tilt of least energy at a pull that friction just
@@ -73,8 +73,8 @@ const LONGEST_WAY_RAD: f64 = 0.1;
 /// Largest tilt (rad) of a base that stands: slender springs roll as far as 0.78 and stay there, and beyond 1.1 no law knows
 /// a coil. A base that goes on falls over.
 const LARGEST_TILT_RAD: f64 = 0.9;
-/// Share of its wrench that a spring which falls over loses in a tick.
-const FALL_PER_TICK: f64 = 1.0 / 32.0;
+/// Share of its wrench that a spring which falls over loses in a step.
+const FALL_PER_STEP: f64 = 1.0 / 32.0;
 /// Change of the tilt (rad) that is left of one that has rolled as far as it will, for the series of slides to be summed.
 const SETTLED_RAD: f64 = 3e-7;
 /// Largest ratio of successive excesses of the pull whose series is summed.
@@ -399,7 +399,7 @@ impl Seat {
     /// nobody gets.
     #[cold]
     fn fall<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
-        self.hold = (self.hold - FALL_PER_TICK).max(0.0);
+        self.hold = (self.hold - FALL_PER_STEP).max(0.0);
         let response = self.base().respond(spring, pose, Demand::WrenchAndEnergy);
         let stored_j = response.energy_j.unwrap_or_default();
         if self.hold == 0.0 || !response.validity.has_answer() || stored_j <= 0.0 {

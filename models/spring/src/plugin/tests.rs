@@ -1,7 +1,7 @@
 use super::*;
 use crate::parameters::{SeatChoice, Switch, Variant};
 use crate::preset::Preset;
-use flotor_hal::Pose;
+use flotor_hal::{Pose, StepStatus};
 
 /// A pose with every kind of load.
 fn input() -> Input {
@@ -176,4 +176,78 @@ fn the_centerline_ends_in_the_plates() {
     assert!(roll_rad.is_nan());
     near(lower, home + pulled.pose.position(), DQuat::IDENTITY);
     near(upper, pulled.pose.position(), DQuat::IDENTITY);
+}
+
+/// Time (ms) that a spring needs at one pose, after a jump to it, to within 1 % of its last force; and whether it moved.
+fn relaxation_ms(choice: Choice, dt_ns: u64, from: &Pose, to: &Pose) -> f64 {
+    let mut model = SpringModel::new(choice);
+    let at = |pose: &Pose| Input { dt_ns, ..Input::at_rest(*pose) };
+    for _ in 0..100 {
+        let _ = model.step(&at(from));
+    }
+    let ticks = 1_000_000_000 / dt_ns;
+    let outputs: Vec<Output> = (0..ticks).map(|_| model.step(&at(to))).collect();
+    let force = |output: &Output| output.wrench.force();
+    let last = force(outputs.last().unwrap());
+    let scale_n = outputs.iter().map(|output| force(output).length()).fold(0.0, f64::max);
+    let is_on_its_way = |output: &&Output| (force(output) - last).length() > 0.01 * scale_n;
+    let moving = outputs.iter().rposition(|output| is_on_its_way(&output)).map_or(0, |last| last + 1);
+    assert!(outputs[..moving].iter().all(|output| output.status() == Some(StepStatus::NotConverged)));
+    moving as f64 * dt_ns as f64 * 1e-6
+}
+
+#[test]
+fn what_a_spring_does_by_itself_takes_the_same_time_at_every_rate() {
+    let choice = |preset: Preset, variant, seat| {
+        let (_, _, stiffness) = preset.parameters();
+        let spring = preset.spring();
+        Choice { spring, stiffness, preset, seat, ..Choice::default_with(variant) }
+    };
+    let pose = |x_m, z_m, about_x, about_y| {
+        Pose::new(
+            DVec3::new(x_m, 0.0, z_m),
+            flotor_hal::orientation_from_rotation_vector(DVec3::new(about_x, about_y, 0.0)),
+        )
+    };
+    // The poses of the review: a rod that snaps, the same in the blend, a base that falls over.
+    let snap = pose(1e-4, -0.02, 0.02, 0.0);
+    let motions = [
+        (choice(Preset::Slender, Variant::Rod, SeatChoice::Fixed), snap),
+        (choice(Preset::Slender, Variant::Energy, SeatChoice::Fixed), snap),
+        (choice(Preset::Thesis3, Variant::Energy, SeatChoice::Free), pose(0.002, -0.02, 0.0, 0.1)),
+    ];
+    for (choice, to) in motions {
+        let at_1_khz_ms = relaxation_ms(choice, 1_000_000, &Pose::HOME, &to);
+        assert!(at_1_khz_ms > 10.0, "{at_1_khz_ms} ms: it has to move by itself");
+        for rate_hz in [100, 250, 500, 700, 2_000, 3_000, 4_000, 7_000, 10_000] {
+            let dt_ns = 1_000_000_000 / rate_hz;
+            let took_ms = relaxation_ms(choice, dt_ns, &Pose::HOME, &to);
+            println!(
+                "{:?} {:?} {rate_hz} Hz: {took_ms:.1} of {at_1_khz_ms:.1} ms",
+                choice.preset, choice.variant
+            );
+            // The last step is made in the nearest tick, and ends with its tick.
+            let tolerance_ms = 1.5 * dt_ns as f64 * 1e-6 + 1.0;
+            assert!(
+                (took_ms - at_1_khz_ms).abs() <= tolerance_ms,
+                "{rate_hz} Hz: {took_ms}, {at_1_khz_ms} ms"
+            );
+        }
+        assert_eq!(relaxation_ms_of_table(choice, &to), at_1_khz_ms, "a row of a table is one step");
+    }
+}
+
+/// The same counted in rows of a table, whose poses have no duration.
+fn relaxation_ms_of_table(choice: Choice, to: &Pose) -> f64 {
+    let mut model = SpringModel::new(choice);
+    let mut stepped = SpringModel::new(choice);
+    let rows: Vec<Input> =
+        [Pose::HOME; 100].iter().chain(&[*to; 1000]).map(|pose| Input::at_rest(*pose)).collect();
+    let mut outputs = vec![Output::default(); rows.len()];
+    model.step_batch(&rows, &mut outputs);
+    for (row, output) in rows.iter().zip(&outputs) {
+        let single = stepped.step(&Input { dt_ns: 1_000_000, ..*row });
+        assert_eq!((single.wrench, single.status()), (output.wrench, output.status()));
+    }
+    relaxation_ms(choice, 1_000_000, &Pose::HOME, to)
 }
