@@ -1,7 +1,8 @@
 //! Where running hosts are found: one socket a run, in a folder that belongs to the user alone.
 
 use crate::platform::{
-    Listening, Stream, is_ours, is_ours_alone, is_same_file, make_folder, remove_if_dead, run_folder,
+    Listening, Stream, is_ours, is_ours_alone, is_out_of_descriptors, is_same_file, make_folder,
+    remove_if_dead, run_folder,
 };
 use std::ffi::OsStr;
 use std::fs::{DirEntry, Metadata};
@@ -36,7 +37,7 @@ pub struct Found {
 #[non_exhaustive]
 pub enum DirectoryError {
     /// The folder cannot be made, or no socket in it.
-    #[error("{}: {cause}; set XDG_RUNTIME_DIR to a folder you may write to", path.display())]
+    #[error("{}: {cause}; {}", path.display(), remedy(cause))]
     Unusable {
         /// The folder or socket.
         path: PathBuf,
@@ -66,6 +67,15 @@ pub fn process_number() -> u32 {
     match PROCESS_NUMBER.load(Ordering::Relaxed) {
         0 => std::process::id(),
         number => number,
+    }
+}
+
+/// Returns the remedy for a folder or socket that cannot be used.
+fn remedy(cause: &io::Error) -> &'static str {
+    match cause.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on its disk",
+        _ if is_out_of_descriptors(cause) => "close some, or allow more (`ulimit -n`)",
+        _ => "set XDG_RUNTIME_DIR to a folder you may write to",
     }
 }
 
@@ -236,6 +246,17 @@ fn process_of(path: &Path) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_that_cannot_be_used_has_the_remedy_of_its_cause() {
+        // EMFILE and ENOSPC of Linux; and any other.
+        for (cause, remedy) in [(24, "ulimit -n"), (28, "make room"), (13, "XDG_RUNTIME_DIR")] {
+            let cause = io::Error::from_raw_os_error(cause);
+            let error = DirectoryError::Unusable { path: PathBuf::from("/run"), cause };
+            assert!(error.to_string().contains(remedy), "{error}");
+        }
+    }
 
     #[test]
     fn a_run_is_found_while_it_lives() {

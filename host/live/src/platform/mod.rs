@@ -9,11 +9,13 @@ mod windows;
 
 #[cfg(not(windows))]
 pub(crate) use unix::{
-    Datagrams, Listening, Stream, connect, connect_now, has_left, is_ours, is_ours_alone, is_same_file,
-    make_folder, private_file, read_at, remove_if_dead, run_folder, write_all_at,
+    Datagrams, Listening, Stream, connect, connect_now, has_left, is_ours, is_ours_alone,
+    is_out_of_descriptors, is_same_file, make_folder, private_file, read_at, remove_if_dead, run_folder,
+    write_all_at,
 };
 #[cfg(windows)]
 pub(crate) use windows::{
-    Datagrams, Listening, Stream, connect, connect_now, has_left, is_ours, is_ours_alone, is_same_file,
-    make_folder, private_file, read_at, remove_if_dead, run_folder, write_all_at,
+    Datagrams, Listening, Stream, connect, connect_now, has_left, is_ours, is_ours_alone,
+    is_out_of_descriptors, is_same_file, make_folder, private_file, read_at, remove_if_dead, run_folder,
+    write_all_at,
 };

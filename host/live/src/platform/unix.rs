@@ -1,6 +1,7 @@
 //! Unix: sockets that are files, and permissions.
 
 use rustix::event::{PollFd, PollFlags, poll};
+use rustix::io::Errno;
 use rustix::net::{AddressFamily, RecvFlags, SocketAddrUnix, SocketType, recv};
 use rustix::process::getuid;
 use std::fs::{DirBuilder, File, Metadata, OpenOptions};
@@ -23,6 +24,11 @@ const PRIVATE: u32 = 0o700;
 /// The folder of the runs of this user, where the system names none.
 pub(crate) fn run_folder() -> PathBuf {
     std::env::temp_dir().join(format!("flotor-{}", getuid().as_raw()))
+}
+
+/// Returns true if the process, or the system, has no descriptor left.
+pub(crate) fn is_out_of_descriptors(cause: &io::Error) -> bool {
+    matches!(Errno::from_io_error(cause), Some(Errno::MFILE | Errno::NFILE))
 }
 
 /// Makes a folder that only this user may enter, if it is not there.

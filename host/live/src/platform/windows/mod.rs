@@ -22,6 +22,12 @@ pub(crate) fn run_folder() -> PathBuf {
     local.unwrap_or_else(std::env::temp_dir).join("flotor").join("run")
 }
 
+/// Returns true if the process has no handle left.
+pub(crate) fn is_out_of_descriptors(cause: &io::Error) -> bool {
+    const TOO_MANY_OPEN_FILES: i32 = 4;
+    cause.raw_os_error() == Some(TOO_MANY_OPEN_FILES)
+}
+
 /// Makes a folder, if it is not there. It has the rights of the one above it: in a profile, those of its user.
 pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
     std::fs::create_dir_all(path)
