@@ -3,7 +3,7 @@
 use crate::bound::{Bound, Miss};
 use crate::case::{Case, Check, combinations};
 use crate::curve::POSE;
-use crate::file::{TestFile, Validate};
+use crate::file::{MeasureDemand, TestFile, Validate};
 use crate::minimise::shortest;
 use crate::numbers::at;
 use crate::process::{Flotor, Ran};
@@ -313,8 +313,8 @@ fn validate(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Ou
         for finding in &findings {
             match Told::of(finding) {
                 Told::Holds => {}
-                Told::NotOnThisSystem { rule, why } => {
-                    note(format!("{plugin}: the rule {rule} passes unchecked: {why}"));
+                Told::NotJudged { rule, why } => {
+                    note(format!("{plugin}: the rule {rule} is not judged: {why}"));
                 }
                 Told::Fails { rule, text, seen } => {
                     outcome.failures.push(Failure::new(format!("rule {rule}"), text, seen));
@@ -334,7 +334,7 @@ fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
     let mut failing = None;
     for model in models {
         let score = with_settings(&["stress", "--model", &model.file, "--size", &stress.size], &stress.set);
-        let counted: Vec<&String> = stress.pass.iter().collect();
+        let counted: Vec<&String> = stress.measures.iter().collect();
         // What does not count is not computed.
         let asked = [&score[..], &only(&counted), &["--json".to_owned(), "-".to_owned()]].concat();
         let answered = flotor.run(asked, "");
@@ -345,7 +345,8 @@ fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
                 counted
             }
             Some(json) => {
-                let failures = counted.into_iter().filter_map(|id| Some((id, measure(&json, id)?)));
+                let failures =
+                    counted.into_iter().filter_map(|id| Some((id, measure(&json, id, stress.demand)?)));
                 let (failed, failures): (Vec<&String>, Vec<Failure>) = failures.unzip();
                 outcome.failures.extend(failures);
                 failed
@@ -359,8 +360,8 @@ fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
     failing
 }
 
-/// A measure of a stress test that failed, or is not there.
-fn measure(json: &Value, id: &str) -> Option<Failure> {
+/// Returns the failure of a measure of a stress test that has not the verdict demanded, or is not there.
+fn measure(json: &Value, id: &str, demand: MeasureDemand) -> Option<Failure> {
     let measures = json.get("measures").and_then(Value::as_array);
     let has_id = |measure: &&Value| measure.get("id").and_then(Value::as_str) == Some(id);
     let Some(found) = measures.and_then(|measures| measures.iter().find(has_id)) else {
@@ -374,7 +375,15 @@ fn measure(json: &Value, id: &str) -> Option<Failure> {
         let got = format!("{} {unit} ({})", number("value"), word("remark"));
         Failure::new(format!("{id} {}", word("name")), expected.trim_end(), got)
     };
-    (word("verdict") == "fail").then(failed)
+    match word("verdict") {
+        "pass" | "note" => None,
+        "fail" => Some(failed()),
+        "nothing to judge" | "not resolved" if demand == MeasureDemand::NotFailed => None,
+        unjudged => {
+            let name = format!("{id} {}", word("name"));
+            Some(Failure::new(name, "a verdict", format!("{unjudged} ({})", word("remark"))))
+        }
+    }
 }
 
 fn with_settings(command: &[&str], set: &[(String, String)]) -> Vec<String> {
@@ -388,6 +397,29 @@ fn with_settings(command: &[&str], set: &[(String, String)]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_measure_that_was_not_judged_does_not_pass() {
+        let json = |verdict: &str| {
+            let measure =
+                serde_json::json!({ "id": "M3", "name": "reciprocity", "verdict": verdict, "remark": "why" });
+            serde_json::json!({ "measures": [measure] })
+        };
+        let is_missed = |verdict: &str, demand| measure(&json(verdict), "M3", demand).is_some();
+        for (verdict, missed_where_named, missed) in [
+            ("pass", false, false),
+            ("note", false, false),
+            ("nothing to judge", true, false),
+            ("not resolved", true, false),
+            ("fail", true, true),
+            ("skipped", true, true),
+            ("", true, true),
+        ] {
+            assert_eq!(is_missed(verdict, MeasureDemand::Judged), missed_where_named, "{verdict}");
+            assert_eq!(is_missed(verdict, MeasureDemand::NotFailed), missed, "{verdict}");
+        }
+        assert!(measure(&json("pass"), "M4", MeasureDemand::NotFailed).is_some(), "it is not there");
+    }
 
     #[test]
     fn a_command_line_survives_a_shell() {

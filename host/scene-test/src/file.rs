@@ -84,9 +84,19 @@ pub(crate) enum Validate {
 #[derive(Debug)]
 pub(crate) struct Stress {
     pub(crate) size: String,
-    /// Measures that must not fail.
-    pub(crate) pass: Vec<String>,
+    /// Measures that count.
+    pub(crate) measures: Vec<String>,
+    pub(crate) demand: MeasureDemand,
     pub(crate) set: Vec<(String, String)>,
+}
+
+/// The verdict that a measure of a stress test needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MeasureDemand {
+    /// Any but a failure: the file names no measure, and not every one applies to every model.
+    NotFailed,
+    /// A pass or a note: the file names the measure.
+    Judged,
 }
 
 /// The file as it is written.
@@ -374,11 +384,14 @@ fn stress_of(written: WrittenStress) -> Result<Stress, String> {
         return Err(format!("unknown size `{size}`; write short or full"));
     }
     let all = || MEASURES.iter().filter(|measure| **measure != COST).map(ToString::to_string).collect();
-    let pass = pass.unwrap_or_else(all);
-    if let Some(unknown) = pass.iter().find(|measure| !MEASURES.contains(&measure.as_str())) {
+    let (measures, demand) = match pass {
+        Some(named) => (named, MeasureDemand::Judged),
+        None => (all(), MeasureDemand::NotFailed),
+    };
+    if let Some(unknown) = measures.iter().find(|measure| !MEASURES.contains(&measure.as_str())) {
         return Err(format!("unknown measure `{unknown}`; they are {}", MEASURES.join(", ")));
     }
-    Ok(Stress { size, pass, set: settings(&set)? })
+    Ok(Stress { size, measures, demand, set: settings(&set)? })
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@ use serde_json::Value;
 pub(crate) enum Told<'a> {
     /// It holds.
     Holds,
-    /// This system cannot check it for any plugin, and why.
-    NotOnThisSystem { rule: &'a str, why: &'a str },
+    /// This system cannot check it for any plugin, or it does not apply to this one, and why.
+    NotJudged { rule: &'a str, why: &'a str },
     /// It is violated, or was not checked though it could be.
     Fails { rule: &'a str, text: &'a str, seen: String },
 }
@@ -20,7 +20,9 @@ impl<'a> Told<'a> {
         let (rule, text) = (word("rule").unwrap_or_default(), word("text").unwrap_or_default());
         match (word("violation"), word("unchecked")) {
             (Some(seen), _) => Self::Fails { rule, text, seen: seen.to_owned() },
-            (None, Some(why)) if word("obstacle") == Some("system") => Self::NotOnThisSystem { rule, why },
+            (None, Some(why)) if matches!(word("obstacle"), Some("system" | "subject")) => {
+                Self::NotJudged { rule, why }
+            }
             (None, Some(why)) => Self::Fails { rule, text, seen: format!("it could not be checked: {why}") },
             (None, None) => Self::Holds,
         }
@@ -35,8 +37,10 @@ mod tests {
     #[test]
     fn only_what_no_plugin_could_pass_here_passes_unchecked() {
         let finding = |obstacle: Option<&str>| json!({ "rule": "no-threads", "text": "it starts none", "violation": null, "unchecked": "why", "obstacle": obstacle });
-        let here = finding(Some("system"));
-        assert_eq!(Told::of(&here), Told::NotOnThisSystem { rule: "no-threads", why: "why" });
+        for obstacle in ["system", "subject"] {
+            let found = finding(Some(obstacle));
+            assert_eq!(Told::of(&found), Told::NotJudged { rule: "no-threads", why: "why" });
+        }
         for obstacle in [Some("requirement"), None] {
             let failed = finding(obstacle);
             let Told::Fails { rule, seen, .. } = Told::of(&failed) else { panic!("{obstacle:?} passed") };

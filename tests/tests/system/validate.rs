@@ -31,6 +31,7 @@ fn assert_found(name: &str, mistake: &str, rule: &str, words: &str) {
     let all = findings(&compiled(&Scratch::default(), name, &[mistake]));
     let found = all.iter().find(|finding| finding["rule"] == rule);
     let found = found.unwrap_or_else(|| panic!("{mistake}: {rule} was not checked: {all:#?}"));
+    assert_ne!(found["obstacle"], "subject", "{mistake}: {rule} has nothing to judge: {all:#?}");
     if let Some(reason) = found["unchecked"].as_str() {
         println!("{mistake}: {rule} cannot be checked here: {reason}");
         return;

@@ -38,8 +38,8 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
         Check::FiniteInMotion => of_model(model::finite_in_motion)?,
         Check::Demand => of_model(model::demand)?,
         Check::LiveParameters => live_parameters::live_parameters(&subject)?,
-        Check::Activity => of_model(model::activity)?,
-        Check::Passive => return Ok(passive::passive(&mut subject.prepared_model()?)?),
+        Check::Activity => model::activity(&mut subject.prepared_model()?)?,
+        Check::Passive => return passive::passive(&mut subject.prepared_model()?),
         Check::SystemCalls => locked::system_calls(subject.prepared_model()?)?,
         Check::Contract(rule) => match rule {
             Rule::Metadata | Rule::Loads => {}
@@ -60,11 +60,18 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
             Rule::TimeBudget => of_model(model::time_budget)?,
             Rule::Independent => model::independent(&subject)?,
             Rule::NoThreads => model::no_threads(subject.prepared_model()?, before.threads()?)?,
-            Rule::EnergyGradient => of_model(model::energy_gradient)?,
+            Rule::EnergyGradient => model::energy_gradient(&mut subject.prepared_model()?)?,
             unknown => return Err(format!("this host cannot check `{}`", unknown.id()).into()),
         },
     }
     Ok(None)
+}
+
+impl Seen {
+    /// The rule does not apply, for this reason.
+    pub(super) fn nothing_to_judge(why: &str) -> Self {
+        Self::NothingToJudge(why.to_owned())
+    }
 }
 
 impl From<String> for Seen {

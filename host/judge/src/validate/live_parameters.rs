@@ -1,5 +1,6 @@
 //! Live parameters: whether a new value takes effect.
 
+use super::Seen;
 use super::checks::Subject;
 use super::path::{CONFIG, finite, walk};
 use crate::platform::processor_time;
@@ -13,7 +14,7 @@ const TIMES: usize = 33;
 
 /// Sets each live parameter to its value, to the ends of its range and to its default. Each has its own instance, because
 /// the value of one may change the range of another.
-pub(super) fn live_parameters(subject: &Subject) -> Result<(), String> {
+pub(super) fn live_parameters(subject: &Subject) -> Result<(), Seen> {
     let is_live = |(_, parameter): &(usize, &Parameter)| parameter.mutability() == Mutability::Live;
     let mut taken = Vec::new();
     for (index, parameter) in subject.plugin.parameters().iter().enumerate().filter(is_live) {
@@ -27,8 +28,13 @@ pub(super) fn live_parameters(subject: &Subject) -> Result<(), String> {
             let _ = set(&mut model, index, parameter, value)?;
         }
     }
-    if !taken.is_empty() && taken.iter().all(|took| *took == Took::Refused) {
-        return Err("it refuses every live parameter, even with its present value".to_owned());
+    if taken.is_empty() {
+        return Err(Seen::nothing_to_judge("the model has no live parameter"));
+    }
+    if taken.iter().all(|took| *took == Took::Refused) {
+        return Err(Seen::Violation(
+            "it refuses every live parameter, even with its present value".to_owned(),
+        ));
     }
     Ok(())
 }

@@ -56,6 +56,8 @@ pub enum Obstacle {
     System,
     /// Something that the plugin or the check needs is missing.
     Requirement,
+    /// The plugin has nothing that the rule applies to.
+    Subject,
 }
 
 /// Measurements of a model without memory near home. No contract limits them, but a person can distinguish newtons per
@@ -69,6 +71,12 @@ pub struct Figures {
 }
 
 impl Finding {
+    /// Returns true if the rule says nothing about this plugin: neither that it holds nor that it does not.
+    #[must_use]
+    pub fn has_nothing_to_judge(&self) -> bool {
+        self.obstacle == Some(Obstacle::Subject)
+    }
+
     fn new(check: Check, verdict: Verdict) -> Self {
         let Verdict { seen, figures } = verdict;
         let (violation, unchecked, obstacle) = match seen {
@@ -76,6 +84,7 @@ impl Finding {
             Some(Seen::Violation(seen)) => (Some(seen), None, None),
             Some(Seen::Missing(what)) => (None, Some(what), Some(Obstacle::Requirement)),
             Some(Seen::NotOnThisSystem(why)) => (None, Some(why), Some(Obstacle::System)),
+            Some(Seen::NothingToJudge(why)) => (None, Some(why), Some(Obstacle::Subject)),
         };
         Self { rule: check.id(), text: check.text(), violation, unchecked, obstacle, figures }
     }
@@ -91,6 +100,8 @@ pub enum Seen {
     Missing(String),
     /// This system cannot tell, whatever the plugin does.
     NotOnThisSystem(String),
+    /// The rule does not apply to this plugin, or nothing of the sample could have violated it.
+    NothingToJudge(String),
 }
 
 /// Result of the process that checks one rule.

@@ -181,11 +181,16 @@ pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Seen> {
 
 /// Compares force and torque with the energy over steps of a micrometre and of a hundredth of a milliradian at poses of a
 /// walk. A kink in the law may lie between two of them, so that a few may differ, but not one in ten.
-pub(super) fn energy_gradient(model: &mut Model) -> Result<(), String> {
+pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Seen> {
     const STEP_M: f64 = 1.0e-6;
     const STEP_RAD: f64 = 1.0e-5;
-    if model.memory() != Memory::Stateless || !model.serves().contains(Demand::ENERGY) {
-        return Ok(());
+    if model.memory() != Memory::Stateless {
+        return Err(Seen::nothing_to_judge(
+            "the model has a history, and its energy is no function of the pose",
+        ));
+    }
+    if !model.serves().contains(Demand::ENERGY) {
+        return Err(Seen::nothing_to_judge("the model serves no energy"));
     }
     // Components of force and of torque, each with what the energy says of it.
     let (mut forces, mut torques) = (Vec::new(), Vec::new());
@@ -195,7 +200,7 @@ pub(super) fn energy_gradient(model: &mut Model) -> Result<(), String> {
         for axis in DVec3::AXES {
             let moved = |along: f64| Pose::new(position + axis * along, orientation);
             let turned = |angle: f64| Pose::new(position, DQuat::from_axis_angle(axis, angle) * orientation);
-            let mut slope = |pose: &dyn Fn(f64) -> Pose, size: f64| -> Result<f64, String> {
+            let mut slope = |pose: &dyn Fn(f64) -> Pose, size: f64| -> Result<f64, Seen> {
                 let ahead_j = step(model, &Input::at_rest(pose(size)))?.energy_j;
                 let behind_j = step(model, &Input::at_rest(pose(-size)))?.energy_j;
                 Ok((ahead_j - behind_j) / (2.0 * size))
@@ -204,8 +209,15 @@ pub(super) fn energy_gradient(model: &mut Model) -> Result<(), String> {
             torques.push((here.torque().dot(axis), -slope(&turned, STEP_RAD)?));
         }
     }
+    let has_something =
+        |(own, gradient): &(f64, f64)| gradient.is_finite() && (*own != 0.0 || *gradient != 0.0);
+    if !forces.iter().chain(&torques).any(has_something) {
+        return Err(Seen::nothing_to_judge(
+            "wrench and energy are zero, or the energy is not finite, on the whole path",
+        ));
+    }
     agree(&forces, ["force", "N"])?;
-    agree(&torques, ["torque", "N·m"])
+    Ok(agree(&torques, ["torque", "N·m"])?)
 }
 
 /// Whether components and those of the energy's gradient are the same, to a five hundredth of the largest: rounding of the
@@ -227,10 +239,10 @@ fn agree(seen: &[(f64, f64)], [what, unit]: [&str; 2]) -> Result<(), String> {
 }
 
 /// Steps the model around its active region: a host does not step it there and assumes zero.
-pub(super) fn activity(model: &mut Model) -> Result<(), String> {
+pub(super) fn activity(model: &mut Model) -> Result<(), Seen> {
     let region = model.active_region();
     if region.shape() == RegionShape::Everywhere {
-        return Ok(());
+        return Err(Seen::nothing_to_judge("the model is active everywhere"));
     }
     let turned = DQuat::from_scaled_axis(DVec3::new(0.1, -0.2, 0.05));
     let mut ticks = 0..;
@@ -244,10 +256,10 @@ pub(super) fn activity(model: &mut Model) -> Result<(), String> {
                 let output = finite(model, &Input { twist, ..input_of(tick, pose) })?;
                 let acts = output.wrench != Wrench::ZERO || output.energy_j.abs() > 0.0;
                 if acts && !region.contains(pose.position()) {
-                    return Err(format!(
+                    return Err(Seen::Violation(format!(
                         "at {position_m} m, outside its active region, it returned {:?} and {} J",
                         output.wrench, output.energy_j
-                    ));
+                    )));
                 }
             }
         }

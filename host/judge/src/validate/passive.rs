@@ -10,8 +10,8 @@
 //! Both are exact but for rounding and for what a law does between two points of the circle, which its change
 //! from one to the next bounds.
 
-use super::Figures;
 use super::path::{FAST, finite, walk_at};
+use super::{Figures, Seen};
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{
     DVec3, Input, Memory, Pose, Twist, Wrench, math, orientation_from_rotation_vector, rotation_vector,
@@ -27,18 +27,23 @@ const RADIUS_RAD: f64 = 1.0e-2;
 const ROUNDING: f64 = 1.0e-12;
 
 /// Checks both, and measures.
-pub(super) fn passive(model: &mut Model) -> Result<Option<Figures>, String> {
-    // What has a memory stores energy where it cannot be seen.
+pub(super) fn passive(model: &mut Model) -> Result<Option<Figures>, Seen> {
     if model.memory() != Memory::Stateless {
-        return Ok(None);
+        return Err(Seen::nothing_to_judge(
+            "the model has a history, and may store energy where no pose shows it",
+        ));
     }
+    let mut largest_n: f64 = 0.0;
     for first in 0..6 {
         for second in first + 1..6 {
-            circle(model, [first, second])?;
+            largest_n = largest_n.max(circle(model, [first, second])?);
         }
     }
     let damping_ns_per_m = there_and_back(model)?;
     let stiffness_n_per_m = steepest(model)?;
+    if largest_n == 0.0 && damping_ns_per_m == 0.0 {
+        return Err(Seen::nothing_to_judge("the wrench is zero on every circle, and there is no damping"));
+    }
     let are_numbers = stiffness_n_per_m.is_finite() && damping_ns_per_m.is_finite();
     Ok(are_numbers.then_some(Figures { stiffness_n_per_m, damping_ns_per_m }))
 }
@@ -57,14 +62,15 @@ fn on_circle(plane: [usize; 2], index: usize) -> Pose {
     Pose::new(DVec3::new(x, y, z), orientation_from_rotation_vector(DVec3::new(a, b, c)))
 }
 
-/// Work on the hand once round the circle, by the trapezoidal rule: a segment is wrong by no more than the
-/// change of the wrench over it times its length.
-fn circle(model: &mut Model, plane: [usize; 2]) -> Result<(), String> {
-    let (mut given_j, mut uncertain_j) = (0.0, 0.0);
+/// Checks the work on the hand once round the circle, by the trapezoidal rule: a segment is wrong by no more than the
+/// change of the wrench over it times its length. Returns the largest wrench, its torque at an arm of a metre, N.
+fn circle(model: &mut Model, plane: [usize; 2]) -> Result<f64, String> {
+    let (mut given_j, mut uncertain_j, mut largest_n) = (0.0, 0.0, 0.0_f64);
     let mut before = (on_circle(plane, 0), finite(model, &Input::at_rest(on_circle(plane, 0)))?.wrench);
     for index in 1..=POINTS {
         let pose = on_circle(plane, index);
         let wrench = finite(model, &Input::at_rest(pose))?.wrench;
+        largest_n = largest_n.max(wrench.force().length() + wrench.torque().length());
         let (pose_before, wrench_before) = std::mem::replace(&mut before, (pose, wrench));
         let moved_m = pose.position() - pose_before.position();
         let turned_rad = rotation_vector(pose.orientation() * pose_before.orientation().inverse());
@@ -76,7 +82,7 @@ fn circle(model: &mut Model, plane: [usize; 2]) -> Result<(), String> {
         uncertain_j += largest_j(&change) + ROUNDING * largest_j(&mean);
     }
     if given_j.abs() <= uncertain_j {
-        return Ok(());
+        return Ok(largest_n);
     }
     let [first, second] = plane.map(|axis| COORDINATES.get(axis).copied().unwrap_or_default());
     Err(format!(

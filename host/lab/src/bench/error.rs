@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Answers a model may need at the first pose until it has converged, ticks.
 const SETTLING_TICKS: u64 = 500;
 
-/// Error of a case along the path. Poses where either has no answer are counted, not compared.
+/// Error of a case along the path: NaN without a pose to compare. Poses where either has no answer are counted, not compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Distance {
     /// Largest error of the force, N.
@@ -26,7 +26,7 @@ pub struct Distance {
 impl Distance {
     /// Between the answers of a case and those of the reference.
     pub(super) fn between(answers: &[Option<Wrench>], truth: &[Option<Wrench>]) -> Self {
-        let mut distance = Self::default();
+        let mut distance = Self { force_max_n: f64::NAN, torque_max_nm: f64::NAN, ..Self::default() };
         let mut compared = 0.0_f64;
         for pair in answers.iter().zip(truth) {
             let (Some(answer), Some(truth)) = pair else {
@@ -41,8 +41,9 @@ impl Distance {
             distance.torque_rms_nm += torque_nm * torque_nm;
             compared += 1.0;
         }
-        distance.force_rms_n = (distance.force_rms_n / compared.max(1.0)).sqrt();
-        distance.torque_rms_nm = (distance.torque_rms_nm / compared.max(1.0)).sqrt();
+        // No number without a pose: 0 / 0.
+        distance.force_rms_n = (distance.force_rms_n / compared).sqrt();
+        distance.torque_rms_nm = (distance.torque_rms_nm / compared).sqrt();
         distance
     }
 }
@@ -87,5 +88,11 @@ mod tests {
         assert_eq!(distance.force_max_n, 5.0);
         assert_eq!(distance.force_rms_n, (25.0_f64 / 2.0).sqrt());
         assert_eq!(distance.unanswered, 1);
+        let nothing = Distance::between(&[None, None], &truth);
+        assert!(
+            [nothing.force_max_n, nothing.force_rms_n, nothing.torque_max_nm, nothing.torque_rms_nm]
+                .iter()
+                .all(|number| number.is_nan())
+        );
     }
 }

@@ -107,7 +107,12 @@ impl BenchReport {
             Some(named(name, [force_max_n, force_rms_n, torque_max_nm, torque_rms_nm]))
         });
         let head = ["case", "force max N", "rms N", "torque max N m", "rms N m"];
-        [vec![format!("  Errors against {reference}")], table(head, rows)].concat()
+        let left_out = self.rows.iter().filter_map(|CaseRow { name, distance, .. }| {
+            let unanswered = (*distance)?.unanswered;
+            (unanswered > 0).then(|| format!("  {name}: {unanswered} poses without an answer, not compared"))
+        });
+        let title = format!("  Errors against {reference}");
+        [vec![title], table(head, rows), left_out.collect()].concat()
     }
 
     fn at_the_hand(&self) -> Vec<String> {

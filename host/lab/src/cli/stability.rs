@@ -1,7 +1,7 @@
 //! `flotor stability`: the stiffest spring that stays stable on the simulated device, compared with theory.
 
 use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
-use crate::stability::{Case, Grip, LoopError, Row, default_cases, measure};
+use crate::stability::{Case, Grip, LoopError, Row, default_cases, is_search_end, measure, worst_deviation};
 use clap::Args;
 use flotor_command::options::{JsonOption, PluginPathOption, count, number, rate_hz, svg_file};
 use flotor_command::tables::{table, to_csv};
@@ -63,7 +63,7 @@ struct Report<'a> {
     device: &'a str,
     version: &'a str,
     rows: &'a [Row],
-    worst_deviation: f64,
+    worst_deviation: Option<f64>,
 }
 
 pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
     let rows = measure(&plugin, &cases, || progress.inc(1)).map_err(refused)?;
     progress.finish_and_clear();
 
-    let worst_deviation = rows.iter().map(|row| row.deviation().abs()).fold(0.0, f64::max);
+    let worst_deviation = worst_deviation(&rows);
     let version = &plugin.metadata().version;
     let report = Report { device: DEVICE, version, rows: &rows, worst_deviation };
     // A table for machines on standard output is all that is there.
@@ -130,21 +130,27 @@ fn refused(error: LoopError) -> CommandError {
     }
 }
 
-fn to_text(rows: &[Row], worst_deviation: f64) -> String {
+/// A limit, or that it is above the end of the search.
+fn limit_text(limit_n_per_m: f64) -> String {
+    let above = if is_search_end(limit_n_per_m) { "above " } else { "" };
+    format!("{above}{limit_n_per_m:.1}")
+}
+
+fn to_text(rows: &[Row], worst_deviation: Option<f64>) -> String {
     let title = style::title("largest stable stiffness in N/m");
     let head = ["T in ms", "delay", "b", "B", "simulated", "exact", "differ", "Gil", "passive"];
     let line = |row: &Row| {
         let [simulated, exact, gil, passive] =
-            [row.k_max_n_per_m, row.exact_n_per_m, row.gil_n_per_m, row.passive_n_per_m]
-                .map(|limit| format!("{limit:.1}"));
+            [row.k_max_n_per_m, row.exact_n_per_m, row.gil_n_per_m, row.passive_n_per_m].map(limit_text);
         let [period_ms, b, virtual_b] =
             [row.period_s * 1.0e3, row.plant_damping_ns_per_m, row.virtual_damping_ns_per_m]
                 .map(|number| number.to_string());
-        let differ = format!("{:.3}%", row.deviation() * 100.0);
+        let differ = row.deviation().map_or("-".to_owned(), |share| format!("{:.3}%", share * 100.0));
         [period_ms, row.delay_ticks.to_string(), b, virtual_b, simulated, exact, differ, gil, passive]
     };
-    let foot =
-        format!("worst difference between simulated and exact limit: {:.3} %", worst_deviation * 100.0);
+    let worst =
+        worst_deviation.map_or("none was compared".to_owned(), |share| format!("{:.3} %", share * 100.0));
+    let foot = format!("worst difference between simulated and exact limit: {worst}");
     [vec![title], table(head, rows.iter().map(line)), vec![foot]].concat().join("\n")
 }
 

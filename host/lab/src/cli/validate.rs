@@ -82,8 +82,11 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if !arguments.json.is_on_standard_output() {
         say!("{}", style::title(&arguments.plugin.display().to_string()));
         findings.iter().for_each(print);
-        let unchecked: Vec<&str> =
-            findings.iter().filter_map(|finding| finding.unchecked.as_deref()).collect();
+        let unchecked: Vec<&str> = findings
+            .iter()
+            .filter(|finding| !finding.has_nothing_to_judge())
+            .filter_map(|finding| finding.unchecked.as_deref())
+            .collect();
         if !unchecked.is_empty() {
             let reasons: BTreeSet<&str> = unchecked.iter().copied().collect();
             let reasons = reasons.into_iter().collect::<Vec<_>>().join("; ");
@@ -100,6 +103,12 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
 fn print(finding: &Finding) {
     let Finding { rule, text, .. } = finding;
     match &finding.violation {
+        None if finding.has_nothing_to_judge() => {
+            say!(
+                "  -       {rule:<20} {text}\n          not judged: {}",
+                finding.unchecked.as_deref().unwrap_or_default()
+            );
+        }
         None if finding.unchecked.is_some() => say!("  ?       {rule:<20} {text}"),
         None => say!("  ok      {rule:<20} {text}"),
         Some(seen) => say!("  FAILED  {rule:<20} {text}\n          {seen}"),

@@ -1,5 +1,6 @@
 //! The cases that are measured, side by side on all processors, and what is reported of each.
 
+use super::search::is_search_end;
 use super::simulated_loop::{Grip, LoopError, LoopSetup};
 use super::theory::{Rendering, exact_limit_n_per_m, gil_limit_n_per_m, passive_limit_n_per_m};
 use flotor_hal::abi::loader::Plugin;
@@ -28,6 +29,8 @@ pub struct Row {
     pub k_max_n_per_m: f64,
     /// Of the exact sampled-data system with an ideal sensor, N/m.
     pub exact_n_per_m: f64,
+    /// Whether the search ended at one of these two: then that limit is above it.
+    pub search_ended: bool,
     /// By Gil's rule, N/m.
     pub gil_n_per_m: f64,
     /// Largest stiffness that is passive in any hand (Colgate and Schenkel), N/m.
@@ -35,17 +38,20 @@ pub struct Row {
 }
 
 impl Row {
-    /// Deviation of the measured from the exact limit, as a share of it; 0 where neither is stable.
+    /// Returns the deviation of the measured from the exact limit, as a share of it: infinite where only the measured loop is
+    /// stable, 0 where neither is. `None` where one of them is above the search, or no number: nothing to compare.
     #[must_use]
-    pub fn deviation(&self) -> f64 {
-        if self.exact_n_per_m > 0.0 {
-            self.k_max_n_per_m / self.exact_n_per_m - 1.0
-        } else if self.k_max_n_per_m > 0.0 {
-            f64::INFINITY
-        } else {
-            0.0
-        }
+    pub fn deviation(&self) -> Option<f64> {
+        let Self { k_max_n_per_m: measured, exact_n_per_m: exact, search_ended, .. } = *self;
+        let share = if measured == exact { 0.0 } else { measured / exact - 1.0 };
+        (!search_ended && !share.is_nan()).then_some(share)
     }
+}
+
+/// Returns the largest magnitude of the deviations of all rows that have one; `None` where none has. Not real-time.
+#[must_use]
+pub fn worst_deviation(rows: &[Row]) -> Option<f64> {
+    rows.iter().filter_map(Row::deviation).map(f64::abs).max_by(f64::total_cmp)
 }
 
 /// The default grid: virtual damping from none to beyond its best at three delays, and single cases with more
@@ -91,6 +97,8 @@ fn row(plugin: &Plugin, case: &Case) -> Result<Row, LoopError> {
     let Case { delay_ticks, plant_damping_ns_per_m, virtual_damping_ns_per_m, quantum_m, grip, .. } = *case;
     let rendering = Rendering { period_s, delay_ticks, virtual_damping_ns_per_m };
     let plant = case.plant(plugin)?;
+    let limits = [case.limit_n_per_m(plugin)?, exact_limit_n_per_m(&plant, &rendering)];
+    let [k_max_n_per_m, exact_n_per_m] = limits;
     Ok(Row {
         period_s,
         delay_ticks,
@@ -98,8 +106,9 @@ fn row(plugin: &Plugin, case: &Case) -> Result<Row, LoopError> {
         virtual_damping_ns_per_m,
         quantum_m,
         hand: grip,
-        k_max_n_per_m: case.limit_n_per_m(plugin)?,
-        exact_n_per_m: exact_limit_n_per_m(&plant, &rendering),
+        k_max_n_per_m,
+        exact_n_per_m,
+        search_ended: limits.into_iter().any(is_search_end),
         gil_n_per_m: gil_limit_n_per_m(&plant, &rendering),
         passive_n_per_m: passive_limit_n_per_m(plant_damping_ns_per_m, &rendering),
     })
@@ -146,6 +155,37 @@ mod tests {
             // Half a unit of the last digit given.
             assert!((exact / limit - 1.0).abs() < 2.0e-4, "{wanted:?}: {exact} {limit}");
         }
+    }
+
+    fn row_with(k_max_n_per_m: f64, exact_n_per_m: f64) -> Row {
+        Row {
+            period_s: 1.0e-3,
+            delay_ticks: 0,
+            plant_damping_ns_per_m: 0.5,
+            virtual_damping_ns_per_m: 0.0,
+            quantum_m: 0.0,
+            hand: Grip::Open,
+            k_max_n_per_m,
+            exact_n_per_m,
+            search_ended: [k_max_n_per_m, exact_n_per_m].into_iter().any(is_search_end),
+            gil_n_per_m: 0.0,
+            passive_n_per_m: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_limit_that_was_not_found_deviates_by_no_number() {
+        let end = 1_048_576.0;
+        for (measured, exact) in [(end, end), (end, 1.0), (f64::NAN, 1.0), (1.0, f64::NAN)] {
+            let row = row_with(measured, exact);
+            assert_eq!(row.deviation(), None, "{measured} {exact}");
+            assert_eq!(worst_deviation(&[row]), None);
+        }
+        assert_eq!(row_with(0.0, 0.0).deviation(), Some(0.0));
+        assert_eq!(row_with(3.0, 0.0).deviation(), Some(f64::INFINITY));
+        let rows =
+            [row_with(end, 1.0), row_with(98.0, 100.0), row_with(101.0, 100.0), row_with(f64::NAN, 1.0)];
+        assert!((worst_deviation(&rows).expect("two have one") - 0.02).abs() < 1.0e-15);
     }
 
     #[test]

@@ -23,5 +23,6 @@ mod search;
 pub mod simulated_loop;
 pub mod theory;
 
-pub use grid::{Case, Row, default_cases, measure};
+pub use grid::{Case, Row, default_cases, measure, worst_deviation};
+pub use search::is_search_end;
 pub use simulated_loop::{Grip, LoopError};

@@ -2,10 +2,18 @@
 
 /// Where the search starts, N/m: softer than anything worth rendering. What is unstable even here has no limit.
 const SOFTEST_N_PER_M: f64 = 1.0;
-/// Where it gives up, N/m: forty times the stiffest wall any haptic device is sold with.
-const STIFFEST_N_PER_M: f64 = 1.0e6;
+/// Where it ends, N/m: forty times the stiffest wall any haptic device is sold with, and a power of two, which doubling meets.
+const STIFFEST_N_PER_M: f64 = 1_048_576.0;
 
-/// The stiffness in N/m up to which `is_stable` holds, within a share of `tolerance`; 0 if it never does.
+/// Returns true if the search for a limit ended before it was found: the loop is stable at this stiffness, N/m, and above. Not
+/// real-time.
+#[must_use]
+pub fn is_search_end(limit_n_per_m: f64) -> bool {
+    limit_n_per_m >= STIFFEST_N_PER_M
+}
+
+/// The stiffness in N/m up to which `is_stable` holds, within a share of `tolerance`; 0 if it never does, and the
+/// [end of the search](is_search_end) if it always does.
 ///
 /// Assumes that one interval of stiffness from the softest on is stable, as it is for a spring on a sampled
 /// mass. Not real-time.
@@ -54,7 +62,9 @@ mod tests {
     #[test]
     fn a_loop_without_limit_ends_and_a_hopeless_one_is_zero() {
         let Ok(endless) = largest_stable(1.0e-6, |_| Ok::<_, Infallible>(true));
-        assert!(endless >= STIFFEST_N_PER_M && endless.is_finite());
+        assert_eq!((endless, is_search_end(endless)), (STIFFEST_N_PER_M, true));
+        let Ok(nearly) = largest_stable(1.0e-6, |k| Ok::<_, Infallible>(k < 0.999 * STIFFEST_N_PER_M));
+        assert!(!is_search_end(nearly), "{nearly}");
         let Ok(hopeless) = largest_stable(1.0e-6, |_| Ok::<_, Infallible>(false));
         assert_eq!(hopeless, 0.0);
     }
