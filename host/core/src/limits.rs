@@ -92,6 +92,8 @@ pub struct Limits {
     pub passivity: PassivityMode,
     /// A device that nothing stops when the host's process is gone is refused.
     pub require_independent_stop: bool,
+    /// A device that only the watchdog process stops may run although a kill of one control group ends both processes.
+    pub accept_shared_control_group: bool,
 }
 
 impl Limits {
@@ -123,6 +125,7 @@ impl Default for Limits {
             emergency_buttons: 0,
             passivity: PassivityMode::Observe,
             require_independent_stop: false,
+            accept_shared_control_group: false,
         }
     }
 }

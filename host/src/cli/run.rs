@@ -72,6 +72,9 @@ pub(crate) struct RunArguments {
     plugin_path: PluginPathOption,
     #[command(flatten)]
     strength: StrengthOption,
+    /// Run although a kill of this program's control group ends the watchdog process with it, which alone stops a device then
+    #[arg(long)]
+    accept_shared_control_group: bool,
 }
 
 impl RunArguments {
@@ -285,6 +288,7 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
         let added = Scene::parse(Path::new("--ml-api"), ML_API).map_err(RunError::Scene)?.models;
         scene.models.extend(added.iter().map(|model| model.replaced_by(None, &[("listen", listen)])));
     }
+    scene.limits.accept_shared_control_group |= arguments.accept_shared_control_group;
     arguments.plugin_path.put_before_those_of(&mut scene);
     for set in &arguments.sets {
         set.apply(&mut scene).map_err(CommandError::Usage)?;

@@ -112,6 +112,47 @@ fn a_killed_control_group_leaves_no_force() {
     }
 }
 
+/// Without the files of control groups no way leads out of one.
+#[test]
+fn a_device_that_only_the_watchdog_process_stops_needs_consent_to_a_shared_control_group() {
+    let _turn = crate::alone();
+    let Some(group) = ControlGroup::in_each_hierarchy().pop() else {
+        let _ = writeln!(
+            std::io::stderr(),
+            "skipped: consent to a shared control group: this user may make none"
+        );
+        return;
+    };
+    let hide = "mount -t tmpfs none /sys/fs/cgroup && PATH=/nowhere exec \"$@\"";
+    let enter = format!("echo $$ > {} && exec unshare -m sh -c '{hide}' sh \"$@\"", group.list().display());
+    let ends = |limits: &str| {
+        let (board, scratch) = (Board::start(), Scratch::default());
+        let limits = format!("watchdog_ms = 60000\n{limits}");
+        let running =
+            run_with(&board, &scratch, dies(), Where::InTheHost, &limits).through_shell(&enter).start();
+        if !limits.contains("accept") {
+            return running.wait();
+        }
+        board.wait_for_force(PAST);
+        running.signal(Signal::INT);
+        let ran = running.wait();
+        let _ = board.assert_stopped("the end");
+        ran
+    };
+    let refused = ends("");
+    assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
+    for expected in ["leaves the force of `device` on", "--accept-shared-control-group"] {
+        assert!(refused.error().contains(expected), "{expected}: {refused:?}");
+    }
+    let accepted = ends("accept_shared_control_group = true");
+    assert_eq!(accepted.code, Some(exit_code::OK), "{accepted:?}");
+    let warnings = accepted
+        .stderr
+        .lines()
+        .filter(|line| line.contains("note: the watchdog process is in the control group"));
+    assert_eq!(warnings.count(), 1, "{accepted:?}");
+}
+
 #[test]
 fn a_killed_process_group_leaves_no_force() {
     let _turn = crate::alone();

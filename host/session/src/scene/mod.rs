@@ -414,14 +414,16 @@ fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> 
             .transpose()?
             .map_or(default.emergency_buttons, |button| 1 << button),
         passivity: section.take("passivity").map(passivity).transpose()?.unwrap_or(default.passivity),
-        require_independent_stop: section
-            .take("require_independent_stop")
-            .map(|value| value.truth())
-            .transpose()?
-            .unwrap_or(default.require_independent_stop),
+        require_independent_stop: truth(&mut section, "require_independent_stop")?,
+        accept_shared_control_group: truth(&mut section, "accept_shared_control_group")?,
     };
     section.finish()?;
     Ok(limits)
+}
+
+/// Reads a key that is false where it is absent.
+fn truth(section: &mut Section<'_>, key: &'static str) -> Result<bool, SceneError> {
+    section.take(key).map_or(Ok(false), |value| value.truth())
 }
 
 fn isolation(value: Value<'_>) -> Result<Isolation, SceneError> {

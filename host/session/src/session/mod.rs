@@ -92,6 +92,18 @@ pub enum RunError {
         "no watchdog process: {0}; `[limits] require_independent_stop = true` requires one; correct the cause, or remove that line"
     )]
     WatchdogProcess(std::io::Error),
+    /// Only the watchdog process stops a device when this process is gone, and a kill of one control group ends both.
+    #[error(
+        "a kill of the control group `{group}`, as at the end of a service or a container or when memory runs out, leaves the force of \
+         `{device}` on: the watchdog process cannot leave that group, and the device has no watchdog of its own; `flotor doctor` says how \
+         to start the run; `[limits] accept_shared_control_group = true` or `--accept-shared-control-group` accepts it"
+    )]
+    SharedControlGroup {
+        /// Name of the device in the scene.
+        device: String,
+        /// The group of both processes.
+        group: String,
+    },
     /// The emergency stop of the machine is pressed, or was while the run started; nothing was energised.
     #[error("{}", latch::latched_words(.0.as_ref()))]
     Latched(Option<Pressed>),
@@ -117,6 +129,7 @@ impl RunError {
         match self {
             Self::Scene(_)
             | Self::Mismatch { .. }
+            | Self::SharedControlGroup { .. }
             | Self::Lookup(LookupError::Unknown { .. } | LookupError::Ambiguous { .. }) => true,
             Self::Lookup(LookupError::Refused(error)) | Self::Plugin(error) => error.is_configuration(),
             Self::Thread(_)

@@ -102,6 +102,13 @@ impl Opened {
                 .to_owned()
         })
     }
+
+    /// Whether a hand may feel it and only the watchdog process stops it when this process is gone.
+    fn needs_watchdog_process(&self) -> bool {
+        self.embodiment == Embodiment::Physical
+            && self.capabilities.actuated != Axes::NONE
+            && matches!(self.independence, Some(Independence::Message { .. }))
+    }
 }
 
 /// That models may ask for torque and the device gives none, unless the scene says that none is wanted. A model says that it can
@@ -158,7 +165,17 @@ pub(super) fn watchdog_process(
         }
     };
     let process_is_there = process.as_ref().and_then(Option::as_ref);
-    warnings.extend(process_is_there.and_then(WatchdogProcess::shared_group).map(shared_group_warning));
+    if let Some(group) = process_is_there.and_then(WatchdogProcess::shared_group) {
+        let mut devices =
+            scene.devices.iter().zip(opened).filter(|(_, opened)| opened.needs_watchdog_process());
+        match devices.next().filter(|_| !scene.limits.accept_shared_control_group) {
+            Some((device, _)) => {
+                let (device, group) = (device.name.clone(), group.to_owned());
+                return Err(RunError::SharedControlGroup { device, group });
+            }
+            None => warnings.push(shared_group_warning(group)),
+        }
+    }
     // One that stops by itself needs nobody.
     if process.is_none() || opened.iter().any(|opened| opened.without_independent_stop().is_some()) {
         warnings.extend(NOT_CAUGHT.map(str::to_owned));
