@@ -2,6 +2,7 @@
 //! plugins are.
 
 use clap::Parser;
+use flotor_core::terminal::escaped;
 use flotor_drawing::camera::View;
 use flotor_live::Directory;
 use flotor_study::screen::{Screen, Told};
@@ -135,7 +136,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure(text, code)) => {
-            eprintln!("error: {text}");
+            eprintln!("error: {}", escaped(&text));
             ExitCode::from(code)
         }
     }
@@ -272,7 +273,7 @@ fn screenshot(
     let (mut shapes, missing) =
         history.first().map(|first| shapes_of(first.run(), &arguments.plugins)).unwrap_or_default();
     for reason in missing {
-        eprintln!("note: {reason}");
+        eprintln!("note: {}", escaped(&reason.to_string()));
     }
     let options = PictureOptions { size_px, scale, look, view: arguments.view, chosen, at_s: arguments.at };
     let image = picture(history, &mut shapes, &options).map_err(Failure::usage)?;

@@ -10,6 +10,7 @@ use flotor_bridge::link::{End, Link, LinkError, LinkOptions, open};
 use flotor_bridge::remote::{Remote, bridges};
 use flotor_bridge::request::{Request, Right};
 use flotor_bridge::serve::{Launcher, Service, serve};
+use flotor_core::terminal::escaped;
 use flotor_live::{Directory, SetValue};
 use std::error::Error;
 use std::path::PathBuf;
@@ -164,7 +165,7 @@ fn main() -> ExitCode {
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {}", escaped(&error.to_string()));
             let is_usage = error
                 .downcast_ref::<LinkError>()
                 .is_some_and(|e| matches!(e, LinkError::Config { .. } | LinkError::WithoutKeys { .. }));
@@ -182,10 +183,10 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
     let directory = Directory::of_this_user();
     let visit = |link: LinkOptions| {
         let link = open(&link.or_this_user(&directory, None), End::Visiting)?;
-        tell_expiry(&link, &mut |line| eprintln!("{line}"));
+        tell_expiry(&link, &mut |line| eprintln!("{}", escaped(line)));
         Ok::<Link, LinkError>(link)
     };
-    let mut tell = |line: &str| eprintln!("{line}");
+    let mut tell = |line: &str| eprintln!("{}", escaped(line));
     match command {
         Command::Serve(serving) => {
             let service = service(serving)?;
@@ -220,7 +221,9 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
                 RecordingEnd::Stopped => "stopped recording",
                 RecordingEnd::Cut => "the bridge cannot be seen any more",
             };
-            println!("{}: {} ticks, {} lost on the way; {words}", file.display(), kept.ticks, kept.lost);
+            let shown =
+                format!("{}: {} ticks, {} lost on the way; {words}", file.display(), kept.ticks, kept.lost);
+            println!("{}", escaped(&shown));
             if kept.end == RecordingEnd::Cut {
                 return Err(
                     "the recording ends before the run has told its end; what had come is in the file".into(),
@@ -239,7 +242,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             }
             for name in names {
                 let status = Remote::listen(&session, &name)?.status()?.unwrap_or_default();
-                println!("zenoh/{name:<20} {:<18} {}", status.state.word(), status.title);
+                println!("zenoh/{name:<20} {:<18} {}", status.state.word(), escaped(&status.title));
             }
         }
         Command::Keys(KeysArguments { folder, hosts, watch, operate, own, days }) => {

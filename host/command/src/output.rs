@@ -1,6 +1,7 @@
 //! What commands print, for people and for machines.
 
 use crate::platform::results_apart;
+use crate::style::for_terminal;
 use crate::{CommandError, style};
 use flotor_servo::last_stop::{ReportedEnd, leave_process, report_end};
 use std::fs::File;
@@ -21,7 +22,7 @@ pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     let code = match result {
         Ok(()) => 0,
         Err(error) => {
-            print_error_line(format_args!("{} {}", style::error("error:"), for_terminal(&error)));
+            print_error_line(format_args!("{} {error}", style::error("error:")));
             error.exit_code()
         }
     };
@@ -61,20 +62,25 @@ fn write_line(line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
 
 /// What `say!` does.
 pub fn print_line(line: std::fmt::Arguments<'_>) {
-    if let Err(error) = write_line(line) {
+    if let Err(error) = write_line(format_args!("{}", for_terminal(line))) {
         let code = if error.kind() == std::io::ErrorKind::BrokenPipe { 0 } else { 1 };
         report_end(ReportedEnd::Code(code));
         std::process::exit(code.into());
     }
 }
 
-/// Prints a line where the command has more to do, or an exit code of its own: a closed pipe ends
+/// Prints a line for people where the command has more to do, or an exit code of its own: a closed pipe ends
 /// nothing.
 ///
 /// # Errors
 /// If standard output cannot be written; a closed pipe is no error.
 pub fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
-    match write_line(line) {
+    report_text(format_args!("{}", for_terminal(line)))
+}
+
+/// The same with a text for machines, which is printed as it is.
+fn report_text(text: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
+    match write_line(text) {
         Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(CommandError::file(Path::new("standard output"), "cannot write the result", cause))
         }
@@ -82,27 +88,14 @@ pub fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
     }
 }
 
-/// Prints a line on standard error. `eprintln!` panics where nobody reads it, and the exit code is lost then.
+/// Prints a line for people on standard error. `eprintln!` panics where nobody reads it, and the exit code is lost then.
 pub fn print_error_line(line: std::fmt::Arguments<'_>) {
-    let _ = writeln!(std::io::stderr(), "{line}");
-}
-
-/// A message, control characters but ends of lines and tabs escaped: a file that it quotes may be anybody's, the terminal is not.
-fn for_terminal(message: impl std::fmt::Display) -> String {
-    let mut shown = String::new();
-    for character in message.to_string().chars() {
-        if character.is_control() && !matches!(character, '\n' | '\t') {
-            shown.extend(character.escape_default());
-        } else {
-            shown.push(character);
-        }
-    }
-    shown
+    let _ = writeln!(std::io::stderr(), "{}", for_terminal(line));
 }
 
 /// Prints a note on standard error; it changes no exit code.
 pub fn note(text: impl std::fmt::Display) {
-    print_error_line(format_args!("{} {}", style::warning("note:"), for_terminal(text)));
+    print_error_line(format_args!("{} {text}", style::warning("note:")));
 }
 
 /// The first error: it decides the exit code, and the caller prints it last. This function prints the others.
@@ -113,7 +106,7 @@ pub fn first_error(results: impl IntoIterator<Item = Result<(), CommandError>>) 
     let mut errors = results.into_iter().filter_map(Result::err);
     let first = errors.next();
     errors.for_each(|error| {
-        print_error_line(format_args!("{} {}", style::error("error:"), for_terminal(error)));
+        print_error_line(format_args!("{} {error}", style::error("error:")));
     });
     first.map_or(Ok(()), Err)
 }
@@ -126,7 +119,7 @@ pub fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), Com
     let json =
         serde_json::to_string_pretty(value).map_err(|error| CommandError::Failed(error.to_string()))?;
     if path.as_os_str() == "-" {
-        return report_line(format_args!("{json}"));
+        return report_text(format_args!("{json}"));
     }
     std::fs::write(path, json + "\n")
         .map_err(|cause| CommandError::file(path, "cannot write the JSON", cause))
@@ -155,7 +148,7 @@ pub fn print_result<T: serde::Serialize>(
 pub fn write_text(path: Option<&Path>, text: impl FnOnce() -> String) -> Result<(), CommandError> {
     let Some(path) = path else { return Ok(()) };
     if path.as_os_str() == "-" {
-        return report_line(format_args!("{}", text().trim_end()));
+        return report_text(format_args!("{}", text().trim_end()));
     }
     std::fs::write(path, text()).map_err(|cause| CommandError::file(path, "cannot write the result", cause))
 }

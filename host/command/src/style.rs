@@ -1,26 +1,55 @@
-//! Colours, on terminals only.
+//! Colours, on terminals only; control characters of names and messages reach none.
+//!
+//! A text carries its colours as marks, noncharacters of Unicode, which become sequences of the terminal when the text is printed.
 
+use flotor_core::terminal::escaped;
 use std::io::IsTerminal;
 
-fn painted(code: &str, text: &str, terminal: bool) -> String {
+/// Marks in a text, each with its sequence for the terminal.
+const MARKS: [(char, &str); 4] =
+    [(ERROR, "\x1b[1;31m"), (WARNING, "\x1b[33m"), (TITLE, "\x1b[1m"), (PLAIN, "\x1b[0m")];
+const ERROR: char = '\u{fdd0}';
+const WARNING: char = '\u{fdd1}';
+const TITLE: char = '\u{fdd2}';
+const PLAIN: char = '\u{fdd3}';
+
+fn painted(mark: char, text: &str, terminal: bool) -> String {
     let wanted = terminal && std::env::var_os("NO_COLOR").is_none();
-    if wanted { format!("\x1b[{code}m{text}\x1b[0m") } else { text.to_owned() }
+    if wanted { format!("{mark}{text}{PLAIN}") } else { text.to_owned() }
+}
+
+/// Returns a text for people as a terminal may receive it: [escaped], with the sequences of its styles.
+#[must_use]
+pub fn for_terminal(text: impl std::fmt::Display) -> String {
+    let escaped = escaped(&text.to_string());
+    MARKS.iter().fold(escaped, |shown, (mark, sequence)| shown.replace(*mark, sequence))
 }
 
 /// Red and bold, for the first word of an error.
 #[must_use]
 pub fn error(text: &str) -> String {
-    painted("1;31", text, std::io::stderr().is_terminal())
+    painted(ERROR, text, std::io::stderr().is_terminal())
 }
 
 /// Yellow, for the first word of a warning.
 #[must_use]
 pub fn warning(text: &str) -> String {
-    painted("33", text, std::io::stderr().is_terminal())
+    painted(WARNING, text, std::io::stderr().is_terminal())
 }
 
 /// Bold, for titles.
 #[must_use]
 pub fn title(text: &str) -> String {
-    painted("1", text, std::io::stdout().is_terminal())
+    painted(TITLE, text, std::io::stdout().is_terminal())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_terminal_receives_no_control_character_but_those_of_a_style() {
+        assert_eq!(for_terminal(painted(TITLE, "x\x1b", true)), "\x1b[1mx\\u{1b}\x1b[0m");
+        assert_eq!(for_terminal("x\u{202e}"), "x\\u{202e}");
+    }
 }

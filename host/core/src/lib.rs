@@ -6,6 +6,7 @@
 //!   a device, in a loop.
 //! - [`plausibility`]: whether a sample can be true.
 //! - [`coupling`]: two devices held together; [`peer`]: what the two ends tell each other.
+//! - [`terminal`]: text without control characters.
 //! - [`Change`]: a parameter that changed while the loop ran.
 //!
 //! Nothing here reads files, starts threads or talks to the system.
@@ -21,6 +22,7 @@ pub mod peer;
 pub mod plausibility;
 mod random;
 pub mod rendered_boundary;
+pub mod terminal;
 pub mod trace;
 
 pub use change::{Change, ChangeOutcome, ChangeSubject};

@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use flotor_command::options::{JsonOption, PluginPathOption};
+use flotor_command::{print_error_line, say};
 use flotor_sweep::executor::execute;
 use flotor_sweep::plan::Plan;
 use flotor_sweep::store::Store;
@@ -55,7 +56,7 @@ fn main() -> ExitCode {
         Err(Failure::Usage(message)) => (2, message),
         Err(Failure::Other(message)) => (1, message),
     };
-    eprintln!("error: {message}");
+    print_error_line(format_args!("error: {message}"));
     ExitCode::from(code)
 }
 
@@ -94,7 +95,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(path) if path.as_os_str() == "-" => println!("{summary:#}"),
         Some(path) => std::fs::write(path, format!("{summary:#}\n"))
             .map_err(|cause| Failure::Other(format!("{}: {cause}", path.display())))?,
-        None => println!(
+        None => say!(
             "{} rows in {} ({} tasks done now, {} found finished, {:.1} s)",
             rows.len(),
             results.display(),

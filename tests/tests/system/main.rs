@@ -60,6 +60,7 @@ mod study_scripts;
 mod supply;
 mod swap;
 mod teleoperation;
+mod terminal;
 mod two_hosts;
 mod validate;
 #[cfg(feature = "drop-ins")]

@@ -4,6 +4,7 @@ use crate::host::{note_emergency_stop, stations_so_far};
 use crate::settings::{Pace, Settings};
 use crate::station::Station;
 use flotor_core::Change;
+use flotor_core::terminal::escaped;
 use flotor_core::trace::TickRecord;
 use flotor_hal::DVec3;
 use flotor_live::Directory;
@@ -300,5 +301,5 @@ pub(crate) fn tell(problem: &str) {
 /// To standard error, which may be closed: a library does not panic for want of it.
 fn tell_plainly(text: &str) {
     use std::io::Write;
-    let _ = writeln!(std::io::stderr(), "{text}");
+    let _ = writeln!(std::io::stderr(), "{}", escaped(text));
 }

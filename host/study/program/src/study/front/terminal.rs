@@ -8,7 +8,7 @@ use flotor_study::conduct::OutsideError;
 use flotor_study::protocol::Quality;
 use flotor_study::screen::{Input, May, Pause, Question, Screen, TrialView};
 use flotor_study::trial::{Phase, Position, Response};
-use std::io::{BufReader, IsTerminal};
+use std::io::{BufReader, IsTerminal, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
 /// A person at this terminal.
@@ -51,7 +51,8 @@ impl FrontEnd for Terminal {
 
     fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
         // The bell is the beep of the thesis; the masking noise is another signal.
-        say!("\x07  {} the handle is out of its range: move it back", style::warning("!"));
+        ring_bell();
+        say!("  {} the handle is out of its range: move it back", style::warning("!"));
         Ok(())
     }
 
@@ -59,6 +60,11 @@ impl FrontEnd for Terminal {
         say!("  {why}");
         Ok(())
     }
+}
+
+/// Rings the bell of the terminal.
+fn ring_bell() {
+    let _ = std::io::stdout().write_all(b"\x07");
 }
 
 /// A screen as text.
