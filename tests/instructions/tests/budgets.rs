@@ -55,13 +55,56 @@ fn keep_budget(name: &str, counted: f64) {
     if cfg!(not(target_arch = "x86_64")) {
         return tools::skipped("budgets are of x86-64");
     }
+    let [budget, margin] = budgets([name, "margin"]);
+    let most = budget * (1.0 + margin);
+    assert!(counted <= most, "{name}: {counted:.2} counted, at most {most:.2}");
+}
+
+/// Numbers of `budgets.toml`.
+fn budgets<const N: usize>(names: [&str; N]) -> [f64; N] {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("budgets.toml");
     let text = std::fs::read_to_string(file).expect("the budgets are there");
     let budgets: toml::Table = text.parse().expect("the budgets are TOML");
     let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
-    let of = |key: &str| budgets.get(key).and_then(number).unwrap_or_else(|| panic!("no budget `{key}`"));
-    let most = of(name) * (1.0 + of("margin"));
-    assert!(counted <= most, "{name}: {counted:.2} counted, at most {most:.2}");
+    names.map(|name| budgets.get(name).and_then(number).unwrap_or_else(|| panic!("no budget `{name}`")))
+}
+
+/// The chapter on speed prints the counts of `budgets.toml`, and shares that follow from them.
+#[test]
+fn the_book_prints_these_counts() {
+    let chapter = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/bench.md");
+    let chapter = std::fs::read_to_string(chapter).expect("the chapter is there");
+    let words = chapter.split_whitespace().collect::<Vec<_>>().join(" ");
+    let prints = |text: &str| assert!(words.contains(text), "the chapter does not print `{text}`");
+    let [printed, closed, energy, blending, closed_batch, energy_batch, rod_mean, rod_worst] = budgets([
+        "law_printed",
+        "law_closed_form",
+        "law_energy",
+        "blending_where_there_is_nothing_to",
+        "law_closed_form_batch",
+        "law_energy_batch",
+        "rod_mean",
+        "rod_worst",
+    ]);
+    for (row, count) in [
+        ("`closed-form`", closed),
+        ("`energy`", energy),
+        ("`energy`, with the check for blending", energy + blending),
+        ("`closed-form`, batch with AVX2", closed_batch),
+        ("`energy`, batch with AVX2", energy_batch),
+    ] {
+        prints(&format!("| {row} | {count} | {:.2} |", count / printed));
+    }
+    prints(&format!("| printed law (`thesis`, double) | {printed} | 1 |"));
+    prints(&format!(
+        "| `rod`, servo, mean of a smooth hand's ticks | {rod_mean} | {:.1} |",
+        rod_mean / printed
+    ));
+    prints(&format!("| `rod`, servo, worst of them | {rod_worst} | {:.0} |", rod_worst / printed));
+    let [scripted, simulated] = budgets(["tick_scripted", "tick_simulated"]);
+    prints(&format!(
+        "`tests/instructions/budgets.toml`: {scripted} on the scripted device, {energy} of them the law of the spring, and {simulated} on"
+    ));
 }
 
 #[test]
