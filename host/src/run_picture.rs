@@ -2,7 +2,7 @@
 
 use crate::timing_picture::panels;
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::{DVec3, rotation_vector};
+use flotor_hal::{DVec3, Demand, rotation_vector};
 use flotor_plot::{Axis, Figure, Mark, Panel, Series};
 use flotor_servo::Timing;
 use flotor_session::Observer;
@@ -42,7 +42,9 @@ impl RunPicture {
             if !is_one_of_several {
                 figure = figure.panel(axes("Torque", "mN·m", 1.0e3, |record| record.commanded.torque()));
             }
-            let energy = self.single(device, &label("Stored energy"), "mJ", |record| record.energy_j * 1.0e3);
+            let energy_mj =
+                |record: &TickRecord| record.model.energy_j().map_or(f64::NAN, |joule| joule * 1.0e3);
+            let energy = self.single(device, &label("Stored energy"), "mJ", energy_mj);
             figure = figure.panel(energy);
         }
         if self.records.iter().any(|record| record.lateness_ns > 0) {
@@ -88,6 +90,11 @@ impl RunPicture {
 }
 
 impl Observer for RunPicture {
+    /// The energy that is drawn.
+    fn demand(&self) -> Demand {
+        Demand::ENERGY.with(Demand::FORCE)
+    }
+
     fn observe(&mut self, record: &TickRecord) {
         self.records.push(*record);
     }

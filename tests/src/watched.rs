@@ -3,6 +3,7 @@
 use crate::library::build_folder;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_live::Directory;
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
@@ -30,6 +31,11 @@ struct Keep {
 impl Observer for Keep {
     fn observe(&mut self, record: &TickRecord) {
         self.records.push(*record);
+    }
+
+    /// Everything that a record can hold.
+    fn demand(&self) -> Demand {
+        Demand::ALL
     }
 
     fn change(&mut self, change: &Change) {

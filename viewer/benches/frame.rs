@@ -10,7 +10,7 @@ use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_drawing::camera::Camera;
 use flotor_drawing::gpu::GpuScene;
-use flotor_hal::Pose;
+use flotor_hal::{Demand, Pose};
 use flotor_record::{PluginDescription, Role, RunDescription};
 use flotor_sync::Words;
 use flotor_viewer::app::{Start, Viewer};
@@ -78,6 +78,7 @@ fn run(model: &str) -> RunDescription {
             blend: Blend::default(),
             field: None,
             latency_s: 0.0,
+            felt: Demand::WRENCH,
             settings: Vec::new(),
             parameters: Vec::new(),
             device: 0,

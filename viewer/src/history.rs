@@ -21,7 +21,7 @@ pub struct Sample {
     pub twist: [f32; 6],
     /// What was sent to the device, N and N·m.
     pub commanded: [f32; 6],
-    /// Energy stored in the models, J.
+    /// Energy stored in the models, J; NaN where it was not computed.
     pub energy_j: f32,
     /// How late the tick started, s.
     pub lateness_s: f32,
@@ -71,7 +71,7 @@ impl From<&TickRecord> for Sample {
             pose: record.pose,
             twist: six(record.twist.linear_m_per_s, record.twist.angular_rad_per_s),
             commanded: six(record.commanded.force_n, record.commanded.torque_nm),
-            energy_j: record.energy_j as f32,
+            energy_j: record.model.energy_j().map_or(f32::NAN, |joule| joule as f32),
             lateness_s: record.lateness_ns as f32 * 1.0e-9,
             stiffness_n_per_m: f32::NAN,
             compute_s: record.compute_ns as f32 * 1.0e-9,

@@ -3,6 +3,7 @@
 use crate::link::LinkError;
 use crate::remote::{Errand, Remote, Told};
 use crate::request::Request;
+use flotor_core::demand::ObserverDemand;
 use flotor_live::{Ask, Directory, End, EndKind, Publication, PublishError, RefusalCause, Serve};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -47,7 +48,13 @@ pub fn attach(
 ) -> Result<(), AttachError> {
     while let Some((greeting, run)) = remote.wait_for_run(stop)? {
         let title = greeting.title.clone();
-        let publication = Publication::open(directory, greeting, &run, Arc::new(remote.errand()))?;
+        let publication = Publication::open(
+            directory,
+            greeting,
+            &run,
+            Arc::new(remote.errand()),
+            ObserverDemand::default(),
+        )?;
         tell(&format!("`{title}` is at {}; `flotor view` shows it", publication.path().display()));
         let lost_before = remote.lost();
         let End { words, kind } = show(remote, &publication, stop);

@@ -1,6 +1,6 @@
 //! Plain data and maths of a run: what servo, recording and observers share, without any of them.
 //!
-//! - [`trace`]: what a tick leaves behind.
+//! - [`trace`]: what a tick leaves behind; [`demand`]: the outputs of models that a run needs.
 //! - [`mapping`]: between the device frame and a model's frame.
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
 //!   a device, in a loop.
@@ -15,9 +15,11 @@
 mod change;
 mod clock;
 pub mod coupling;
+pub mod demand;
 pub mod limits;
 pub mod mapping;
 pub mod oscillation;
+mod outputs;
 pub mod peer;
 pub mod plausibility;
 mod random;
@@ -27,6 +29,7 @@ pub mod trace;
 
 pub use change::{Change, ChangeOutcome, ChangeSubject};
 pub use clock::Clock;
+pub use outputs::ModelOutputs;
 pub use random::Random;
 
 /// Devices of a run at most.

@@ -2,7 +2,8 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
-use flotor_hal::{Pose, Twist, Wrench};
+use crate::ModelOutputs;
+use flotor_hal::{Demand, Pose, Twist, Wrench};
 use flotor_sync::Words;
 
 /// Things that happened in a tick, as a bit set.
@@ -126,7 +127,7 @@ impl Events {
 /// Everything one tick leaves behind at one device, in the device frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TickRecord {
-    /// Number of the tick, below 2^48: 8900 years at 1 kHz.
+    /// Number of the tick, below 2^46: 2200 years at 1 kHz.
     pub tick: u64,
     /// Number of the device in the scene: a tick leaves one record for each, in this order.
     pub device: u16,
@@ -138,14 +139,12 @@ pub struct TickRecord {
     pub pose: Pose,
     /// Velocity of the handle, m/s and rad/s.
     pub twist: Twist,
-    /// What the models asked for, mapped to the device frame, N and N·m.
-    pub model: Wrench,
+    /// Outputs of models and couplings, in the device frame and scaled to the device.
+    pub model: ModelOutputs,
     /// What was sent to the device after the envelope, N and N·m.
     pub commanded: Wrench,
     /// What the device says it delivered since the previous tick, N and N·m.
     pub delivered: Wrench,
-    /// Energy stored in the models, scaled to the device, J.
-    pub energy_j: f64,
     /// Energy the hand has put into the device's port so far less what has come out, J.
     pub port_energy_j: f64,
     /// What happened.
@@ -163,9 +162,13 @@ pub const RECORD_WORDS: usize = 39;
 /// Words at the end of a record that hold measured times.
 pub const TIMING_WORDS: usize = 2;
 
-/// Bits of the first word that hold the number of the tick; the device is above.
-const TICK_BITS: u32 = 48;
+/// Bits of the first word that hold the number of the tick; the absent outputs are above, and the device above these.
+const TICK_BITS: u32 = 46;
 const TICK_MASK: u64 = (1 << TICK_BITS) - 1;
+/// Bit of the first word that is set where an output of the models is absent.
+const ABSENT: [(Demand, u64); 2] = [(Demand::TORQUE, 1 << TICK_BITS), (Demand::ENERGY, 1 << (TICK_BITS + 1))];
+/// First bit of the number of the device.
+const DEVICE_BIT: u32 = TICK_BITS + 2;
 
 impl Words<RECORD_WORDS> for TickRecord {
     /// Written out: a tick does this, and a loop over the parts costs it three times as much.
@@ -177,14 +180,18 @@ impl Words<RECORD_WORDS> for TickRecord {
             let Wrench { force_n: [fx, fy, fz], torque_nm: [tx, ty, tz] } = *wrench;
             [fx, fy, fz, tx, ty, tz].map(f64::to_bits)
         };
-        let [m0, m1, m2, m3, m4, m5] = six(&self.model);
+        let (model, energy_j) = self.model.numbers();
+        let [m0, m1, m2, m3, m4, m5] = six(model);
         let [c0, c1, c2, c3, c4, c5] = six(&self.commanded);
         let [d0, d1, d2, d3, d4, d5] = six(&self.delivered);
         let [x, y, z, qx, qy, qz, qw] = [x, y, z, qx, qy, qz, qw].map(f64::to_bits);
         let [vx, vy, vz, wx, wy, wz] = [vx, vy, vz, wx, wy, wz].map(f64::to_bits);
-        let number = self.tick & TICK_MASK | u64::from(self.device) << TICK_BITS;
+        let computed = self.model.computed();
+        let absent = |(output, bit): (Demand, u64)| if computed.contains(output) { 0 } else { bit };
+        let [torque, energy_bit] = ABSENT.map(absent);
+        let number = self.tick & TICK_MASK | torque | energy_bit | u64::from(self.device) << DEVICE_BIT;
         let flags = u64::from(self.events.bits) | u64::from(self.buttons) << 32;
-        let [energy, port_energy] = [self.energy_j, self.port_energy_j].map(f64::to_bits);
+        let [energy, port_energy] = [energy_j, self.port_energy_j].map(f64::to_bits);
         #[rustfmt::skip] // a line for each part of a record
         let words = [
             number, self.time_ns, self.dt_ns,
@@ -205,7 +212,10 @@ impl Words<RECORD_WORDS> for TickRecord {
         let mut word = || rest.next().unwrap_or(0);
         let (number, time_ns, dt_ns) = (word(), word(), word());
         #[allow(clippy::cast_possible_truncation)] // two parts of one word
-        let (tick, device) = (number & TICK_MASK, (number >> TICK_BITS) as u16);
+        let (tick, device) = (number & TICK_MASK, (number >> DEVICE_BIT) as u16);
+        let computed = ABSENT.iter().fold(Demand::FORCE, |computed, (output, bit)| {
+            if number & bit == 0 { computed.with(*output) } else { computed }
+        });
         let mut number = || f64::from_bits(word());
         let mut three = || std::array::from_fn(|_| number());
         let position_m = three();
@@ -215,6 +225,7 @@ impl Words<RECORD_WORDS> for TickRecord {
         let mut wrench = || Wrench { force_n: three(), torque_nm: three() };
         let (model, commanded, delivered) = (wrench(), wrench(), wrench());
         let (energy_j, port_energy_j) = (number(), number());
+        let model = ModelOutputs::new(model, energy_j).limited_to(computed);
         let flags = word();
         #[allow(clippy::cast_possible_truncation)] // two halves of one word
         let (events, buttons) = (Events::from_bits(flags as u32), (flags >> 32) as u32);
@@ -230,7 +241,6 @@ impl Words<RECORD_WORDS> for TickRecord {
             model,
             commanded,
             delivered,
-            energy_j,
             port_energy_j,
             events,
             buttons,
@@ -248,5 +258,18 @@ mod tests {
     fn every_word_of_a_record_survives_the_ring() {
         let words: [u64; RECORD_WORDS] = std::array::from_fn(|i| 0x3ff0_0000_0000_0000 + i as u64 * 0x101);
         assert_eq!(TickRecord::from_words(&words).to_words(), words);
+    }
+
+    #[test]
+    fn an_absent_output_stays_absent_and_leaves_no_number() {
+        let all = TickRecord::from_words(&std::array::from_fn(|i| i as u64 + 1));
+        for demand in [Demand::FORCE, Demand::WRENCH, Demand::FORCE.with(Demand::ENERGY), Demand::ALL] {
+            let record = TickRecord { model: all.model.limited_to(demand), ..all };
+            let back = TickRecord::from_words(&record.to_words());
+            assert_eq!((back, back.model.computed()), (record, demand));
+            assert_eq!(back.model.torque().is_some(), demand.contains(Demand::TORQUE));
+            assert_eq!(back.model.energy_j().is_some(), demand.contains(Demand::ENERGY));
+            assert_eq!((back.tick, back.device), (all.tick, all.device));
+        }
     }
 }

@@ -28,17 +28,23 @@ pub(crate) fn read_recording(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'
     matrix(&columns, &records, "orientation_xyzw", |r| r.pose.orientation_xyzw)?;
     matrix(&columns, &records, "linear_m_per_s", |r| r.twist.linear_m_per_s)?;
     matrix(&columns, &records, "angular_rad_per_s", |r| r.twist.angular_rad_per_s)?;
-    for (wrench, force, torque) in [
-        (0, "model_force_n", "model_torque_nm"),
-        (1, "commanded_force_n", "commanded_torque_nm"),
-        (2, "delivered_force_n", "delivered_torque_nm"),
-    ] {
-        let pick = move |r: &TickRecord| [r.model, r.commanded, r.delivered][wrench];
+    for (wrench, force, torque) in
+        [(0, "commanded_force_n", "commanded_torque_nm"), (1, "delivered_force_n", "delivered_torque_nm")]
+    {
+        let pick = move |r: &TickRecord| [r.commanded, r.delivered][wrench];
         matrix(&columns, &records, force, move |r| pick(r).force_n)?;
         matrix(&columns, &records, torque, move |r| pick(r).torque_nm)?;
     }
-    let energy_j: Vec<f64> = records.iter().map(|r| r.energy_j).collect();
-    columns.set_item("energy_j", energy_j.into_pyarray(py))?;
+    matrix(&columns, &records, "model_force_n", |r| r.model.force().to_array())?;
+    // A column only of what was computed; NaN in the ticks without it.
+    if records.iter().any(|r| r.model.torque().is_some()) {
+        let torque_nm = |r: &TickRecord| r.model.torque().map_or([f64::NAN; 3], |torque| torque.to_array());
+        matrix(&columns, &records, "model_torque_nm", torque_nm)?;
+    }
+    if records.iter().any(|r| r.model.energy_j().is_some()) {
+        let energy_j: Vec<f64> = records.iter().map(|r| r.model.energy_j().unwrap_or(f64::NAN)).collect();
+        columns.set_item("energy_j", energy_j.into_pyarray(py))?;
+    }
     let events: Vec<u32> = records.iter().map(|r| r.events.bits()).collect();
     columns.set_item("events", events.into_pyarray(py))?;
     columns.set_item("lateness_ns", whole(|r| r.lateness_ns))?;

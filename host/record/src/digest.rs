@@ -1,7 +1,7 @@
 //! A run in one line: equal digests, equal runs.
 
+use flotor_core::ModelOutputs;
 use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
-use flotor_hal::Wrench;
 use flotor_sync::Words;
 use xxhash_rust::xxh3::Xxh3;
 
@@ -23,7 +23,7 @@ impl Coverage {
     #[inline]
     fn of(self, record: &TickRecord) -> TickRecord {
         match self {
-            Self::Hand => TickRecord { model: Wrench::ZERO, energy_j: 0.0, port_energy_j: 0.0, ..*record },
+            Self::Hand => TickRecord { model: ModelOutputs::ZERO, port_energy_j: 0.0, ..*record },
             Self::Everything => *record,
         }
     }

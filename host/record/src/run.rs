@@ -4,6 +4,7 @@ use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Run, Setting, Vector
 use flotor_core::Clock;
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+use flotor_hal::Demand;
 use prost::Message;
 use std::collections::BTreeMap;
 
@@ -56,6 +57,8 @@ pub struct PluginDescription {
     pub field: Option<FieldTiming>,
     /// Of a device: the latency that it declares, s; 0 in recordings of earlier versions.
     pub latency_s: f64,
+    /// Of a device: the outputs of models that reach the hand there; force and torque in recordings of earlier versions.
+    pub felt: Demand,
     /// What scene and command line set, as written, in order: to repeat the run, set these.
     pub settings: Vec<(String, String)>,
     /// Every parameter with the value in force: to know what they were.
@@ -191,10 +194,20 @@ impl PluginDescription {
                 latency_s: Some(field.latency_s),
             }),
             latency_s: matches!(self.role, Role::Device).then_some(self.latency_s),
+            felt: match self.role {
+                Role::Model(_) => schema::Felt::Unspecified,
+                Role::Device if self.felt.contains(Demand::TORQUE) => schema::Felt::Wrench,
+                Role::Device => schema::Felt::Force,
+            }
+            .into(),
         }
     }
 
     fn from_message(plugin: Plugin) -> Result<Self, Missing> {
+        let felt = match plugin.felt() {
+            schema::Felt::Force => Demand::FORCE,
+            schema::Felt::Wrench | schema::Felt::Unspecified => Demand::WRENCH,
+        };
         let role = match plugin.mapping {
             None => Role::Device,
             Some(mapping) => Role::Model(mapping.config()?),
@@ -217,6 +230,7 @@ impl PluginDescription {
             device: u16::try_from(plugin.device).map_err(|_| Missing("plugin.device"))?,
             field,
             latency_s: plugin.latency_s.unwrap_or(0.0),
+            felt,
             name: plugin.name,
             id: plugin.id,
             version: plugin.version,

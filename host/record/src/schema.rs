@@ -7,8 +7,8 @@
 use crate::{Note, Severity};
 use flotor_core::mapping::MappingConfig;
 use flotor_core::trace::{Events, TickRecord};
-use flotor_core::{Change as ParameterChange, ChangeOutcome, ChangeSubject};
-use flotor_hal::{Pose, Twist as TwistValue, Wrench as WrenchValue};
+use flotor_core::{Change as ParameterChange, ChangeOutcome, ChangeSubject, ModelOutputs};
+use flotor_hal::{Demand, Pose, Twist as TwistValue, Wrench as WrenchValue};
 use prost::{Enumeration, Message};
 use prost_types::Timestamp;
 
@@ -19,7 +19,7 @@ pub(crate) const DESCRIPTOR_SET: &[u8] = include_bytes!("../proto/flotor.binpb")
 pub(crate) const ENCODING: &str = "protobuf";
 
 /// Format this program writes, and the highest it reads.
-pub(crate) const FORMAT: u32 = 1;
+pub(crate) const FORMAT: u32 = 2;
 
 /// Frame of all numbers; its axes are those of the device frame.
 const DEVICE_FRAME: &str = "device";
@@ -191,6 +191,7 @@ messages! {
         device: u32 = 10 [uint32],
         field: Option<FieldTiming> = 11 [message, optional],
         latency_s: Option<f64> = 12 [double, optional],
+        felt: i32 = 13 [enumeration = "Felt"],
     }
 
     FieldTiming: Copy {
@@ -243,6 +244,14 @@ enum Subject {
     Parameter = 0,
     Weight = 1,
     Plugin = 2,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+pub(crate) enum Felt {
+    Unspecified = 0,
+    Force = 1,
+    Wrench = 2,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
@@ -359,6 +368,27 @@ impl Wrench {
         Self { force_n: Some(force), torque_nm: Some(torque) }
     }
 
+    /// Without the torque where it is absent.
+    fn of_models(outputs: &ModelOutputs) -> Self {
+        let force_n = Some(Vector3::new(outputs.force().to_array()));
+        Self { force_n, torque_nm: outputs.torque().map(|torque| Vector3::new(torque.to_array())) }
+    }
+
+    /// Outputs of the models, with torque and energy absent where the messages have none.
+    fn outputs(self, energy_j: Option<f64>) -> Result<ModelOutputs, Missing> {
+        let force_n = self.force_n.ok_or(Missing("force_n"))?.to_array();
+        let torque_nm = self.torque_nm.map(Vector3::to_array);
+        let mut computed = Demand::FORCE;
+        if torque_nm.is_some() {
+            computed = computed.with(Demand::TORQUE);
+        }
+        if energy_j.is_some() {
+            computed = computed.with(Demand::ENERGY);
+        }
+        let wrench = WrenchValue { force_n, torque_nm: torque_nm.unwrap_or_default() };
+        Ok(ModelOutputs::new(wrench, energy_j.unwrap_or_default()).limited_to(computed))
+    }
+
     fn value(self) -> Result<WrenchValue, Missing> {
         Ok(WrenchValue {
             force_n: self.force_n.ok_or(Missing("force_n"))?.to_array(),
@@ -374,10 +404,10 @@ impl Tick {
             time_ns: record.time_ns,
             dt_ns: record.dt_ns,
             twist: Some(Twist::new(&record.twist)),
-            model: Some(Wrench::new(&record.model)),
+            model: Some(Wrench::of_models(&record.model)),
             commanded: Some(Wrench::new(&record.commanded)),
             delivered: Some(Wrench::new(&record.delivered)),
-            energy_j: Some(record.energy_j),
+            energy_j: record.model.energy_j(),
             port_energy_j: Some(record.port_energy_j),
             events: record.events.bits(),
             buttons: record.buttons,
@@ -396,10 +426,9 @@ impl Tick {
             dt_ns: self.dt_ns,
             pose,
             twist: self.twist.ok_or(Missing("twist"))?.value()?,
-            model: self.model.ok_or(Missing("model"))?.value()?,
+            model: self.model.ok_or(Missing("model"))?.outputs(self.energy_j)?,
             commanded: self.commanded.ok_or(Missing("commanded"))?.value()?,
             delivered: self.delivered.ok_or(Missing("delivered"))?.value()?,
-            energy_j: self.energy_j(),
             port_energy_j: self.port_energy_j(),
             events: Events::from_bits(self.events),
             buttons: self.buttons,

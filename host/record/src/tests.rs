@@ -4,6 +4,7 @@ use super::*;
 use flotor_core::Clock;
 use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
 use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
+use flotor_hal::Demand;
 use flotor_sync::Words;
 use mcap::records::op;
 use prost::Message;
@@ -54,6 +55,7 @@ fn run() -> RunDescription {
         },
         field: (role != Role::Device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025 }),
         latency_s: if role == Role::Device { 0.001 } else { 0.0 },
+        felt: if role == Role::Device { Demand::FORCE } else { Demand::WRENCH },
         settings,
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
         device: 0,
@@ -412,7 +414,7 @@ fn other_files_are_refused_with_name_reason_and_remedy() {
         mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
     writer.write_to_known_channel(&header, &message.encode_to_vec()).unwrap();
     writer.finish().unwrap();
-    holds(&refusal(&newer.0), &["format 2", "9.8.7", "update flotor"]);
+    holds(&refusal(&newer.0), &["format 3", "9.8.7", "update flotor"]);
 }
 
 #[test]
@@ -489,7 +491,11 @@ fn the_digest_is_xxh3_of_the_words_little_endian() {
     assert_eq!(digest.finish(), "xxh3:1420234c6443381c-2");
 }
 
-/// The words of a record in which a changed bit changes the digest; each bit of a word does, or none.
+/// Bits of the first word that are set where an output of the models is absent.
+const ABSENCE: std::ops::Range<u32> = 46..48;
+
+/// The words of a record in which a changed bit changes the digest; each bit of a word does, or none, but those of absent
+/// outputs, which [`the_digest_of_the_hand_does_not_see_which_outputs_are_absent`].
 fn covered_words(coverage: Coverage) -> Vec<usize> {
     let digest = |words: &[u64; RECORD_WORDS]| {
         let mut digest = TraceDigest::covering(coverage);
@@ -499,13 +505,17 @@ fn covered_words(coverage: Coverage) -> Vec<usize> {
     let words = tick(3, 1_000_000).to_words();
     let plain = digest(&words);
     let is_covered = |word: usize| {
-        let changed = (0..u64::BITS).filter(|bit| {
-            let mut other = words;
-            other[word] ^= 1 << bit;
-            digest(&other) != plain
-        });
+        let bits = (0..u64::BITS).filter(|bit| word > 0 || !ABSENCE.contains(bit));
+        let (count, changed) = (
+            bits.clone().count(),
+            bits.filter(|bit| {
+                let mut other = words;
+                other[word] ^= 1 << bit;
+                digest(&other) != plain
+            }),
+        );
         let changed = changed.count();
-        assert!([0, u64::BITS as usize].contains(&changed), "word {word}: {changed} bits");
+        assert!([0, count].contains(&changed), "word {word}: {changed} bits");
         changed > 0
     };
     (0..RECORD_WORDS).filter(|word| is_covered(*word)).collect()
@@ -523,6 +533,34 @@ fn the_digest_sees_every_bit_of_what_the_hand_gets_and_nothing_for_an_observer()
     // 21), their energy (34) and that of the port (35).
     let expected: Vec<usize> = (0..16).chain(22..34).chain([36]).collect();
     assert_eq!(covered_words(Coverage::Hand), expected);
+}
+
+#[test]
+fn the_digest_of_the_hand_does_not_see_which_outputs_are_absent() {
+    let digest = |coverage, record: &TickRecord| {
+        let mut digest = TraceDigest::covering(coverage);
+        digest.update(record);
+        digest.finish()
+    };
+    let all = tick(3, 1_000_000);
+    for demand in [Demand::FORCE, Demand::WRENCH, Demand::FORCE.with(Demand::ENERGY)] {
+        let fewer = TickRecord { model: all.model.limited_to(demand), ..all };
+        assert_eq!(digest(Coverage::Hand, &fewer), digest(Coverage::Hand, &all));
+        assert_ne!(digest(Coverage::Everything, &fewer), digest(Coverage::Everything, &all));
+    }
+}
+
+#[test]
+fn outputs_that_were_not_computed_come_back_absent_and_others_bit_for_bit() {
+    let file = TestFile::new("absent");
+    let demands = [Demand::FORCE, Demand::WRENCH, Demand::FORCE.with(Demand::ENERGY), Demand::ALL];
+    let all = (0..40).map(|index| tick(index, 1_000_000)).zip(demands.iter().cycle());
+    let ticks: Vec<TickRecord> =
+        all.map(|(tick, demand)| TickRecord { model: tick.model.limited_to(*demand), ..tick }).collect();
+    write(&file.0, &ticks);
+    let (back, end) = read(&file.0);
+    assert_eq!(end.unwrap(), Ending::Finished);
+    assert_eq!(back, ticks);
 }
 
 #[test]

@@ -4,13 +4,15 @@
 
 use super::Heartbeat;
 use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement};
+use flotor_core::ModelOutputs;
+use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
 use flotor_coupling::{
     Coupling, CouplingDescription, CouplingEnds, Grip, Hearing, Line, Patience, Pull, Reach, RemoteEnd, Tank,
     TankState,
 };
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DeviceState, Tick, Wrench};
+use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
 
 /// What passes through the port of one device in a tick, device frame.
 #[derive(Clone, Copy, Debug)]
@@ -19,26 +21,62 @@ pub struct Port {
     pub state: DeviceState,
     /// The wrench that is held since the last tick.
     pub commanded: Wrench,
-    /// What models and couplings ask for.
+    /// Outputs of models that reach the hand here.
+    felt: Demand,
+    /// Outputs of models that were computed in this tick.
+    computed: Demand,
+    /// What models and couplings ask for, as far as it reaches the hand.
     pub requested: Wrench,
     /// Of this, what the models alone ask for.
     by_models: Wrench,
-    /// Energy stored in models and couplings, J.
-    pub energy_j: f64,
+    /// Torque of the models that reaches no hand, N·m: for observers, where they asked for it.
+    unfelt_torque_nm: DVec3,
+    /// Energy stored in models and couplings, J, where it was computed.
+    energy_j: f64,
     /// What has happened in this tick.
     pub events: Events,
 }
 
 impl Port {
-    /// A port at rest.
-    pub const REST: Port = Port {
-        state: DeviceState::HOME,
-        commanded: Wrench::ZERO,
-        requested: Wrench::ZERO,
-        by_models: Wrench::ZERO,
-        energy_j: 0.0,
-        events: Events::NONE,
-    };
+    /// A port at rest of a device where these outputs of models reach the hand ([`flotor_core::demand::felt_at`]).
+    #[must_use]
+    pub const fn at_rest(felt: Demand) -> Self {
+        Self {
+            state: DeviceState::HOME,
+            commanded: Wrench::ZERO,
+            felt,
+            computed: felt,
+            requested: Wrench::ZERO,
+            by_models: Wrench::ZERO,
+            unfelt_torque_nm: DVec3::ZERO,
+            energy_j: 0.0,
+            events: Events::NONE,
+        }
+    }
+
+    /// Outputs of models and couplings in this tick. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn outputs(&self) -> ModelOutputs {
+        let Self { felt, computed, requested, unfelt_torque_nm, energy_j, .. } = self;
+        let wrench = if felt.contains(Demand::TORQUE) {
+            *requested
+        } else {
+            Wrench::new(requested.force(), requested.torque() + *unfelt_torque_nm)
+        };
+        ModelOutputs::new(wrench, *energy_j).limited_to(*computed)
+    }
+
+    /// Takes what the models ask for: an output that observers alone asked for goes no further than their record.
+    #[inline]
+    fn take(&mut self, demand: TickDemand, wrench: Wrench, energy_j: f64) {
+        (self.by_models, self.unfelt_torque_nm) = if self.felt.contains(Demand::TORQUE) {
+            (wrench, DVec3::ZERO)
+        } else {
+            (Wrench::from_force(wrench.force()), wrench.torque())
+        };
+        (self.requested, self.energy_j, self.computed) = (self.by_models, energy_j, demand.computed());
+    }
 
     /// What is held for the couplings: all that is not the models'. Exact where a device has no models; where it has,
     /// what the envelope takes away counts as taken from the coupling.
@@ -204,14 +242,15 @@ impl Forces {
         }
     }
 
-    /// What all of them ask for at the states of the ports, one for each device. Real-time: bounded by the models that
-    /// are near, no allocation.
-    pub fn step(&mut self, tick: &Tick, ports: &mut [Port], heart: &Heartbeat) {
+    /// Asks all of them at the states of the ports, one for each device; observers ask for the outputs `observed`. Real-time:
+    /// bounded by the models that are near, no allocation.
+    pub fn step(&mut self, tick: &Tick, ports: &mut [Port], observed: Demand, heart: &Heartbeat) {
         // The couplings first: what is held now is what they and the models asked for last.
         self.couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
         for (stack, port) in self.stacks.iter_mut().zip(&mut *ports) {
-            let (wrench, energy_j) = stack.step(tick, &port.state, heart, &mut port.events);
-            (port.requested, port.by_models, port.energy_j) = (wrench, wrench, energy_j);
+            let demand = TickDemand::new(port.felt, observed);
+            let (wrench, energy_j) = stack.step(tick, &port.state, demand, heart, &mut port.events);
+            port.take(demand, wrench, energy_j);
         }
         self.couplings.iter().for_each(|coupled| coupled.add_to(ports));
     }

@@ -13,6 +13,7 @@ use crate::{
     Cause, Due, EmergencySource, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, Place, Port,
     Reported, RunEvent, RunState, Stage, Station, StopSwitch, Timing, Unwound, WEIGHT,
 };
+use flotor_core::demand::ObserverDemand;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
@@ -39,6 +40,7 @@ pub struct Servo {
     /// Of the devices, in the same order.
     ports: Box<[Port]>,
     forces: Forces,
+    observers: ObserverDemand,
     parameters: ParameterQueue,
     swaps: LoopSwaps,
     config: RunConfig,
@@ -55,6 +57,7 @@ impl Servo {
     pub fn new(
         stations: Vec<Station>,
         forces: Forces,
+        observers: ObserverDemand,
         parameters: ParameterQueue,
         swaps: LoopSwaps,
         config: RunConfig,
@@ -63,9 +66,10 @@ impl Servo {
         Self {
             _unwound: None,
             _last_stop: None,
-            ports: vec![Port::REST; stations.len()].into(),
+            ports: stations.iter().map(|station| Port::at_rest(station.felt)).collect(),
             stations: stations.into(),
             forces,
+            observers,
             parameters,
             swaps,
             config,
@@ -105,7 +109,7 @@ impl Servo {
         mut leave: impl FnMut(&TickRecord),
     ) {
         for (device, (station, port)) in (0..).zip(self.stations.iter().zip(&self.ports)) {
-            let Port { state, requested, commanded, energy_j, .. } = port;
+            let Port { state, commanded, .. } = port;
             let mut events = run_events;
             events.insert(port.events);
             leave(&TickRecord {
@@ -115,10 +119,9 @@ impl Servo {
                 dt_ns: due.tick.dt_ns,
                 pose: state.pose,
                 twist: state.twist,
-                model: *requested,
+                model: port.outputs(),
                 commanded: *commanded,
                 delivered: state.delivered,
-                energy_j: *energy_j,
                 port_energy_j: station.envelope.port_energy_j(),
                 events,
                 buttons: state.buttons,
@@ -142,7 +145,7 @@ impl Servo {
         self.follow(sample, buttons, tick, stop, &mut events);
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Read);
 
-        self.forces.step(tick, &mut self.ports, &self.heart);
+        self.forces.step(tick, &mut self.ports, self.observers.now(), &self.heart);
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Models);
 
         let gate = self.run.gate(tick.time_ns, self.config.ramp_ns);

@@ -1,6 +1,7 @@
 //! Everything a servo is made of, its devices open and not yet energised.
 
 use crate::{Envelope, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
+use flotor_core::demand::ObserverDemand;
 use flotor_core::limits::Bound;
 use flotor_hal::abi::loader::{OpenedDevice, Stopper};
 use flotor_hal::{Capabilities, LoopConfig, Refusal};
@@ -20,6 +21,7 @@ pub struct Guarded {
 pub struct Standby {
     devices: Vec<Guarded>,
     forces: Forces,
+    observers: ObserverDemand,
     parameters: ParameterQueue,
     swaps: LoopSwaps,
     config: LoopConfig,
@@ -37,12 +39,18 @@ impl Standby {
         config: LoopConfig,
         run: RunConfig,
     ) -> Self {
-        Self { devices, forces, parameters, swaps, config, run, heart: Heartbeat::default() }
+        let (observers, heart) = (ObserverDemand::default(), Heartbeat::default());
+        Self { devices, forces, observers, parameters, swaps, config, run, heart }
     }
 
     /// What the servo's watchdog will listen to.
     pub fn heart(&self) -> Heartbeat {
         self.heart.clone()
+    }
+
+    /// Returns the place where observers ask for outputs of the models.
+    pub fn observers(&self) -> ObserverDemand {
+        self.observers.clone()
     }
 
     /// The most that may reach a hand at any device: force (N), torque (N·m), each with the longest there is as its norm.
@@ -78,7 +86,7 @@ impl Standby {
     pub fn activate(self, names: Vec<String>, enters: impl Fn(usize)) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
         let last_stop = LastStop::arm(stoppers.clone(), names, self.heart());
-        let Self { devices, forces, parameters, swaps, config, run, heart } = self;
+        let Self { devices, forces, observers, parameters, swaps, config, run, heart } = self;
         let station = |(number, guarded): (usize, Guarded)| {
             let Guarded { mut device, capabilities, envelope } = guarded;
             enters(number);
@@ -90,6 +98,6 @@ impl Standby {
         let stations =
             devices.into_iter().enumerate().map(station).collect::<Result<Vec<_>, (usize, Refusal)>>();
         let stations = stations.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
-        Ok(Servo::new(stations, forces, parameters, swaps, run, heart).guarded_by(last_stop))
+        Ok(Servo::new(stations, forces, observers, parameters, swaps, run, heart).guarded_by(last_stop))
     }
 }

@@ -3,12 +3,13 @@
 use super::envelope::{Envelope, EnvelopeEffects};
 use super::forces::Port;
 use super::state::{Cause, Gate, RunEvent};
+use flotor_core::demand::felt_at;
 use flotor_core::plausibility::{
     Implausible, ImplausibleSamples, PlausibilityCheck, Trust, normalised, stale_ticks_limit,
 };
 use flotor_core::trace::Events;
 use flotor_hal::abi::loader::ActiveDevice;
-use flotor_hal::{Axes, Capabilities, Conditions, Cycle, Fault, Tick};
+use flotor_hal::{Axes, Capabilities, Conditions, Cycle, Demand, Fault, Tick};
 
 /// How much longer than samples a device may fail to take commands: what it was told last is on the hand meanwhile.
 const UNTAKEN_TIMES: u32 = 10;
@@ -17,6 +18,8 @@ const UNTAKEN_TIMES: u32 = 10;
 pub struct Station {
     pub(super) device: ActiveDevice,
     pub(super) envelope: Envelope,
+    /// Outputs of models that reach the hand here.
+    pub(super) felt: Demand,
     plausibility: PlausibilityCheck,
     /// Stale ticks that are borne; without end where no hand is sensed that could be elsewhere by now.
     stale_ticks_limit: u32,
@@ -63,6 +66,7 @@ impl Station {
         Self {
             device,
             envelope,
+            felt: felt_at(told),
             plausibility: PlausibilityCheck::new(told, period_ns),
             stale_ticks_limit: if told.sensed == Axes::NONE { u32::MAX } else { stale_ticks },
             stale_ticks: 0,

@@ -71,6 +71,7 @@ impl Feel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flotor_core::ModelOutputs;
     use flotor_hal::{DQuat, Twist, Wrench};
 
     /// A handle that goes down a way within a number of ticks of 1 ms, in a spring, and then rests for as many.
@@ -86,10 +87,9 @@ mod tests {
                 dt_ns: 1_000_000,
                 pose: Pose::new(DVec3::Z * -depth_m, DQuat::IDENTITY),
                 twist: Twist::ZERO,
-                model: force,
+                model: ModelOutputs::new(force, 0.0),
                 commanded: force,
                 delivered: force,
-                energy_j: 0.0,
                 port_energy_j: 0.0,
                 events,
                 buttons: 0,

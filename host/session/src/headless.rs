@@ -7,6 +7,7 @@ use crate::summary::{RunFacts, RunSummary, Tally};
 use crate::{Observer, RunError, RunOptions, RunRecording, Session};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_record::{RecordError, Recorder, TraceDigest};
 use flotor_servo::{Clock, StopSwitch};
 use std::path::Path;
@@ -23,7 +24,8 @@ pub enum HeadlessError {
     Record(#[from] RecordError),
 }
 
-/// Runs a scene as fast as it goes; equal scenes and seeds give equal digests. Not real-time.
+/// Runs a scene as fast as it goes, with `demand` and what the recording stores asked of its models; equal scenes and seeds give
+/// equal digests. Not real-time.
 ///
 /// # Errors
 /// [`HeadlessError`]. A device that faults is no error: the summary says so in `end`.
@@ -32,6 +34,7 @@ pub fn run(
     registry: &Registry,
     seed: u64,
     recording: Option<&Path>,
+    demand: Demand,
 ) -> Result<RunSummary, HeadlessError> {
     let options = RunOptions { clock: Clock::Virtual, seed };
     let session = Session::prepare(scene, registry, &options)?;
@@ -39,11 +42,11 @@ pub fn run(
     let recorder =
         recording.map(|path| Recorder::create(path, &describe(scene, &options, &plugins))).transpose()?;
     let recording = RunRecording::new(recorder);
-    let mut watchers = Watchers { tally: Tally::default(), digest: TraceDigest::new(), recording };
+    let mut watchers = Watchers { tally: Tally::default(), digest: TraceDigest::new(), recording, demand };
     let mut outcome = session.run(&mut watchers, &StopSwitch::default())?;
     // Nobody was there to be told before.
     outcome.warnings.splice(0..0, notices);
-    let Watchers { tally, digest, mut recording } = watchers;
+    let Watchers { tally, digest, mut recording, .. } = watchers;
     recording.finish(&[])?;
     let facts = RunFacts {
         title: &scene.title,
@@ -62,6 +65,7 @@ struct Watchers {
     tally: Tally,
     digest: TraceDigest,
     recording: RunRecording,
+    demand: Demand,
 }
 
 impl Observer for Watchers {
@@ -73,5 +77,9 @@ impl Observer for Watchers {
         self.tally.observe(record);
         self.digest.update(record);
         self.recording.observe(record);
+    }
+
+    fn demand(&self) -> Demand {
+        self.demand.with(self.recording.demand())
     }
 }

@@ -55,6 +55,7 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         blend: Blend::default(),
         field: None,
         latency_s: report.latency_s,
+        felt: report.felt,
         settings: settings.collect(),
         parameters: report.parameters.iter().cloned().chain(named_files(report)).collect(),
     }

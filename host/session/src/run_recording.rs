@@ -3,6 +3,7 @@
 use crate::Observer;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_record::{Note, RecordError, Recorder};
 
 /// Records a run, if it is to be recorded at all. A failing disk ends the recording, not the run. Not real-time.
@@ -54,6 +55,11 @@ impl RunRecording {
 impl Observer for RunRecording {
     fn change(&mut self, change: &Change) {
         self.write(|recorder| recorder.change(change));
+    }
+
+    /// All that a recording stores, while it is on.
+    fn demand(&self) -> Demand {
+        if self.is_on() && self.failure.is_none() { Demand::ALL } else { Demand::FORCE }
     }
 
     fn observe(&mut self, record: &TickRecord) {

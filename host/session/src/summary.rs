@@ -24,6 +24,8 @@ pub struct Tally {
     events: Events,
     generated_peak_j: f64,
     port_lowest_j: f64,
+    /// Outputs of the models that were not computed in every tick.
+    not_computed: NotComputed,
 }
 
 /// The same of one device.
@@ -31,9 +33,8 @@ pub struct Tally {
 struct DeviceTally {
     peak_force_n: f64,
     peak_torque_nm: f64,
-    last: Option<(TickRecord, f64)>,
-    work_j: f64,
-    generated_j: f64,
+    last: Option<TickRecord>,
+    balance: LoopBalance,
     port_lowest_j: f64,
     feel: Feel,
 }
@@ -43,24 +44,44 @@ impl DeviceTally {
         self.peak_force_n = self.peak_force_n.max(record.commanded.force().length());
         self.peak_torque_nm = self.peak_torque_nm.max(record.commanded.torque().length());
         self.feel.observe(record);
-        // Work of the models on the hand, with the wrench held over the tick as the device holds it.
-        let first_energy_j = match &self.last {
-            None => record.energy_j,
-            Some((last, first_energy_j)) => {
-                let moved = record.pose.position() - last.pose.position();
-                let turn = record.pose.orientation() * last.pose.orientation().conjugate();
-                let turned: DVec3 = flotor_hal::rotation_vector(turn);
-                self.work_j += last.model.force().dot(moved) + last.model.torque().dot(turned);
-                *first_energy_j
-            }
-        };
-        self.generated_j = self.work_j - (first_energy_j - record.energy_j);
+        self.balance.observe(self.last.as_ref(), record);
         self.port_lowest_j = self.port_lowest_j.min(record.port_energy_j);
-        self.last = Some((*record, first_energy_j));
+        self.last = Some(*record);
     }
 
     fn port_energy_j(&self) -> f64 {
-        self.last.as_ref().map_or(0.0, |(record, _)| record.port_energy_j)
+        self.last.as_ref().map_or(0.0, |record| record.port_energy_j)
+    }
+}
+
+/// Energy that the sampled loop puts out at a device beyond the energy stored in the models: known while all outputs of the models
+/// are computed.
+#[derive(Default)]
+struct LoopBalance {
+    /// Energy stored in the first tick, J.
+    first_energy_j: Option<f64>,
+    work_j: f64,
+    generated_j: Option<f64>,
+}
+
+impl LoopBalance {
+    /// Adds the work of the models on the hand from one tick to the next, with the wrench held over the tick as the device holds
+    /// it.
+    fn observe(&mut self, last: Option<&TickRecord>, record: &TickRecord) {
+        let energy_j = record.model.energy_j();
+        if last.is_none() {
+            (self.first_energy_j, self.generated_j) = (energy_j, Some(0.0));
+        }
+        if let Some(last) = last {
+            let moved = record.pose.position() - last.pose.position();
+            let turn = record.pose.orientation() * last.pose.orientation().conjugate();
+            let turned: DVec3 = flotor_hal::rotation_vector(turn);
+            let torque = last.model.torque().unwrap_or(DVec3::NAN);
+            self.work_j += last.model.force().dot(moved) + torque.dot(turned);
+        }
+        let stored = self.first_energy_j.zip(energy_j).filter(|_| self.generated_j.is_some());
+        let generated_j = stored.map(|(first_j, now_j)| self.work_j - (first_j - now_j));
+        self.generated_j = generated_j.filter(|joule| joule.is_finite());
     }
 }
 
@@ -73,8 +94,14 @@ impl Tally {
     /// Time of the last tick, ns.
     #[must_use]
     pub fn last_ns(&self) -> u64 {
-        let last = |device: &DeviceTally| device.last.as_ref().map(|(record, _)| record.time_ns);
+        let last = |device: &DeviceTally| device.last.as_ref().map(|record| record.time_ns);
         self.devices.iter().filter_map(last).max().unwrap_or(0)
+    }
+
+    /// The largest energy that the loops of all devices together have generated, J, if it is known to the end.
+    fn generated_peak_j(&self) -> Option<f64> {
+        let is_known = self.devices.iter().all(|device| device.balance.generated_j.is_some());
+        is_known.then_some(self.generated_peak_j)
     }
 
     /// Largest of a number of all devices.
@@ -91,17 +118,37 @@ impl Observer for Tally {
             self.events = Events::NONE;
         }
         self.events.insert(record.events);
+        self.not_computed.observe(record);
         let device = usize::from(record.device);
         if self.devices.len() <= device {
             self.devices.resize_with(device + 1, DeviceTally::default);
         }
         self.devices[device].observe(record);
         if device + 1 == self.devices.len() {
-            let generated_j = self.devices.iter().map(|device| device.generated_j).sum();
+            let generated_j = self.devices.iter().filter_map(|device| device.balance.generated_j).sum();
             self.generated_peak_j = self.generated_peak_j.max(generated_j);
             let port_j = self.devices.iter().map(DeviceTally::port_energy_j).sum();
             self.port_lowest_j = self.port_lowest_j.min(port_j);
         }
+    }
+}
+
+/// Outputs of the models that were absent in some tick at some device.
+#[derive(Default)]
+struct NotComputed {
+    torque: bool,
+    energy: bool,
+}
+
+impl NotComputed {
+    fn observe(&mut self, record: &TickRecord) {
+        self.torque |= record.model.torque().is_none();
+        self.energy |= record.model.energy_j().is_none();
+    }
+
+    fn names(&self) -> Vec<&'static str> {
+        let all = [(self.torque, "torque"), (self.energy, "energy")];
+        all.into_iter().filter_map(|(is_absent, name)| is_absent.then_some(name)).collect()
     }
 }
 
@@ -153,6 +200,8 @@ pub struct RunSummary {
     pub events: std::collections::BTreeMap<&'static str, u64>,
     /// Digest of the trace without measured times: equal digests, equal runs.
     pub trace_digest: String,
+    /// Outputs of the models that were not computed in every tick, because nobody asked for them: "torque", "energy".
+    pub not_computed: Vec<&'static str>,
     /// Records lost because an observer was too slow.
     pub dropped_records: u64,
     /// Wall-clock time, s.
@@ -304,8 +353,10 @@ pub struct EnergySummary {
     pub device_residual_relative: Option<f64>,
     /// Largest mechanical energy of the device, J; absent without a balance.
     pub device_peak_j: Option<f64>,
-    /// Largest energy the sampled loop has put out beyond what the models had stored, J: a hold leaks.
-    pub loop_generated_j: f64,
+    /// Largest energy the sampled loop has put out beyond what the models had stored, J: a hold leaks. Absent where torque or
+    /// energy of the models was not computed in every tick, or was not finite.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loop_generated_j: Option<f64>,
     /// Lowest energy at the ports of the devices together, J: how much more has come out at some time than had ever gone in.
     pub port_lowest_j: f64,
     /// Energy at the ports at the end, J: what the hands have put in altogether.
@@ -444,7 +495,7 @@ impl RunSummary {
                     .map(relative_residual)
                     .max_by(|a, b| a.abs().total_cmp(&b.abs())),
                 device_peak_j: ledgers().map(|ledger| ledger.peak_j).max_by(f64::total_cmp),
-                loop_generated_j: tally.generated_peak_j,
+                loop_generated_j: tally.generated_peak_j(),
                 port_lowest_j: tally.port_lowest_j,
                 port_end_j: tally.devices.iter().map(DeviceTally::port_energy_j).sum(),
             },
@@ -459,6 +510,7 @@ impl RunSummary {
                 .collect(),
             events: events.filter(|(_, count)| *count > 0).collect(),
             trace_digest: facts.trace_digest,
+            not_computed: tally.not_computed.names(),
             dropped_records: outcome.dropped_records,
             wall_s: outcome.wall_s,
             warnings: outcome.warnings.clone(),
@@ -543,6 +595,9 @@ impl RunSummary {
             let events: Vec<String> =
                 self.events.iter().map(|(name, count)| format!("{name} {count}")).collect();
             row("events", events.join("   "));
+        }
+        if !self.not_computed.is_empty() {
+            row("not computed", format!(": {}", self.not_computed.join(", ")));
         }
         if self.dropped_records > 0 {
             let dropped = self.dropped_records;

@@ -15,6 +15,7 @@ use flotor_command::{
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_coupling::Line;
+use flotor_hal::Demand;
 use flotor_live::{Directory, EndKind};
 use flotor_record::{Note, Recorder, Severity, TraceDigest};
 use flotor_servo::{Clock, Core, EmergencySource, RunEnd};
@@ -372,6 +373,11 @@ const PROGRESS_TICKS: u64 = 33;
 impl Observer for Watchers {
     fn change(&mut self, change: &Change) {
         self.recording.change(change);
+    }
+
+    fn demand(&self) -> Demand {
+        let plot = self.plot.as_ref().map_or(Demand::FORCE, RunPicture::demand);
+        self.recording.demand().with(plot)
     }
 
     fn observe(&mut self, record: &TickRecord) {

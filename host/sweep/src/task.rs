@@ -2,9 +2,9 @@
 
 use crate::design::{Cell, Design, Point};
 use crate::plan::{POSE_COLUMNS, Plan, PlanError, Question};
-use flotor_hal::DVec3;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_hal::{DVec3, Demand};
 use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
 use flotor_session::headless;
 use flotor_session::registry::Registry;
@@ -221,7 +221,8 @@ impl Sweep {
 
     fn run(&self, point: &Point, scene: &Scene, folders: &[PathBuf]) -> Vec<Cell> {
         let answer = self.scene_at(point, scene).and_then(|scene| {
-            headless::run(&scene, &Registry::search(folders), point.seed, None).map_err(|e| e.to_string())
+            let registry = Registry::search(folders);
+            headless::run(&scene, &registry, point.seed, None, Demand::ALL).map_err(|e| e.to_string())
         });
         let none = || Cell::Number(None);
         match answer {
@@ -229,7 +230,7 @@ impl Sweep {
                 Cell::number(summary.ticks as f64),
                 Cell::number(summary.peak_force_n),
                 Cell::number(summary.peak_torque_nm),
-                Cell::number(summary.energy.loop_generated_j),
+                Cell::number(summary.energy.loop_generated_j.unwrap_or(f64::NAN)),
                 Cell::number(summary.energy.device_peak_j.unwrap_or(f64::NAN)),
                 Cell::Word(summary.end.to_owned()),
                 Cell::Word(summary.trace_digest),

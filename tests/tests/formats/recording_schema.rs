@@ -3,8 +3,8 @@
 use flotor_core::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, PassivityMode};
 use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
 use flotor_core::trace::{Events, TickRecord};
-use flotor_core::{Change, ChangeOutcome, ChangeSubject};
-use flotor_hal::{Pose, Twist, Wrench};
+use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs};
+use flotor_hal::{Demand, Pose, Twist, Wrench};
 use flotor_record::{Note, PluginDescription, Recorder, Role, RunDescription, Severity};
 use flotor_servo::Clock;
 use prost_reflect::prost::Message;
@@ -97,10 +97,9 @@ fn record() -> TickRecord {
         dt_ns: 1_000_001,
         pose: Pose { position_m, orientation_xyzw },
         twist,
-        model: wrench(),
+        model: ModelOutputs::new(wrench(), 99.5),
         commanded: wrench(),
         delivered: wrench(),
-        energy_j: 99.5,
         port_energy_j: 98.5,
         events: Events::from_bits(0b101),
         buttons: 0b10,
@@ -125,6 +124,7 @@ fn run() -> RunDescription {
         },
         field: (role != Role::Device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025 }),
         latency_s: if role == Role::Device { 0.001 } else { 0.0 },
+        felt: Demand::WRENCH,
         settings: vec![pair("preset", "plain")],
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
         device: 0,
@@ -218,14 +218,16 @@ fn expected_tick(record: &TickRecord) -> Vec<String> {
     ];
     lines.extend(expected_vector("twist.linear_m_per_s", record.twist.linear_m_per_s));
     lines.extend(expected_vector("twist.angular_rad_per_s", record.twist.angular_rad_per_s));
-    for (name, wrench) in
-        [("model", record.model), ("commanded", record.commanded), ("delivered", record.delivered)]
-    {
+    for (name, wrench) in [
+        ("model", record.model.wrench().expect("all outputs")),
+        ("commanded", record.commanded),
+        ("delivered", record.delivered),
+    ] {
         lines.extend(expected_vector(&format!("{name}.force_n"), wrench.force_n));
         lines.extend(expected_vector(&format!("{name}.torque_nm"), wrench.torque_nm));
     }
     lines.extend([
-        format!("energy_j = {:?}", record.energy_j),
+        "energy_j = 99.5".to_owned(),
         format!("events = {}", record.events.bits()),
         format!("buttons = {}", record.buttons),
         format!("lateness_ns = {}", record.lateness_ns),
@@ -269,7 +271,7 @@ fn expected_run() -> Vec<String> {
         lines
     };
     let mut lines: Vec<String> = [
-        "format = 1",
+        "format = 2",
         "flotor_version = \"9.8.7\"",
         "rate_hz = 1000.0",
         "duration_s = 0.5",
@@ -280,9 +282,9 @@ fn expected_run() -> Vec<String> {
     .map(str::to_owned)
     .into();
     lines.extend(plugin(0, "left"));
-    lines.push("plugins[0].latency_s = 0.001".to_owned());
+    lines.extend(["latency_s = 0.001", "felt = 2"].map(|line| format!("plugins[0].{line}")));
     lines.extend(plugin(1, "right"));
-    lines.extend(["device = 1", "latency_s = 0.001"].map(|line| format!("plugins[1].{line}")));
+    lines.extend(["device = 1", "latency_s = 0.001", "felt = 2"].map(|line| format!("plugins[1].{line}")));
     lines.extend(plugin(2, "spring"));
     let mapping = [
         "rotation.x = 0.5".to_owned(),

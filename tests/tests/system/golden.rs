@@ -21,7 +21,7 @@ use std::path::Path;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Scenes that need a device or another host.
-const NOT_VIRTUAL: [&str; 7] =
+pub(crate) const NOT_VIRTUAL: [&str; 7] =
     ["falcon", "force-dimension", "haply", "inverse3", "openhaptics", "spacemouse", "teleoperation-apart"];
 /// Models by setting, of the spring unless they are named.
 const TABLES: [(&str, &str); 10] = [

@@ -11,6 +11,7 @@ mod campaign;
 mod changes;
 mod composition;
 mod crash;
+mod demand;
 mod determinism;
 #[cfg(feature = "drop-ins")]
 mod doctor;

@@ -2,6 +2,7 @@
 //! loop, no half-read value. Files are whole ones with a few bytes, lines or lengths changed, which gets deeper than
 //! noise does; the seeds are fixed, so a failure comes back.
 
+use flotor_hal::Demand;
 use flotor_hal::abi::loader::read_metadata;
 use flotor_lab::poses::Poses;
 use flotor_live::{Ask, Frames, Kind, Request, SetValue, frame, ticks_from_payload};
@@ -121,7 +122,7 @@ fn recordings() {
     scene.duration_s = 0.05;
     let registry =
         flotor_session::registry::Registry::search(&[flotor_tests::library::build_folder().join("deps")]);
-    flotor_session::headless::run(&scene, &registry, 1, Some(&whole)).expect("the demo runs");
+    flotor_session::headless::run(&scene, &registry, 1, Some(&whole), Demand::FORCE).expect("the demo runs");
     let whole = std::fs::read(whole).expect("it was just written");
     let file = scratch.path().join("wounded.mcap");
     let mut random = Random(2);

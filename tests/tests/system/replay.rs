@@ -1,8 +1,9 @@
 //! A recording is asked again: what a person set for that stays set, the models find the files of the run,
 //! and a difference nobody asked for is explained by what the recording itself tells.
 
-use flotor_core::Clock;
 use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{Clock, ModelOutputs};
+use flotor_hal::{DVec3, Wrench};
 use flotor_record::{NamedFile, Recorder, Recording, RunDescription};
 use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, Ran, exit_code};
@@ -77,7 +78,8 @@ fn edited(recording: &Path, edit: impl Fn(TickRecord) -> Option<TickRecord>) -> 
 /// Another wrench than the models would give, and what happened in that tick.
 fn otherwise(record: TickRecord, events: Events) -> TickRecord {
     let mut other = record;
-    other.model.force_n[2] += 1.0;
+    let wrench = record.model.wrench().expect("it was recorded") + Wrench::from_force(DVec3::Z);
+    other.model = ModelOutputs::new(wrench, record.model.energy_j().expect("it was recorded"));
     other.events.insert(events);
     other
 }

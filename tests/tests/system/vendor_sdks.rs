@@ -113,7 +113,8 @@ fn pose_gap(a: &TickRecord, b: &TickRecord) -> f64 {
 
 /// Difference of what one host sent to its device and what the models of the other one got, N and N·m, whichever is greater.
 fn wrench_gap(sent: &TickRecord, got: &TickRecord) -> f64 {
-    let [sent, got] = [&sent.commanded, &got.model];
+    let got = got.model.wrench().expect("a recording stores both");
+    let sent = &sent.commanded;
     (sent.force() - got.force()).length().max((sent.torque() - got.torque()).length())
 }
 

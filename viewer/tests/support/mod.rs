@@ -13,7 +13,7 @@ pub(crate) mod tools;
 use flotor_core::Clock;
 use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
-use flotor_hal::SoftRange;
+use flotor_hal::{Demand, SoftRange};
 use flotor_live::{
     Answer, Ask, ChangeMessage, Directory, End, EndKind, Frames, Greeting, Kind, Listener, Outcome, PROTOCOL,
     PanelPlugin, RefusalCause, Request, SetValue, Subject, WrenchLimits, frame, ticks_to_payload,
@@ -66,6 +66,7 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
         blend: Blend::default(),
         field: None,
         latency_s: 0.0,
+        felt: Demand::WRENCH,
         settings,
         parameters,
         device: 0,

@@ -13,6 +13,7 @@ use flotor_bridge::remote::Remote;
 use flotor_bridge::request::Right;
 use flotor_bridge::serve::{Service, serve};
 use flotor_core::Clock;
+use flotor_core::demand::ObserverDemand;
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_live::{Ask, Directory, Greeting, PROTOCOL, Publication, RefusalCause, Serve, WrenchLimits};
 use flotor_record::RunDescription;
@@ -113,7 +114,9 @@ impl FakeHost {
             limits: WrenchLimits::default(),
         };
         let host = Arc::clone(&self.asked);
-        self.publication = Some(Publication::open(&self.directory, greeting, &description(), host).unwrap());
+        let demand = ObserverDemand::default();
+        let opened = Publication::open(&self.directory, greeting, &description(), host, demand);
+        self.publication = Some(opened.unwrap());
     }
 
     pub fn publication(&self) -> &Publication {

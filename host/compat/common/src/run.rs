@@ -6,7 +6,7 @@ use crate::station::Station;
 use flotor_core::Change;
 use flotor_core::terminal::escaped;
 use flotor_core::trace::TickRecord;
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, Demand};
 use flotor_live::Directory;
 use flotor_record::{Note, Recorder, RunDescription, Severity, TraceDigest};
 use flotor_servo::{RunEnd, StopSwitch};
@@ -81,6 +81,11 @@ impl Observer for Watchers {
         self.recording.change(change);
     }
 
+    /// Force and torque that the program asks for, and what the recording stores.
+    fn demand(&self) -> Demand {
+        Demand::WRENCH.with(self.recording.demand())
+    }
+
     fn observe(&mut self, record: &TickRecord) {
         self.tally.observe(record);
         self.digest.update(record);
@@ -91,7 +96,7 @@ impl Observer for Watchers {
         }
         if let Some(asked) = self.asked.get_mut(device) {
             asked.force_n = asked.force_n.max(length(record.model.force()));
-            asked.torque_nm = asked.torque_nm.max(length(record.model.torque()));
+            asked.torque_nm = asked.torque_nm.max(record.model.torque().map_or(0.0, length));
             asked.applied_n = asked.applied_n.max(record.commanded.force().length());
             asked.applied_nm = asked.applied_nm.max(record.commanded.torque().length());
         }

@@ -4,7 +4,8 @@ use crate::replay::{Compared, Coverage, Difference, DivergenceCause, Replay};
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, PluginKeyValue, PluginPathOption, svg_file};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
-use flotor_hal::{DVec3, Wrench};
+use flotor_core::ModelOutputs;
+use flotor_hal::DVec3;
 use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_record::Ending;
 use serde::Serialize;
@@ -75,11 +76,11 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     let mut samples = Vec::new();
     let mut end_ns = 0;
     let Compared { difference, coverage, why, ending, implausible, health } =
-        replay.compare(|record, wrench| {
+        replay.compare(|record, outputs| {
             end_ns = record.time_ns;
             progress.set_position(record.time_ns / 1_000_000);
             if arguments.plot.is_some() {
-                samples.push(Sample { time_ns: record.time_ns, recorded: record.model, replayed: *wrench });
+                samples.push(Sample { time_ns: record.time_ns, recorded: record.model, replayed: *outputs });
             }
         })?;
     progress.finish_and_clear();
@@ -165,11 +166,17 @@ fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
     lines.join("\n")
 }
 
-/// A tick of the recording and the wrench of the models now.
+/// A tick of the recording and the outputs of the models now.
 struct Sample {
     time_ns: u64,
-    recorded: Wrench,
-    replayed: Wrench,
+    recorded: ModelOutputs,
+    replayed: ModelOutputs,
+}
+
+/// N·m; NaN, which leaves a gap, where the recording holds no torque.
+fn difference_of_torque(sample: &Sample) -> DVec3 {
+    let torques = sample.replayed.torque().zip(sample.recorded.torque());
+    torques.map_or(DVec3::NAN, |(now, then)| now - then)
 }
 
 /// Recorded and replayed force, and their difference along every axis.
@@ -190,7 +197,7 @@ fn picture(samples: &[Sample]) -> String {
                 .series(Series::line("replayed", line(&|sample| sample.replayed.force().z))),
         )
         .panel(axes("Difference of force", "N", 1.0, |s| s.replayed.force() - s.recorded.force()))
-        .panel(axes("Difference of torque", "mN·m", 1.0e3, |s| s.replayed.torque() - s.recorded.torque()))
+        .panel(axes("Difference of torque", "mN·m", 1.0e3, difference_of_torque))
         .panel_height_px(180.0)
         .to_svg()
 }

@@ -15,10 +15,10 @@ use files::as_recorded;
 use flotor_core::coupling::{CouplingDescription, CouplingEnds};
 use flotor_core::plausibility::{ImplausibleSamples, PlausibilityCheck};
 use flotor_core::trace::{Events, TickRecord};
-use flotor_core::{Change, ChangeOutcome, ChangeSubject};
+use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs};
 use flotor_coupling::{Patience, Reach};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::{Axes, Capabilities, DeviceState, LoopConfig, Tick, Wrench};
+use flotor_hal::{Axes, Capabilities, Demand, DeviceState, LoopConfig, Tick};
 use flotor_record::{Ending, ReadError, Recording, Role, RunDescription};
 use flotor_servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
 use flotor_session::registry::Registry;
@@ -161,17 +161,22 @@ impl<'r> Replay<'r> {
         &self.plugins
     }
 
-    /// Evaluates the models at every recorded pose. `look` gets the recorded tick and the replayed wrench.
+    /// Evaluates the models at every recorded pose. `look` gets the recorded tick and what the models
+    /// give now, as far as the recording holds it.
     ///
     /// # Errors
     /// [`ReplayError`] at a damaged place, or if a plugin that was put in during the run is refused; what was compared
     /// before is lost with it.
-    pub fn compare(mut self, mut look: impl FnMut(&TickRecord, &Wrench)) -> Result<Compared, ReplayError> {
+    pub fn compare(
+        mut self,
+        mut look: impl FnMut(&TickRecord, &ModelOutputs),
+    ) -> Result<Compared, ReplayError> {
         let mut difference = Difference::default();
         let mut evidence = Evidence::of(self.recording.run());
         let mut plausibility = vec![any_device(self.config.period_ns); self.devices];
         let heart = Heartbeat::default(); // no watchdog observes a replay
-        let mut ports = vec![Port::REST; self.devices];
+        let mut ports: Vec<Port> =
+            self.recording.run().devices().map(|device| Port::at_rest(device.felt)).collect();
         let mut records: Vec<TickRecord> = Vec::with_capacity(self.devices);
         while let Some(record) = self.recording.next() {
             let record = record?;
@@ -201,16 +206,20 @@ impl<'r> Replay<'r> {
             }
             let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
             while self.forces.take_faded(&tick).is_some() {}
-            self.forces.step(&tick, &mut ports, &heart);
+            // All that the recording holds of the tick, and no more.
+            let computed = |all: Demand, record: &TickRecord| all.with(record.model.computed());
+            let observed = records.iter().fold(Demand::FORCE, computed);
+            self.forces.step(&tick, &mut ports, observed, &heart);
             evidence.look(tick.index, &records, &ports);
             let is_other =
-                |(record, port): (&TickRecord, &Port)| bits(&port.requested) != bits(&record.model);
+                |(record, port): (&TickRecord, &Port)| bits(&replayed(port, record)) != bits(&record.model);
             if records.iter().zip(&ports).any(is_other) {
                 evidence.differs(tick.index, &records, &ports);
             }
             for (port, record) in ports.iter_mut().zip(records.drain(..)) {
-                difference.add(&record, &port.requested);
-                look(&record, &port.requested);
+                let outputs = replayed(port, &record);
+                difference.add(&record, &outputs);
+                look(&record, &outputs);
                 // The pose that was really held then.
                 port.commanded = record.commanded;
             }
@@ -283,16 +292,17 @@ impl<'r> Replay<'r> {
 
 impl Difference {
     /// Adds one tick; the root mean squares hold sums until [`Self::finish`].
-    fn add(&mut self, record: &TickRecord, wrench: &Wrench) {
+    fn add(&mut self, record: &TickRecord, outputs: &ModelOutputs) {
         self.ticks += 1;
-        if bits(wrench) == bits(&record.model) {
+        if bits(outputs) == bits(&record.model) {
             return;
         }
         self.differing_ticks += 1;
         self.first_tick.get_or_insert(record.tick);
         self.last_tick = Some(record.tick);
-        let force_n = (wrench.force() - record.model.force()).length();
-        let torque_nm = (wrench.torque() - record.model.torque()).length();
+        let force_n = (outputs.force() - record.model.force()).length();
+        let torques = outputs.torque().zip(record.model.torque());
+        let torque_nm = torques.map_or(0.0, |(now, then)| (now - then).length());
         self.max_force_n = self.max_force_n.max(force_n);
         self.max_torque_nm = self.max_torque_nm.max(torque_nm);
         self.rms_force_n += force_n * force_n;
@@ -336,10 +346,15 @@ fn look_at_sample(check: &mut PlausibilityCheck, record: &TickRecord) {
     let _ = check.check(&tick, &state);
 }
 
-fn bits(wrench: &Wrench) -> [u64; 6] {
-    let [fx, fy, fz] = wrench.force_n;
-    let [tx, ty, tz] = wrench.torque_nm;
-    [fx, fy, fz, tx, ty, tz].map(f64::to_bits)
+/// Outputs of the models now, as far as the record holds them.
+fn replayed(port: &Port, record: &TickRecord) -> ModelOutputs {
+    port.outputs().limited_to(record.model.computed())
+}
+
+/// Force and, if it was computed, torque to the bit; every NaN is the same.
+fn bits(outputs: &ModelOutputs) -> ([u64; 3], Option<[u64; 3]>) {
+    let bits = |number: f64| if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() };
+    (outputs.force().to_array().map(bits), outputs.torque().map(|torque| torque.to_array().map(bits)))
 }
 
 /// Finds the files that settings of the run named. Settings of this replay are taken as they are.

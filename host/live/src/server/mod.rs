@@ -17,7 +17,9 @@ use crate::{
     frame,
 };
 use flotor_core::Change;
+use flotor_core::demand::ObserverDemand;
 use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_record::RunDescription;
 use outbox::Outbox;
 use std::io::{self, ErrorKind};
@@ -79,11 +81,13 @@ struct Shared {
     greeting: Mutex<Greeting>,
     run: Vec<u8>,
     host: Arc<dyn Serve>,
+    /// Where clients that watch ask for the outputs that they are shown.
+    demand: ObserverDemand,
     started: Instant,
 }
 
 impl Publication {
-    /// Lets a run be found and watched.
+    /// Lets a run be found and watched. While a client watches, all outputs of the models are asked for at `demand`.
     ///
     /// # Errors
     /// [`PublishError`]; the run goes on without.
@@ -92,6 +96,7 @@ impl Publication {
         greeting: Greeting,
         run: &RunDescription,
         host: Arc<dyn Serve>,
+        demand: ObserverDemand,
     ) -> Result<Self, PublishError> {
         let listener = directory.listen()?;
         let shared = Arc::new(Shared {
@@ -100,6 +105,7 @@ impl Publication {
             greeting: Mutex::new(greeting),
             run: run.to_bytes(),
             host,
+            demand,
             started: Instant::now(),
         });
         let (socket, for_acceptor) = (Arc::clone(listener.socket()), Arc::clone(&shared));
@@ -175,7 +181,7 @@ impl Shared {
         if !outbox.wants_ticks() && self.watching.load(Ordering::Relaxed) >= MOST_WATCHERS {
             return Err(format!("{MOST_WATCHERS} programs watch already; close one of them"));
         }
-        outbox.want_ticks(every.max(1));
+        outbox.want_ticks(every.max(1), self.demand.request(Demand::ALL));
         self.count(&watchers);
         Ok(())
     }

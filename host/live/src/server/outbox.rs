@@ -1,6 +1,7 @@
 //! What waits to be sent to one watcher: a queue of fixed length that drops and counts.
 
 use crate::{ChangeMessage, Kind, frame, ticks_to_payload};
+use flotor_core::demand::DemandRequest;
 use flotor_core::trace::{Events, TickRecord};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -39,6 +40,8 @@ struct State {
     last: Option<Vec<u8>>,
     /// One tick in so many; none while 0.
     every: u32,
+    /// Asks for the outputs of models while ticks are wanted.
+    request: Option<DemandRequest>,
     /// What happened in the ticks between.
     passed: Events,
     is_closed: bool,
@@ -57,11 +60,17 @@ impl Outbox {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// One tick in `every` from now on; 0 for none.
-    pub(super) fn want_ticks(&self, every: u32) {
+    /// Takes one tick in `every` from now on, with the outputs of models that `request` asks for.
+    pub(super) fn want_ticks(&self, every: u32, request: DemandRequest) {
         let mut state = self.lock();
-        state.every = every;
-        state.ticks.reserve_exact(if every == 0 { 0 } else { MOST_TICKS });
+        (state.every, state.request) = (every, Some(request));
+        state.ticks.reserve_exact(MOST_TICKS);
+    }
+
+    /// Takes no tick from now on, and asks for no output of models.
+    pub(super) fn want_no_ticks(&self) {
+        let mut state = self.lock();
+        (state.every, state.request) = (0, None);
     }
 
     pub(super) fn wants_ticks(&self) -> bool {
@@ -217,12 +226,18 @@ impl Batch {
 mod tests {
     use super::*;
     use crate::{Frames, Outcome, Subject, ticks_from_payload};
+    use flotor_core::demand::ObserverDemand;
     use flotor_core::trace::RECORD_WORDS;
+    use flotor_hal::Demand;
     use flotor_sync::Words;
     use std::time::Instant;
 
     fn record(tick: u64, events: Events) -> TickRecord {
         TickRecord { tick, events, ..TickRecord::from_words(&[0; RECORD_WORDS]) }
+    }
+
+    fn nothing() -> DemandRequest {
+        ObserverDemand::default().request(Demand::FORCE)
     }
 
     fn taken(outbox: &Outbox) -> (u64, Vec<TickRecord>) {
@@ -242,7 +257,7 @@ mod tests {
     fn what_finds_no_room_is_dropped_and_counted() {
         let outbox = Outbox::default();
         outbox.tick(&record(0, Events::NONE));
-        outbox.want_ticks(1);
+        outbox.want_ticks(1, nothing());
         for tick in 0..5000 {
             outbox.tick(&record(tick, Events::NONE));
         }
@@ -259,7 +274,7 @@ mod tests {
     #[test]
     fn nothing_that_happens_between_two_ticks_is_lost() {
         let outbox = Outbox::default();
-        outbox.want_ticks(10);
+        outbox.want_ticks(10, nothing());
         for tick in 0..20 {
             outbox.tick(&record(tick, if tick == 7 { Events::BOUNDARY } else { Events::NONE }));
         }
@@ -310,7 +325,7 @@ mod tests {
     #[test]
     fn a_change_stays_between_the_ticks_it_came_between() {
         let outbox = Outbox::default();
-        outbox.want_ticks(1);
+        outbox.want_ticks(1, nothing());
         outbox.tick(&record(0, Events::NONE));
         outbox.tick(&record(1, Events::NONE));
         outbox.change(changed("gamma_n", Outcome::Applied), frame(Kind::Change, b"{}"));
@@ -328,7 +343,7 @@ mod tests {
     #[test]
     fn the_newest_change_stays_after_the_tick_before_it() {
         let outbox = Outbox::default();
-        outbox.want_ticks(1);
+        outbox.want_ticks(1, nothing());
         for tick in 0..1000 {
             outbox.change(changed("gamma_n", Outcome::Applied), frame(Kind::Change, b"{}"));
             outbox.tick(&record(tick, Events::NONE));
@@ -350,7 +365,7 @@ mod tests {
         let shortest = |every: u32| {
             let rounds = (0..5).map(|_| {
                 let outbox = Outbox::default();
-                outbox.want_ticks(every);
+                outbox.want_ticks(every, nothing());
                 (0..MOST_TICKS as u64).for_each(|tick| outbox.tick(&record(tick, Events::NONE)));
                 let message = changed("gamma_n", Outcome::Applied);
                 let since = Instant::now();

@@ -43,7 +43,8 @@ fn publication() -> (tempfile::TempDir, Directory, Publication, Sender<()>) {
         plugins: Vec::new(),
         couplings: Vec::new(),
     };
-    let publication = Publication::open(&directory, greeting, &run, Arc::new(host));
+    let publication =
+        Publication::open(&directory, greeting, &run, Arc::new(host), ObserverDemand::default());
     (scratch, directory, publication.unwrap(), over)
 }
 

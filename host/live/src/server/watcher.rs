@@ -41,8 +41,9 @@ impl Watcher {
         let reader = thread("flotor-live-in").spawn(move || {
             read(&to_read, &for_reader, &of_run, &heard);
             // The watcher has gone or talks nonsense: the writer ends, too.
-            for_reader.want_ticks(0);
+            for_reader.want_no_ticks();
             for_reader.close();
+            of_run.count(&of_run.watchers());
         });
         match reader {
             Ok(reader) => Some(Self { outbox, stream, writer, reader, heard_ms }),
@@ -85,7 +86,7 @@ fn write(stream: &Stream, outbox: &Outbox) {
         }
         outbox.pause(BATCH_PERIOD);
     }
-    outbox.want_ticks(0);
+    outbox.want_no_ticks();
     // A reader sees the end when it has read all of it.
     let _ = stream.shutdown(Shutdown::Write);
 }
@@ -153,7 +154,7 @@ fn carry_out(ask: Ask, outbox: &Outbox, shared: &Shared) -> Result<(), (RefusalC
             shared.admit(outbox, every).map_err(|refused| (RefusalCause::Other, refused))?
         }
         Ask::LookAway => {
-            outbox.want_ticks(0);
+            outbox.want_no_ticks();
             shared.count(&shared.watchers());
         }
         asked => shared.host.serve(asked)?,

@@ -4,6 +4,7 @@ use super::broad_phase::{Bounds, BroadPhase};
 use super::end_wall::EndWall;
 use crate::budget::{Allowed, Answer, Overrun, TimeBudget};
 use crate::engine::{Engine, Stepped};
+use flotor_core::demand::TickDemand;
 use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
@@ -77,12 +78,12 @@ struct Object {
     is_out: bool,
 }
 
-/// What a layer asks for in a tick.
+/// What a layer asks for in a tick. An output that was not computed is NaN.
 #[derive(Clone, Copy)]
 pub(super) struct Share {
-    /// In the device frame, not weighted.
+    /// In the device frame, not weighted; its torque is NaN where only an observer asks for it and it is not finite.
     pub(super) wrench: Wrench,
-    /// Stored energy scaled to the device, J.
+    /// Stored energy scaled to the device, J; NaN where it is not finite.
     pub(super) energy_j: f64,
 }
 
@@ -103,11 +104,48 @@ impl Share {
     }
 }
 
+/// Outputs that a model is asked for, and those that it can give.
+#[derive(Clone, Copy)]
+struct Asked {
+    demand: TickDemand,
+    serves: Demand,
+}
+
+impl Asked {
+    /// Returns the answer with NaN in place of each output that was not asked for; `None` if what reaches the hand is not finite,
+    /// or the status is unknown. Real-time: bounded, no allocation.
+    #[inline(always)] // in the middle of a tick
+    fn usable(self, mut output: Output) -> Option<Output> {
+        let Self { demand, serves } = self;
+        output.status()?;
+        if demand.felt().contains(Demand::TORQUE) {
+            if !output.wrench.is_finite() {
+                return None;
+            }
+        } else {
+            if !output.wrench.force().is_finite() {
+                return None;
+            }
+            if !(demand.computed().contains(Demand::TORQUE) && output.wrench.torque().is_finite()) {
+                output.wrench.torque_nm = [f64::NAN; 3];
+            }
+        }
+        if !demand.computed().contains(Demand::ENERGY) {
+            output.energy_j = f64::NAN;
+        } else if !output.energy_j.is_finite() {
+            // A model without energy adds none.
+            output.energy_j = if serves.contains(Demand::ENERGY) { f64::NAN } else { 0.0 };
+        }
+        Some(output)
+    }
+}
+
 /// A model in all its places.
 pub struct Layer {
     objects: Box<[Object]>,
     broad: BroadPhase,
-    demand: Demand,
+    /// Outputs that its model can give.
+    serves: Demand,
     memory: Memory,
     budget: TimeBudget,
     /// What it asked for last: it fades if the model took too long too often.
@@ -141,8 +179,7 @@ impl Layer {
         budget: TimeBudget,
         sampled: &SampledLoop,
     ) -> Self {
-        let served = |(model, _): &(Engine, Mapping)| Demand::ALL.limited_to(model.serves());
-        let demand = instances.first().map_or(Demand::ALL, served);
+        let serves = instances.first().map_or(Demand::ALL, |(model, _)| model.serves());
         let object = |(mut model, mapping): (Engine, Mapping)| {
             let end = EndWall::new(&model.workspace_bounds(), &mapping, sampled);
             Object { model, mapping, end, last: None, stepped_at: None, float_changes: 0, is_out: false }
@@ -153,7 +190,7 @@ impl Layer {
         Self {
             objects,
             broad: BroadPhase::new(bounds),
-            demand,
+            serves,
             memory,
             budget,
             last: Share::NONE,
@@ -183,11 +220,17 @@ impl Layer {
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
     #[inline(always)] // 3 ns: its share stays in registers
-    pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
+    pub(super) fn step(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        demand: TickDemand,
+        events: &mut Events,
+    ) -> Share {
         match self.budget.allowed(tick.time_ns) {
             Allowed::Asked => {
                 let (begun_ns, late_answers) = (self.budget.begin(), self.health.late_answers);
-                let share = self.ask(tick, state, events);
+                let share = self.ask(tick, state, demand, events);
                 if let Some(begun_ns) = begun_ns {
                     let is_there = self.health.late_answers == late_answers;
                     let answer = if is_there { Answer::There } else { Answer::Missing };
@@ -212,12 +255,13 @@ impl Layer {
 
     /// Asks all objects that can act where the handle is; the others are not called.
     #[inline]
-    fn ask(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
-        let Self { objects, broad, demand, memory, health, .. } = self;
+    fn ask(&mut self, tick: &Tick, state: &DeviceState, demand: TickDemand, events: &mut Events) -> Share {
+        let Self { objects, broad, serves, memory, health, .. } = self;
+        let asked = Asked { demand, serves: *serves };
         let mut share = Share::NONE;
         broad.for_each_near(objects, state.pose.position(), |object| {
-            let input = object.mapping.input(tick, state, *demand);
-            let Some(output) = object.answer(&input, *memory, health, events) else {
+            let input = object.mapping.input(tick, state, demand.computed().limited_to(*serves));
+            let Some(output) = object.answer(&input, asked, *memory, health, events) else {
                 events.insert(Events::MODEL_FAULT);
                 return;
             };
@@ -227,9 +271,7 @@ impl Layer {
                 events.insert(Events::BOUNDARY);
                 share.wrench = share.wrench + push;
             }
-            if output.energy_j.is_finite() {
-                share.energy_j += output.energy_j * object.mapping.energy_scale();
-            }
+            share.energy_j += output.energy_j * object.mapping.energy_scale();
             if output.status() != Some(StepStatus::Ok) {
                 events.insert(Events::MODEL_DEGRADED);
             }
@@ -307,6 +349,7 @@ impl Object {
     fn answer(
         &mut self,
         input: &Input,
+        asked: Asked,
         memory: Memory,
         health: &mut ModelHealth,
         events: &mut Events,
@@ -328,16 +371,17 @@ impl Object {
             health.change_floats(input.tick);
         }
         match stepped {
-            Stepped::Answered if output.wrench.is_finite() && output.status().is_some() => {
-                if self.model.may_be_late() {
-                    self.last = Some(output);
-                }
-                Some(output)
-            }
             Stepped::Answered => {
-                self.last = None;
-                health.reject(input.tick);
-                None
+                let usable = asked.usable(output);
+                match usable {
+                    Some(_) if self.model.may_be_late() => self.last = usable,
+                    Some(_) => {}
+                    None => {
+                        self.last = None;
+                        health.reject(input.tick);
+                    }
+                }
+                usable
             }
             // One tick may pass with the answer before; a second one in a row finds none.
             Stepped::Late => {

@@ -17,9 +17,10 @@ pub use layer::{Layer, LayerReport};
 use super::{Heartbeat, Place};
 use broad_phase::BroadPhase;
 use fade::Fade;
+use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DeviceState, Tick, Wrench};
+use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
 use layer::Share;
 use slot::Slot;
 
@@ -70,7 +71,8 @@ impl ModelStack {
         Self { slots, broad, levels: priorities.into_iter().map(level).collect() }
     }
 
-    /// What the models together ask for at a state of the device, in the device frame, and the energy they store, J.
+    /// Returns the wrench of the models together at a state of the device, in the device frame, and the energy they store, J. A
+    /// part that nobody asked for is undefined, one that an observer alone asked for NaN where it is not finite.
     ///
     /// Real-time: bounded by the models that are near, no allocation.
     #[inline]
@@ -78,6 +80,7 @@ impl ModelStack {
         &mut self,
         tick: &Tick,
         state: &DeviceState,
+        demand: TickDemand,
         heart: &Heartbeat,
         events: &mut Events,
     ) -> (Wrench, f64) {
@@ -91,10 +94,10 @@ impl ModelStack {
                 return;
             }
             heart.enter(tick.index, Place::Model(slot.number));
-            let share = slot.step(tick, state, events);
+            let share = slot.step(tick, state, demand, events);
             let mut weight = slot.weight.at(tick.time_ns);
             if let Some(level) = level {
-                level.pushes |= weight > 0.0 && share.wrench != Wrench::ZERO;
+                level.pushes |= weight > 0.0 && is_felt(&share.wrench, demand.felt());
                 weight *= level.gain.at(tick.time_ns);
             }
             sum.wrench = sum.wrench + share.wrench * weight;
@@ -187,4 +190,10 @@ impl ModelStack {
     pub(crate) fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
         self.slots.into_iter().flat_map(Slot::into_layers)
     }
+}
+
+/// True if a part of the wrench that reaches the hand is not zero.
+#[inline]
+fn is_felt(wrench: &Wrench, felt: Demand) -> bool {
+    wrench.force() != DVec3::ZERO || felt.contains(Demand::TORQUE) && wrench.torque() != DVec3::ZERO
 }

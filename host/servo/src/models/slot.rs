@@ -7,6 +7,7 @@
 use super::broad_phase::Bounds;
 use super::fade::Fade;
 use super::layer::{Layer, LayerReport, ModelHealth, Share};
+use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DeviceState, Tick};
@@ -102,12 +103,18 @@ impl Slot {
 
     /// What it asks for at a state of the device. Real-time: bounded by the objects that are near, no allocation.
     #[inline]
-    pub(super) fn step(&mut self, tick: &Tick, state: &DeviceState, events: &mut Events) -> Share {
-        let share = self.current.step(tick, state, events);
+    pub(super) fn step(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        demand: TickDemand,
+        events: &mut Events,
+    ) -> Share {
+        let share = self.current.step(tick, state, demand, events);
         let Some(leaving) = &mut self.leaving else { return share };
         // The current layer mixed with the one that leaves.
         let presence = self.presence.at(tick.time_ns);
-        let mut before = leaving.step(tick, state, events);
+        let mut before = leaving.step(tick, state, demand, events);
         if let Some(rest) = self.rest {
             before = before.plus(rest);
         }

@@ -5,6 +5,8 @@ use super::{
     ChangeLog, Controls, Epilogue, Finished, Observer, Outcome, RealTimeReport, RunError, Session, TapEnds,
     publish_to,
 };
+use flotor_core::demand::DemandRequest;
+use flotor_hal::Demand;
 use flotor_hal::abi::loader::Stopper;
 use flotor_servo::{Loop, RunEnd, Schedule, StopSwitch};
 
@@ -14,6 +16,7 @@ pub struct Lockstep {
     controls: Controls,
     changes: ChangeLog,
     taps: TapEnds,
+    asked: DemandRequest,
     stoppers: Stoppers,
     epilogue: Epilogue,
 }
@@ -37,8 +40,9 @@ impl Session {
         let epilogue = self.epilogue();
         let Session { standby, controls, changes, taps, period_ns, duration_ns, plugins, .. } = self;
         let stoppers = Stoppers(standby.stoppers());
+        let asked = standby.observers().request(Demand::FORCE);
         let runner = Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
-        Ok(Lockstep { runner, controls, changes, taps, stoppers, epilogue })
+        Ok(Lockstep { runner, controls, changes, taps, asked, stoppers, epilogue })
     }
 }
 
@@ -46,10 +50,11 @@ impl Lockstep {
     /// One tick; the observer is told of it and of what changed before it. How the run ended, if it has: then there was no
     /// tick. Not real-time: the observer is not.
     pub fn advance(&mut self, observer: &mut dyn Observer, stop: &StopSwitch) -> Option<RunEnd> {
-        let Self { runner, controls, changes, taps, .. } = self;
+        let Self { runner, controls, changes, taps, asked, .. } = self;
         if runner.end().is_some() {
             return runner.end();
         }
+        asked.change_to(observer.demand());
         runner.advance(stop, |record| {
             publish_to(taps, record);
             changes.up_to(record.tick, |change| observer.change(change));

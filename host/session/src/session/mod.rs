@@ -26,15 +26,18 @@ use ceiling::{norm_notice, under_ceiling};
 use controls::{ChangeLog, Parts};
 use epilogue::Epilogue;
 use flotor_core::Change;
-use flotor_core::MOST_DEVICES;
+use flotor_core::demand::ObserverDemand;
 use flotor_core::limits::Limits;
 use flotor_core::plausibility::ImplausibleSamples;
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
+use flotor_core::{MOST_DEVICES, ModelOutputs};
 use flotor_coupling::{Line, Patience, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
-use flotor_hal::{Axes, Capabilities, Embodiment, EnergyLedger, Fault, LoopConfig, Parameter, SoftRange};
+use flotor_hal::{
+    Axes, Capabilities, Demand, Embodiment, EnergyLedger, Fault, LoopConfig, Parameter, SoftRange,
+};
 use flotor_hal::{Pose, Twist, Wrench};
 use flotor_live::{Directory, Pressed, WrenchLimits};
 use flotor_servo::last_stop::TakenSignals;
@@ -159,6 +162,8 @@ pub struct PluginReport {
     pub soft_ranges: Vec<Option<SoftRange>>,
     /// Latency that a device declares, s; 0 of a model.
     pub latency_s: f64,
+    /// Of a device: the outputs of models that reach the hand there.
+    pub felt: Demand,
     /// Signals of the host that it took away while it was made, and that were taken back.
     pub signals_taken: TakenSignals,
     /// What a model says of its own error when it is ready ([`crate::estimates`]), by name.
@@ -182,6 +187,12 @@ pub trait Observer {
 
     /// A parameter that changed, before the tick that saw it first. Not real-time.
     fn change(&mut self, _change: &Change) {}
+
+    /// Returns the outputs of models that the observer reads; the loop computes the others only where the hand feels them.
+    /// Called before the run and now and then during it. Not real-time.
+    fn demand(&self) -> Demand {
+        Demand::FORCE
+    }
 }
 
 /// The newest record of a device, for another thread: version 0 is a device at home before the first tick. Read without waiting.
@@ -204,10 +215,9 @@ const AT_HOME: TickRecord = TickRecord {
     dt_ns: 0,
     pose: Pose::HOME,
     twist: Twist::ZERO,
-    model: Wrench::ZERO,
+    model: ModelOutputs::ZERO,
     commanded: Wrench::ZERO,
     delivered: Wrench::ZERO,
-    energy_j: 0.0,
     port_energy_j: 0.0,
     events: flotor_core::trace::Events::NONE,
     buttons: 0,
@@ -590,6 +600,12 @@ impl Session {
         tap
     }
 
+    /// Returns the place where observers ask for outputs of the models, beside the one that the run is given.
+    #[must_use]
+    pub fn observers(&self) -> ObserverDemand {
+        self.standby.observers()
+    }
+
     /// What the devices can do, in the scene's order.
     #[must_use]
     pub fn capabilities(&self) -> &[Capabilities] {
@@ -632,11 +648,13 @@ impl Session {
     fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
         let Session { standby, controls, mut changes, mut taps, period_ns, duration_ns, plugins, .. } = self;
         let stoppers = standby.stoppers();
+        let mut asked = standby.observers().request(observer.demand());
         let mut runner =
             Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
         // A tick may end a batch with a record for each device.
         let mut batch = Vec::with_capacity(VIRTUAL_BATCH + usize::from(MOST_DEVICES));
         while runner.end().is_none() {
+            asked.change_to(observer.demand());
             while batch.len() < VIRTUAL_BATCH && runner.end().is_none() {
                 runner.advance(stop, |record| {
                     publish_to(&mut taps, record);
@@ -680,7 +698,8 @@ impl Session {
         // Before the look at the latch that counts: a press after that is seen here.
         let watch = latch.as_ref().map(|latch| latch.watch(stop)).transpose();
         let _watch = watch.map_err(|_| RunError::Thread(latch::NO_WATCH))?;
-        let mut look = |record: TickRecord| {
+        let mut asked = standby.observers().request(observer.demand());
+        let mut look = |observer: &mut dyn Observer, record: TickRecord| {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(&record);
         };
@@ -748,7 +767,8 @@ impl Session {
         let mut bitten = None;
         let mut stopping_since = None;
         while !servo_thread.is_finished() {
-            drain(&mut receiver, &mut look);
+            asked.change_to(observer.demand());
+            drain(&mut receiver, |record| look(observer, record));
             controls.sweep();
             guardian.look(stop);
             if let Err(hung) = progress.look(limit()) {
@@ -778,7 +798,7 @@ impl Session {
             std::thread::sleep(OBSERVER_PERIOD);
         }
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
-        drain(&mut receiver, &mut look);
+        drain(&mut receiver, |record| look(observer, record));
         Ok(Finished { end: guardian.end(finished.end), warning: guardian.warning(), ..finished })
     }
 }

@@ -12,13 +12,14 @@ use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
     ParameterText, PluginUse, Scene, SceneError,
 };
+use flotor_core::demand::felt_at;
 use flotor_core::limits::Boundary;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting, Stopper};
 use flotor_hal::{
-    Axes, Capabilities, Embodiment, Independence, LoopConfig, Parameter, ParameterKind, Refusal, SampledLoop,
-    SoftRange,
+    Axes, Capabilities, Demand, Embodiment, Independence, LoopConfig, Parameter, ParameterKind, Refusal,
+    SampledLoop, SoftRange,
 };
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
@@ -218,6 +219,7 @@ pub(super) fn open_device(
     }
     report.signals_taken = signals.put_back();
     report.latency_s = capabilities.latency_s;
+    report.felt = felt_at(&capabilities);
     let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
     Ok((Opened { device, capabilities, embodiment, independence }, report))
 }
@@ -468,6 +470,7 @@ fn report(
         soft_ranges: soft_ranges(plugin, &parameters),
         parameters,
         latency_s: 0.0,
+        felt: Demand::WRENCH,
         signals_taken: TakenSignals::default(),
         estimates: Vec::new(),
     }

@@ -4,7 +4,9 @@ use super::prepare::activate;
 use super::{ChangeLog, Controls, Observer, RunError, RunOptions, Session};
 use crate::registry::Registry;
 use crate::scene::Scene;
+use flotor_core::demand::DemandRequest;
 use flotor_coupling::Line;
+use flotor_hal::Demand;
 use flotor_hal::abi::loader::Stopper;
 use flotor_servo::{Clock, CouplingOutcome, Loop, RunEnd, Schedule, StopSwitch};
 
@@ -13,6 +15,7 @@ pub struct Steps {
     runner: Loop,
     controls: Controls,
     changes: ChangeLog,
+    asked: DemandRequest,
     stop: StopSwitch,
     stoppers: Vec<Stopper>,
     lines: Vec<(String, Line)>,
@@ -27,8 +30,9 @@ impl Steps {
         let session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
         let Session { standby, controls, changes, period_ns, duration_ns, lines, plugins, .. } = session;
         let stoppers = standby.stoppers();
+        let asked = standby.observers().request(Demand::FORCE);
         let runner = Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
-        Ok(Self { runner, controls, changes, stop: StopSwitch::default(), stoppers, lines })
+        Ok(Self { runner, controls, changes, asked, stop: StopSwitch::default(), stoppers, lines })
     }
 
     /// The handle by which parameters, weights and models of the run are changed.
@@ -54,7 +58,8 @@ impl Steps {
     /// # Errors
     /// How the run ended, if it did; then there was no tick.
     pub fn advance(&mut self, observer: &mut dyn Observer) -> Result<(), RunEnd> {
-        let Self { runner, changes, stop, .. } = self;
+        let Self { runner, changes, asked, stop, .. } = self;
+        asked.change_to(observer.demand());
         runner.advance(stop, |record| {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(record);

@@ -22,6 +22,7 @@ use crate::scene::Scene;
 use crate::{ControlError, Controls, LatchGuard, NewValue, Observer, PluginReport, Session};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_live::{
     Ask, Directory, EndKind, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, RefusalCause, Serve,
     process_number,
@@ -67,7 +68,7 @@ pub fn announce(
         plugins: session.plugins().iter().map(panel).collect(),
         limits: session.limits(),
     };
-    Publication::open(directory, greeting, run, host)
+    Publication::open(directory, greeting, run, host, session.observers())
 }
 
 fn panel(report: &PluginReport) -> PanelPlugin {
@@ -98,6 +99,11 @@ impl<O: Observer> Observer for Watched<O> {
         if let Some(publication) = &self.publication {
             publication.observe(record);
         }
+    }
+
+    /// That of the observer: each client asks for itself.
+    fn demand(&self) -> Demand {
+        self.observer.demand()
     }
 
     fn change(&mut self, change: &Change) {

@@ -15,6 +15,7 @@ use crate::protocol::SubjectNumber;
 use crate::trial::{Exploration, Trial};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_record::Recorder;
 use flotor_servo::Clock;
 use flotor_servo::RunEnd;
@@ -191,6 +192,10 @@ impl Observer for Both<'_> {
     fn observe(&mut self, record: &TickRecord) {
         self.0.observe(record);
         self.1.observe(record);
+    }
+
+    fn demand(&self) -> Demand {
+        self.0.demand().with(self.1.demand())
     }
 
     fn change(&mut self, change: &Change) {

@@ -3,6 +3,7 @@
 use crate::kinematics::{KinematicsMeter, Sample};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome};
+use flotor_hal::Demand;
 use flotor_session::{Observer, RunRecording};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -31,6 +32,10 @@ impl Observer for Watch {
         self.recording.observe(record);
     }
 
+    fn demand(&self) -> Demand {
+        self.recording.demand()
+    }
+
     fn change(&mut self, change: &Change) {
         if change.outcome != ChangeOutcome::Applied {
             self.refused = Some(change.clone());
@@ -53,6 +58,10 @@ impl Shared {
 impl Observer for Shared {
     fn observe(&mut self, record: &TickRecord) {
         self.lock().observe(record);
+    }
+
+    fn demand(&self) -> Demand {
+        self.lock().demand()
     }
 
     fn change(&mut self, change: &Change) {

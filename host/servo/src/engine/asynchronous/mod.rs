@@ -196,7 +196,8 @@ impl Inline {
             let dt_ns = self.looked_ns.map_or(0, |before_ns| input.time_ns - before_ns);
             self.looked_ns = Some(input.time_ns);
             let mut field = LinearField::NONE;
-            match self.model.linear_field(&Input { dt_ns, ..*input }, &mut field) {
+            let demand = self.model.serves().limited_to(Demand::WRENCH);
+            match self.model.linear_field(&Input { dt_ns, demand, ..*input }, &mut field) {
                 Stepped::Answered => {
                     field.time_ns = input.time_ns;
                     self.held_back = Some((input.time_ns + self.latency_ns, field));

@@ -1,0 +1,140 @@
+//! Outputs of models that a run needs: those that reach the hand, and those that observers ask for.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
+
+use flotor_hal::{Capabilities, Demand};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Returns the outputs that reach a hand at a device: force, and torque if the device gives any.
+#[must_use]
+pub fn felt_at(device: &Capabilities) -> Demand {
+    if device.max_torque_nm.iter().any(|most_nm| *most_nm > 0.0) { Demand::WRENCH } else { Demand::FORCE }
+}
+
+/// Outputs that the models of a device compute in one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TickDemand {
+    felt: Demand,
+    computed: Demand,
+}
+
+impl TickDemand {
+    /// The outputs that are felt at a device, and those that only observers ask for. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub const fn new(felt: Demand, observed: Demand) -> Self {
+        Self { felt, computed: felt.with(observed) }
+    }
+
+    /// Outputs that reach the hand.
+    #[inline]
+    #[must_use]
+    pub const fn felt(self) -> Demand {
+        self.felt
+    }
+
+    /// Outputs that reach the hand or an observer.
+    #[inline]
+    #[must_use]
+    pub const fn computed(self) -> Demand {
+        self.computed
+    }
+}
+
+/// Outputs that are counted, each with one request for it in the word of counts.
+const COUNTS: [(Demand, u64); 2] = [(Demand::TORQUE, 1), (Demand::ENERGY, 1 << 32)];
+
+/// The outputs that observers of a run ask for: a count of requests for each, in one word that the loop reads every tick.
+///
+/// A clone counts the same requests. Force is always computed and never counted.
+#[derive(Clone, Debug, Default)]
+pub struct ObserverDemand {
+    counts: Arc<AtomicU64>,
+}
+
+impl ObserverDemand {
+    /// Asks for outputs until the request is dropped; the loop computes them from its next tick on.
+    pub fn request(&self, outputs: Demand) -> DemandRequest {
+        let counted = counted(outputs);
+        // Nothing else is published with the counts.
+        self.counts.fetch_add(counted, Ordering::Relaxed);
+        DemandRequest { demand: self.clone(), counted }
+    }
+
+    /// Returns force and the outputs that at least one request is for. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn now(&self) -> Demand {
+        let counts = self.counts.load(Ordering::Relaxed);
+        let [torque, energy] = COUNTS;
+        let mut demand = Demand::FORCE;
+        if counts & u64::from(u32::MAX) != 0 {
+            demand = demand.with(torque.0);
+        }
+        if counts >= energy.1 {
+            demand = demand.with(energy.0);
+        }
+        demand
+    }
+}
+
+/// A request of one observer, withdrawn when dropped.
+#[derive(Debug)]
+#[must_use = "a request is withdrawn when it is dropped"]
+pub struct DemandRequest {
+    demand: ObserverDemand,
+    counted: u64,
+}
+
+impl DemandRequest {
+    /// Asks for other outputs from now on.
+    pub fn change_to(&mut self, outputs: Demand) {
+        if self.counted != counted(outputs) {
+            // The new request first: what both ask for is demanded throughout.
+            *self = self.demand.request(outputs);
+        }
+    }
+}
+
+/// Returns one request for each output, as counted in the word.
+fn counted(outputs: Demand) -> u64 {
+    COUNTS.iter().filter(|(output, _)| outputs.contains(*output)).map(|(_, one)| one).sum()
+}
+
+impl Drop for DemandRequest {
+    fn drop(&mut self) {
+        self.demand.counts.fetch_sub(self.counted, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_is_demanded_while_one_request_for_it_is_left() {
+        let demand = ObserverDemand::default();
+        assert_eq!(demand.now(), Demand::FORCE);
+        let all = demand.request(Demand::ALL);
+        let torque = demand.clone().request(Demand::TORQUE);
+        let nothing = demand.request(Demand::FORCE);
+        assert_eq!(demand.now(), Demand::ALL);
+        drop(all);
+        assert_eq!(demand.now(), Demand::WRENCH);
+        let mut energy = demand.request(Demand::WRENCH);
+        energy.change_to(Demand::ENERGY);
+        drop(torque);
+        assert_eq!(demand.now(), Demand::FORCE.with(Demand::ENERGY));
+        drop((energy, nothing));
+        assert_eq!(demand.now(), Demand::FORCE);
+    }
+
+    #[test]
+    fn torque_is_felt_where_a_device_gives_any() {
+        let mut device = Capabilities::UNDRIVEN;
+        assert_eq!(felt_at(&device), Demand::FORCE);
+        device.max_torque_nm[2] = 0.1;
+        assert_eq!(felt_at(&device), Demand::WRENCH);
+    }
+}
