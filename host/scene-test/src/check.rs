@@ -85,6 +85,9 @@ pub(crate) fn run_arguments(
     for (key, value) in set {
         arguments.extend(["--set".to_owned(), format!("{key}={value}")]);
     }
+    for output in file.outputs() {
+        arguments.extend(["--compute".to_owned(), output.to_owned()]);
+    }
     if let Some(duration) = duration {
         arguments.extend(["--duration".to_owned(), duration.to_owned()]);
     }

@@ -2,11 +2,11 @@
 
 use crate::bound::{Bound, number};
 use crate::curve::Points;
-use crate::numbers::did_you_mean;
+use crate::numbers::{did_you_mean, outputs_for};
 use flotor_command::CommandError;
 use flotor_command::options::{PluginPathOption, duration_s};
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::{Spanned, Value};
 
@@ -179,6 +179,13 @@ impl TestFile {
         let file = Self::parse(path, &text)
             .map_err(|(at, wrong)| CommandError::Usage(format!("{}: {wrong}", place(path, &text, at))))?;
         Ok(Self { plugin_path: plugin_path.clone(), ..file })
+    }
+
+    /// Outputs of the models that the numbers of the file need, each once.
+    pub(crate) fn outputs(&self) -> BTreeSet<&'static str> {
+        let compared = self.reference.iter().flat_map(|reference| &reference.within).map(|(path, _)| path);
+        let paths = self.expect.iter().map(|expectation| &expectation.path).chain(compared);
+        paths.flat_map(|path| outputs_for(path)).copied().collect()
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self, Wrong> {

@@ -12,6 +12,11 @@ pub(crate) fn at<'j>(json: &'j Value, path: &str) -> Option<&'j Value> {
     found.or_else(|| is_event().then(|| NEVER.get_or_init(|| 0.into()))).filter(|value| !value.is_null())
 }
 
+/// Outputs of the models that a run has to compute for the number at a path.
+pub(crate) fn outputs_for(path: &str) -> &'static [&'static str] {
+    if path == "energy.loop_generated_j" { &["torque", "energy"] } else { &[] }
+}
+
 /// How often an event happened that is not there.
 static NEVER: OnceLock<Value> = OnceLock::new();
 

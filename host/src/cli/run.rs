@@ -2,7 +2,7 @@
 
 use crate::platform::most_open_files;
 use crate::run_picture::RunPicture;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use flotor_command::options::{
     ClockOption, JsonOption, PluginKeyValue, PluginPathOption, StrengthOption, core, duration_s, mcap_file,
     rate_hz, svg_file, whole,
@@ -63,6 +63,9 @@ pub(crate) struct RunArguments {
     plot: Option<PathBuf>,
     #[command(flatten)]
     json: JsonOption,
+    /// Compute an output of the models although neither the hand nor an observer needs it (repeatable)
+    #[arg(long, value_enum, value_name = "OUTPUT")]
+    compute: Vec<OutputOption>,
     /// Set a parameter of a plugin of the scene (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
@@ -82,6 +85,24 @@ impl RunArguments {
     /// Whether `flotor lend` has started this run, with which it ends: nobody else would end it.
     pub(crate) fn is_lent(&self) -> bool {
         self.ml_api.is_some()
+    }
+}
+
+/// `--compute`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum OutputOption {
+    /// Torque, where the device gives none
+    Torque,
+    /// Stored energy
+    Energy,
+}
+
+impl OutputOption {
+    fn demand(self) -> Demand {
+        match self {
+            Self::Torque => Demand::TORQUE,
+            Self::Energy => Demand::ENERGY,
+        }
     }
 }
 
@@ -136,6 +157,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         plot: arguments.plot.as_ref().map(|_| {
             RunPicture::new(&scene.title, scene.devices.iter().map(|device| device.name.clone()).collect())
         }),
+        compute: arguments.compute.iter().fold(Demand::FORCE, |all, output| all.with(output.demand())),
         progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
     };
     let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
@@ -143,7 +165,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let latch = session.latch().cloned();
     let outcome = session.run(&mut watched, &stop);
     drop(keys);
-    let Watched { observer: Watchers { tally, digest, mut recording, plot, progress }, publication } =
+    let Watched { observer: Watchers { tally, digest, mut recording, plot, progress, .. }, publication } =
         watched;
     progress.finish_and_clear();
     let outcome = match outcome {
@@ -364,6 +386,8 @@ struct Watchers {
     digest: TraceDigest,
     recording: RunRecording,
     plot: Option<RunPicture>,
+    /// Outputs of the models that the command line asks for.
+    compute: Demand,
     progress: ProgressBar,
 }
 
@@ -377,7 +401,7 @@ impl Observer for Watchers {
 
     fn demand(&self) -> Demand {
         let plot = self.plot.as_ref().map_or(Demand::FORCE, RunPicture::demand);
-        self.recording.demand().with(plot)
+        self.compute.with(self.recording.demand()).with(plot)
     }
 
     fn observe(&mut self, record: &TickRecord) {

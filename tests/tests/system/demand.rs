@@ -306,8 +306,30 @@ fn a_summary_names_what_was_not_computed_and_has_no_number_that_needs_it() {
         assert!(text.contains(&format!("  not computed: {}\n", names.join(", "))), "{text}");
     }
     let recording = scratch.path().join("run.mcap").display().to_string();
-    let (json, _) = summary("three", &["--record", &recording]);
-    assert_eq!(json["not_computed"], Value::from(Vec::<&str>::new()), "{json}");
+    for all in [&["--record", &recording][..], &["--compute", "torque", "--compute", "energy"]] {
+        let (json, _) = summary("three", all);
+        assert_eq!(json["not_computed"], Value::from(Vec::<&str>::new()), "{json}");
+    }
+    for (output, other) in [("torque", "energy"), ("energy", "torque")] {
+        let (json, _) = summary("three", &["--compute", output]);
+        assert_eq!(json["not_computed"], Value::from(vec![other]), "{json}");
+    }
+}
+
+#[test]
+fn an_expectation_asks_for_the_outputs_that_its_number_needs() {
+    let scratch = Scratch::default();
+    let scene = "duration_s = 0.2\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"spring\"\n";
+    let _ = scratch.file("scene.toml", scene);
+    let test = |expectation: &str| {
+        let text = format!("scene = \"scene.toml\"\n[expect]\n{expectation}\n");
+        let file = scratch.file("one.test.toml", text).display().to_string();
+        Flotor::with(["test", &file]).inside(scratch.path()).run()
+    };
+    let passed = test("\"energy.loop_generated_j\" = { min = 0, max = 1 }");
+    assert_eq!(passed.code, Some(exit_code::OK), "{passed:?}");
+    let failed = test("\"energy.loop_generated_j\" = { min = 1, max = 2 }");
+    assert!(failed.code != Some(exit_code::OK) && failed.stdout.contains("--compute energy"), "{failed:?}");
 }
 
 /// A request is of no use to a run that is over, and does no harm.
