@@ -52,17 +52,27 @@ impl Load {
         Self { kind, force_n, onset_m, drawn: Shape::default() }
     }
 
-    /// Force along z, N, and energy, J, at a height. Real-time: bounded, no allocation.
+    /// Returns the force along z at a height, N. Real-time: bounded, no allocation.
     #[must_use]
-    pub fn at(&self, height_m: f64) -> (f64, f64) {
+    pub fn force_n(&self, height_m: f64) -> f64 {
         match self.kind {
-            Kind::Felt => (-self.force_n, self.force_n * height_m),
-            Kind::Exerted if height_m >= 0.0 => (0.0, 0.0),
+            Kind::Felt => -self.force_n,
+            Kind::Exerted if height_m >= 0.0 => 0.0,
+            Kind::Exerted => self.force_n * math::tanh(-height_m / self.onset_m),
+        }
+    }
+
+    /// Returns the energy stored at a height, J. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn energy_j(&self, height_m: f64) -> f64 {
+        match self.kind {
+            Kind::Felt => self.force_n * height_m,
+            Kind::Exerted if height_m >= 0.0 => 0.0,
             Kind::Exerted => {
                 let depth = -height_m / self.onset_m;
                 // ln cosh x without overflow: x + ln((1 + exp(-2x)) / 2).
                 let log_cosh = depth + math::ln_1p(math::exp(-2.0 * depth)) - std::f64::consts::LN_2;
-                (self.force_n * math::tanh(depth), self.force_n * self.onset_m * log_cosh)
+                self.force_n * self.onset_m * log_cosh
             }
         }
     }
@@ -99,7 +109,10 @@ impl ForceModel for Load {
         }
         let position_m = input.pose.position();
         let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
-        let (force_n, energy_j) = self.at(reached_m.z);
+        let force_n = self.force_n(reached_m.z);
+        // Most of what a resistance costs.
+        let is_asked = input.demand.contains(Demand::ENERGY);
+        let energy_j = if is_asked { self.energy_j(reached_m.z) } else { f64::NAN };
         let status = if reached_m == position_m { StepStatus::Ok } else { StepStatus::Clamped };
         Output::new(Wrench::from_force(DVec3::Z * force_n), energy_j, status)
     }

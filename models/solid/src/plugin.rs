@@ -233,7 +233,7 @@ impl ForceModel for Solid {
         let modulus = self.youngs_modulus_pa;
         let (wrench, energy_j) = match &self.law {
             Law::Bonded(patch) => {
-                let (wrench, energy_j) = patch.answer(reached_m, input.pose.orientation());
+                let (wrench, energy_j) = patch.answer(reached_m, input.pose.orientation(), input.demand);
                 (Wrench::new(wrench.force() * modulus, wrench.torque() * modulus), energy_j * modulus)
             }
             Law::Sphere(atlas) => {

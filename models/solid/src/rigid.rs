@@ -4,7 +4,7 @@
 //! displacement, with the exact rotation `R`. The energy is `1/2 v.K v` in those twelve; force and torque are its
 //! derivatives with respect to the movement of the hand.
 
-use flotor_hal::{DMat3, DQuat, DVec3, Wrench};
+use flotor_hal::{DMat3, DQuat, DVec3, Demand, Wrench};
 
 /// Number of the numbers: three of `t`, nine of `R - I`.
 pub const MODES: usize = 12;
@@ -37,19 +37,26 @@ impl RigidPatch {
         modes
     }
 
-    /// Wrench on the hand, and stored energy, J. Real-time: bounded, no allocation.
+    /// Returns the wrench on the hand, and the stored energy, J, with zeros in the place of what is not demanded. Real-time:
+    /// bounded, no allocation.
     #[must_use]
-    pub fn answer(&self, position_m: DVec3, orientation: DQuat) -> (Wrench, f64) {
-        let rotation = DMat3::from_quat(orientation);
-        let columns = [rotation.x_axis, rotation.y_axis, rotation.z_axis];
+    pub fn answer(&self, position_m: DVec3, orientation: DQuat, demand: Demand) -> (Wrench, f64) {
         let modes = Self::modes(position_m, orientation);
         let mut slope = [0.0; MODES];
+        let is_force_alone = !(demand.contains(Demand::TORQUE) || demand.contains(Demand::ENERGY));
+        // Force is the slope of three of the twelve numbers; torque and energy need all.
+        let rows = if is_force_alone { 3 } else { MODES };
         let mut energy_j = 0.0;
-        for ((target, row), mode) in slope.iter_mut().zip(&self.stiffness).zip(&modes) {
+        for ((target, row), mode) in slope.iter_mut().zip(&self.stiffness).zip(&modes).take(rows) {
             *target = row.iter().zip(&modes).map(|(k, v)| k * v).sum();
             energy_j += 0.5 * *target * mode;
         }
         let force_n = -DVec3::new(slope[0], slope[1], slope[2]);
+        if is_force_alone {
+            return (Wrench::from_force(force_n), 0.0);
+        }
+        let rotation = DMat3::from_quat(orientation);
+        let columns = [rotation.x_axis, rotation.y_axis, rotation.z_axis];
         let mut torque_nm = DVec3::ZERO;
         for (j, column) in columns.into_iter().enumerate() {
             let moment =
@@ -75,11 +82,14 @@ mod tests {
         let patch = RigidPatch { stiffness };
         let (position, turn) =
             (DVec3::new(0.3, -0.2, 0.5), DQuat::from_scaled_axis(DVec3::new(0.4, -0.7, 0.2)));
-        let (wrench, _) = patch.answer(position, turn);
+        let (wrench, _) = patch.answer(position, turn, Demand::ALL);
+        let (alone, _) = patch.answer(position, turn, Demand::FORCE);
+        assert_eq!(alone, Wrench::from_force(wrench.force()));
         let h = 1.0e-5;
         for axis in DVec3::AXES {
-            let moved = |s: f64| patch.answer(position + axis * s, turn).1;
-            let turned = |s: f64| patch.answer(position, DQuat::from_scaled_axis(axis * s) * turn).1;
+            let moved = |s: f64| patch.answer(position + axis * s, turn, Demand::ALL).1;
+            let turned =
+                |s: f64| patch.answer(position, DQuat::from_scaled_axis(axis * s) * turn, Demand::ALL).1;
             let (force, torque) = ((moved(h) - moved(-h)) / (2.0 * h), (turned(h) - turned(-h)) / (2.0 * h));
             // Central differences: h squared times third derivatives of order twelve.
             assert!((wrench.force().dot(axis) + force).abs() < 1.0e-8, "{axis}");

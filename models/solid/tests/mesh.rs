@@ -2,7 +2,7 @@
 
 use crate::table::rows;
 use flotor_hal::abi::loader::{Plugin, Setting};
-use flotor_hal::{DVec3, orientation_from_rotation_vector};
+use flotor_hal::{DVec3, Demand, orientation_from_rotation_vector};
 use flotor_solid::atlas::Atlas;
 use flotor_solid::cells::Kind;
 use flotor_solid::dissection::{Stiffness, subtract_forces};
@@ -170,7 +170,7 @@ fn a_plate_on_a_beam_from_a_file() {
             let mut worst: f64 = 0.0;
             for row in rows("a_cantilever_plate.csv").iter().filter(|row| row.number("nu") == nu) {
                 let rotation = orientation_from_rotation_vector(row.vector(["rx_rad", "ry_rad", "rz_rad"]));
-                let (wrench, _) = patch.answer(row.vector(["x_m", "y_m", "z_m"]), rotation);
+                let (wrench, _) = patch.answer(row.vector(["x_m", "y_m", "z_m"]), rotation, Demand::ALL);
                 let modulus = row.number("E_pa");
                 let force = row.vector(["fx_n", "fy_n", "fz_n"]);
                 let torque = row.vector(["tx_nm", "ty_nm", "tz_nm"]);

@@ -1,7 +1,7 @@
 //! The open rows of the reference tables, at the standard resolution. Bounds are those the tables' makers set.
 
 use crate::table::{Row, rows};
-use flotor_hal::{DQuat, DVec3, Wrench, orientation_from_rotation_vector};
+use flotor_hal::{DQuat, DVec3, Demand, Wrench, orientation_from_rotation_vector};
 use flotor_solid::half_space::HalfSpace;
 use flotor_solid::law::{Body, Description, LINEAR_TETRAHEDRA, Law, RESOLUTIONS, Tool};
 use flotor_solid::punch::{Bond, Outline};
@@ -25,7 +25,7 @@ fn solve(body: Body, tool: Tool, poisson_ratio: f64) -> Law {
 fn errors(law: &Law, row: &Row, arm_m: f64) -> (f64, f64) {
     let Law::Bonded(patch) = law else { panic!("a rigid patch") };
     let rotation = orientation_from_rotation_vector(row.vector(["rx_rad", "ry_rad", "rz_rad"]));
-    let (wrench, energy_j) = patch.answer(row.vector(["x_m", "y_m", "z_m"]), rotation);
+    let (wrench, energy_j) = patch.answer(row.vector(["x_m", "y_m", "z_m"]), rotation, Demand::ALL);
     let modulus = row.number("E_pa");
     let (force, torque) = (row.vector(["fx_n", "fy_n", "fz_n"]), row.vector(["tx_nm", "ty_nm", "tz_nm"]));
     let size = force.length() + torque.length() / arm_m;
@@ -157,7 +157,8 @@ fn linear_tetrahedra_are_half_as_soft() {
         };
         // Force and torque of a deflection along z and of a small rotation about y; no torque on the tip.
         let small = 1.0e-6;
-        let at = |z: f64, angle: f64| patch.answer(DVec3::Z * z, DQuat::from_rotation_y(angle)).0;
+        let at =
+            |z: f64, angle: f64| patch.answer(DVec3::Z * z, DQuat::from_rotation_y(angle), Demand::ALL).0;
         let (moved, turned) = (at(small, 0.0), at(0.0, small));
         let softened = turned.force().z * moved.torque().y / turned.torque().y;
         (small / (softened - moved.force().z), error)
