@@ -1,7 +1,14 @@
-//! Text files that people write, and where in them something is wrong.
+//! Files that people name: read whole, within a bound, and where in a text something is wrong.
 
 use std::fmt;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
+
+/// Most bytes of a text: hundreds of times the largest table in use.
+const MOST_TEXT_BYTES: u64 = 256 << 20;
+/// Mark at the start of a text that some programs write.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// What is wrong with a text file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,13 +40,39 @@ impl TextProblem {
     }
 }
 
-/// Reads a text file; `what` names it where it cannot be read. Not real-time.
+/// Reads a whole regular file of at most so many bytes. A pipe, whose writer may never come, and a device file, which may have
+/// no end, are not opened. Not real-time.
+///
+/// # Errors
+/// The system's; of kind `InvalidInput` for a pipe or a device file, `FileTooLarge` for a longer file.
+pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+    let attributes = std::fs::metadata(path)?;
+    if attributes.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    if !attributes.is_file() {
+        let problem = "it is a pipe or a device; write its contents to a file and name that";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most_bytes {
+        let problem = format!("it has more than {} MiB", most_bytes >> 20);
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));
+    }
+    Ok(bytes)
+}
+
+/// Reads a text file of at most 256 MiB, without a byte order mark; `what` names it where it cannot be read. Not real-time.
 ///
 /// # Errors
 /// What the system says, or the first line that is not UTF-8.
 pub fn read_text(path: &Path, what: &str) -> Result<String, TextProblem> {
-    let bytes =
-        std::fs::read(path).map_err(|error| TextProblem::of_file(format!("cannot read {what}: {error}")))?;
+    let mut bytes = read_file(path, MOST_TEXT_BYTES)
+        .map_err(|error| TextProblem::of_file(format!("cannot read {what}: {error}")))?;
+    if bytes.starts_with(BYTE_ORDER_MARK) {
+        bytes.drain(..BYTE_ORDER_MARK.len());
+    }
     String::from_utf8(bytes).map_err(|error| {
         let before = error.as_bytes().iter().take(error.utf8_error().valid_up_to());
         let line = 1 + before.filter(|byte| **byte == b'\n').count();
@@ -57,8 +90,23 @@ mod tests {
         std::fs::write(&path, b"one\ntwo \xff\nthree\xfe\n").expect("the folder can be written to");
         let told = read_text(&path, "it").map_err(|wrong| wrong.in_file("it.txt"));
         assert_eq!(told.unwrap_err(), "it.txt:2: this is not UTF-8; save the file as UTF-8");
+        std::fs::write(&path, b"\xef\xbb\xbfx,y\n").expect("the folder can be written to");
+        assert_eq!(read_text(&path, "it"), Ok("x,y\n".to_owned()), "spreadsheets write a mark first");
+        assert_eq!(read_file(&path, 7).expect("seven bytes").len(), 7);
+        assert_eq!(read_file(&path, 6).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         std::fs::remove_file(&path).expect("it is there");
         let told = read_text(&path, "it").map_err(|wrong| wrong.in_file("it.txt"));
         assert!(told.unwrap_err().starts_with("it.txt: cannot read it: "));
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_file_without_an_end_is_not_read() {
+        for path in ["/dev/zero", "/dev/null", "/dev/tty"] {
+            let told = read_text(Path::new(path), "it").map_err(|wrong| wrong.in_file(path));
+            let told = told.unwrap_err();
+            assert!(told.contains("a pipe or a device") || told.contains("No such"), "{told}");
+        }
+        assert_eq!(read_file(Path::new("/"), 1).unwrap_err().kind(), io::ErrorKind::IsADirectory);
     }
 }

@@ -1,7 +1,10 @@
 //! The user's own firmware file. This repository has none, and may have none: see the chapter of the book.
 
+use flotor_hal::read_file;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
+use std::io::ErrorKind;
+use std::path::Path;
 
 /// Largest file that is read: twice the known ones.
 const MOST_BYTES: u64 = 20_000;
@@ -18,13 +21,12 @@ const LEAST_DIGITS: usize = 16;
 /// # Errors
 /// One sentence: what the file is instead, and what to do.
 pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
-    let size = std::fs::metadata(path).map_err(|error| format!("firmware {path}: {error}"))?.len();
-    if size > MOST_BYTES {
-        return Err(format!(
-            "firmware {path} has {size} bytes, and no firmware of a Falcon has more than {MOST_BYTES}"
-        ));
-    }
-    let bytes = std::fs::read(path).map_err(|error| format!("firmware {path}: {error}"))?;
+    let bytes = read_file(Path::new(path), MOST_BYTES).map_err(|error| match error.kind() {
+        ErrorKind::FileTooLarge => {
+            format!("firmware {path} has more than {MOST_BYTES} bytes, and no firmware of a Falcon has")
+        }
+        _ => format!("firmware {path}: {error}"),
+    })?;
     let digest = digest(&bytes);
     let is_right = match expected {
         Some(expected) => {
@@ -86,7 +88,7 @@ mod tests {
             assert!(refused.contains(words) && refused.contains(known), "{refused}");
         }
         std::fs::write(&path, vec![0; 30_000]).expect("it is ours");
-        assert!(read(&name, None).expect_err("it is too long").contains("30000 bytes"));
+        assert!(read(&name, None).expect_err("it is too long").contains("more than 20000 bytes"));
         std::fs::remove_file(&path).expect("it is ours");
         assert!(read(&name, None).is_err());
     }

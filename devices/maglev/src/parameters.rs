@@ -4,7 +4,7 @@ use crate::boundary::{Walls, thesis_nm_per_rad};
 use crate::facts;
 use crate::ml_api;
 use crate::transport::{Kind, tcp};
-use flotor_hal::{Choices, Parameter, Refusal, Settings, choices};
+use flotor_hal::{Choices, Parameter, Refusal, Settings, choices, read_text};
 use std::path::Path;
 use std::time::Duration;
 
@@ -274,7 +274,7 @@ impl Values {
         let wrong = |why: &dyn std::fmt::Display| {
             Refusal::parameter(format!("first_contact = \"{}\": {why}", report.display()))
         };
-        let text = std::fs::read_to_string(report).map_err(|error| wrong(&error))?;
+        let text = read_text(report, "the report").map_err(|problem| wrong(&problem.problem))?;
         let table: toml::Table = text.parse().map_err(|error: toml::de::Error| wrong(&error))?;
         let parameters = table.get("device").and_then(|device| device.get("parameters"));
         let Some(parameters) = parameters.and_then(toml::Value::as_table) else {

@@ -120,6 +120,10 @@ impl Recording {
     /// [`ReadError`]: not a recording, or nothing of it can be read.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let unreadable = |cause| ReadError::Open { path: path.into(), cause };
+        // A pipe would wait for a writer.
+        if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+            return Err(ReadError::NotMcap { path: path.into() });
+        }
         let mut file = File::open(path).map_err(unreadable)?;
         if !begins_as_mcap(&mut file).map_err(unreadable)? {
             return Err(ReadError::NotMcap { path: path.into() });

@@ -1,5 +1,6 @@
 //! A force-position curve: a CSV with poses and the wrench expected at each.
 
+use flotor_hal::read_text;
 use std::path::Path;
 
 /// Columns of a pose, as `flotor eval` reads them.
@@ -21,7 +22,7 @@ impl Points {
     /// # Errors
     /// In words, with the line.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|cause| format!("{}: {cause}", path.display()))?;
+        let text = read_text(path, "the curve").map_err(|wrong| wrong.in_file(path.display()))?;
         Self::parse(&text).map_err(|wrong| format!("{}:{wrong}", path.display()))
     }
 

@@ -5,6 +5,7 @@ use crate::curve::Points;
 use crate::numbers::{did_you_mean, outputs_for};
 use flotor_command::CommandError;
 use flotor_command::options::{PluginPathOption, duration_s};
+use flotor_hal::read_text;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -174,8 +175,8 @@ impl TestFile {
     /// # Errors
     /// `FILE:LINE: what is wrong`.
     pub(crate) fn read(path: &Path, plugin_path: &PluginPathOption) -> Result<Self, CommandError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|cause| CommandError::Usage(format!("{}: cannot read: {cause}", path.display())))?;
+        let text = read_text(path, "the test")
+            .map_err(|wrong| CommandError::Usage(wrong.in_file(path.display())))?;
         let file = Self::parse(path, &text)
             .map_err(|(at, wrong)| CommandError::Usage(format!("{}: {wrong}", place(path, &text, at))))?;
         Ok(Self { plugin_path: plugin_path.clone(), ..file })

@@ -1,5 +1,6 @@
 //! What is asked: axes, seeds, and the model or scene to ask, read from TOML and checked before anything runs.
 
+use flotor_hal::read_file;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -168,13 +169,17 @@ struct AxisText {
     scale: Scale,
 }
 
+/// Longest plan, bytes.
+const MOST_BYTES: u64 = 64 << 20;
+
 impl Plan {
     /// Reads a plan from its file.
     ///
     /// # Errors
     /// [`PlanError`], with file and line or what would be right.
     pub fn load(path: &Path) -> Result<Self, PlanError> {
-        let text = std::fs::read_to_string(path)
+        let text = read_file(path, MOST_BYTES)
+            .and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other))
             .map_err(|cause| PlanError::Unreadable { path: path.into(), cause })?;
         Self::parse(&text, path)
     }

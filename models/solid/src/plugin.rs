@@ -9,8 +9,9 @@ use crate::{cache, gmsh};
 use flotor_hal::{
     Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output,
     Parameter, Pose, Refusal, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel, Wrench,
-    choices,
+    choices, read_file,
 };
+use std::path::Path;
 
 /// Farther from home than this along an axis there is no handle, m: the answer is that at the edge, and says so.
 const REACH_M: f64 = 10.0;
@@ -137,6 +138,9 @@ fn resolve(settings: &Settings<'_>) -> [f64; SCHEMA.len()] {
 ///
 /// # Errors
 /// A [`Refusal`] that names the file, the place and the remedy.
+/// Longest file of a mesh, bytes: beyond any body that can be solved for.
+const MOST_MESH_BYTES: u64 = 1 << 30;
+
 fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     let file = settings.text("file");
     let faces = ["fixed_face", "touched_face"].map(|id| settings.text(id));
@@ -152,11 +156,12 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     if let Some(id) = sizes.into_iter().find(|id| settings.number(id).is_some()) {
         return Err(Refusal::parameter(format!("`{id}`: a mesh has a size of its own; leave it out")));
     }
-    let bytes = std::fs::read(path)
+    let bytes = read_file(Path::new(path), MOST_MESH_BYTES)
         .map_err(|error| Refusal::resource(format!("{path}: cannot read the mesh: {error}")))?;
     let [fixed, touched] = [faces[0].unwrap_or("fixed"), faces[1].unwrap_or("touched")];
     let wrong = |problem: &dyn std::fmt::Display| Refusal::resource(format!("{path}: {problem}"));
-    let parts = gmsh::read(&String::from_utf8_lossy(&bytes)).map_err(|problem| wrong(&problem))?;
+    let parts = gmsh::read(String::from_utf8_lossy(&bytes).trim_start_matches('\u{feff}'))
+        .map_err(|problem| wrong(&problem))?;
     let mesh = Mesh::new(parts, fixed, touched).map_err(|problem| wrong(&problem))?;
     let named = [&bytes[..], b"\0", fixed.as_bytes(), b"\0", touched.as_bytes()].concat();
     Ok(Some((mesh, cache::digest(&named))))

@@ -25,6 +25,7 @@ mod falcon;
 mod force_sensor;
 mod golden;
 mod haply;
+mod inputs;
 mod installation;
 #[cfg(feature = "drop-ins")]
 mod inverse3;

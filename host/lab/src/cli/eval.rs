@@ -6,8 +6,8 @@ use clap::Args;
 use flotor_command::options::{KeyValue, PluginPathOption, new_file, settings};
 use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, progress_bar, while_preparing, write_text};
-use flotor_hal::Detail;
 use flotor_hal::abi::PluginKind;
+use flotor_hal::{Detail, read_file};
 use flotor_session::registry::is_same_file;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -91,9 +91,12 @@ fn read_poses(path: &Path) -> Result<Poses, CommandError> {
     Poses::parse(&path.display().to_string(), &bytes).map_err(|error| CommandError::Usage(error.to_string()))
 }
 
+/// Longest file of poses, bytes: twenty million poses.
+const MOST_BYTES: u64 = 2 << 30;
+
 fn read(path: &Path) -> std::io::Result<Vec<u8>> {
     if path.as_os_str() != "-" {
-        return std::fs::read(path);
+        return read_file(path, MOST_BYTES);
     }
     if std::io::IsTerminal::is_terminal(&std::io::stdin()) {
         note("reading poses from the terminal; end with Ctrl-D");

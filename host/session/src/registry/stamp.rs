@@ -51,6 +51,9 @@ fn is_settled((seconds, nanoseconds): (i64, i64), now: SystemTime) -> bool {
 
 /// xxh3-64 of a file's bytes, however many. Not real-time.
 pub(super) fn hash_of(path: &Path) -> std::io::Result<u64> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file"));
+    }
     let mut hash = Xxh3Default::new();
     std::io::copy(&mut File::open(path)?, &mut hash)?;
     Ok(hash.digest())

@@ -8,6 +8,7 @@ use crate::of_dataset;
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note};
+use flotor_hal::read_text;
 use flotor_study::apparatus::attend::{FrontEnd, Least, attend};
 use flotor_study::apparatus::real_time_rig::RealTimeRig;
 use flotor_study::apparatus::rig::TrialFiles;
@@ -117,9 +118,8 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
 
 /// What is to be read, from a file.
 fn text_of(path: &Path) -> Result<String, CommandError> {
-    let text = std::fs::read_to_string(path).map_err(|cause| {
-        CommandError::Usage(format!("{}: cannot be read as text: {cause}", path.display()))
-    })?;
+    let text =
+        read_text(path, "the text").map_err(|wrong| CommandError::Usage(wrong.in_file(path.display())))?;
     let text = text.trim().to_owned();
     if text.is_empty() {
         return Err(CommandError::Usage(format!("{}: the file is empty", path.display())));

@@ -8,6 +8,7 @@ use super::{StudyArguments, Task};
 use clap::{Args, FromArgMatches};
 use flotor_command::CommandError;
 use flotor_hal::abi::loader::nearest;
+use flotor_hal::read_text;
 use flotor_study::exclusion::ExclusionRules;
 use flotor_study::log::{Plan, digest};
 use serde::Deserialize;
@@ -89,8 +90,9 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         file => file,
     };
     let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
-    let text = std::fs::read_to_string(&file)
-        .map_err(|cause| CommandError::Usage(format!("{}: {cause}; name a study file", file.display())))?;
+    let text = read_text(&file, "the study file").map_err(|wrong| {
+        CommandError::Usage(format!("{}; name a study file", wrong.in_file(file.display())))
+    })?;
     let (words, exclusion) = words(&file, &text, further)?;
     let command = clap::Command::new("study").no_binary_name(true);
     let matches = StudyArguments::augment_args(command)

@@ -1,0 +1,70 @@
+//! A file without an end, or without an answer, in place of every input file: refused at once, in one line that names it.
+
+use flotor_tests::program::Flotor;
+use flotor_tests::scratch::Scratch;
+use rayon::prelude::*;
+use std::process::Command;
+
+/// Every command that reads a file, with `FILE` in its place; `PLUGIN` and `CALIBRATION` are scenes that name it.
+const DOORS: [&[&str]; 18] = [
+    &["run", "FILE"],
+    &["run", "PLUGIN"],
+    &["replay", "FILE"],
+    &["test", "FILE"],
+    &["validate", "FILE"],
+    &["plugins", "FILE"],
+    &["eval", "--model", "spring", "--poses", "FILE"],
+    &["eval", "--model", "FILE", "--poses", "POSES"],
+    &["eval", "--model", "measured", "--set", "curve=FILE", "--poses", "POSES"],
+    &["eval", "--model", "membrane", "--set", "file=FILE", "--poses", "POSES"],
+    &["eval", "--model", "solid", "--set", "body=file", "--set", "file=FILE", "--poses", "POSES"],
+    &["run", "--clock", "virtual", "--duration", "10ms", "--set", "device.hand_recording=FILE"],
+    &["run", "--clock", "virtual", "--duration", "10ms", "--set", "device.hand_script=FILE"],
+    &["run", "CALIBRATION"],
+    &["calibrate", "verify", "FILE", "--simulated"],
+    &["study", "run", "FILE"],
+    &["analyse", "FILE"],
+    &["study", "spring", "FILE"],
+];
+
+#[test]
+fn a_pipe_or_a_device_file_is_refused_in_place_of_every_input() {
+    let scratch = Scratch::default();
+    let pipe = scratch.path().join("pipe").display().to_string();
+    assert!(Command::new("mkfifo").arg(&pipe).status().is_ok_and(|made| made.success()));
+    let poses = scratch.file("poses.csv", "x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,-0.005,0,0,0\n");
+    let poses = poses.display().to_string();
+    let endless = ["/dev/zero", pipe.as_str()];
+    let tries: Vec<(&[&str], &str)> =
+        DOORS.iter().flat_map(|door| endless.iter().map(|file| (*door, *file))).collect();
+    let wrong: Vec<String> = tries
+        .into_par_iter()
+        .filter_map(|(door, file)| {
+            let scenes = Scratch::default();
+            let scene = |name: &str, lines: String| scenes.file(name, lines).display().to_string();
+            let arguments = door.iter().map(|word| match *word {
+                "PLUGIN" => scene(
+                    "plugin.toml",
+                    format!("[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"{file}\"\n"),
+                ),
+                "CALIBRATION" => scene(
+                    "calibration.toml",
+                    format!(
+                        "[device]\nplugin = \"simulated\"\ncalibration = \"{file}\"\n[[model]]\nplugin = \"spring\"\n"
+                    ),
+                ),
+                word => word.replace("FILE", file).replace("POSES", &poses),
+            });
+            let arguments: Vec<String> = arguments.collect();
+            // Four gigabytes of addresses, twenty seconds: what reads on or waits fails here.
+            let ran = Flotor::with(&arguments)
+                .through_shell("ulimit -v 4000000; exec timeout -s KILL 20 \"$@\"")
+                .inside(scratch.path())
+                .run();
+            let refused = ran.code.is_some_and(|code| (1..=4).contains(&code));
+            let says = ran.stderr.lines().any(|line| line.starts_with("error: ") && line.contains(file));
+            (!refused || !says).then(|| format!("{arguments:?}: {:?} {}", ran.code, ran.stderr))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
