@@ -1,6 +1,7 @@
 //! What `tests/budgets.rs` counts: runs one workload, by name. What is counted happens within [`one_counted_part`],
 //! so that what is made before it, which takes time that depends on the machine, is left out.
 
+mod demand;
 #[allow(dead_code)] // the spring's tests use the rest
 #[path = "../../../models/spring/tests/sample/mod.rs"]
 mod sample;
@@ -47,6 +48,7 @@ fn main() {
         "scene-alone" => scenes(""),
         "scene-among-inactive" => scenes(INACTIVE),
         "scene-replacing" => scene(1000, &replacements(1000)),
+        "demands" => demand::demands(one_counted_part),
         "laws" => laws(),
         "rod" => rod(),
         "flotor-plain" => twice(1000, 2000, ticks_of_the_flotor(None)),

@@ -25,8 +25,14 @@ fn counts(workload: &str, function: &str) -> Option<Vec<f64>> {
         return None;
     }
     let scratch = tempfile::tempdir().expect("there is a place for temporary files");
-    let file = scratch.path().join("count");
+    counts_in(scratch.path(), workload, function)
+}
+
+/// As [`counts`], with what models keep between runs in this folder.
+fn counts_in(folder: &Path, workload: &str, function: &str) -> Option<Vec<f64>> {
+    let file = folder.join("count");
     let counted = Command::new("valgrind")
+        .env(CACHE, folder)
         .args(["--tool=callgrind", "--collect-atstart=no"])
         .args([format!("--toggle-collect={function}"), format!("--dump-after={function}")])
         .arg(format!("--callgrind-out-file={}", file.display()))
@@ -42,6 +48,9 @@ fn counts(workload: &str, function: &str) -> Option<Vec<f64>> {
     };
     Some((1..).map_while(total).collect())
 }
+
+/// Where the solid keeps what it has solved.
+const CACHE: &str = "XDG_CACHE_HOME";
 
 /// Counts of a workload whose parts are these.
 fn parts<const N: usize>(workload: &str) -> Option<[f64; N]> {
@@ -184,5 +193,88 @@ fn a_tick_of_the_flotor_costs_no_more_than_so_many_steps_of_a_rigid_body() {
         let Some(tick) = per_tick(workload) else { return };
         println!("{workload}: {tick:.0} instructions a tick, a step of a rigid body {step:.0}");
         keep_budget(name, tick / step);
+    }
+}
+
+/// Settings of the models and the instructions of a step by demand: the names of `[demand]` in `budgets.toml`, in the order of
+/// the workload, each with the ticks of a part.
+const DEMANDS: [(&str, f64); 19] = [
+    ("spring, `energy`", 500.0),
+    ("spring, `energy`, `hand_over = \"off\"`", 500.0),
+    ("spring, `energy`, `wire = \"on\"`", 500.0),
+    ("spring, `thesis`", 500.0),
+    ("spring, `closed-form`", 500.0),
+    ("spring, `current-length`", 500.0),
+    ("spring, `rod`", 200.0),
+    ("spring, `seat = \"free\"`", 200.0),
+    ("spring, `coil_contact = \"on\"`", 100.0),
+    ("load, `felt`", 500.0),
+    ("load, `exerted`", 500.0),
+    ("measured", 500.0),
+    ("wall, `plane`", 500.0),
+    ("wall, `sphere`", 500.0),
+    ("wall, `box`", 500.0),
+    ("solid, half-space under a sphere", 500.0),
+    ("solid, half-space under a punch", 500.0),
+    ("solid, block under a sphere", 500.0),
+    ("membrane", 20.0),
+];
+
+/// Instructions of a step by demand (force; force and torque; all) of a setting.
+fn demand_budget(name: &str) -> [f64; 3] {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("budgets.toml");
+    let text = std::fs::read_to_string(file).expect("the budgets are there");
+    let budgets: toml::Table = text.parse().expect("the budgets are TOML");
+    let counts = budgets.get("demand").and_then(|all| all.get(name)?.as_array());
+    let counts = counts.unwrap_or_else(|| panic!("no demand `{name}`"));
+    std::array::from_fn(|demand| counts[demand].as_integer().expect("a count") as f64)
+}
+
+/// The share of all instructions that a step for force alone saves, %.
+fn saved_percent([force, _, all]: [f64; 3]) -> f64 {
+    // Not -0 where the same step takes a few instructions more or less.
+    (100.0 * (1.0 - force / all)).max(0.0)
+}
+
+#[test]
+fn a_step_for_force_alone_saves_what_only_torque_and_energy_need() {
+    if !tools::required(Tool::Valgrind) {
+        return;
+    }
+    // What is solved before the loop is solved once, without a counter.
+    let scratch = tempfile::tempdir().expect("there is a place for temporary files");
+    let solving = Command::new(env!("CARGO_BIN_EXE_counted_workload"))
+        .arg("demands")
+        .env(CACHE, scratch.path())
+        .status();
+    assert!(solving.expect("it was built").success());
+    let Some(counts) = counts_in(scratch.path(), "demands", PART) else { return };
+    assert_eq!(counts.len(), 3 * DEMANDS.len(), "a part for each demand of each setting");
+    let [margin] = budgets(["margin"]);
+    let mut wrong = Vec::new();
+    for ((name, ticks), counts) in DEMANDS.iter().zip(counts.chunks_exact(3)) {
+        let counted: [f64; 3] = std::array::from_fn(|demand| counts[demand] / ticks);
+        let [force, wrench, all] = counted.map(f64::round);
+        println!("'{name}' = [{force}, {wrench}, {all}] # {:.0} %", saved_percent(counted));
+        let budget = demand_budget(name);
+        let above = counted.iter().zip(budget).any(|(counted, budget)| *counted > budget * (1.0 + margin));
+        let saves_less = saved_percent(counted) < saved_percent(budget) - 2.0;
+        if above || saves_less {
+            wrong.push(format!("{name}: {counted:?}, not {budget:?}"));
+        }
+    }
+    assert!(wrong.is_empty() || cfg!(not(target_arch = "x86_64")), "{}", wrong.join("\n"));
+}
+
+/// The chapter on demand prints the counts of `budgets.toml`, and the share that is saved.
+#[test]
+fn the_book_prints_what_a_demand_saves() {
+    let chapter = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/bench.md");
+    let chapter = std::fs::read_to_string(chapter).expect("the chapter is there");
+    for (name, _) in DEMANDS {
+        let counts = demand_budget(name);
+        let [force, wrench, all] = counts;
+        let row = format!("| {name} | {force} | {wrench} | {all} | {:.0} % |", saved_percent(counts));
+        assert!(chapter.contains(&row), "the chapter does not print `{row}`");
     }
 }
