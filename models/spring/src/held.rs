@@ -4,13 +4,18 @@ use crate::contact::AxialContact;
 use crate::energy::EnergyForm;
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
-use crate::rod::Rod;
 use crate::wire::Wire;
 
 /// A law for a spring whose lower plate is held, asked from tick to tick.
 pub trait HeldSpring {
     /// Answer at a pose relative to the lower plate. Real-time: bounded, no allocation.
     fn respond(&mut self, pose: &Pose, demand: Demand) -> Response;
+
+    /// Answer at a pose in the shape of the last answer, while that is on its way: the derivatives of the energy of this shape. A
+    /// formula has no shape of its own. Real-time: bounded, no allocation.
+    fn stay(&mut self, pose: &Pose, demand: Demand) -> Response {
+        self.respond(pose, demand)
+    }
 
     /// How much of the slope of its energy the law leaves open, as the tilt of a plate that makes such a slope (rad).
     /// Zero for a formula; for a law that solves, what its solver calls equal.
@@ -40,32 +45,6 @@ impl HeldSpring for EnergyForm {
     }
 }
 
-impl HeldSpring for Rod {
-    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
-        self.step(pose, demand)
-    }
-
-    fn noise_rad(&self) -> f64 {
-        Rod::noise_rad(self)
-    }
-
-    fn cost(&self) -> u32 {
-        self.work().cost()
-    }
-
-    fn mark(&mut self) {
-        Rod::mark(self);
-    }
-
-    fn go_back(&mut self) {
-        Rod::go_back(self);
-    }
-
-    fn unload(&mut self) {
-        self.reset();
-    }
-}
-
 /// A law and what it leaves out of the coil, where that is wanted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held<L> {
@@ -82,12 +61,9 @@ impl<L> Held<L> {
     pub(crate) fn is_plain(&self) -> bool {
         self.contact.is_none() && self.wire.is_none()
     }
-}
 
-impl<L: HeldSpring> HeldSpring for Held<L> {
     #[inline]
-    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
-        let mut response = self.law.respond(pose, demand);
+    fn with_additions(&self, mut response: Response, pose: &Pose, demand: Demand) -> Response {
         if self.is_plain() || !response.validity.has_answer() {
             return response;
         }
@@ -98,6 +74,19 @@ impl<L: HeldSpring> HeldSpring for Held<L> {
             Some(wire) => wire.added_to(&response, pose, demand),
             None => response,
         }
+    }
+}
+
+impl<L: HeldSpring> HeldSpring for Held<L> {
+    #[inline]
+    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
+        let response = self.law.respond(pose, demand);
+        self.with_additions(response, pose, demand)
+    }
+
+    fn stay(&mut self, pose: &Pose, demand: Demand) -> Response {
+        let response = self.law.stay(pose, demand);
+        self.with_additions(response, pose, demand)
     }
 
     fn noise_rad(&self) -> f64 {

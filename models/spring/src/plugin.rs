@@ -66,7 +66,7 @@ impl ForceModel for SpringModel {
 
     fn reset(&mut self) {
         self.law.reset();
-        self.pace.end();
+        self.pace = Pace::default();
     }
 }
 

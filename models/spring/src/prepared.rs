@@ -9,7 +9,7 @@ use crate::contact::AxialContact;
 use crate::contract;
 use crate::energy::EnergyForm;
 use crate::held::{Held, HeldSpring};
-use crate::pace::Pace;
+use crate::pace::{Advance, Pace};
 use crate::parameters::{Choice, SeatChoice, Switch, Variant};
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
@@ -130,24 +130,26 @@ impl Prepared {
             Self::Energy(held) if held.is_plain() => contract::step(&held.law, input),
             Self::RodBlend(held) if held.is_plain() && !held.law.blends(&contract::pose(input)) => {
                 held.law.leave();
-                pace.end();
+                *pace = Pace::default();
                 contract::step(held.law.energy(), input)
             }
-            _ => contract::output(&pace.respond(input, |pose, demand| self.respond(pose, demand))),
+            _ => contract::output(
+                &pace.respond(input, |advance, pose, demand| self.respond(advance, pose, demand)),
+            ),
         }
     }
 
     /// The answer at a pose. Real-time: bounded, no allocation.
-    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
+    fn respond(&mut self, advance: Advance, pose: &Pose, demand: Demand) -> Response {
         match self {
             Self::Thesis(law) => law.respond(pose, demand),
             Self::ClosedForm(law) => law.respond(pose, demand),
             Self::Energy(held) => held.respond(pose, demand),
-            Self::RodBlend(held) => held.respond(pose, demand),
-            Self::Rod(held) => held.respond(pose, demand),
-            Self::FreeEnergy(held, seat) => seat.step(held, pose, demand),
-            Self::FreeRodBlend(held, seat) => seat.step(held, pose, demand),
-            Self::FreeRod(held, seat) => seat.step(held, pose, demand),
+            Self::RodBlend(held) => held_response(held, advance, pose, demand),
+            Self::Rod(held) => held_response(held, advance, pose, demand),
+            Self::FreeEnergy(held, seat) => free_response(held, seat, advance, pose, demand),
+            Self::FreeRodBlend(held, seat) => free_response(held, seat, advance, pose, demand),
+            Self::FreeRod(held, seat) => free_response(held, seat, advance, pose, demand),
         }
     }
 
@@ -235,6 +237,26 @@ impl Prepared {
     }
 }
 
+fn held_response<S: HeldSpring>(spring: &mut S, advance: Advance, pose: &Pose, demand: Demand) -> Response {
+    match advance {
+        Advance::Step => spring.respond(pose, demand),
+        Advance::Stay => spring.stay(pose, demand),
+    }
+}
+
+fn free_response<S: HeldSpring>(
+    spring: &mut S,
+    seat: &mut Seat,
+    advance: Advance,
+    pose: &Pose,
+    demand: Demand,
+) -> Response {
+    match advance {
+        Advance::Step => seat.step(spring, pose, demand),
+        Advance::Stay => seat.stay(spring, pose, demand),
+    }
+}
+
 fn wire(choice: &Choice) -> Option<Wire> {
     (choice.wire == Switch::On).then(|| Wire::new(&choice.spring))
 }
@@ -280,10 +302,12 @@ fn coils(choice: &Choice) -> Coils {
 fn blend_some(law: &mut RodBlend, pace: &mut Pace, inputs: &[Input], outputs: &mut [Output]) {
     for (input, output) in inputs.iter().zip(outputs) {
         if law.blends(&contract::pose(input)) {
-            *output = contract::output(&pace.respond(input, |pose, demand| law.respond(pose, demand)));
+            *output = contract::output(
+                &pace.respond(input, |advance, pose, demand| held_response(law, advance, pose, demand)),
+            );
         } else {
             law.leave();
-            pace.end();
+            *pace = Pace::default();
         }
     }
 }

@@ -32,6 +32,7 @@ use std::f64::consts::PI;
 use flotor_hal::glam::DVec3;
 
 use crate::centerline::Section;
+use crate::held::HeldSpring;
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
@@ -234,21 +235,6 @@ impl Rod {
         State { branch: self.branch, unstable_directions }
     }
 
-    /// How far equilibria of the same pose may be apart, as a lean of a section (rad).
-    pub(crate) fn noise_rad(&self) -> f64 {
-        either!(&self.solver, equilibrium => equilibrium.tolerance())
-    }
-
-    /// Marks the shape of the last tick.
-    pub(crate) fn mark(&mut self) {
-        either!(&mut self.solver, equilibrium => equilibrium.mark());
-    }
-
-    /// In the shape that was marked.
-    pub(crate) fn go_back(&mut self) {
-        either!(&mut self.solver, equilibrium => equilibrium.go_back());
-    }
-
     /// What the last tick cost. Real-time: bounded, no allocation.
     #[must_use]
     pub fn work(&self) -> Work {
@@ -328,6 +314,36 @@ impl Rod {
         }
         self.last = response;
         response
+    }
+}
+
+impl HeldSpring for Rod {
+    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
+        self.step(pose, demand)
+    }
+
+    fn stay(&mut self, pose: &Pose, demand: Demand) -> Response {
+        self.answer(pose, |solver, plate| either!(solver, equilibrium => equilibrium.moving(plate)), demand)
+    }
+
+    fn noise_rad(&self) -> f64 {
+        either!(&self.solver, equilibrium => equilibrium.tolerance())
+    }
+
+    fn cost(&self) -> u32 {
+        self.work().cost()
+    }
+
+    fn mark(&mut self) {
+        either!(&mut self.solver, equilibrium => equilibrium.mark());
+    }
+
+    fn go_back(&mut self) {
+        either!(&mut self.solver, equilibrium => equilibrium.go_back());
+    }
+
+    fn unload(&mut self) {
+        self.reset();
     }
 }
 

@@ -132,16 +132,20 @@ impl RodBlend {
         response
     }
 
-    /// Where the rod has a share.
-    fn blend(&mut self, pose: &Pose, share: &Share, demand: Demand) -> Response {
+    /// Where the rod has a share, and answers by `rod`.
+    fn blend(
+        &mut self,
+        pose: &Pose,
+        share: &Share,
+        demand: Demand,
+        rod: impl FnOnce(&mut Self, Demand) -> Response,
+    ) -> Response {
         self.share = share.value;
         if share.value >= 1.0 {
-            return self.ask_rod(pose, share.is_buckled, demand);
+            return rod(self, demand);
         }
-        let (rod, energy) = (
-            self.ask_rod(pose, share.is_buckled, Demand::WrenchAndEnergy),
-            self.energy.respond(pose, Demand::WrenchAndEnergy),
-        );
+        let (rod, energy) =
+            (rod(self, Demand::WrenchAndEnergy), self.energy.respond(pose, Demand::WrenchAndEnergy));
         let (Some(rod_j), Some(energy_j)) = (rod.energy_j, energy.energy_j) else {
             return self.energy.respond(pose, demand);
         };
@@ -164,10 +168,19 @@ impl HeldSpring for RodBlend {
     fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
         let share = self.shares.at(pose);
         if share.value > 0.0 {
-            return self.blend(pose, &share, demand);
+            return self
+                .blend(pose, &share, demand, |blend, demand| blend.ask_rod(pose, share.is_buckled, demand));
         }
         self.leave();
         self.energy.respond(pose, demand)
+    }
+
+    fn stay(&mut self, pose: &Pose, demand: Demand) -> Response {
+        let share = self.shares.at(pose);
+        if share.value > 0.0 && self.share > 0.0 {
+            return self.blend(pose, &share, demand, |blend, demand| blend.rod.stay(pose, demand));
+        }
+        self.respond(pose, demand)
     }
 
     fn noise_rad(&self) -> f64 {

@@ -17,12 +17,9 @@
 //! The rim is subject to friction. If the force along the ground and the torque about the base's normal, divided by the radius,
 //! together exceed the friction limit, the base slides and spins until they are at the limit. That dissipates energy.
 //!
-//! A spring that would be pulled hangs from the upper plate, without load: its base moves, tilts and turns with the plate. It
-//! touches down where its rim meets the ground, with no stored energy, and stands there as it hung. It leaves the ground
-//! where a hanging rim would. With a coefficient above `D/L0`, Coulomb's law alone would let a bent spring jam on its rim, and
-//! snap off while it is lifted. The part of the coefficient beyond `D/L0` therefore multiplies the force of a straight spring
-//! whose compression is the depth of the hanging rim below the ground. That force goes to zero as the hanging rim comes free,
-//! so lift-off is continuous.
+//! A spring that would be pulled hangs from the upper plate, without load. It touches down where its rim meets the ground, and
+//! leaves the ground where a hanging rim would: the part of the coefficient of friction beyond `D/L0` acts by the depth of the hanging
+//! rim, so that lift-off is continuous.
 //!
 //! If a spring is pressed past buckling, its base may lose contact with the ground or roll on without end. If the spring would
 //! need more energy to stand straight than it has, it falls over: wrench and energy fade together, by an equal part in each step,
@@ -393,6 +390,23 @@ impl Seat {
         spring.go_back();
         self.at = at;
         only(Response { validity: Validity::NotConverged, ..response }, demand)
+    }
+
+    /// Wrench on the hand of a spring that is on its way, with its base and its shape where they are: the derivatives of one energy.
+    /// Real-time: bounded, no allocation.
+    pub(crate) fn stay<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+        let (_, height_m) = Standing::hanging(pose, &self.lengths, LARGEST_TILT_RAD);
+        if height_m > 0.0 || self.lifted || self.hold == 0.0 {
+            return self.step(spring, pose, demand);
+        }
+        let response = self.base().answer(pose, |relative| spring.stay(relative, Demand::WrenchAndEnergy));
+        let response = Response {
+            force_n: response.force_n * self.hold,
+            torque_nm: response.torque_nm * self.hold,
+            energy_j: response.energy_j.map(|stored_j| stored_j * self.hold),
+            validity: Validity::NotConverged,
+        };
+        only(response, demand)
     }
 
     /// Gives way where it stood, a share a tick: its energy and its wrench are that share of the law's, so what it loses

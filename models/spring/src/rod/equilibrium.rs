@@ -424,7 +424,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
 
     /// What is felt of the shape as it is now, short of equilibrium: the derivatives of its own energy, so that the hand gets
     /// what the rod loses.
-    fn moving(&mut self, plate: &Plate) -> Outcome {
+    pub(crate) fn moving(&mut self, plate: &Plate) -> Outcome {
         let (reading, _) = self.functional.reading(&self.shape, plate);
         self.work.evaluations += 1;
         if reading.energy.is_finite() { Outcome::Moving(reading) } else { Outcome::Failed }

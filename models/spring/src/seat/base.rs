@@ -104,10 +104,15 @@ impl Base {
 
     /// The law's answer with the base here, in the model frame. Real-time: bounded, no allocation.
     pub(super) fn respond<S: HeldSpring>(&self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+        self.answer(pose, |relative| spring.respond(relative, demand))
+    }
+
+    /// An answer at the pose relative to the base, in the model frame. Real-time: bounded, no allocation.
+    pub(super) fn answer(&self, pose: &Pose, at: impl FnOnce(&Pose) -> Response) -> Response {
         if self.is_seated {
-            return spring.respond(pose, demand);
+            return at(pose);
         }
-        let response = spring.respond(&self.relative(pose), demand);
+        let response = at(&self.relative(pose));
         Response {
             force_n: self.rotation * response.force_n,
             torque_nm: self.rotation * response.torque_nm,
