@@ -216,6 +216,28 @@ fn no_shipped_plugin_is_accused() {
     });
 }
 
+/// A rule that has looked at nothing says neither that it holds nor that it does not.
+#[test]
+fn a_rule_with_nothing_to_judge_is_not_ok() {
+    for (name, rule, why) in [
+        ("flotor-measured", "activity", "the model is active everywhere"),
+        ("flotor-membrane", "passive", "the model has a history"),
+        ("flotor-membrane", "energy-gradient", "the model has a history"),
+    ] {
+        let library = plugin_file(name);
+        let arguments = ["validate".as_ref(), library.as_os_str(), "--only".as_ref(), rule.as_ref()];
+        let ran = Flotor::with(arguments).run();
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+        assert!(ran.stdout.contains(&format!("-       {rule}")), "{ran:#?}");
+        assert!(ran.stdout.contains(&format!("not judged: {why}")), "{ran:#?}");
+        assert!(!ran.stdout.contains("could not be checked"), "{ran:#?}");
+    }
+    let library = plugin_file("flotor-measured");
+    let arguments = ["validate".as_ref(), library.as_os_str(), "--only".as_ref(), "passive".as_ref()];
+    let ran = Flotor::with(arguments).run();
+    assert!(ran.stdout.contains("ok      passive"), "the rule looks at a model without a history: {ran:#?}");
+}
+
 #[test]
 fn a_file_that_is_not_there_is_told_as_such() {
     let ran = Flotor::with(["validate", "none.so"]).run();

@@ -3,8 +3,9 @@
 //! **Loop energy.** The hand takes the handle around random closed paths in all six dimensions. The
 //! work of the model's force on the hand during a lap, relative to all work exchanged, is zero for a force that
 //! comes from an energy; what is not zero can be pumped. The rectangle rule on a closed smooth path
-//! converges faster than any power of the step, so 1e-9 can be told from zero; what it leaves uncertain is
-//! taken off, and a lap where that exceeds the bound is not resolved.
+//! converges faster than any power of the step, so 1e-9 can be distinguished from zero; where the power has kinks
+//! [`quadrature`](super::quadrature) takes its place. What is uncertain is taken off, and a lap where that exceeds the bound is not
+//! resolved.
 //!
 //! Every path is gone twice: at rest in each of its poses, where the work of a model without memory is zero, and in
 //! [motion](super::motion), with its velocity, where damping and friction may take energy and nothing may give it.
@@ -13,10 +14,11 @@
 //! by more than the hand puts in, and for a model without memory not by less either. One in a thousand of the energy
 //! stored on the lap is tolerated: the trapezoidal rule between two samples, which are doubled until it is met.
 
+use super::Setup;
 use super::measure::{Measure, NO_ANSWER, PoseRecord, Verdict};
 use super::motion::Motion;
+use super::quadrature::{Work, work};
 use super::sweep::sweep;
-use super::{MOSTLY, Setup};
 use crate::sampling::Random;
 use crate::subject::Subject;
 use crate::tally::{Decades, Worst, tally};
@@ -31,6 +33,8 @@ pub(super) const CONSERVATIVE: f64 = 1.0e-9;
 const FEWEST_SAMPLES: usize = 256;
 /// See [`FEWEST_SAMPLES`].
 const MOST_SAMPLES: usize = 16384;
+/// Samples at which the work of a smooth lap has settled.
+const SMOOTH_SAMPLES: usize = 1024;
 /// Relative change between two numbers of samples that counts as settled.
 const SETTLED: f64 = 1.0e-12;
 /// Samples of a lap in motion.
@@ -133,6 +137,19 @@ impl Lap {
         Self { mismatch: mismatch(samples, memory), ..Self::from_powers(&powers) }
     }
 
+    /// Returns the lap itself if its work is known to the bound, or its work by [`work`], whose laps `powers` goes.
+    pub(super) fn or_resolved(
+        self,
+        dissipation: Dissipation,
+        powers: impl FnMut(&[f64]) -> Option<Vec<f64>>,
+    ) -> Option<Self> {
+        if self.is_resolved(dissipation) {
+            return Some(self);
+        }
+        let Work { net_j, gross_j, uncertain_j } = work(CONSERVATIVE, powers)?;
+        Some(Self { net_j, gross_j, uncertain_j, mismatch: self.mismatch })
+    }
+
     /// Energy that it generates beyond what is uncertain, J.
     pub(super) fn made_j(&self, dissipation: Dissipation) -> f64 {
         (self.work_j(dissipation) - self.uncertain_j).max(0.0)
@@ -184,16 +201,26 @@ fn doubled(subject: &mut Subject<'_>, path: &Trajectory, known: &[Sample]) -> Op
 
 fn lap(subject: &mut Subject<'_>, path: &Trajectory) -> Option<Lap> {
     let memory = subject.memory();
-    if memory == Memory::PathDependent {
-        // The first lap forgets where it came from, the second counts. Steps are short as they are.
-        samples(subject, path, 4096)?;
-        return Some(Lap::from_samples(&samples(subject, path, 4096)?, memory));
-    }
+    let even = match memory {
+        Memory::PathDependent => {
+            // The first lap forgets where it came from, the second counts. Steps are short as they are.
+            samples(subject, path, 4096)?;
+            Lap::from_samples(&samples(subject, path, 4096)?, memory)
+        }
+        Memory::Stateless => sampled_as_needed(subject, path)?,
+    };
+    even.or_resolved(Dissipation::at_rest(memory), |parts| {
+        parts.iter().map(|part| Some(sample(subject, path, *part)?.power_j)).collect()
+    })
+}
+
+/// A lap of a model without memory, in as many even samples as its stored energy needs to be compared, and its work to settle.
+fn sampled_as_needed(subject: &mut Subject<'_>, path: &Trajectory) -> Option<Lap> {
     let mut samples = samples(subject, path, FEWEST_SAMPLES)?;
     loop {
-        let lap = Lap::from_samples(&samples, memory);
-        // The work of a smooth lap settles long before the trapezoidal rule between its samples does.
-        let is_done = lap.is_settled() && lap.mismatch <= SAME_ENERGY;
+        let lap = Lap::from_samples(&samples, Memory::Stateless);
+        // The work of a smooth lap settles long before the trapezoidal rule between its samples does; that of another never does.
+        let is_done = (lap.is_settled() || samples.len() >= SMOOTH_SAMPLES) && lap.mismatch <= SAME_ENERGY;
         if is_done || samples.len() >= MOST_SAMPLES {
             return Some(lap);
         }
@@ -257,8 +284,10 @@ pub(super) fn measure_loops(setup: &Setup<'_>) -> Result<(Measure, Decades), Loa
 
 fn judge_loops(total: &LoopTally) -> Measure {
     let verdict = Verdict::of(total.worst.value, CONSERVATIVE, CONSERVATIVE);
-    let share = total.resolved as f64 / total.comparable.max(1) as f64;
-    let known = format!("{} laps, {:.2} of them known to the bound", total.laps, share);
+    let known = match total.comparable - total.resolved {
+        0 => format!("{} laps, all known to the bound", total.laps),
+        unknown => format!("{unknown} of {} laps are not known to the bound", total.laps),
+    };
     let comment = match verdict {
         Verdict::Fail => format!(
             "{} of {} laps generate energy, up to {:.3} mJ a lap; the worst starts at this pose",
@@ -285,7 +314,7 @@ fn judge_loops(total: &LoopTally) -> Measure {
     if differs && verdict != Verdict::Fail {
         (measure.verdict, measure.pose) = (Verdict::Fail, total.mismatch.pose.map(PoseRecord::from));
     }
-    let possible = if share >= MOSTLY { total.worst.value } else { f64::INFINITY };
+    let possible = if total.resolved == total.comparable { total.worst.value } else { f64::INFINITY };
     let why = if total.unanswered == total.laps { NO_ANSWER } else { "no lap exchanges work with the hand" };
     measure.unless_uncertain(possible, || known).unless_empty(total.comparable, why)
 }

@@ -33,6 +33,7 @@ mod motion;
 mod parts;
 mod picture;
 mod poses;
+mod quadrature;
 mod score;
 mod search;
 mod stiffness;
@@ -64,7 +65,7 @@ const DAMPINGS_NS_PER_M: [f64; 2] = [0.5, 2.0];
 /// hemisphere of 115 mm radius, `sqrt(2/3) R`. Angles times this are lengths, torques over this are forces.
 const LEVER_M: f64 = 0.0939;
 /// Share of a sample that stands for all of it: of a law that is only here and there too stiff for a device with heavy
-/// damping, or only here and there not resolved.
+/// damping, or has no derivative only here and there.
 const MOSTLY: f64 = 0.9;
 /// How much wider than the workspace the model is asked: a hand overshoots, a sensor lies.
 const WIDER: f64 = 1.5;

@@ -3,7 +3,7 @@
 //! A hand hurries on one part of a lap and dawdles on another: what is lost on the fast part of a law with friction and
 //! damping need not come back on the slow one, and a law may confuse the two.
 
-use super::energy::Lap;
+use super::energy::{Dissipation, Lap};
 use crate::sampling::Random;
 use crate::subject::Subject;
 use crate::trajectory::Trajectory;
@@ -49,20 +49,23 @@ impl Motion {
         if subject.memory() == Memory::PathDependent {
             subject.ask(self.at(0.0).0).ok()?;
         }
-        least_of_later_laps(|| Some(Lap::from_powers(&self.powers(subject, samples)?)))
+        let even: Vec<f64> = (0..samples).map(|index| index as f64 / samples as f64).collect();
+        let lap = least_of_later_laps(|| Some(Lap::from_powers(&self.powers(subject, &even)?)))?;
+        lap.or_resolved(Dissipation::Allowed, |parts| self.powers(subject, parts))
     }
 
-    /// Power on the hand at evenly spaced times of a lap, J per lap.
-    fn powers(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Vec<f64>> {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most two seconds
-        let dt_ns = (self.lap_s * 1.0e9 / samples as f64).round() as u64;
-        let power = |index: usize| {
-            let (pose, motion_m, turn_rad) = self.at(index as f64 / samples as f64);
+    /// Powers on the hand at increasing parts of the time of a lap, J per lap.
+    fn powers(&self, subject: &mut Subject<'_>, parts: &[f64]) -> Option<Vec<f64>> {
+        let mut before = parts.last()? - 1.0;
+        let power = |part: &f64| {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most two seconds
+            let dt_ns = ((part - std::mem::replace(&mut before, *part)) * self.lap_s * 1.0e9).round() as u64;
+            let (pose, motion_m, turn_rad) = self.at(*part);
             let twist = Twist::new(motion_m / self.lap_s, turn_rad / self.lap_s);
             let wrench = subject.advance(pose, twist, dt_ns).ok()?.wrench;
             Some(wrench.force().dot(motion_m) + wrench.torque().dot(turn_rad))
         };
-        (0..samples).map(power).collect()
+        parts.iter().map(power).collect()
     }
 }
 

@@ -475,6 +475,15 @@ fn the_damping_that_a_wall_needs_is_half_its_stiffness_times_the_period() {
     }
 }
 
+#[test]
+fn the_work_of_every_lap_through_a_surface_is_known() {
+    let report = stress_with::<Lawful<Wall<2_000>>>(StressOptions::default(), &[Part::Loops]);
+    assert_eq!(measure(&report, "M4").verdict, Verdict::Pass, "{}", report.to_text());
+    let [laps, known] =
+        ["laps where work is exchanged", "laps known to the bound"].map(|name| value(&report, "M4", name));
+    assert!(laps > 100.0 && known == laps, "{}", report.to_text());
+}
+
 /// Ribs 0.73 µm wide on one half of the workspace: every difference crosses some of them.
 struct Ribbed;
 impl Law for Ribbed {
