@@ -163,15 +163,39 @@ struct Believed {
     over_s: f64,
 }
 
+/// Poses that a device may report: two ellipsoids, of twice its range in position and in rotation.
+#[derive(Clone, Copy, Debug)]
+pub struct PoseBounds {
+    /// Per metre from home, and per sine of half a rotation from home: their vector is longer than one outside the bounds.
+    per_reach: DVec3,
+    per_turn: DVec3,
+}
+
+impl PoseBounds {
+    /// Returns the bounds of a device; an axis without a range has 10 m and every rotation. Not real-time.
+    #[must_use]
+    pub fn of(device: &Capabilities) -> Self {
+        let reach_m = device.range_m.map(|range_m| if range_m > 0.0 { RANGES * range_m } else { ROOM_M });
+        // Twice the sine of half an angle is never more than the angle.
+        let per_turn = device.range_rad.map(|range| if range > 0.0 { 2.0 / (RANGES * range) } else { 0.0 });
+        Self { per_reach: DVec3::from_array(reach_m).recip(), per_turn: DVec3::from_array(per_turn) }
+    }
+
+    /// Returns true if a pose is within the bounds; false for NaN. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn contain(&self, pose: &Pose) -> bool {
+        let (out, turned) = (pose.position() * self.per_reach, pose.orientation().xyz() * self.per_turn);
+        out.length_squared() <= 1.0 && turned.length_squared() <= 1.0
+    }
+}
+
 /// The check of the samples of one device.
 #[derive(Clone)]
 pub struct PlausibilityCheck {
     /// A device that senses no pose may leave it as it likes.
     has_pose: bool,
-    /// Per metre from home, and per sine of half a rotation from home: their vector is longer than one outside of what can
-    /// be.
-    per_reach: DVec3,
-    per_turn: DVec3,
+    bounds: PoseBounds,
     slack_m: f64,
     ahead_ns: u64,
     behind_ns: u64,
@@ -189,16 +213,12 @@ impl PlausibilityCheck {
     /// For a device that can do this, in a loop of this period. Not real-time.
     #[must_use]
     pub fn new(device: &Capabilities, period_ns: u64) -> Self {
-        let reach_m = device.range_m.map(|range_m| if range_m > 0.0 { RANGES * range_m } else { ROOM_M });
-        // Twice the sine of half an angle is never more than the angle.
-        let per_turn = device.range_rad.map(|range| if range > 0.0 { 2.0 / (RANGES * range) } else { 0.0 });
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some seconds
         let latency_ns = (device.latency_s * 1.0e9) as u64;
         let period_ns = period_ns.max(1);
         Self {
             has_pose: device.sensed != Axes::NONE,
-            per_reach: DVec3::from_array(reach_m).recip(),
-            per_turn: DVec3::from_array(per_turn),
+            bounds: PoseBounds::of(device),
             slack_m: SLACK_M.max(SLACK_STEPS * device.resolution_m),
             ahead_ns: AHEAD_NS + AHEAD_PERIODS * period_ns,
             behind_ns: BEHIND_NS.max(BEHIND_PERIODS * period_ns) + latency_ns,
@@ -270,9 +290,7 @@ impl PlausibilityCheck {
         if !is_rotation(pose.orientation()) {
             return Err(Implausible::Quaternion);
         }
-        let (out, turned) = (pose.position() * self.per_reach, pose.orientation().xyz() * self.per_turn);
-        let is_in_range = out.length_squared() <= 1.0 && turned.length_squared() <= 1.0;
-        if !is_in_range {
+        if !self.bounds.contain(pose) {
             return Err(Implausible::Range);
         }
         if is_too_fast(twist) {

@@ -237,3 +237,22 @@ fn an_accepted_orientation_has_length_one_and_a_unit_quaternion_keeps_its_bits()
         );
     }
 }
+
+#[test]
+fn the_bounds_of_a_pose_are_ellipsoids_of_twice_the_range() {
+    let bounds = PoseBounds::of(&DEVICE);
+    let at = |position_m: [f64; 3], rotation_rad: [f64; 3]| {
+        let orientation = orientation_from_rotation_vector(DVec3::from_array(rotation_rad));
+        bounds.contain(&Pose::new(DVec3::from_array(position_m), orientation))
+    };
+    assert!(at([0.0239, 0.0, 0.0], [0.0; 3]) && at([0.0; 3], [0.0, 0.23, 0.0]));
+    // Within twice the range along each axis, and beyond it as a whole.
+    assert!(
+        !at([0.0239, 0.0, 0.0239], [0.0; 3])
+            && !at([0.0; 3], [0.2, 0.2, 0.0])
+            && !at([f64::NAN; 3], [0.0; 3])
+    );
+    let endless = PoseBounds::of(&Capabilities { range_m: [0.0; 3], range_rad: [0.0; 3], ..DEVICE });
+    assert!(endless.contain(&Pose::new(DVec3::X * 9.9, DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0))));
+    assert!(!endless.contain(&Pose::new(DVec3::X * 10.1, DQuat::IDENTITY)));
+}

@@ -1,9 +1,11 @@
 //! Rules of a device: its description, its life cycle, and its stop.
 
 use super::path::CONFIG;
-use flotor_core::plausibility::is_rotation;
+use flotor_core::plausibility::{PoseBounds, is_rotation};
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
-use flotor_hal::{Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Fault, Tick, Wrench};
+use flotor_hal::{
+    Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Fault, Tick, Wrench, rotation_vector,
+};
 use flotor_session::LatchGuard;
 use std::time::{Duration, Instant};
 
@@ -135,9 +137,6 @@ struct Sampled {
     last: u64,
 }
 
-/// How far a handle may be, in ranges: a little beyond is a matter of calibration.
-const FARTHEST: f64 = 2.0;
-
 /// All conditions of the contract.
 const KNOWN: Conditions = Conditions::SATURATED.with(Conditions::EXCESS_FORCE).with(Conditions::NOISY);
 
@@ -225,10 +224,13 @@ impl Running {
         if !is_rotation(orientation) {
             return Err(format!("a quaternion of length {}, not 1", orientation.length()));
         }
-        let (position_m, range_m) = (state.pose.position(), DVec3::from_array(self.told.range_m));
-        let is_far = position_m.abs().cmpgt(range_m * FARTHEST) & range_m.cmpgt(DVec3::ZERO);
-        if is_far.any() {
-            return Err(format!("{position_m} m, beyond {FARTHEST} times its range {range_m} m"));
+        if !PoseBounds::of(&self.told).contain(&state.pose) {
+            let Capabilities { range_m, range_rad, .. } = self.told;
+            let rotation_rad = rotation_vector(orientation);
+            return Err(format!(
+                "{} m and {rotation_rad} rad, beyond twice its range {range_m:?} m and {range_rad:?} rad",
+                state.pose.position()
+            ));
         }
         if !KNOWN.contains(state.conditions) {
             return Err(format!("conditions that the contract does not know: {:?}", state.conditions));
