@@ -90,7 +90,7 @@ fn a_recording_of_plugins_named_by_their_files_replays_where_their_folder_is_tol
     let folder = scratch.path().display().to_string();
     let found = Flotor::with(["replay", &recording, "--plugin-path", &folder]).run();
     assert_eq!(found.code, Some(exit_code::OK), "{found:#?}");
-    assert!(found.stdout.contains("bit for bit the recorded wrench"), "{found:#?}");
+    assert!(found.stdout.contains("bit for bit the recorded outputs"), "{found:#?}");
 }
 
 #[test]

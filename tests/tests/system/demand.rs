@@ -55,7 +55,7 @@ fn scene(axes: &str, fault: &str) -> String {
         ["fixture-faulty-device", "fixture-faulty-model"].map(|name| plugin_file(name).display().to_string());
     format!(
         "duration_s = 0.05\n[limits]\nramp_s = 0\nforce_n = [0, 0, 10]\n[device]\nplugin = {device:?}\nparameters = {{ axes = {axes:?} }}\n\
-         [[model]]\nplugin = {model:?}\nparameters = {{ fault = {fault:?} }}\n"
+         [[model]]\nname = \"model\"\nplugin = {model:?}\nparameters = {{ fault = {fault:?} }}\n"
     )
 }
 
@@ -285,6 +285,27 @@ fn a_replay_asks_for_what_its_recording_holds_and_compares_that() {
             assert_eq!((&report["bit_exact"], &report["ticks"]), (&true.into(), &50.into()));
         }
     }
+}
+
+#[test]
+fn a_replay_tells_another_energy_beside_the_same_force() {
+    let scratch = Scratch::default();
+    let file = scratch.path().join("run.mcap");
+    let text = scene("six", "wrong-energy");
+    let scene = Scene::parse(Path::new("scene.toml"), &text).expect("the scene is right");
+    headless::run(&scene, &Registry::search(&[]), 1, Some(&file), Demand::FORCE).expect("it runs");
+    let report = |set: &[&str]| -> Value {
+        let recording = file.display().to_string();
+        let replay = Flotor::with([&["replay", &recording, "--json", "-"], set].concat());
+        let folder = plugin_file("fixture-faulty-model").parent().expect("it is in a folder").to_owned();
+        let replay = replay.searching(&[&folder]).run();
+        assert_eq!(replay.code, Some(exit_code::OK), "{replay:?}");
+        serde_json::from_str(&replay.stdout).expect("it is JSON")
+    };
+    let same = report(&[]);
+    assert_eq!((&same["bit_exact"], &same["max_energy_j"]), (&true.into(), &0.0.into()), "{same}");
+    let other = report(&["--set", "model.fault=none"]);
+    assert_eq!((&other["differing_ticks"], &other["max_force_n"]), (&50.into(), &0.0.into()), "{other}");
 }
 
 #[test]

@@ -15,7 +15,7 @@ use std::time::Instant;
 /// Re-evaluate the models on a recorded trajectory: bit-exact, or with changed parameters.
 #[derive(Args)]
 #[command(
-    after_help = "Without a change the wrench must equal the recorded one bit for bit: the exit code is 1 if it does not. With --set \
+    after_help = "Without a change force, torque and energy must equal the recorded ones bit for bit, as far as the recording holds them: the exit code is 1 if it does not. With --set \
     or --model a difference is the expected result. If the scene of the run named a plugin by its file, give the folder of \
     that file with --plugin-path.\n\n\
     Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.preset=thesis-3 --plot difference.svg\n  \
@@ -105,7 +105,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     }
     if !bit_exact && !arguments.changes_anything() {
         let why = report.why_apart.unwrap_or(DivergenceCause::OtherBuild);
-        return Err(CommandError::Failed(format!("the wrench differs although nothing was changed: {why}")));
+        return Err(CommandError::Failed(format!("the outputs differ although nothing was changed: {why}")));
     }
     Ok(())
 }
@@ -115,9 +115,11 @@ impl Report {
     fn verdict(&self) -> String {
         match (self.difference.ticks, self.bit_exact, self.coverage.missing_ticks) {
             (0, ..) => "no tick to compare".to_owned(),
-            (_, false, _) => "the wrench differs".to_owned(),
-            (_, true, 0) => "bit for bit the recorded wrench".to_owned(),
-            (_, true, missing) => format!("bit for bit the recorded wrench, but {missing} ticks are missing"),
+            (_, false, _) => "the outputs of the models differ".to_owned(),
+            (_, true, 0) => "bit for bit the recorded outputs".to_owned(),
+            (_, true, missing) => {
+                format!("bit for bit the recorded outputs, but {missing} ticks are missing")
+            }
         }
     }
 
@@ -154,11 +156,16 @@ fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
         let (differ, same) = (d.differing_ticks, report.same_around(first, last));
         row("differ", format!("{differ} ticks, the first is {first}, the last {last}{same}"));
         row("force", format!("max {:.3e} N, rms {:.3e} N", d.max_force_n, d.rms_force_n));
-        row("torque", format!("max {:.3e} N·m, rms {:.3e} N·m", d.max_torque_nm, d.rms_torque_nm));
+        if let (Some(max_nm), Some(rms_nm)) = (d.max_torque_nm, d.rms_torque_nm) {
+            row("torque", format!("max {max_nm:.3e} N·m, rms {rms_nm:.3e} N·m"));
+        }
+        if let Some(max_j) = d.max_energy_j {
+            row("energy", format!("max {max_j:.3e} J"));
+        }
     }
     // If nothing was changed, the error gives the cause.
     if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
-        row("note", format!("the wrench differs for another reason as well: {why}"));
+        row("note", format!("the outputs differ for another reason as well: {why}"));
     }
     let implausible = report.implausible.iter().map(|found| format!("as recorded: {found}"));
     implausible.for_each(|found| row("note", found));

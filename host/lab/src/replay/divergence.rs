@@ -55,7 +55,7 @@ impl Coverage {
     }
 }
 
-/// Why a replayed wrench differs from the recorded one.
+/// Why outputs of the models differ in a replay from the recorded ones.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
 #[serde(tag = "cause", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -165,7 +165,7 @@ impl Evidence {
         self.cause = Some(cause);
     }
 
-    /// Why the wrench differs although nothing was changed, if it does.
+    /// Returns why the outputs differ although nothing was changed, if they do.
     pub(super) fn cause(&self) -> Option<DivergenceCause> {
         self.cause.clone()
     }

@@ -60,12 +60,12 @@ fn is_remote(coupling: &CouplingDescription) -> bool {
     matches!(coupling.ends, CouplingEnds::Remote(_))
 }
 
-/// How the replayed wrench differs from the recorded one.
+/// Difference of the outputs of the models in a replay from those that the recording holds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Difference {
     /// Ticks compared.
     pub ticks: u64,
-    /// Ticks in which some bit of the wrench differs.
+    /// Ticks in which some bit of an output differs.
     pub differing_ticks: u64,
     /// The first of them: before it, all is the same.
     pub first_tick: Option<u64>,
@@ -73,18 +73,23 @@ pub struct Difference {
     pub last_tick: Option<u64>,
     /// Largest difference of force, N.
     pub max_force_n: f64,
-    /// Largest difference of torque, N·m.
-    pub max_torque_nm: f64,
+    /// Largest difference of torque, N·m; absent where the recording holds no torque.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_torque_nm: Option<f64>,
     /// Root mean square of the difference of force, N.
     pub rms_force_n: f64,
-    /// Root mean square of the difference of torque, N·m.
-    pub rms_torque_nm: f64,
+    /// Root mean square of the difference of torque, N·m; absent where the recording holds no torque.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_torque_nm: Option<f64>,
+    /// Largest difference of stored energy, J; absent where the recording holds no energy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_energy_j: Option<f64>,
 }
 
 /// Result of a replay.
 #[derive(Clone, Debug)]
 pub struct Compared {
-    /// How the wrench differs.
+    /// How the outputs differ.
     pub difference: Difference,
     /// The part of the run that the recording holds.
     pub coverage: Coverage,
@@ -294,25 +299,30 @@ impl Difference {
     /// Adds one tick; the root mean squares hold sums until [`Self::finish`].
     fn add(&mut self, record: &TickRecord, outputs: &ModelOutputs) {
         self.ticks += 1;
-        if bits(outputs) == bits(&record.model) {
-            return;
+        if bits(outputs) != bits(&record.model) {
+            self.differing_ticks += 1;
+            self.first_tick.get_or_insert(record.tick);
+            self.last_tick = Some(record.tick);
         }
-        self.differing_ticks += 1;
-        self.first_tick.get_or_insert(record.tick);
-        self.last_tick = Some(record.tick);
+        // Two outputs of which one is not finite have no distance.
+        let finite = |distance: f64| if distance.is_finite() { distance } else { 0.0 };
         let force_n = (outputs.force() - record.model.force()).length();
-        let torques = outputs.torque().zip(record.model.torque());
-        let torque_nm = torques.map_or(0.0, |(now, then)| (now - then).length());
         self.max_force_n = self.max_force_n.max(force_n);
-        self.max_torque_nm = self.max_torque_nm.max(torque_nm);
         self.rms_force_n += force_n * force_n;
-        self.rms_torque_nm += torque_nm * torque_nm;
+        if let Some((now, then)) = outputs.torque().zip(record.model.torque()) {
+            let torque_nm = finite((now - then).length());
+            self.max_torque_nm = Some(self.max_torque_nm.unwrap_or(0.0).max(torque_nm));
+            self.rms_torque_nm = Some(self.rms_torque_nm.unwrap_or(0.0) + torque_nm * torque_nm);
+        }
+        if let Some((now_j, then_j)) = outputs.energy_j().zip(record.model.energy_j()) {
+            self.max_energy_j = Some(self.max_energy_j.unwrap_or(0.0).max(finite((now_j - then_j).abs())));
+        }
     }
 
     fn finish(&mut self) {
         let ticks = self.ticks.max(1) as f64;
         self.rms_force_n = (self.rms_force_n / ticks).sqrt();
-        self.rms_torque_nm = (self.rms_torque_nm / ticks).sqrt();
+        self.rms_torque_nm = self.rms_torque_nm.map(|sum| (sum / ticks).sqrt());
     }
 
     /// True if every bit of every tick is the same.
@@ -351,10 +361,11 @@ fn replayed(port: &Port, record: &TickRecord) -> ModelOutputs {
     port.outputs().limited_to(record.model.computed())
 }
 
-/// Force and, if it was computed, torque to the bit; every NaN is the same.
-fn bits(outputs: &ModelOutputs) -> ([u64; 3], Option<[u64; 3]>) {
+/// The outputs that are there, to the bit; every NaN is the same.
+fn bits(outputs: &ModelOutputs) -> ([u64; 3], Option<[u64; 3]>, Option<u64>) {
     let bits = |number: f64| if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() };
-    (outputs.force().to_array().map(bits), outputs.torque().map(|torque| torque.to_array().map(bits)))
+    let torque = outputs.torque().map(|torque| torque.to_array().map(bits));
+    (outputs.force().to_array().map(bits), torque, outputs.energy_j().map(bits))
 }
 
 /// Finds the files that settings of the run named. Settings of this replay are taken as they are.
