@@ -2,7 +2,6 @@
 
 use std::error::Error;
 use std::io::Write;
-use std::net::TcpListener;
 use std::path::Path;
 
 /// A number of an option, within its limits.
@@ -23,16 +22,6 @@ pub fn say(line: &str) {
     let mut out = std::io::stdout().lock();
     // Nobody reads: nothing to do about it, the device goes on.
     let _ = writeln!(out, "{line}").and_then(|()| out.flush());
-}
-
-/// Listens at an address.
-///
-/// # Errors
-/// What the system says, and an address that is always free.
-pub fn listen(at: &str) -> Result<TcpListener, Box<dyn Error>> {
-    TcpListener::bind(at).map_err(|error| {
-        format!("cannot listen at {at}: {error}; --listen 127.0.0.1:0 takes any free port").into()
-    })
 }
 
 /// A symbolic link by this name. Only a link is replaced, never somebody's file.
@@ -57,13 +46,5 @@ mod tests {
             assert_eq!(within(text, 0.1, 7.0, "mm"), Err("must be 0.1 to 7 mm".to_owned()), "{text}");
         }
         assert_eq!(within("1 mm", 0.1, 7.0, "mm"), Err("`1 mm` is no number".to_owned()));
-    }
-
-    #[test]
-    fn an_address_that_is_taken_is_named_with_the_remedy() {
-        let taken = listen("127.0.0.1:0").unwrap().local_addr().unwrap();
-        let _holder = listen(&taken.to_string()).unwrap();
-        let error = listen(&taken.to_string()).unwrap_err().to_string();
-        assert!(error.contains(&taken.to_string()) && error.contains("127.0.0.1:0"), "{error}");
     }
 }

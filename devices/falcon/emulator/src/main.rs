@@ -1,7 +1,8 @@
 //! A Novint Falcon without hardware: `flotor emulate falcon` starts it.
 
 use clap::{Parser, ValueEnum};
-use flotor_emulation::command_line::{listen, say, within};
+use flotor_emulation::command_line::{say, within};
+use flotor_emulation::port::{Clients, Reach, listen};
 use flotor_emulation::rig::RigArguments;
 use flotor_falcon::kinematics::CENTRE_M;
 use flotor_falcon_emulator::in_process::InProcess;
@@ -25,6 +26,9 @@ struct Arguments {
     /// Tcp: where to listen (port 0: any free one)
     #[arg(long, default_value = "127.0.0.1:4108", value_name = "HOST:PORT")]
     listen: String,
+    /// Listen beyond this machine: anybody who reaches the port commands the device
+    #[arg(long)]
+    allow_remote: bool,
     /// Whether its firmware runs already
     #[arg(long, value_enum, default_value = "on")]
     power: PowerOption,
@@ -103,10 +107,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     };
     match arguments.transport {
         TransportOption::Tcp => {
-            let listener = listen(&arguments.listen)?;
+            let listener = listen(&arguments.listen, Reach::of(arguments.allow_remote))?;
             say(&format!("listening tcp:{}", listener.local_addr()?));
+            let mut clients = Clients::of(listener)?;
             loop {
-                let (stream, _) = listener.accept()?;
+                let stream = clients.wait_for_one()?;
                 // A host that goes is no failure.
                 let _ = server::serve(stream, &device);
                 if arguments.once {

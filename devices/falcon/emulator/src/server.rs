@@ -1,23 +1,31 @@
 //! The device for a plugin in another process, over TCP (`flotor_falcon::remote`).
 
 use crate::in_process::InProcess;
+use flotor_emulation::port::REST_OF_MESSAGE;
 use flotor_falcon::remote::{REQUEST, WRITE};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
+use std::time::Instant;
 
 /// How long is waited for the host before a look whether a packet is due, ns. `poll` waits so short a time; the timeout of a
 /// socket is rounded to the system's ticks of some milliseconds.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000 };
 
-/// Serves a host until it is gone, or the device is.
+/// Serves a host until it is gone, or the device is. One that does not send its messages whole is none.
 ///
 /// # Errors
 /// What the system says of the connection.
 pub fn serve(mut stream: TcpStream, device: &InProcess) -> io::Result<()> {
     stream.set_nodelay(true)?;
+    stream.set_write_timeout(Some(REST_OF_MESSAGE))?;
     let (mut heard, mut chunk) = (Vec::new(), [0; 1024]);
+    // Of the last whole message, or of a moment in which none was due.
+    let (mut whole, mut is_host) = (Instant::now(), false);
     loop {
+        if whole.elapsed() > REST_OF_MESSAGE {
+            return Err(ErrorKind::TimedOut.into());
+        }
         if poll(&mut [PollFd::new(&stream, PollFlags::IN)], Some(&LOOK))? > 0 {
             match stream.read(&mut chunk)? {
                 0 => return Ok(()),
@@ -26,6 +34,10 @@ pub fn serve(mut stream: TcpStream, device: &InProcess) -> io::Result<()> {
         }
         while let Some(length) = obey(&heard, device)? {
             heard.drain(..length);
+            is_host = true;
+        }
+        if is_host && heard.is_empty() {
+            whole = Instant::now();
         }
         let now = device.now();
         let mut machine = device.machine();

@@ -1,5 +1,6 @@
 //! The plugin against the emulated device: boot loader, exchange and the contract, and on a kernel's own USB.
 
+mod attacks;
 mod boot;
 mod contract;
 mod exchange;

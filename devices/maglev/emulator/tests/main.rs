@@ -1,5 +1,6 @@
 //! The emulated controller: as a program, as a plant, and at the edge of its range.
 
+mod attacks;
 mod boundary;
 mod emulator;
 mod flight;

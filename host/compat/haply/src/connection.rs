@@ -13,7 +13,7 @@ use tungstenite::handshake::derive_accept_key;
 /// Time-out of a whole request, and of each write of an answer.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(5);
 /// Connections of a port served at the same time; more are closed at once. Each has a thread.
-const MOST_CONNECTIONS: usize = 128;
+const MOST_CONNECTIONS: usize = 30;
 /// Longest head and body of a request, bytes.
 const LONGEST_HEAD: usize = 16 << 10;
 const LONGEST_BODY: usize = 64 << 10;

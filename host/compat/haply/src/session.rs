@@ -59,10 +59,7 @@ pub(crate) fn socket(stream: TcpStream, read: Vec<u8>) -> WebSocket<Link> {
 
 /// Serves a client until it is gone.
 pub(crate) fn serve(service: &Service, mut socket: WebSocket<Link>) {
-    let Some(session) = service.enter() else {
-        let _ = socket.close(None);
-        return;
-    };
+    let session = service.enter();
     if service.host.pace() == Pace::Real {
         let _ = socket.get_ref().stream.set_read_timeout(Some(LONGEST_SILENCE));
     }

@@ -7,13 +7,14 @@
 use super::controller::{Commanders, Controller, ControllerConfig, ForceCommand, Silence};
 use super::server::{Hub, Server};
 use crate::controller::Sample;
+use flotor_emulation::port::{self, Reach};
 use flotor_hal::{
     Choices, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, Refusal, Settings,
     StepStatus, Wrench, choices, export_model,
 };
-use std::net::TcpListener;
 use std::sync::Arc;
 
+const REACHES: Choices = choices!["this-machine", "any-machine"];
 const FORCE_COMMANDS: Choices = choices!["replace", "add"];
 const COMMANDERS: Choices = choices!["one", "all"];
 const SILENCE: Choices = choices!["land", "ignore"];
@@ -22,6 +23,12 @@ const SCHEMA: &[Parameter] = &[
     Parameter::text(
         "listen",
         "Where clients connect, as host:port; without it nobody does, and there is no force",
+    ),
+    Parameter::choice(
+        "reach",
+        REACHES,
+        0,
+        "Machines whose programs may connect: this one, or all that reach the address",
     ),
     Parameter::choice("force_command", FORCE_COMMANDS, 0, "What a force command does to the gains"),
     Parameter::choice("commanders", COMMANDERS, 0, "Who may command: the first client that does, or all"),
@@ -45,6 +52,7 @@ const SCHEMA: &[Parameter] = &[
 pub struct MlApiModel {
     hub: Arc<Hub>,
     listen: Option<String>,
+    reach: Reach,
     server: Option<Server>,
     values: [f64; SCHEMA.len()],
     period_s: f64,
@@ -86,6 +94,7 @@ impl ForceModel for MlApiModel {
             // Nobody writes lines in a tick.
             hub: Arc::new(Hub::new(Controller::new(config), Vec::new(), false, Box::new(|_| ()))),
             listen: settings.text("listen").map(str::to_owned),
+            reach: Reach::of(settings.choice_or_default("reach") == 1),
             server: None,
             values,
             period_s: 1.0e-3,
@@ -97,7 +106,7 @@ impl ForceModel for MlApiModel {
         self.period_s = config.period_ns as f64 * 1.0e-9;
         let (Some(listen), None) = (&self.listen, &self.server) else { return Ok(()) };
         let refused = |error| Refusal::resource(format!("cannot listen at {listen}: {error}"));
-        let listener = TcpListener::bind(listen).map_err(refused)?;
+        let listener = port::listen(listen, self.reach).map_err(Refusal::parameter)?;
         let address = listener.local_addr().map_err(refused)?;
         self.server = Some(Server::start(listener, Arc::clone(&self.hub)).map_err(refused)?);
         println!("listening tcp {address}");

@@ -10,12 +10,15 @@ mod stator;
 mod usb;
 
 use clap::{Parser, ValueEnum};
-use flotor_emulation::command_line::{self, link_to, say};
+use flotor_emulation::command_line::{link_to, say};
+use flotor_emulation::port::{self, Clients, REST_OF_MESSAGE, Reach};
 use flotor_emulation::rig::{RigArguments, serve};
 use flotor_hal::Refusal;
 use flotor_hal::abi::loader::{LoadError, Setting};
+use flotor_maglev::protocol::FRAME_BYTES;
 use flotor_maglev::transport::stream::StreamLink;
 use flotor_maglev::transport::tcp::{self, prepared};
+use flotor_maglev::transport::{Incoming, LinkLost, Transport};
 #[cfg(target_os = "linux")]
 use flotor_maglev_emulator::gadget::Personality;
 use flotor_maglev_emulator::{Emulator, Event, Pace, controller_config};
@@ -25,6 +28,7 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
 /// Emulate the controller of the magnetic-levitation device.
 #[derive(Parser)]
@@ -46,6 +50,9 @@ struct Arguments {
     /// Tcp: where to listen (port 0: any free one; default 127.0.0.1, port 5679, with the ML API 5678)
     #[arg(long, value_name = "HOST:PORT")]
     listen: Option<String>,
+    /// Tcp: listen beyond this machine: anybody who reaches the port commands the device
+    #[arg(long)]
+    allow_remote: bool,
     /// Pty: a name for the terminal, as a symbolic link
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
@@ -184,21 +191,50 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 /// Listens where it is said, or at this port of this machine, and says where.
 fn listen(arguments: &Arguments, port: u16) -> Result<TcpListener, Box<dyn Error>> {
     let at = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{port}"));
-    let listener = command_line::listen(&at)?;
+    let listener = port::listen(&at, Reach::of(arguments.allow_remote)).map_err(Refusal::parameter)?;
     say(&format!("listening tcp {}", listener.local_addr()?));
     Ok(listener)
 }
 
 fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let listener = listen(arguments, tcp::PORT)?;
+    let mut clients = Clients::of(listen(arguments, tcp::PORT)?)?;
     loop {
-        let (stream, from) = listener.accept()?;
+        let stream = clients.wait_for_one()?;
+        // One that has left again is no failure.
+        let (Ok(from), Ok(stream)) = (stream.peer_addr(), prepared(stream)) else { continue };
         say(&format!("connected {from}"));
-        let mut link = StreamLink::new(prepared(stream)?);
+        let mut link = Introduced::new(StreamLink::new(stream));
         emulator.serve(&mut link, &AtomicBool::new(false), &mut tell);
         if arguments.once {
             return Ok(());
         }
+    }
+}
+
+/// A link that is lost unless the other end soon sends a request that is answered: else it is no host.
+struct Introduced<L> {
+    link: L,
+    connected: Instant,
+    is_host: bool,
+}
+
+impl<L> Introduced<L> {
+    fn new(link: L) -> Self {
+        Self { link, connected: Instant::now(), is_host: false }
+    }
+}
+
+impl<L: Transport> Transport for Introduced<L> {
+    fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost> {
+        self.is_host = true;
+        self.link.send(frame)
+    }
+
+    fn receive(&mut self) -> Result<Incoming, LinkLost> {
+        if !self.is_host && self.connected.elapsed() > REST_OF_MESSAGE {
+            return Err(LinkLost);
+        }
+        self.link.receive()
     }
 }
 

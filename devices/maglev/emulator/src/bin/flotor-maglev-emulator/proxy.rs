@@ -62,7 +62,11 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
     }
     let listen = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{PORT}"));
     let parameters = arguments.ml_api.model_parameters();
-    write!(scene, "[[model]]\nplugin = \"ml-api\"\n[model.parameters]\nlisten = {listen:?}\n{parameters}")?;
+    let reach = if arguments.allow_remote { "any-machine" } else { "this-machine" };
+    write!(
+        scene,
+        "[[model]]\nplugin = \"ml-api\"\n[model.parameters]\nlisten = {listen:?}\nreach = \"{reach}\"\n{parameters}"
+    )?;
     Ok(scene)
 }
 

@@ -4,10 +4,11 @@ use super::callback;
 use super::hub::{Hub, Id};
 use crate::ml_api::controller::{Answer, Ticket};
 use crate::ml_api::misbehavior::Deed;
+use flotor_emulation::port::FIRST_MESSAGE;
 use flotor_maglev::ml_api::{Frame, Function, Intake, Reply, Request, Results, Status, Taken};
-use std::io::{ErrorKind, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How late a reply comes that is to come late.
 const STALL: Duration = Duration::from_secs(3);
@@ -19,13 +20,11 @@ pub(super) fn serve(mut stream: TcpStream, hub: &Hub) {
     let from = stream.peer_addr().map_or_else(|_| "?".to_owned(), |address| address.to_string());
     let id = hub.connect(&from);
     let mut intake = Intake::default();
-    loop {
-        match intake.take(&mut stream) {
-            Taken::Frame(_) => {}
-            Taken::Nothing => continue,
-            // Dropping the connection resets it.
-            Taken::Malformed | Taken::Lost => break,
-        }
+    let mut deadline = Some(Instant::now() + FIRST_MESSAGE);
+    // Dropping the connection resets it.
+    while let Taken::Frame(_) = intake.take(&mut Timed { stream: &mut stream, deadline }) {
+        // A client may be silent for as long as it likes, but not in the middle of a request.
+        deadline = intake.is_in_the_middle().then(|| Instant::now() + FIRST_MESSAGE);
         let request = Request::decode(intake.frame());
         if request == Ok(Request::Plain(Function::RequestToken)) {
             callback::serve(stream, hub, hub.becomes_callback(id));
@@ -37,6 +36,25 @@ pub(super) fn serve(mut stream: TcpStream, hub: &Hub) {
     }
     // Before the connection is dropped: whoever sees it closed finds the flotor landing.
     hub.disconnect(id);
+}
+
+/// A connection from which a whole request is read before a deadline, which the first bytes of the request set where there is none.
+struct Timed<'s> {
+    stream: &'s mut TcpStream,
+    deadline: Option<Instant>,
+}
+
+impl Read for Timed<'_> {
+    fn read(&mut self, room: &mut [u8]) -> io::Result<usize> {
+        let left = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
+        if left.is_some_and(|left| left.is_zero()) {
+            return Err(ErrorKind::TimedOut.into());
+        }
+        self.stream.set_read_timeout(left)?;
+        let read = self.stream.read(room)?;
+        self.deadline.get_or_insert_with(|| Instant::now() + FIRST_MESSAGE);
+        Ok(read)
+    }
 }
 
 /// Handles one request; false if the connection is to be dropped.

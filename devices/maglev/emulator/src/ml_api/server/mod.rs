@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// Connections at a time; more are reset.
-const CONNECTIONS: usize = 64;
+const CONNECTIONS: usize = 60;
 /// How long a client may take to read a reply.
 const WRITE_PATIENCE: Duration = Duration::from_secs(2);
 
