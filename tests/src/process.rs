@@ -55,6 +55,15 @@ impl Owned {
         panic!("no process under {number}");
     }
 
+    /// Kills the process that carries out the command, unless it has ended.
+    pub fn kill_host(&self) {
+        let number = self.pid().as_raw_nonzero();
+        let children = std::fs::read_to_string(format!("/proc/{number}/task/{number}/children"));
+        if let Some(host) = children.unwrap_or_default().trim().parse().ok().and_then(Pid::from_raw) {
+            let _ = kill_process(host, Signal::KILL);
+        }
+    }
+
     /// Sends a signal to the process that carries out the command.
     ///
     /// # Panics

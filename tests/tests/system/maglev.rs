@@ -319,7 +319,7 @@ fn a_killed_host_disarms_the_controller() {
     for transport in ["tcp", "pty"] {
         let scratch = Scratch::default();
         let (mut emulator, mut host) = Emulator::levitating(transport, &scratch);
-        host.signal(Signal::KILL);
+        host.signal_host(Signal::KILL);
         let line = emulator.wait_for(&["mode Disarmed", "link-lost"]);
         // Long before the watchdog of 700 ms could have seen anything.
         assert!(number(&line, "silence_us") < 700_000, "{transport}: {line}");
@@ -332,13 +332,13 @@ fn a_killed_host_disarms_the_controller() {
 fn hang_and_wake_a_host(transport: &'static str) {
     let scratch = Scratch::default();
     let (mut emulator, host) = Emulator::levitating(transport, &scratch);
-    host.signal(Signal::STOP);
+    host.signal_host(Signal::STOP);
     let line = emulator.wait_for(&["mode Holding", "watchdog"]);
     // By the controller's own clock, which is what the bound is about: watchdog and two milliseconds.
     assert!((700_000..=702_000).contains(&number(&line, "silence_us")), "{transport}: {line}");
     emulator.wait_for(&["mode Landing"]);
     emulator.wait_for(&["mode Fault", "watchdog"]);
-    host.signal(Signal::CONT);
+    host.signal_host(Signal::CONT);
     let output = host.output();
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(exit_code::DEVICE_FAULT), "{transport}: {error}");

@@ -151,7 +151,7 @@ fn a_flotor_whose_host_is_killed_lands() {
     // The callback connection is the third: the run begins.
     controller.wait_for(&["connected"]);
     std::thread::sleep(Duration::from_millis(300));
-    host.signal(Signal::KILL);
+    host.signal_host(Signal::KILL);
     let killed = Instant::now();
     controller.wait_for(&["flight Landing faults=none"]);
     let landing = killed.elapsed();
