@@ -60,6 +60,25 @@ impl SlewLimit {
         dt_s: f64,
         [forces, torques]: [&Region; 2],
     ) -> Option<Wrench> {
+        let is_slow = self.force.allows(request.force(), held.force(), dt_s)
+            && self.torque.allows(request.torque(), held.torque(), dt_s);
+        if is_slow {
+            self.requested = None;
+            return None;
+        }
+        self.limit_fast(request, held, twist, dt_s, [forces, torques])
+    }
+
+    /// Limits a change that is too fast for one side, or while energy is to be paid back.
+    #[cold]
+    fn limit_fast(
+        &mut self,
+        request: &Wrench,
+        held: &Wrench,
+        twist: &Twist,
+        dt_s: f64,
+        [forces, torques]: [&Region; 2],
+    ) -> Option<Wrench> {
         let force = self.force.limit(request.force(), held.force(), twist.linear(), dt_s, forces);
         let torque = self.torque.limit(request.torque(), held.torque(), twist.angular(), dt_s, torques);
         if force.is_none() && torque.is_none() {
@@ -86,7 +105,13 @@ impl Side {
         self.ledger.generated_j <= 0.0
     }
 
+    /// Returns whether the change is slow enough, with nothing to be paid back.
     #[inline]
+    fn allows(&self, request: DVec3, held: DVec3, dt_s: f64) -> bool {
+        let most = self.most_per_s * dt_s;
+        self.is_settled() && (request - held).length_squared() <= most * most
+    }
+
     fn limit(
         &self,
         request: DVec3,
@@ -95,10 +120,10 @@ impl Side {
         dt_s: f64,
         region: &Region,
     ) -> Option<DVec3> {
-        let most = self.most_per_s * dt_s;
-        if self.is_settled() && (request - held).length_squared() <= most * most {
+        if self.allows(request, held, dt_s) {
             return None;
         }
+        let most = self.most_per_s * dt_s;
         let along = velocity.normalize_or_zero();
         let drive = request.dot(along).max(0.0);
         let allowed = drive * self.ledger.share();
