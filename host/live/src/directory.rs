@@ -247,12 +247,12 @@ fn process_of(path: &Path) -> Option<u32> {
 mod tests {
     use super::*;
 
-    #[cfg(unix)]
     #[test]
     fn a_folder_that_cannot_be_used_has_the_remedy_of_its_cause() {
-        // EMFILE and ENOSPC of Linux; and any other.
-        for (cause, remedy) in [(24, "ulimit -n"), (28, "make room"), (13, "XDG_RUNTIME_DIR")] {
-            let cause = io::Error::from_raw_os_error(cause);
+        for (cause, remedy) in
+            [(io::ErrorKind::StorageFull, "make room"), (io::ErrorKind::PermissionDenied, "XDG_RUNTIME_DIR")]
+        {
+            let cause = io::Error::from(cause);
             let error = DirectoryError::Unusable { path: PathBuf::from("/run"), cause };
             assert!(error.to_string().contains(remedy), "{error}");
         }

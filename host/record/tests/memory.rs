@@ -1,5 +1,4 @@
 //! A recording of any length needs the same memory. Alone in its process: it reads the memory of the process.
-#![cfg(target_os = "linux")]
 
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_core::{Clock, mapping::Blend};
@@ -17,7 +16,7 @@ fn anonymous_kb() -> u64 {
     let status =
         std::fs::read_to_string("/proc/self/status").expect("the kernel tells the memory of a process");
     let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:")).expect("Linux 4.5 and later");
-    line.trim().trim_end_matches(" kB").parse().expect("a number of kB")
+    Some(line.trim().trim_end_matches(" kB").parse().expect("a number of kB"))
 }
 
 #[test]
@@ -64,5 +63,9 @@ fn the_index_of_a_long_recording_is_not_in_memory() {
     std::fs::remove_file(&path).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     assert_eq!(summary.chunk_indexes.len() as u64, WARM_UP + CHUNKS + 1, "the index is complete");
+    let Some((before_kb, after_kb)) = before_kb.zip(after_kb) else {
+        println!("skipped: this system does not tell the memory of a process in a file");
+        return;
+    };
     assert!(after_kb <= before_kb + SLACK_KB, "{before_kb} kB grew to {after_kb} kB");
 }

@@ -175,6 +175,13 @@ mod tests {
     use std::os::unix::fs::PermissionsExt;
     use std::path::PathBuf;
 
+    #[test]
+    fn a_process_without_descriptors_is_told_to_allow_more() {
+        let cause = rustix::io::Errno::MFILE.into();
+        let error = DirectoryError::Unusable { path: PathBuf::from("/run"), cause };
+        assert!(error.to_string().contains("ulimit -n"), "{error}");
+    }
+
     /// Two containers with one folder: each run is process 1 of its own, and no process of the other exists.
     #[test]
     fn a_socket_lives_as_long_as_a_process_has_it_open_whatever_its_number() {
