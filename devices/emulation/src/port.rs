@@ -35,16 +35,19 @@ impl Reach {
 /// Binds a port.
 ///
 /// # Errors
-/// The system's error, or an address beyond this machine without consent; both with the remedy.
-pub fn listen(at: &str, reach: Reach) -> Result<TcpListener, String> {
-    let unusable =
-        |error| format!("cannot listen at {at}: {error}; --listen 127.0.0.1:0 takes any free port");
+/// The system's error, or one of kind `InvalidInput` for an address beyond this machine without consent; both with the remedy.
+pub fn listen(at: &str, reach: Reach) -> io::Result<TcpListener> {
+    let unusable = |error: io::Error| {
+        let problem = format!("cannot listen at {at}: {error}; --listen 127.0.0.1:0 takes any free port");
+        io::Error::new(error.kind(), problem)
+    };
     let addresses: Vec<SocketAddr> = at.to_socket_addrs().map_err(unusable)?.collect();
     if reach == Reach::ThisMachine && addresses.iter().any(|address| !address.ip().is_loopback()) {
-        return Err(format!(
+        let problem = format!(
             "{at} can be reached from other machines, and whoever reaches it commands the device; listen at 127.0.0.1, or add \
              --allow-remote"
-        ));
+        );
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     }
     TcpListener::bind(&addresses[..]).map_err(unusable)
 }
@@ -123,14 +126,17 @@ mod tests {
     fn an_address_that_is_taken_is_named_with_the_remedy() {
         let holder = listen("127.0.0.1:0", Reach::ThisMachine).unwrap();
         let at = holder.local_addr().unwrap().to_string();
-        let error = listen(&at, Reach::ThisMachine).unwrap_err();
+        let error = listen(&at, Reach::ThisMachine).unwrap_err().to_string();
         assert!(error.contains(&at) && error.contains("127.0.0.1:0"), "{error}");
     }
 
     #[test]
     fn other_machines_reach_a_port_with_consent_only() {
         for at in ["0.0.0.0:0", "[::]:0"] {
-            assert!(listen(at, Reach::ThisMachine).unwrap_err().contains("--allow-remote"), "{at}");
+            assert!(
+                listen(at, Reach::ThisMachine).unwrap_err().to_string().contains("--allow-remote"),
+                "{at}"
+            );
         }
         assert!(listen("0.0.0.0:0", Reach::AnyMachine).is_ok());
         assert!(listen("localhost:0", Reach::ThisMachine).is_ok());

@@ -274,7 +274,7 @@ impl Values {
         let wrong = |why: &dyn std::fmt::Display| {
             Refusal::parameter(format!("first_contact = \"{}\": {why}", report.display()))
         };
-        let text = read_text(report, "the report").map_err(|problem| wrong(&problem.problem))?;
+        let text = read_text(report, "the file").map_err(|problem| wrong(&problem.problem))?;
         let table: toml::Table = text.parse().map_err(|error: toml::de::Error| wrong(&error))?;
         let parameters = table.get("device").and_then(|device| device.get("parameters"));
         let Some(parameters) = parameters.and_then(toml::Value::as_table) else {

@@ -1,7 +1,7 @@
 //! A command that runs the code of plugins, in a process of its own: a supervisor waits for that process and gives its exit code.
 //!
 //! A plugin can end its process without a message and with exit code 0: `_exit`, `exec`, a thread that crashes before the host's
-//! handlers stand. The supervisor runs no plugin. It forwards signals, and what ends without the report of the host
+//! handlers stand. The supervisor runs no plugin. It forwards signals, and what ends without the end report of the host
 //! ([`flotor_servo::last_stop::report_end`]) fails with a message. If the supervisor is killed, the command is asked to end.
 //!
 //! Windows has none.
@@ -25,7 +25,7 @@ pub(crate) enum Side {
     Child {
         /// Number of the supervisor.
         supervisor: u32,
-        /// Memory of the report.
+        /// Memory of the end report.
         report: &'static AtomicU32,
     },
     /// The supervisor of a child that has ended.

@@ -121,7 +121,7 @@ impl Recording {
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let unreadable = |cause| ReadError::Open { path: path.into(), cause };
         // A pipe would wait for a writer.
-        if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
             return Err(ReadError::NotMcap { path: path.into() });
         }
         let mut file = File::open(path).map_err(unreadable)?;

@@ -82,7 +82,7 @@ fn push_n(device: &Capabilities, rate_hz: u64) -> f64 {
 /// beyond the error of the trapezoidal rule at the edges of the wall. A force along the ray from the centre made up to 99 % of the
 /// work exchanged.
 #[test]
-fn no_lap_through_a_wall_of_unequal_axes_makes_energy() {
+fn no_lap_through_a_wall_of_unequal_axes_generates_energy() {
     for seed in 0..60 {
         for damping in [0.0, 15.0] {
             let wall = BoundaryWall {

@@ -21,7 +21,7 @@ pub enum ReportedEnd {
 }
 
 impl ReportedEnd {
-    /// Returns the report in a word; `None` if there is none yet.
+    /// Returns the end report in a word; `None` if there is none yet.
     #[must_use]
     pub fn read(word: &AtomicU32) -> Option<Self> {
         match word.load(Ordering::Acquire) {
@@ -32,7 +32,7 @@ impl ReportedEnd {
     }
 }
 
-/// Writes the report of this process to `word` from now on. Once for a process. Not real-time.
+/// Writes the end report of this process to `word` from now on. Once for a process. Not real-time.
 pub fn report_end_to(word: &'static AtomicU32) {
     let _ = WORD.set(word);
 }

@@ -12,6 +12,7 @@ use flotor_hal::{
     Choices, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, Refusal, Settings,
     StepStatus, Wrench, choices, export_model,
 };
+use std::io::ErrorKind;
 use std::sync::Arc;
 
 const REACHES: Choices = choices!["this-machine", "any-machine"];
@@ -106,7 +107,10 @@ impl ForceModel for MlApiModel {
         self.period_s = config.period_ns as f64 * 1.0e-9;
         let (Some(listen), None) = (&self.listen, &self.server) else { return Ok(()) };
         let refused = |error| Refusal::resource(format!("cannot listen at {listen}: {error}"));
-        let listener = port::listen(listen, self.reach).map_err(Refusal::parameter)?;
+        let listener = port::listen(listen, self.reach).map_err(|error| match error.kind() {
+            ErrorKind::InvalidInput => Refusal::parameter(error.to_string()),
+            _ => Refusal::resource(error.to_string()),
+        })?;
         let address = listener.local_addr().map_err(refused)?;
         self.server = Some(Server::start(listener, Arc::clone(&self.hub)).map_err(refused)?);
         println!("listening tcp {address}");

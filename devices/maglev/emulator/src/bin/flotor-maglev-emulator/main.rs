@@ -191,7 +191,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 /// Listens where it is said, or at this port of this machine, and says where.
 fn listen(arguments: &Arguments, port: u16) -> Result<TcpListener, Box<dyn Error>> {
     let at = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{port}"));
-    let listener = port::listen(&at, Reach::of(arguments.allow_remote)).map_err(Refusal::parameter)?;
+    let listener = port::listen(&at, Reach::of(arguments.allow_remote))
+        .map_err(|error| Refusal::parameter(error.to_string()))?;
     say(&format!("listening tcp {}", listener.local_addr()?));
     Ok(listener)
 }
