@@ -1,4 +1,4 @@
-//! The report of this process on its own end, in memory that its supervisor reads: an end without one was not the host's.
+//! The end report of a process, in memory that its supervisor reads: without one another cause than the host ended the process.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
