@@ -60,7 +60,7 @@ pub struct CouplingEnd {
     pub mapping: MappingConfig,
 }
 
-/// Largest error of the gain of a coupling whose scales cancel: three quotients of numbers in decimal round less.
+/// Largest rounding error of the gain of a coupling whose scales cancel, relative: above that of three quotients.
 const GAIN_ROUNDING: f64 = 1.0e-12;
 
 /// Where the ends of a coupling are.

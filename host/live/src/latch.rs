@@ -254,7 +254,7 @@ fn last_press(file: &File) -> Option<(u64, Result<String, String>)> {
     }
 }
 
-/// A number that differs between different texts (FNV-1a), small enough to be a time of long ago.
+/// Hash of a text (FNV-1a), below any time of the present in nanoseconds.
 fn fingerprint(text: &str) -> u64 {
     let hash = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     text.bytes().fold(0xcbf2_9ce4_8422_2325, hash) >> 8

@@ -49,7 +49,7 @@ impl Chords {
         self.gains.into_iter().fold(0.0, f64::max)
     }
 
-    /// The largest stiffness along a coordinate; 0 where the wrench opposes no motion.
+    /// Largest stiffness along a coordinate; 0 where the wrench opposes no motion.
     pub(super) fn stiffness(&self) -> f64 {
         self.against.into_iter().fold(0.0, f64::max)
     }

@@ -104,7 +104,7 @@ impl Opened {
         })
     }
 
-    /// Whether a hand may feel it and only the watchdog process stops it when this process is gone.
+    /// Returns true for a physical device that only the watchdog process stops after the death of the host.
     fn needs_watchdog_process(&self) -> bool {
         self.embodiment == Embodiment::Physical
             && self.capabilities.actuated != Axes::NONE
