@@ -7,7 +7,7 @@
 mod support;
 
 use flotor_live::{Ask, Client, Directory, SetValue};
-use rustix::process::{Pid, Signal, setpriority_process};
+use rustix::process::{Signal, setpriority_process};
 use serde_json::Value;
 use std::io::Write;
 use std::os::unix::net::UnixStream;
@@ -36,7 +36,7 @@ fn start_run(folder: &Path) -> Owned {
     run.args(["run", "--clock", "virtual", "--seed", "7", "--json", "-"]);
     run.arg("--duration").arg(format!("{}ms", ticks()));
     let run = Owned::start(run.stdout(Stdio::piped()).stderr(Stdio::piped()));
-    setpriority_process(Some(Pid::from_child(&run)), 19).expect("anybody may yield");
+    setpriority_process(Some(run.host()), 19).expect("anybody may yield");
     run
 }
 
@@ -108,9 +108,9 @@ impl Watched {
     /// busy the machine is, and a window does.
     fn work_until<T>(&mut self, what: &str, come_about: impl Fn(&Self) -> Option<T>) -> T {
         patiently(what, || {
-            self.run.signal(Signal::CONT);
+            self.run.signal_host(Signal::CONT);
             std::thread::sleep(Duration::from_millis(1));
-            self.run.signal(Signal::STOP);
+            self.run.signal_host(Signal::STOP);
             assert!(goes_on(&mut self.run), "the run was over before there was {what}");
             come_about(self)
         })
@@ -118,7 +118,7 @@ impl Watched {
 
     /// Lets the run, which was held in its midst, go on to its end; gives its summary.
     fn end(&mut self) -> Value {
-        self.run.signal(Signal::CONT);
+        self.run.signal_host(Signal::CONT);
         summary(&mut self.run)
     }
 }

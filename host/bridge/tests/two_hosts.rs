@@ -246,9 +246,9 @@ fn a_host_that_is_delayed_overdraws_by_what_came_out_meanwhile_and_no_more() {
     network.run(&program, scenes, 4.0, |runs, _| {
         for run in runs.iter().cycle().take(40) {
             std::thread::sleep(Duration::from_millis(37)); // no part of a swing's period
-            run.signal(Signal::STOP);
+            run.signal_host(Signal::STOP);
             std::thread::sleep(Duration::from_millis(40));
-            run.signal(Signal::CONT);
+            run.signal_host(Signal::CONT);
         }
     });
     let missing_j = [0, 1].map(|index| out_while_missing_j(&network.hosts[index].records()));
