@@ -11,6 +11,8 @@ pub(super) struct Region {
     radius: f64,
     /// Its square, finite.
     radius_squared: f64,
+    /// Square of the radius of a ball that is in both, with room for rounding; 0 where there is none.
+    inner_squared: f64,
 }
 
 /// A ball without end has this radius, so that its square is a number: what is in a region is finite.
@@ -24,7 +26,8 @@ impl Region {
     pub(super) fn of(bound: Bound) -> Self {
         let radius = bound.norm().min(ENDLESS);
         let half_sides = DVec3::from_array(bound.axes()).min(DVec3::splat(ENDLESS));
-        Self { bound, half_sides, radius, radius_squared: radius * radius }
+        let inner = radius.min(half_sides.min_element()) * SURELY_INSIDE;
+        Self { bound, half_sides, radius, radius_squared: radius * radius, inner_squared: inner * inner }
     }
 
     /// What it was made of. Not real-time.
@@ -32,10 +35,15 @@ impl Region {
         self.bound
     }
 
-    /// True if a vector is in it; false for NaN. Real-time: bounded, no allocation.
+    /// Returns true if a vector is in the region; false for NaN. Most are well inside, which one comparison shows; a tick asks five
+    /// times.
+    ///
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn holds(&self, vector: DVec3) -> bool {
-        vector.abs().cmple(self.half_sides).all() && vector.length_squared() <= self.radius_squared
+        let squared = vector.length_squared();
+        squared < self.inner_squared
+            || (vector.abs().cmple(self.half_sides).all() && squared <= self.radius_squared)
     }
 
     /// The longest vector in it of the same direction, not longer than `vector`. Axes with a half side of zero are left out:

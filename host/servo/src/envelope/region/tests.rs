@@ -30,6 +30,22 @@ fn what_is_not_driven_takes_nothing_of_the_norm() {
 }
 
 #[test]
+fn the_edges_are_in_it_and_their_neighbours_outside_are_not() {
+    for size in [0.0, 1.0e-200, 1.0e-3, 1.0, 1.0 / 3.0, 7.3e5] {
+        let boxed = Region::of(Bound::box_of([size, 2.0 * size, f64::INFINITY]));
+        assert!(boxed.holds(DVec3::new(size, 0.0, 0.0)) && boxed.holds(DVec3::new(-size, 2.0 * size, 0.0)));
+        assert!(!boxed.holds(DVec3::new(size.next_up(), 0.0, 0.0)), "{size}");
+        assert!(!boxed.holds(DVec3::new(0.0, -(2.0 * size).next_up(), 1.0)), "{size}");
+    }
+    for radius in [1.0e-3, 1.0, 1.0 / 3.0, 7.3e5] {
+        let ball = Region::of(Bound::ball(radius));
+        assert!(ball.holds(DVec3::new(0.0, radius, 0.0)) && ball.holds(DVec3::splat(0.577 * radius)));
+        assert!(!ball.holds(DVec3::new(0.0, radius * (1.0 + 1.0e-15), 0.0)), "{radius}");
+        assert!(!ball.holds(DVec3::splat(0.5774 * radius)), "{radius}");
+    }
+}
+
+#[test]
 fn a_region_without_end_passes_what_is_finite_and_nothing_overflows() {
     let endless = Region::of(Bound::NONE);
     assert_eq!(endless.shrink(FORCE), FORCE);
