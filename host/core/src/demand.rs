@@ -2,14 +2,15 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
-use flotor_hal::{Capabilities, Demand};
+use crate::limits::Bound;
+use flotor_hal::Demand;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Returns the outputs that reach a hand at a device: force, and torque if the device gives any.
+/// Returns the outputs that reach a hand at a device: force, and torque if device and scene allow any.
 #[must_use]
-pub fn felt_at(device: &Capabilities) -> Demand {
-    if device.max_torque_nm.iter().any(|most_nm| *most_nm > 0.0) { Demand::WRENCH } else { Demand::FORCE }
+pub fn felt_within(torque_nm: &Bound) -> Demand {
+    if torque_nm.longest() > 0.0 { Demand::WRENCH } else { Demand::FORCE }
 }
 
 /// Outputs that the models of a device compute in one tick.
@@ -131,10 +132,11 @@ mod tests {
     }
 
     #[test]
-    fn torque_is_felt_where_a_device_gives_any() {
-        let mut device = Capabilities::UNDRIVEN;
-        assert_eq!(felt_at(&device), Demand::FORCE);
-        device.max_torque_nm[2] = 0.1;
-        assert_eq!(felt_at(&device), Demand::WRENCH);
+    fn torque_is_felt_where_device_and_scene_allow_any() {
+        let device = Bound::box_of([0.0, 0.0, 0.1]);
+        assert_eq!(felt_within(&Bound::box_of([0.0; 3])), Demand::FORCE);
+        assert_eq!(felt_within(&device), Demand::WRENCH);
+        assert_eq!(felt_within(&device.and(Bound::ball(0.0))), Demand::FORCE);
+        assert_eq!(felt_within(&device.and(Bound::box_of([0.5, 0.5, 0.0]))), Demand::FORCE);
     }
 }

@@ -38,7 +38,7 @@ pub struct Port {
 }
 
 impl Port {
-    /// A port at rest of a device where these outputs of models reach the hand ([`flotor_core::demand::felt_at`]).
+    /// A port at rest of a device where these outputs of models reach the hand ([`flotor_core::demand::felt_within`]).
     #[must_use]
     pub const fn at_rest(felt: Demand) -> Self {
         Self {

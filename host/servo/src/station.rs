@@ -3,7 +3,7 @@
 use super::envelope::{Envelope, EnvelopeEffects};
 use super::forces::Port;
 use super::state::{Cause, Gate, RunEvent};
-use flotor_core::demand::felt_at;
+use flotor_core::demand::felt_within;
 use flotor_core::plausibility::{
     Implausible, ImplausibleSamples, PlausibilityCheck, Trust, normalised, stale_ticks_limit,
 };
@@ -63,10 +63,11 @@ impl Station {
     /// A device in a loop of this period. Not real-time.
     pub fn new(device: ActiveDevice, envelope: Envelope, told: &Capabilities, period_ns: u64) -> Self {
         let stale_ticks = stale_ticks_limit(period_ns);
+        let [_, torque_nm] = envelope.most();
         Self {
             device,
             envelope,
-            felt: felt_at(told),
+            felt: felt_within(&torque_nm),
             plausibility: PlausibilityCheck::new(told, period_ns),
             stale_ticks_limit: if told.sensed == Axes::NONE { u32::MAX } else { stale_ticks },
             stale_ticks: 0,

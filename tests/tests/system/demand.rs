@@ -88,6 +88,18 @@ fn a_model_is_asked_for_what_the_device_gives_and_observers_want_and_no_more() {
 }
 
 #[test]
+fn a_scene_without_torque_asks_for_none_on_a_device_that_gives_some() {
+    for torque_nm in ["0", "[0, 0, 0]"] {
+        let limits = format!("[limits]\ntorque_nm = {torque_nm}\n");
+        let text = scene("six", "returns-demand").replace("[limits]\n", &limits);
+        for record in run(prepared(Clock::Virtual, &text), Demand::FORCE).records {
+            assert_eq!(record.model.computed(), Demand::FORCE, "torque_nm = {torque_nm}");
+            assert_eq!(record.model.force().z, FORCE_N, "torque_nm = {torque_nm}");
+        }
+    }
+}
+
+#[test]
 fn an_output_is_computed_from_the_request_to_its_end() {
     let session = prepared(Clock::Virtual, &scene("three", "returns-demand"));
     let observers = session.observers();

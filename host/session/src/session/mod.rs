@@ -26,8 +26,8 @@ use ceiling::{norm_notice, under_ceiling};
 use controls::{ChangeLog, Parts};
 use epilogue::Epilogue;
 use flotor_core::Change;
-use flotor_core::demand::ObserverDemand;
-use flotor_core::limits::Limits;
+use flotor_core::demand::{ObserverDemand, felt_within};
+use flotor_core::limits::{Bound, Limits};
 use flotor_core::plausibility::ImplausibleSamples;
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
@@ -373,7 +373,9 @@ impl Session {
         let mut plugins = Vec::new();
         let mut opened = Vec::new();
         for device in &scene.devices {
-            let (device, report) = prepare::open_device(registry, device)?;
+            let (device, mut report) = prepare::open_device(registry, device)?;
+            let most_torque_nm = Bound::box_of(device.capabilities.max_torque_nm);
+            report.felt = felt_within(&scene.limits.torque_nm.and(most_torque_nm));
             opened.push(device);
             plugins.push(report);
         }

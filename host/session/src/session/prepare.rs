@@ -12,7 +12,6 @@ use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
     ParameterText, PluginUse, Scene, SceneError,
 };
-use flotor_core::demand::felt_at;
 use flotor_core::limits::Boundary;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
@@ -219,7 +218,6 @@ pub(super) fn open_device(
     }
     report.signals_taken = signals.put_back();
     report.latency_s = capabilities.latency_s;
-    report.felt = felt_at(&capabilities);
     let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
     Ok((Opened { device, capabilities, embodiment, independence }, report))
 }
