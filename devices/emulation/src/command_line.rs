@@ -1,5 +1,6 @@
 //! What the programs of emulators read and write.
 
+use flotor_core::terminal::escaped;
 use std::error::Error;
 use std::io::Write;
 use std::path::Path;
@@ -17,11 +18,16 @@ pub fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, Stri
     }
 }
 
-/// Writes a line at once: somebody may be waiting for it.
+/// Writes a line at once, because somebody may be waiting for it, with control characters escaped.
 pub fn say(line: &str) {
     let mut out = std::io::stdout().lock();
     // Nobody reads: nothing to do about it, the device goes on.
-    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+    let _ = writeln!(out, "{}", escaped(line)).and_then(|()| out.flush());
+}
+
+/// Writes a line to standard error, with control characters escaped.
+pub fn warn(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", escaped(line));
 }
 
 /// A symbolic link by this name. Only a link is replaced, never somebody's file.

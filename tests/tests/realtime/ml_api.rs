@@ -8,6 +8,7 @@ use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, SampleWait, Tick, Wrench
 use flotor_maglev_emulator::controller::Sample;
 use flotor_maglev_emulator::ml_api::server::Hub;
 use flotor_maglev_emulator::ml_api::{Controller, ControllerConfig, Machine, Server};
+use flotor_maglev_emulator::port::{Port, Reach};
 use flotor_maglev_emulator::{Pace, Plant};
 use flotor_tests::TestSize;
 use std::io::{Read, Write};
@@ -87,13 +88,13 @@ fn medians(times: &[Duration]) -> [Duration; 2] {
 fn a_minute_of_ticks_comes_at_the_controllers_rate_and_allocates_nothing() {
     let ticks = TestSize::of_this_run().pick(1000, 60_000);
     let full = ticks > 1000;
-    let listener = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
-    let address = listener.local_addr().expect("it is bound").to_string();
+    let port = Port::bind("127.0.0.1:0", Reach::ThisUser).expect("there is a free port");
+    let address = port.address().expect("it is bound").to_string();
     let stop = Arc::new(AtomicBool::new(false));
     let controller = Controller::new(ControllerConfig::DEFAULT);
     let hub = Arc::new(Hub::new(controller, Vec::new(), false, Box::new(|_| ())));
     let mut machine = Machine::new(Arc::clone(&hub), Pace::RealTime, Held);
-    let _server = Server::start(listener, hub).expect("a thread starts");
+    let _server = Server::start(port, hub).expect("a thread starts");
     let stopped = Arc::clone(&stop);
     let machine = std::thread::spawn(move || machine.run(&stopped));
 

@@ -1,8 +1,9 @@
 //! A Novint Falcon without hardware: `flotor emulate falcon` starts it.
 
 use clap::{Parser, ValueEnum};
-use flotor_emulation::command_line::{say, within};
-use flotor_emulation::port::{Clients, Reach, listen};
+use flotor_emulation::clients::{Clients, Tenure};
+use flotor_emulation::command_line::{say, warn, within};
+use flotor_emulation::port::{Port, ReachArguments};
 use flotor_emulation::rig::RigArguments;
 use flotor_falcon::kinematics::CENTRE_M;
 use flotor_falcon_emulator::in_process::InProcess;
@@ -26,9 +27,8 @@ struct Arguments {
     /// Tcp: where to listen (port 0: any free one)
     #[arg(long, default_value = "127.0.0.1:4108", value_name = "HOST:PORT")]
     listen: String,
-    /// Listen beyond this machine: anybody who reaches the port commands the device
-    #[arg(long)]
-    allow_remote: bool,
+    #[command(flatten)]
+    reach: ReachArguments,
     /// Whether its firmware runs already
     #[arg(long, value_enum, default_value = "on")]
     power: PowerOption,
@@ -86,7 +86,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            warn(&format!("error: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -107,13 +107,13 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     };
     match arguments.transport {
         TransportOption::Tcp => {
-            let listener = listen(&arguments.listen, Reach::of(arguments.allow_remote))?;
-            say(&format!("listening tcp:{}", listener.local_addr()?));
-            let mut clients = Clients::of(listener)?;
+            let port = Port::bind(&arguments.listen, arguments.reach.reach())?;
+            say(&format!("listening tcp:{}", port.address()?));
+            let mut clients = Clients::of(port)?;
             loop {
                 let stream = clients.wait_for_one()?;
                 // A host that goes is no failure.
-                let _ = server::serve(stream, &device);
+                let _ = server::serve(stream, &device, Tenure::begin(&mut clients));
                 if arguments.once {
                     return Ok(());
                 }

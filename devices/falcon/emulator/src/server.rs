@@ -1,29 +1,29 @@
 //! The device for a plugin in another process, over TCP (`flotor_falcon::remote`).
 
 use crate::in_process::InProcess;
-use flotor_emulation::port::REST_OF_MESSAGE;
+use flotor_emulation::clients::Tenure;
 use flotor_falcon::remote::{REQUEST, WRITE};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::time::Instant;
+use std::time::Duration;
 
 /// How long is waited for the host before a look whether a packet is due, ns. `poll` waits so short a time; the timeout of a
 /// socket is rounded to the system's ticks of some milliseconds.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000 };
+/// Time in which a host takes a packet.
+const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// Serves a host until it is gone, or the device is. One that does not send its messages whole is none.
+/// Serves a host until it is gone, or the device is, or its tenure is over.
 ///
 /// # Errors
-/// What the system says of the connection.
-pub fn serve(mut stream: TcpStream, device: &InProcess) -> io::Result<()> {
+/// The system's error of the connection.
+pub fn serve(mut stream: TcpStream, device: &InProcess, mut tenure: Tenure<'_>) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    stream.set_write_timeout(Some(REST_OF_MESSAGE))?;
+    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
     let (mut heard, mut chunk) = (Vec::new(), [0; 1024]);
-    // Of the last whole message, or of a moment in which none was due.
-    let (mut whole, mut is_host) = (Instant::now(), false);
     loop {
-        if whole.elapsed() > REST_OF_MESSAGE {
+        if tenure.is_over() {
             return Err(ErrorKind::TimedOut.into());
         }
         if poll(&mut [PollFd::new(&stream, PollFlags::IN)], Some(&LOOK))? > 0 {
@@ -34,10 +34,10 @@ pub fn serve(mut stream: TcpStream, device: &InProcess) -> io::Result<()> {
         }
         while let Some(length) = obey(&heard, device)? {
             heard.drain(..length);
-            is_host = true;
+            tenure.message();
         }
-        if is_host && heard.is_empty() {
-            whole = Instant::now();
+        if !heard.is_empty() {
+            tenure.part();
         }
         let now = device.now();
         let mut machine = device.machine();

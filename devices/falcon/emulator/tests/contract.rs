@@ -1,12 +1,13 @@
 //! The plugin through the contract, on an emulated device over TCP.
 
+use flotor_emulation::clients::{Clients, Tenure};
+use flotor_emulation::port::{Port, Reach};
 use flotor_falcon::kinematics::CENTRE_M;
 use flotor_falcon_emulator::in_process::InProcess;
 use flotor_falcon_emulator::machine::{Fault, Machine, Motion, Power};
 use flotor_falcon_emulator::server;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, Tick, VerticalCalibration, Wrench};
-use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
 pub(super) const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };
@@ -19,12 +20,13 @@ const WORD_N: f64 = 5.0e-3;
 /// A device at a port of this machine, for one host after another.
 pub(super) fn serve(power: Power, place_m: DVec3) -> (InProcess, String) {
     let device = InProcess::new(Machine::new(power, Motion::held(place_m)));
-    let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
-    let address = format!("tcp:{}", listener.local_addr().expect("it is bound"));
+    let port = Port::bind("127.0.0.1:0", Reach::ThisUser).expect("there is a port");
+    let address = format!("tcp:{}", port.address().expect("it is bound"));
+    let mut clients = Clients::of(port).expect("the system waits");
     let served = device.clone();
     std::thread::spawn(move || {
-        while let Ok((stream, _)) = listener.accept() {
-            let _ = server::serve(stream, &served);
+        while let Ok(stream) = clients.wait_for_one() {
+            let _ = server::serve(stream, &served, Tenure::begin(&mut clients));
         }
     });
     (device, address)

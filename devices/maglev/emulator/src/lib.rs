@@ -13,4 +13,6 @@ mod emulator;
 pub mod gadget;
 pub mod ml_api;
 
+pub use flotor_emulation::port;
+
 pub use emulator::{Emulator, Event, Pace, Plant, controller_config};

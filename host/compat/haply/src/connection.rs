@@ -4,8 +4,9 @@ use crate::access::Access;
 use crate::http;
 use crate::service::Service;
 use crate::session;
+use flotor_emulation::port::Port;
 use std::io::{self, Read as _, Write as _};
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpStream;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
@@ -47,8 +48,8 @@ pub(crate) struct Head {
 ///
 /// # Errors
 /// If there is no thread that accepts them.
-pub(crate) fn serve(service: &'static Service, listener: TcpListener) -> io::Result<()> {
-    accept(listener, "flotor-accept", move |stream| serve_one(service, stream))
+pub(crate) fn serve(service: &'static Service, port: Port) -> io::Result<()> {
+    accept(port, "flotor-accept", move |stream| serve_one(service, stream))
 }
 
 /// Accepts connections in a thread, and lets each be served in one of its own.
@@ -56,7 +57,7 @@ pub(crate) fn serve(service: &'static Service, listener: TcpListener) -> io::Res
 /// # Errors
 /// If there is no thread that accepts them.
 pub(crate) fn accept(
-    listener: TcpListener,
+    port: Port,
     name: &str,
     serve: impl Fn(TcpStream) -> io::Result<()> + Copy + Send + 'static,
 ) -> io::Result<()> {
@@ -64,7 +65,7 @@ pub(crate) fn accept(
         // Each connection's thread has a copy.
         let served = Arc::new(());
         loop {
-            let Ok((stream, _)) = listener.accept() else {
+            let Ok(stream) = port.accept() else {
                 std::thread::sleep(PAUSE);
                 continue;
             };

@@ -3,9 +3,10 @@
 use crate::connection::{PATIENCE, accept, prepared, rest, upgraded};
 use crate::service::{Service, inverse_id};
 use crate::session::socket;
+use flotor_emulation::port::Port;
 use serde_json::{Value, json};
 use std::io;
-use std::net::{Shutdown, TcpListener, TcpStream};
+use std::net::{Shutdown, TcpStream};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -52,8 +53,8 @@ fn event(name: &str, category: &str, level: Level, data: Value, message: &str) -
 ///
 /// # Errors
 /// If there is no thread that accepts connections.
-pub(crate) fn serve(service: &'static Service, listener: TcpListener) -> io::Result<()> {
-    accept(listener, "flotor-events", move |stream| tell(service, stream))
+pub(crate) fn serve(service: &'static Service, port: Port) -> io::Result<()> {
+    accept(port, "flotor-events", move |stream| tell(service, stream))
 }
 
 fn tell(service: &Service, mut stream: TcpStream) -> io::Result<()> {

@@ -33,9 +33,10 @@ use flotor_command::options::{PluginPathOption, arguments, json_file, mcap_file,
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, say, supervised};
 use flotor_compat::{Pace, Settings, prepare};
+use flotor_emulation::port::{Port, Reach, ReachArguments};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use service::Service;
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -56,9 +57,8 @@ struct Arguments {
     /// Where to listen for the events channel (port 0: any free one)
     #[arg(long, default_value = "127.0.0.1:10020", value_name = "HOST:PORT")]
     events: String,
-    /// Listen beyond this machine: anybody who reaches the port can then push the handle, within the scene's limits
-    #[arg(long)]
-    allow_remote: bool,
+    #[command(flatten)]
+    reach: ReachArguments,
     /// Let web pages of this origin connect, for example http://localhost:3000 (repeatable; default: no page)
     #[arg(long, value_name = "ORIGIN")]
     allow_origin: Vec<String>,
@@ -119,7 +119,7 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     if settings.report.is_none() {
         settings.report = Some("-".into());
     }
-    let reach = if arguments.allow_remote { Reach::AnyMachine } else { Reach::ThisMachine };
+    let reach = arguments.reach.reach();
     let (simulation, simulation_at) = listen("--listen", &arguments.listen, reach)?;
     let (events, events_at) = listen("--events", &arguments.events, reach)?;
     let access = Access::new(arguments.allow_origin, simulation_at);
@@ -146,29 +146,13 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     }
 }
 
-/// Machines whose programs may connect.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Reach {
-    ThisMachine,
-    AnyMachine,
-}
-
-/// Binds a port; returns the listener and its address.
-fn listen(option: &str, at: &str, reach: Reach) -> Result<(TcpListener, SocketAddr), CommandError> {
-    let bound = TcpListener::bind(at).and_then(|listener| {
-        let address = listener.local_addr()?;
-        Ok((listener, address))
+/// Binds a port; returns it and its address.
+fn listen(option: &str, at: &str, reach: Reach) -> Result<(Port, SocketAddr), CommandError> {
+    let bound = Port::bind(at, reach).and_then(|port| {
+        let address = port.address()?;
+        Ok((port, address))
     });
-    let (listener, address) = bound.map_err(|cause| {
-        CommandError::Usage(format!(
-            "cannot listen at {at}: {cause}; Haply's own service may be running; `{option} 127.0.0.1:0` takes any port"
-        ))
-    })?;
-    if reach == Reach::ThisMachine && !address.ip().is_loopback() {
-        return Err(CommandError::Usage(format!(
-            "{option} {at} listens beyond this machine, and anybody who reaches the port can push the handle; \
-             use 127.0.0.1, or add --allow-remote"
-        )));
-    }
-    Ok((listener, address))
+    bound.map_err(|cause| {
+        CommandError::Usage(format!("{option}: {cause}; Haply's own service may be running"))
+    })
 }

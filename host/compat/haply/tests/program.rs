@@ -4,10 +4,9 @@
 mod strangers;
 
 use std::io::{Read, Write};
-use std::net::TcpStream;
 use std::process::Command;
 use std::time::Duration;
-use strangers::Listening;
+use strangers::{Listening, Place};
 
 #[test]
 fn the_program_names_its_ports() {
@@ -17,17 +16,42 @@ fn the_program_names_its_ports() {
     assert!(output.status.success() && help.contains("10001") && help.contains("10020"), "{help}");
 }
 
-#[test]
-fn strangers_cost_little_and_a_client_is_served_all_the_same() {
-    let request = b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n";
+/// Starts the service; `--events` or the simulation channel is the target.
+fn start(options: &[&str], before: &str) -> Listening {
     let program = env!("CARGO_BIN_EXE_flotor-haply-service-emulator");
-    let arguments = ["--listen", "127.0.0.1:0", "--events", "127.0.0.1:0"];
-    Listening::start(program, &arguments, "listening ws://").withstand(request, |at| {
-        let asked = TcpStream::connect(at).and_then(|mut stream| {
-            stream.set_read_timeout(Some(Duration::from_secs(1)))?;
-            stream.write_all(request)?;
-            stream.read(&mut [0; 16])
-        });
-        asked.is_ok_and(|length| length > 0)
+    let arguments = [&["--listen", "127.0.0.1:0", "--events", "127.0.0.1:0"], options].concat();
+    Listening::start(program, &arguments, before)
+}
+
+/// Sends a request; returns whether anything is answered in time.
+fn answers(place: &Place, request: &[u8]) -> bool {
+    let asked = place.connect().and_then(|mut stream| {
+        stream.set_read_timeout(Some(Duration::from_secs(1)))?;
+        stream.write_all(request)?;
+        stream.read(&mut [0; 16])
     });
+    asked.is_ok_and(|length| length > 0)
+}
+
+const REQUEST: &[u8] = b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n";
+const SOCKET: &[u8] = b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+    Sec-WebSocket-Key: dGhlIHNhbXBsZQ==\r\n\r\n";
+
+#[test]
+fn strangers_at_the_simulation_channel_cost_little_and_a_client_is_served_all_the_same() {
+    start(&[], "listening ws://").target.withstand(REQUEST, |place| answers(place, REQUEST));
+}
+
+#[test]
+fn strangers_at_the_events_channel_cost_little_and_a_client_is_served_all_the_same() {
+    start(&[], " events ws://").target.withstand(SOCKET, |place| answers(place, SOCKET));
+}
+
+#[test]
+fn another_user_is_served_with_consent_only() {
+    let [alone, with_others] = [&[][..], &["--allow-users"]].map(|options| start(options, "listening ws://"));
+    if let Some(length) = alone.target.answers_to_stranger(REQUEST) {
+        assert_eq!(length, 0);
+        assert_eq!(with_others.target.answers_to_stranger(REQUEST), Some(1));
+    }
 }

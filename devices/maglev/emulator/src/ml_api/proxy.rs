@@ -7,7 +7,7 @@
 use super::controller::{Commanders, Controller, ControllerConfig, ForceCommand, Silence};
 use super::server::{Hub, Server};
 use crate::controller::Sample;
-use flotor_emulation::port::{self, Reach};
+use flotor_emulation::port::{Port, Reach};
 use flotor_hal::{
     Choices, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, Refusal, Settings,
     StepStatus, Wrench, choices, export_model,
@@ -15,7 +15,7 @@ use flotor_hal::{
 use std::io::ErrorKind;
 use std::sync::Arc;
 
-const REACHES: Choices = choices!["this-machine", "any-machine"];
+const REACHES: Choices = choices!["this-user", "this-machine", "any-machine"];
 const FORCE_COMMANDS: Choices = choices!["replace", "add"];
 const COMMANDERS: Choices = choices!["one", "all"];
 const SILENCE: Choices = choices!["land", "ignore"];
@@ -29,7 +29,7 @@ const SCHEMA: &[Parameter] = &[
         "reach",
         REACHES,
         0,
-        "Machines whose programs may connect: this one, or all that reach the address",
+        "Programs that may connect: this user's, those of every user of this machine, or all that reach the address",
     ),
     Parameter::choice("force_command", FORCE_COMMANDS, 0, "What a force command does to the gains"),
     Parameter::choice("commanders", COMMANDERS, 0, "Who may command: the first client that does, or all"),
@@ -95,7 +95,11 @@ impl ForceModel for MlApiModel {
             // Nobody writes lines in a tick.
             hub: Arc::new(Hub::new(Controller::new(config), Vec::new(), false, Box::new(|_| ()))),
             listen: settings.text("listen").map(str::to_owned),
-            reach: Reach::of(settings.choice_or_default("reach") == 1),
+            reach: match settings.choice_or_default("reach") {
+                1 => Reach::ThisMachine,
+                2 => Reach::AnyMachine,
+                _ => Reach::ThisUser,
+            },
             server: None,
             values,
             period_s: 1.0e-3,
@@ -107,12 +111,12 @@ impl ForceModel for MlApiModel {
         self.period_s = config.period_ns as f64 * 1.0e-9;
         let (Some(listen), None) = (&self.listen, &self.server) else { return Ok(()) };
         let refused = |error| Refusal::resource(format!("cannot listen at {listen}: {error}"));
-        let listener = port::listen(listen, self.reach).map_err(|error| match error.kind() {
+        let port = Port::bind(listen, self.reach).map_err(|error| match error.kind() {
             ErrorKind::InvalidInput => Refusal::parameter(error.to_string()),
             _ => Refusal::resource(error.to_string()),
         })?;
-        let address = listener.local_addr().map_err(refused)?;
-        self.server = Some(Server::start(listener, Arc::clone(&self.hub)).map_err(refused)?);
+        let address = port.address().map_err(refused)?;
+        self.server = Some(Server::start(port, Arc::clone(&self.hub)).map_err(refused)?);
         println!("listening tcp {address}");
         Ok(())
     }

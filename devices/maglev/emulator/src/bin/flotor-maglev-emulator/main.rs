@@ -10,8 +10,9 @@ mod stator;
 mod usb;
 
 use clap::{Parser, ValueEnum};
-use flotor_emulation::command_line::{link_to, say};
-use flotor_emulation::port::{self, Clients, REST_OF_MESSAGE, Reach};
+use flotor_emulation::clients::{Clients, Tenure};
+use flotor_emulation::command_line::{link_to, say, warn};
+use flotor_emulation::port::{Port, ReachArguments};
 use flotor_emulation::rig::{RigArguments, serve};
 use flotor_hal::Refusal;
 use flotor_hal::abi::loader::{LoadError, Setting};
@@ -24,11 +25,9 @@ use flotor_maglev_emulator::gadget::Personality;
 use flotor_maglev_emulator::{Emulator, Event, Pace, controller_config};
 use plant::LoadedPlant;
 use std::error::Error;
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 /// Emulate the controller of the magnetic-levitation device.
 #[derive(Parser)]
@@ -50,9 +49,8 @@ struct Arguments {
     /// Tcp: where to listen (port 0: any free one; default 127.0.0.1, port 5679, with the ML API 5678)
     #[arg(long, value_name = "HOST:PORT")]
     listen: Option<String>,
-    /// Tcp: listen beyond this machine: anybody who reaches the port commands the device
-    #[arg(long)]
-    allow_remote: bool,
+    #[command(flatten)]
+    reach: ReachArguments,
     /// Pty: a name for the terminal, as a symbolic link
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
@@ -120,7 +118,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            warn(&format!("error: {error}"));
             let is_plugins = error.downcast_ref().is_some_and(LoadError::is_configuration);
             ExitCode::from(if is_plugins || error.is::<Refusal>() { 2 } else { 1 })
         }
@@ -189,12 +187,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 }
 
 /// Listens where it is said, or at this port of this machine, and says where.
-fn listen(arguments: &Arguments, port: u16) -> Result<TcpListener, Box<dyn Error>> {
+fn listen(arguments: &Arguments, port: u16) -> Result<Port, Box<dyn Error>> {
     let at = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{port}"));
-    let listener = port::listen(&at, Reach::of(arguments.allow_remote))
-        .map_err(|error| Refusal::parameter(error.to_string()))?;
-    say(&format!("listening tcp {}", listener.local_addr()?));
-    Ok(listener)
+    let port =
+        Port::bind(&at, arguments.reach.reach()).map_err(|error| Refusal::parameter(error.to_string()))?;
+    say(&format!("listening tcp {}", port.address()?));
+    Ok(port)
 }
 
 fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -204,7 +202,7 @@ fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
         // One that has left again is no failure.
         let (Ok(from), Ok(stream)) = (stream.peer_addr(), prepared(stream)) else { continue };
         say(&format!("connected {from}"));
-        let mut link = Introduced::new(StreamLink::new(stream));
+        let mut link = ServedHost { link: StreamLink::new(stream), tenure: Tenure::begin(&mut clients) };
         emulator.serve(&mut link, &AtomicBool::new(false), &mut tell);
         if arguments.once {
             return Ok(());
@@ -212,27 +210,20 @@ fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
     }
 }
 
-/// A link that is lost unless the other end soon sends a request that is answered: else it is no host.
-struct Introduced<L> {
+/// A link that is lost when the tenure of its client is over; a request that is answered counts as a message.
+struct ServedHost<'c, L> {
     link: L,
-    connected: Instant,
-    is_host: bool,
+    tenure: Tenure<'c>,
 }
 
-impl<L> Introduced<L> {
-    fn new(link: L) -> Self {
-        Self { link, connected: Instant::now(), is_host: false }
-    }
-}
-
-impl<L: Transport> Transport for Introduced<L> {
+impl<L: Transport> Transport for ServedHost<'_, L> {
     fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost> {
-        self.is_host = true;
+        self.tenure.message();
         self.link.send(frame)
     }
 
     fn receive(&mut self) -> Result<Incoming, LinkLost> {
-        if !self.is_host && self.connected.elapsed() > REST_OF_MESSAGE {
+        if self.tenure.is_over() {
             return Err(LinkLost);
         }
         self.link.receive()

@@ -2,6 +2,7 @@
 //! the host. What stands between program and hand is what stands there in every run.
 
 use super::{Arguments, ProtocolOption, plant};
+use flotor_emulation::port::Reach;
 use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Axes, Capabilities, Refusal};
 use flotor_maglev::ml_api::PORT;
@@ -62,7 +63,11 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
     }
     let listen = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{PORT}"));
     let parameters = arguments.ml_api.model_parameters();
-    let reach = if arguments.allow_remote { "any-machine" } else { "this-machine" };
+    let reach = match arguments.reach.reach() {
+        Reach::ThisUser => "this-user",
+        Reach::ThisMachine => "this-machine",
+        Reach::AnyMachine => "any-machine",
+    };
     write!(
         scene,
         "[[model]]\nplugin = \"ml-api\"\n[model.parameters]\nlisten = {listen:?}\nreach = \"{reach}\"\n{parameters}"

@@ -4,7 +4,7 @@ use super::callback;
 use super::hub::{Hub, Id};
 use crate::ml_api::controller::{Answer, Ticket};
 use crate::ml_api::misbehavior::Deed;
-use flotor_emulation::port::FIRST_MESSAGE;
+use flotor_emulation::clients::FIRST_MESSAGE;
 use flotor_maglev::ml_api::{Frame, Function, Intake, Reply, Request, Results, Status, Taken};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};

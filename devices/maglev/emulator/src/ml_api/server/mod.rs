@@ -14,14 +14,17 @@ mod state;
 
 pub use hub::{Hub, Log, TickWait};
 
+use flotor_emulation::port::Port;
 use std::io;
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// Connections at a time; more are reset.
 const CONNECTIONS: usize = 60;
+/// Pause after a connection could not be accepted: there may be no descriptor left.
+const PAUSE: Duration = Duration::from_millis(10);
 /// How long a client may take to read a reply.
 const WRITE_PATIENCE: Duration = Duration::from_secs(2);
 
@@ -31,16 +34,19 @@ pub struct Server {
 }
 
 impl Server {
-    /// Accepts connections of a listener from now on, as long as the process lives.
+    /// Accepts connections of a port from now on, as long as the process lives.
     ///
     /// # Errors
-    /// What the system says.
-    pub fn start(listener: TcpListener, hub: Arc<Hub>) -> io::Result<Self> {
+    /// The system's error.
+    pub fn start(port: Port, hub: Arc<Hub>) -> io::Result<Self> {
         let shared = Arc::clone(&hub);
         let open = Arc::new(AtomicUsize::new(0));
         std::thread::Builder::new().name("ml-api".to_owned()).spawn(move || {
-            for stream in listener.incoming() {
-                let Ok(stream) = stream.and_then(prepared) else { continue };
+            loop {
+                let Ok(stream) = port.accept().and_then(prepared) else {
+                    std::thread::sleep(PAUSE);
+                    continue;
+                };
                 if open.load(Ordering::Acquire) >= CONNECTIONS {
                     continue;
                 }
