@@ -10,7 +10,7 @@ use rcgen::{
 use serde_json::{Value, json};
 use std::fs::OpenOptions;
 use std::io::{self, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -112,6 +112,20 @@ fn member(name: &str, hosts: &[String], valid: Duration) -> Result<CertificatePa
         vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
     parameters.key_usages = vec![KeyUsagePurpose::DigitalSignature];
     Ok(parameters)
+}
+
+/// Returns the first file with a private key that others than its owner may read or write: one that the TLS part of a Zenoh
+/// configuration names, or the configuration itself if it holds a key.
+pub(crate) fn exposed_key(tls: &Value, config: Option<&Path>) -> Option<PathBuf> {
+    let text = |key: &str| tls.get(key).and_then(Value::as_str);
+    let ends = ["listen", "connect"];
+    let named = ends.iter().filter_map(|end| text(&format!("{end}_private_key"))).map(PathBuf::from);
+    let inline = ends.iter().filter_map(|end| text(&format!("{end}_private_key_base64")));
+    let holding = inline.filter_map(|_| config.map(Path::to_path_buf));
+    // Zenoh reports a file that is missing.
+    let is_exposed =
+        |file: &PathBuf| file.metadata().is_ok_and(|found| found.permissions().mode() & 0o077 != 0);
+    named.chain(holding).find(is_exposed)
 }
 
 /// Good from yesterday, for clocks that differ, to as long from now as chosen.

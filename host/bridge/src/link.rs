@@ -46,6 +46,12 @@ pub enum LinkError {
         /// What is wrong.
         reason: String,
     },
+    /// Whoever has read a key is a member for as long as its certificate is valid.
+    #[error("other users may read the key in {}; `chmod 600 {}`, and if one may have read it, make new keys", file.display(), file.display())]
+    ExposedKey {
+        /// The file with the key.
+        file: PathBuf,
+    },
     /// Others than this user could do anything.
     #[error(
         "`{endpoint}` is open to others, and only keys distinguish members: `flotor bridge keys` makes some for --config, or say \
@@ -178,6 +184,11 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     let says = |config: &Config, key: &str| -> Option<Value> {
         serde_json::from_str(&config.get_json(key).ok()?).ok()
     };
+    if let Some(file) =
+        access::exposed_key(&says(&config, "transport/link/tls").unwrap_or_default(), file.as_deref())
+    {
+        return Err(LinkError::ExposedKey { file });
+    }
     let has_rules = says(&config, "access_control/enabled") == Some(Value::Bool(true));
     // A configuration is somebody's own; what it means for a visitor is not known here.
     let is_known = end == End::Serving || options.config.is_none();
@@ -246,6 +257,25 @@ mod tests {
         let connect = vec!["tcp/192.0.2.1:7447".to_owned()];
         let options = LinkOptions { connect, ..LinkOptions::default() };
         assert!(matches!(open(&options, End::Serving), Err(LinkError::WithoutKeys { .. })));
+    }
+
+    #[test]
+    fn a_key_that_others_may_read_is_refused_with_the_remedy() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let hosts = vec!["localhost".to_owned()];
+        let members = access::Members { hosts, peers: Vec::new(), valid: access::VALID };
+        let config = access::write_keys(folder.path(), &members).unwrap().remove(0);
+        let listen = vec!["tls/127.0.0.1:0".to_owned()];
+        let options = LinkOptions { config: Some(config), listen, ..LinkOptions::default() };
+        assert!(open(&options, End::Serving).is_ok());
+        let key = folder.path().join("bridge.key");
+        for mode in [0o644, 0o640, 0o602] {
+            std::fs::set_permissions(&key, std::fs::Permissions::from_mode(mode)).unwrap();
+            let refused =
+                open(&options, End::Serving).err().map(|error| error.to_string()).unwrap_or_default();
+            assert!(refused.contains("chmod 600") && refused.contains("bridge.key"), "{mode:o}: {refused}");
+        }
     }
 
     #[test]
