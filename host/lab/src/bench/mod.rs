@@ -1,20 +1,21 @@
 //! Work against precision: what an evaluation of a force model costs, and how wrong it is, for many settings of it.
 //!
-//! Every case goes along one smooth path (1 to 3 Hz in all six coordinates, 1 kHz) and is timed four ways: without
-//! interruption (the mean of a tick), in a batch, call by call (median and p99.9), and cold (after a reset, each call at
+//! Every case goes along one smooth path (1 to 3 Hz in all six coordinates, 1 kHz) and through a whole workspace, and is timed four
+//! ways: without interruption (the mean of a tick), in a batch, call by call (median and p99.9), and cold (after a reset, each call at
 //! another pose). All cases take turns, so that what is reported of one against another does not depend on what else the
 //! machine does. An error is the distance from a reference that walks the same path: another setting of the same model,
 //! computed in this run, not a table.
 //!
-//! - `path`: the motion. `times`: the times. `split`: times of two kinds of calls. `error`: the distance from the
-//!   reference.
+//! - `path`: the motions. `times`: the times. `split`: times of two kinds of calls. `error`: the distance from the
+//!   reference. `front`: which cases are worth their time over the workspace.
 //! - `reach_hand`: the whole loop: what of the reference's force reaches a hand, through sampling and delay.
-//! - `report`: table, CSV and picture.
+//! - `tables`: table, CSV and picture.
 //! - `whole_tick`: what the loop around a model costs with it, on a [`scripted`] device and on the simulated flotor.
 //!
 //! Not real-time.
 
 mod error;
+mod front;
 mod path;
 mod reach_hand;
 mod round_trip;
@@ -25,7 +26,8 @@ mod times;
 mod whole_tick;
 
 pub use error::Distance;
-pub use path::Hand;
+pub use front::{Front, FrontRow};
+pub use path::{Hand, Workspace};
 pub use reach_hand::{Losses, Sampling};
 pub use round_trip::time_round_trips;
 pub use split::{Speed, SplitTimes};
@@ -66,8 +68,10 @@ pub struct Plan {
     pub baseline: usize,
     /// Reference case of the errors.
     pub reference: Option<Case>,
-    /// The motion.
+    /// The hand's motion.
     pub hand: Hand,
+    /// The workspace of the Pareto front; `None` without a reference.
+    pub workspace: Option<Workspace>,
     /// Calls to split.
     pub split: Option<Split>,
     /// How much is timed.
@@ -79,8 +83,8 @@ pub struct Plan {
 pub struct Split {
     /// Id of the detail: above zero, or not.
     pub detail: String,
-    /// In which cases, each along its motion.
-    pub walks: Vec<(Case, Hand)>,
+    /// In which cases, each through its workspace.
+    pub walks: Vec<(Case, Workspace)>,
 }
 
 /// Force only, force and torque, and all that a case serves.
@@ -92,7 +96,7 @@ const DEMANDS: [(&str, Demand); 3] =
 /// # Errors
 /// [`LoadError`] if the plugin refuses a case or the reference.
 pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<BenchReport, LoadError> {
-    let Plan { cases, baseline, reference, hand, split, size } = plan;
+    let Plan { cases, baseline, reference, hand, workspace, split, size } = plan;
     let (ticks, rounds) = extent(*size);
     let path = hand.poses(ticks);
     let mut models = cases.iter().map(|case| create(plugin, case)).collect::<Result<Vec<_>, _>>()?;
@@ -119,15 +123,25 @@ pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<
         CaseRow { name: case.name.clone(), distance, times: [force, wrench, all] }
     });
     let rows = rows.collect();
+    let mut front = None;
+    if let (Some(case), Some(workspace)) = (reference, workspace) {
+        let (mut exact, named) = (create(plugin, case)?, cases.iter().map(|case| &*case.name));
+        progress.begin("times: workspace", rounds as u64);
+        let named: Vec<&str> = named.collect();
+        let extent = [ticks, rounds];
+        front = Some(Front::measure(&named, &mut models, &mut exact, *baseline, *workspace, extent, || {
+            progress.advance(1);
+        }));
+    }
     let mut split_rows = Vec::new();
     if let Some(Split { detail, walks }) = split {
         progress.begin(detail, walks.len() as u64);
-        for (case, hand) in walks {
+        for (case, workspace) in walks {
             let mut model = create(plugin, case)?;
-            let times = split::split_times(&mut model, detail, &hand.poses(ticks), rounds);
+            let times = split::split_times(&mut model, detail, &workspace.poses(ticks), rounds);
             split_rows.extend(times.map(|apart| SplitRow {
                 name: case.name.clone(),
-                depth_m: hand.depth_m,
+                radius_m: workspace.radius_m,
                 detail: detail.clone(),
                 apart,
             }));
@@ -142,6 +156,7 @@ pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<
         ticks: path.len(),
         rows,
         losses,
+        front,
         apart: split_rows,
     })
 }

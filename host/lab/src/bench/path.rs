@@ -1,6 +1,6 @@
-//! The motion every case goes along: smooth, in all six coordinates, never at rest for long.
+//! The motions that every case goes along, in all six coordinates: a hand's about a point, and one through the workspace.
 
-use flotor_hal::{DVec3, Pose};
+use flotor_hal::{DVec3, Pose, math, orientation_from_rotation_vector};
 use flotor_judge::trajectory::{Series, Trajectory};
 use std::f64::consts::TAU;
 
@@ -38,5 +38,77 @@ impl Hand {
     pub(super) fn poses(self, ticks: usize) -> Vec<Pose> {
         let trajectory = self.trajectory();
         (0..ticks).map(|tick| trajectory.pose(tick as f64 * 1.0e-3)).collect()
+    }
+}
+
+/// A motion through all of a workspace, a ball of positions and a ball of rotations about home. The time in each part of
+/// it is proportional to the part's volume, so a mean over the motion is one over uniformly distributed poses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Workspace {
+    /// Radius of the ball of positions, m.
+    pub radius_m: f64,
+    /// Largest angle of a rotation, rad.
+    pub rotation_rad: f64,
+}
+
+/// Frequencies of the six coordinates, Hz: those of a hand, without a common period.
+const SWEEPS_HZ: [[f64; 3]; 2] = [[0.618, 1.303, 1.732], [0.541, 1.618, 2.236]];
+
+impl Workspace {
+    /// The workspace shrunk about home.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { radius_m: self.radius_m * factor, rotation_rad: self.rotation_rad * factor }
+    }
+
+    /// The poses of the first ticks, at 1 kHz.
+    pub(super) fn poses(self, ticks: usize) -> Vec<Pose> {
+        let pose = |tick: usize| {
+            let [position, rotation] = SWEEPS_HZ.map(|rates_hz| in_unit_ball(tick as f64 * 1.0e-3, rates_hz));
+            Pose::new(
+                position * self.radius_m,
+                orientation_from_rotation_vector(rotation * self.rotation_rad),
+            )
+        };
+        (0..ticks).map(pose).collect()
+    }
+}
+
+/// A point that spends equal times in equal volumes of the unit ball: the cube of its radius and the cosine of its polar angle rise
+/// and fall evenly, and its azimuth turns evenly.
+fn in_unit_ball(time_s: f64, [radius_hz, polar_hz, azimuth_hz]: [f64; 3]) -> DVec3 {
+    let rise_and_fall = |rate_hz: f64| {
+        let phase = rate_hz * time_s % 1.0;
+        1.0 - (2.0 * phase - 1.0).abs()
+    };
+    let radius = math::cbrt(rise_and_fall(radius_hz));
+    let cosine = 2.0 * rise_and_fall(polar_hz) - 1.0;
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    let azimuth = TAU * azimuth_hz * time_s;
+    DVec3::new(sine * math::cos(azimuth), sine * math::sin(azimuth), cosine) * radius
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::rotation_vector;
+
+    /// Means over a ball of radius 1: of the radius 3/4, of each coordinate 0, of its square 1/5. The motion is a line on a torus, so its
+    /// means approach these as one over the number of sweeps, 11 to 45 in 20 s: within 2 %.
+    #[test]
+    fn equal_volumes_take_equal_times() {
+        let poses = Workspace { radius_m: 2.0, rotation_rad: 0.5 }.poses(20_000);
+        let balls: [fn(&Pose) -> DVec3; 2] =
+            [|pose| pose.position() / 2.0, |pose| rotation_vector(pose.orientation()) / 0.5];
+        for ball in balls {
+            let count = poses.len() as f64;
+            let radius = poses.iter().map(|pose| ball(pose).length()).sum::<f64>() / count;
+            let mean = poses.iter().map(ball).sum::<DVec3>() / count;
+            let squares = poses.iter().map(|pose| ball(pose) * ball(pose)).sum::<DVec3>() / count;
+            assert!((radius - 0.75).abs() < 0.02, "{radius}");
+            assert!(mean.abs().max_element() < 0.02, "{mean}");
+            assert!((squares - DVec3::splat(0.2)).abs().max_element() < 0.02, "{squares}");
+            assert!(poses.iter().all(|pose| ball(pose).length() < 1.0 + 1.0e-12));
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The measurements as a table, as CSV, as a picture.
 
-use super::{DEMANDS, Distance, Losses, Sampling, Speed, SplitTimes, Times};
+use super::{DEMANDS, Distance, Front, FrontRow, Losses, Sampling, Speed, SplitTimes, Times};
 use flotor_command::tables::{table, to_csv};
 use flotor_plot::{Axis, Bin, Figure, Mark, Panel, Series};
 use serde::Serialize;
@@ -22,6 +22,8 @@ pub struct BenchReport {
     pub rows: Vec<CaseRow>,
     /// Each case in a whole loop: error of the force at the hand by cause.
     pub losses: Vec<(String, Losses)>,
+    /// The cases over the whole workspace; none without a reference.
+    pub front: Option<Front>,
     /// Times of calls of two kinds.
     pub apart: Vec<SplitRow>,
 }
@@ -42,8 +44,8 @@ pub struct CaseRow {
 pub struct SplitRow {
     /// Name of the case.
     pub name: String,
-    /// How far below home the middle of its path lies, m.
-    pub depth_m: f64,
+    /// Radius of the workspace of its path, m.
+    pub radius_m: f64,
     /// The detail that splits them.
     pub detail: String,
     /// The times.
@@ -68,7 +70,8 @@ impl BenchReport {
     /// The tables for people.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let tables = [self.times(), self.errors(), self.at_the_hand(), self.split_calls()];
+        let tables =
+            [self.times(), self.errors(), self.at_the_hand(), self.pareto_front(), self.split_calls()];
         tables
             .into_iter()
             .filter(|lines| !lines.is_empty())
@@ -132,20 +135,44 @@ impl BenchReport {
         [vec![title], table(head, rows)].concat()
     }
 
+    fn pareto_front(&self) -> Vec<String> {
+        let Some(Front { radius_m, rotation_rad, rows }) = &self.front else { return Vec::new() };
+        let title = format!(
+            "  The whole workspace, a ball of {:.1} mm and {:.1}°: time of a tick, largest error, Pareto front",
+            radius_m * 1e3,
+            rotation_rad.to_degrees()
+        );
+        let cells = rows.iter().map(|FrontRow { name, times, distance, dominated_by }| {
+            let Distance { force_max_n, force_rms_n, torque_max_nm, .. } = *distance;
+            let [mean, p999] = [times.mean_ns, times.warm_p999_ns].map(|ns| format!("{ns:.0}"));
+            let [max, rms, torque] = [force_max_n, force_rms_n, torque_max_nm].map(|n| format!("{n:.1e}"));
+            let place =
+                dominated_by.as_ref().map_or_else(|| "yes".to_owned(), |by| format!("dominated by {by}"));
+            [name.clone(), mean, p999, max, rms, torque, place]
+        });
+        let head = ["case", "mean ns", "p99.9", "force max N", "rms N", "torque max N m", "Pareto front"];
+        let unanswered = rows.iter().filter(|row| row.distance.unanswered > 0);
+        let left_out = unanswered.map(|FrontRow { name, distance, .. }| {
+            format!("  {name}: {} poses without an answer, not compared", distance.unanswered)
+        });
+        let left_out: Vec<String> = left_out.collect();
+        [vec![title], table(head, cells), left_out].concat()
+    }
+
     fn split_calls(&self) -> Vec<String> {
         let Some(SplitRow { detail, .. }) = self.apart.first() else { return Vec::new() };
         let two = |speed: Option<Speed>| match speed {
             Some(Speed { mean_ns, p99_ns }) => [format!("{mean_ns:.0}"), format!("{p99_ns:.0}")],
             None => ["-".to_owned(), "-".to_owned()],
         };
-        let rows = self.apart.iter().map(|SplitRow { name, depth_m, apart, .. }| {
+        let rows = self.apart.iter().map(|SplitRow { name, radius_m, apart, .. }| {
             let ([mean, p99], [others, others_p99]) = (two(apart.above), two(apart.others));
-            let [depth, share] = [depth_m * 1e3, apart.share * 100.0].map(|number| format!("{number:.1}"));
-            [name.clone(), depth, share, mean, p99, others, others_p99]
+            let [radius, share] = [radius_m * 1e3, apart.share * 100.0].map(|number| format!("{number:.1}"));
+            [name.clone(), radius, share, mean, p99, others, others_p99]
         });
         let title =
             format!("  Calls with {detail} above zero, and the others: of each tick the fastest call, ns");
-        let head = ["case", "depth mm", "share %", "mean", "p99", "others: mean", "p99"];
+        let head = ["case", "radius mm", "share %", "mean", "p99", "others: mean", "p99"];
         [vec![title], table(head, rows)].concat()
     }
 
@@ -295,6 +322,7 @@ mod tests {
             ticks: 1000,
             rows: vec![row("variant=energy", 300.0), row("variant=rod", 900.0)],
             losses: Vec::new(),
+            front: None,
             apart: Vec::new(),
         };
         let svg = report.to_svg();

@@ -2,7 +2,9 @@
 
 use super::ProgressLine;
 use crate::Size;
-use crate::bench::{BenchDevice, Case, Hand, Plan, Split, TickCost, WholeTick, measure, time_round_trips};
+use crate::bench::{
+    BenchDevice, Case, Hand, Plan, Split, TickCost, WholeTick, Workspace, measure, time_round_trips,
+};
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, PluginPathOption, new_file, number, svg_file};
 use flotor_command::tables::table;
@@ -26,7 +28,7 @@ use std::path::PathBuf;
     flotor bench --case variant=energy --case variant=rod,accuracy=servo --size full\n  \
     flotor bench --model solid --set body=beam --set tool=plate --plot beam.svg\n  \
     flotor bench --model ./libmy_model.so --case steps=8 --case steps=64 --reference steps=1024\n  \
-    flotor bench --set preset=slender --case variant=energy --depth-mm 20 --apart rod_share\n  \
+    flotor bench --set preset=slender --case variant=energy --apart rod_share\n  \
     flotor bench --tick"
 )]
 pub(crate) struct BenchArguments {
@@ -48,6 +50,12 @@ pub(crate) struct BenchArguments {
     /// Depth of the middle of the motion below home
     #[arg(long, value_name = "MM", default_value_t = 4.0, value_parser = number("mm", "depth", 0.0..=100.0))]
     depth_mm: f64,
+    /// Radius of the workspace about home [default: 12, the device's; of a spring, times its free length over 15 mm]
+    #[arg(long, value_name = "MM", value_parser = number("mm", "radius", 0.001..=1000.0))]
+    workspace_mm: Option<f64>,
+    /// Largest rotation in the workspace
+    #[arg(long, value_name = "DEGREES", default_value_t = 7.0, value_parser = number("degrees", "rotation", 0.0..=180.0))]
+    workspace_deg: f64,
     /// Report separately the calls that return more than zero for this detail (a column of `eval --details`)
     #[arg(long, value_name = "DETAIL")]
     apart: Option<String>,
@@ -93,19 +101,16 @@ const SPHERE_CASES: [&str; 3] = [
 const PLATE_CASES: [&str; 3] = ["resolution=standard", "resolution=quick", "resolution=linear-tetrahedra"];
 /// Their reference.
 const SOLID_REFERENCE: &str = "resolution=fine";
-/// The detail that splits its calls, and the depths (mm): that of the cases, and about half the free length, where springs
-/// that can buckle have both laws.
+/// The detail that splits its calls, the springs, and the parts of their workspaces.
 const SPRING_SPLIT: &str = "rod_share";
-const SPRING_WALKS: [(&str, f64); 8] = [
-    ("preset=thesis-1", 4.0),
-    ("preset=thesis-1", 12.5),
-    ("preset=thesis-2", 4.0),
-    ("preset=thesis-2", 18.7),
-    ("preset=thesis-3", 4.0),
-    ("preset=thesis-3", 13.5),
-    ("preset=slender", 4.0),
-    ("preset=slender", 30.0),
-];
+const SPRINGS: [&str; 4] = ["preset=thesis-1", "preset=thesis-2", "preset=thesis-3", "preset=slender"];
+const PARTS: [f64; 2] = [0.5, 1.0];
+
+/// Radius of the device's range, mm: the thesis's, and the simulated flotor's.
+const DEVICE_RANGE_MM: f64 = 12.0;
+/// Free length (mm) of a spring whose length unit is the device's: scenes scale a spring's motion by its free length over this.
+const UNSCALED_LENGTH_MM: f64 = 15.0;
+const FREE_LENGTH: &str = "free_length_mm";
 
 pub(crate) fn run(arguments: &BenchArguments) -> Result<(), CommandError> {
     if arguments.tick { time_ticks(arguments) } else { compare_cases(arguments) }
@@ -215,19 +220,30 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
         }
         None => 0,
     };
+    let workspace = |case: &Case| workspace(arguments, &plugin, case);
     let spring_walks = || {
-        let walks = SPRING_WALKS.iter().map(|(text, mm)| Ok((case(text)?, Hand { depth_m: mm / 1e3 })));
+        let walks = SPRINGS.into_iter().flat_map(|spring| PARTS.map(|part| (spring, part)));
+        let walks = walks.map(|(spring, part)| {
+            let case = case(spring)?;
+            let workspace = workspace(&case)?.scaled(part);
+            Ok((case, workspace))
+        });
+        walks.collect::<Result<_, CommandError>>()
+    };
+    let case_walks = || {
+        let walks = cases.iter().map(|case| Ok((case.clone(), workspace(case)?)));
         walks.collect::<Result<_, CommandError>>()
     };
     let split = match (&arguments.apart, is_spring) {
-        (Some(detail), _) => Some((detail.clone(), cases.iter().map(|case| (case.clone(), hand)).collect())),
+        (Some(detail), _) => Some((detail.clone(), case_walks()?)),
         (None, true) => Some((SPRING_SPLIT.to_owned(), spring_walks()?)),
         (None, false) => None,
     };
     let split = split.map(|(detail, walks)| Split { detail, walks });
     let reference = reference.map(case).transpose()?;
+    let workspace = reference.as_ref().map(workspace).transpose()?;
     let line = ProgressLine::new();
-    let plan = Plan { cases, baseline, reference, hand, split, size: arguments.size };
+    let plan = Plan { cases, baseline, reference, hand, workspace, split, size: arguments.size };
     let report = measure(&plugin, &plan, &line)?;
     line.0.finish_and_clear();
 
@@ -235,6 +251,21 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     print_result(arguments.json.file(), &report, || format!("{}\n{}", title(), report.to_text()))?;
     write_text(arguments.csv.as_deref(), || report.to_csv())?;
     write_text(arguments.plot.as_deref(), || report.to_svg())
+}
+
+/// The workspace of a case: the one set, else the device's range, for a spring in units of its free length.
+fn workspace(arguments: &BenchArguments, plugin: &Plugin, case: &Case) -> Result<Workspace, CommandError> {
+    let plugin = case.other.as_ref().unwrap_or(plugin);
+    let radius_mm = match arguments.workspace_mm {
+        Some(radius_mm) => radius_mm,
+        None => {
+            let mut model = plugin.create_model(&case.settings)?;
+            let index = model.parameters().iter().position(|parameter| parameter.id() == FREE_LENGTH);
+            let scale = index.map_or(1.0, |index| model.parameter(index) / UNSCALED_LENGTH_MM);
+            DEVICE_RANGE_MM * scale
+        }
+    };
+    Ok(Workspace { radius_m: radius_mm / 1e3, rotation_rad: arguments.workspace_deg.to_radians() })
 }
 
 /// Among the settings of a case, the id of another model.

@@ -1,0 +1,102 @@
+//! The Pareto front of a model's settings over a whole workspace: cost against error, and which cases others dominate.
+
+use super::error::{Distance, walk};
+use super::path::Workspace;
+use super::times::{Times, in_turns};
+use flotor_hal::Demand;
+use flotor_hal::abi::loader::Model;
+use serde::Serialize;
+
+/// All cases over one workspace.
+#[derive(Clone, Debug, Serialize)]
+pub struct Front {
+    /// Radius of the workspace, m.
+    pub radius_m: f64,
+    /// Largest angle of a rotation in it, rad.
+    pub rotation_rad: f64,
+    /// The cases.
+    pub rows: Vec<FrontRow>,
+}
+
+/// A case over the workspace.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrontRow {
+    /// Its name.
+    pub name: String,
+    /// Times for force and torque.
+    pub times: Times,
+    /// Distance from the reference.
+    pub distance: Distance,
+    /// The most accurate case that takes no more time for no larger error; `None` on the Pareto front.
+    pub dominated_by: Option<String>,
+}
+
+impl Front {
+    /// Walks through the workspace with all cases in turns, and with the reference.
+    pub(super) fn measure(
+        named: &[&str],
+        models: &mut [Model],
+        exact: &mut Model,
+        baseline: usize,
+        workspace: Workspace,
+        [ticks, rounds]: [usize; 2],
+        done: impl Fn(),
+    ) -> Self {
+        let path = workspace.poses(ticks);
+        let truth = walk(exact, &path);
+        let distances: Vec<Distance> =
+            models.iter_mut().map(|model| Distance::between(&walk(model, &path), &truth)).collect();
+        let times = in_turns(models, baseline, &path, Demand::WRENCH, rounds, done);
+        let points: Vec<Point> = times
+            .iter()
+            .zip(&distances)
+            .map(|(times, distance)| Point { time_ns: times.mean_ns, error_n: distance.force_max_n })
+            .collect();
+        let dominated_by = |point: &Point| Some((*named.get(dominator(*point, &points)?)?).to_owned());
+        let rows = named.iter().zip(times).zip(distances).zip(&points);
+        let rows = rows.map(|(((name, times), distance), point)| FrontRow {
+            name: (*name).to_owned(),
+            times,
+            distance,
+            dominated_by: dominated_by(point),
+        });
+        let Workspace { radius_m, rotation_rad } = workspace;
+        Self { radius_m, rotation_rad, rows: rows.collect() }
+    }
+}
+
+/// Cost and error of a case.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Point {
+    time_ns: f64,
+    error_n: f64,
+}
+
+impl Point {
+    /// Whether a point is no worse than another in both respects, and better in one. NaN is neither.
+    fn dominates(self, other: Self) -> bool {
+        self.time_ns <= other.time_ns && self.error_n <= other.error_n && self != other
+    }
+}
+
+/// The index of the most accurate of the points that dominate this one.
+fn dominator(point: Point, points: &[Point]) -> Option<usize> {
+    let better = points.iter().enumerate().filter(|(_, other)| other.dominates(point));
+    better.min_by(|(_, a), (_, b)| a.error_n.total_cmp(&b.error_n)).map(|(index, _)| index)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_most_accurate_of_the_better_cases_dominates() {
+        let points =
+            [[100.0, 0.2], [80.0, 0.2], [90.0, 0.1], [800.0, 1e-6], [1500.0, 1e-4], [60.0, f64::NAN]]
+                .map(|[time_ns, error_n]| Point { time_ns, error_n });
+        let found = points.map(|point| dominator(point, &points));
+        assert_eq!(found, [Some(2), None, None, None, Some(3), None]);
+        // Equals do not dominate one another.
+        assert_eq!(dominator(points[1], &[points[1], points[1]]), None);
+    }
+}
