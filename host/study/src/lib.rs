@@ -39,6 +39,7 @@ pub mod exclusion;
 pub mod kinematics;
 pub mod log;
 pub mod observer;
+mod platform;
 pub mod power;
 pub mod procedure;
 pub mod protocol;

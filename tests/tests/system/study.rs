@@ -613,6 +613,45 @@ fn a_misplaced_log_is_refused() {
     assert!(ran.error().contains("sub-02") && ran.error().contains("is a log of sub-01"), "{ran:?}");
 }
 
+/// What macOS puts beside each file that it copies to a stick or a share.
+#[test]
+fn files_of_a_system_are_no_logs() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    assert_eq!(
+        study(&["jnd", "--apparatus", "none", "--subjects", "2"], &out).run().code,
+        Some(exit_code::OK)
+    );
+    let analysed = || Flotor::with(["analyse", out.to_str().unwrap()]).run();
+    let before = analysed();
+    assert_eq!(before.code, Some(exit_code::OK), "{before:?}");
+    let strewn = log_of(&out, 1).with_file_name("._sub-01_task-jnd_log.jsonl");
+    std::fs::write(strewn, [0, 5, 22, 7, 0, 2, 0, 0]).unwrap();
+    assert_eq!(analysed(), before);
+}
+
+/// Two terminals, one command: the first sitting keeps its log.
+#[test]
+fn a_sitting_that_runs_elsewhere_is_not_continued_here() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let broken_off = person("terminal", "\n\n\n1\nq\n", &["--no-demo"], &out);
+    assert_eq!(broken_off.code, Some(exit_code::OK), "{broken_off:?}");
+    let path = log_of(&out, 1);
+    let running = SittingLog::read(&path).unwrap().resume("elsewhere").unwrap();
+    let written = std::fs::read(&path).unwrap();
+    for more in [&["--no-demo", "--subject", "1"][..], &["--no-demo", "--subject", "1", "--resume"]] {
+        let refused = person("terminal", "\n\n\n1\nq\n", more, &out);
+        assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
+        assert!(refused.error().contains("another process is running this sitting"), "{refused:?}");
+        assert_eq!(std::fs::read(&path).unwrap(), written);
+    }
+    drop(running);
+    let resumed = person("terminal", "\n\n\n1\nq\n", &["--no-demo", "--subject", "1", "--resume"], &out);
+    assert_eq!(resumed.code, Some(exit_code::OK), "{resumed:?}");
+    assert_eq!(SittingLog::read(&path).unwrap().trials.len(), 2);
+}
+
 /// By keyboard alone, from the consent to the analysis of a pilot: what was read is in the log, what was said of the person in the list
 /// of participants, and nothing else of them.
 #[test]

@@ -14,7 +14,7 @@
 mod table;
 
 use crate::exclusion::Exclusion;
-use crate::log::{Begin, Event, LogError, LogWriter, SittingLog};
+use crate::log::{Begin, Event, LogError, LogProblem, LogWriter, SittingLog};
 use crate::protocol::SubjectNumber;
 use crate::sitting::Sitting;
 use std::path::{Path, PathBuf};
@@ -186,7 +186,7 @@ impl Dataset {
         for folder in folders.flatten().filter(|entry| entry.path().is_dir()) {
             let files =
                 std::fs::read_dir(folder.path()).into_iter().flatten().flatten().map(|file| file.path());
-            paths.extend(files.filter(|path| path.to_string_lossy().ends_with("_log.jsonl")));
+            paths.extend(files.filter(|path| is_log(path)));
         }
         paths.sort();
         if paths.is_empty() { Err(DatasetError::NoStudy(self.root.clone())) } else { Ok(paths) }
@@ -202,10 +202,7 @@ impl Dataset {
         let log = match SittingLog::read(&path) {
             _ if !path.exists() => None,
             // Killed before its first line was complete: nothing happened yet.
-            Err(LogError { problem: crate::log::LogProblem::Empty, .. }) => {
-                self.file(&path, "cannot remove the empty log", std::fs::remove_file(&path))?;
-                None
-            }
+            Err(LogError { problem: LogProblem::Empty, .. }) => None,
             log => Some(Box::new(log?)),
         };
         let Some(log) = log else {
@@ -214,6 +211,9 @@ impl Dataset {
             let other = logs.find_map(Result::ok);
             return other.map_or(Ok(()), |other| same_study(begin, &other)).map(|()| Progress::New);
         };
+        if !log.complete {
+            LogWriter::check_free(&path)?;
+        }
         match earlier {
             Earlier::Refuse if log.complete => Err(DatasetError::Duplicate { subject, root }),
             Earlier::Refuse => Err(DatasetError::Unfinished { subject, trials: log.trials.len(), root }),
@@ -298,4 +298,11 @@ pub fn trials_csv(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
 fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
     let changed = |what| DatasetError::Changed { path: log.path().to_path_buf(), what };
     begin.differs(&log.begin).map_or(Ok(()), |what| Err(changed(what)))
+}
+
+/// Returns true for the log of a sitting. A name that begins with a dot belongs to the system: macOS puts a file `._NAME` beside each
+/// one that it copies to a stick.
+fn is_log(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.ends_with("_log.jsonl") && !name.starts_with('.')
 }

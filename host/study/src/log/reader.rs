@@ -36,6 +36,9 @@ pub enum LogProblem {
         /// What the system said.
         cause: std::io::Error,
     },
+    /// Another process writes to it, or has written to it since it was read.
+    #[error("another process is running this sitting; end it there before it is continued here")]
+    InUse,
     /// No log at all.
     #[error("has no complete line, so nothing was recorded; remove the file")]
     Empty,
@@ -82,6 +85,10 @@ impl LogError {
     pub(crate) fn file(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
         Self { path: path.into(), line: 0, problem: LogProblem::File { action, cause } }
     }
+
+    pub(super) fn in_use(path: &Path) -> Self {
+        Self { path: path.into(), line: 0, problem: LogProblem::InUse }
+    }
 }
 
 /// A trial as the log has it.
@@ -114,6 +121,7 @@ pub struct SittingLog {
     sitting: Sitting,
     path: PathBuf,
     complete_bytes: u64,
+    read_bytes: u64,
     chain: String,
 }
 
@@ -143,6 +151,8 @@ impl SittingLog {
             let not_text = || at(number, LogProblem::Text("it is not UTF-8".to_owned()));
             let text = std::str::from_utf8(bytes).map_err(|_| not_text())?;
             let text = text.strip_suffix('\n').unwrap_or(text);
+            // Line ends that a copy through Windows or git has changed.
+            let text = text.strip_suffix('\r').unwrap_or(text);
             let (found, event) = parts(text)
                 .ok_or_else(|| at(number, LogProblem::Text("no `chain` and `event`".to_owned())))?;
             before = chain(&before, event);
@@ -166,7 +176,7 @@ impl SittingLog {
             }
         }
         let mut log = log.ok_or_else(|| at(0, LogProblem::Empty))?;
-        log.complete_bytes = complete as u64;
+        (log.complete_bytes, log.read_bytes) = (complete as u64, bytes.len() as u64);
         log.chain = before;
         Ok(log)
     }
@@ -185,6 +195,7 @@ impl SittingLog {
             sitting,
             path: path.into(),
             complete_bytes: 0,
+            read_bytes: 0,
             chain: String::new(),
         }
     }
@@ -287,7 +298,8 @@ impl SittingLog {
 
     /// The log to go on with; with a person, the time of day is in every line.
     fn writer(&self) -> Result<LogWriter, LogError> {
-        let writer = LogWriter::append(&self.path, self.complete_bytes, self.chain.clone())?;
+        let writer =
+            LogWriter::append(&self.path, [self.complete_bytes, self.read_bytes], self.chain.clone())?;
         Ok(if self.begin.is_of_a_person() { writer.stamped() } else { writer })
     }
 

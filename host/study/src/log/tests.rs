@@ -76,6 +76,50 @@ fn what_is_written_is_read() {
     assert!(LogWriter::create(&path).is_err(), "an existing log is not overwritten");
 }
 
+#[test]
+fn a_log_has_one_writer_at_a_time() {
+    let folder = Folder::new("owner");
+    let path = folder.file("log.jsonl");
+    let is_in_use =
+        |result: Result<(), LogError>| matches!(result, Err(LogError { problem: LogProblem::InUse, .. }));
+    let mut first = LogWriter::create(&path).unwrap();
+    assert!(is_in_use(LogWriter::create(&path).map(drop)), "before its first line too");
+    first.write(&Event::Begin(Box::new(begin()))).unwrap();
+    let read = || SittingLog::read(&path).unwrap();
+    assert!(is_in_use(read().resume("0").map(drop)) && is_in_use(read().annotate("late")));
+    assert!(is_in_use(LogWriter::check_free(&path)));
+    let before = read();
+    first.write(&Event::Note { text: "meanwhile".to_owned() }).unwrap();
+    drop(first);
+    LogWriter::check_free(&path).unwrap();
+    let written = std::fs::read(&path).unwrap();
+    assert!(is_in_use(before.resume("0").map(drop)), "a line has come since it was read");
+    assert_eq!(std::fs::read(&path).unwrap(), written);
+    read().resume("0").unwrap();
+}
+
+#[test]
+fn a_file_without_a_complete_line_becomes_a_log() {
+    let folder = Folder::new("half-a-line");
+    let path = folder.file("log.jsonl");
+    std::fs::write(&path, "{\"chain\":\"half a li").unwrap();
+    LogWriter::create(&path).unwrap().write(&Event::Begin(Box::new(begin()))).unwrap();
+    assert_eq!(SittingLog::read(&path).unwrap().begin, begin());
+}
+
+#[test]
+fn line_ends_of_windows_change_nothing() {
+    let folder = Folder::new("ends");
+    let path = folder.file("log.jsonl");
+    sit(&path);
+    let before = SittingLog::read(&path).unwrap();
+    std::fs::write(&path, std::fs::read_to_string(&path).unwrap().replace('\n', "\r\n")).unwrap();
+    let after = SittingLog::read(&path).unwrap();
+    assert_eq!((after.complete, after.trials), (true, before.trials));
+    SittingLog::read(&path).unwrap().annotate("copied").unwrap();
+    assert_eq!(SittingLog::read(&path).unwrap().notes.len(), before.notes.len() + 1);
+}
+
 /// Whatever rules a study file may have, the log that follows it is read again.
 #[test]
 fn every_rule_of_a_study_file_is_read_again() {

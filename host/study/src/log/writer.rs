@@ -1,12 +1,13 @@
 //! Adds lines to a log and does not return before they are on disk.
 
 use super::{CHAIN_START, Event, LogError, LogProblem, chain, line, stamped};
+use crate::platform::open_alone;
 use crate::time_of_day::TimeOfDay;
 use std::fs::{File, OpenOptions};
-use std::io::Write;
+use std::io::{Error, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// An open log.
+/// An open log, which no other process writes to meanwhile.
 pub struct LogWriter {
     file: File,
     path: PathBuf,
@@ -22,13 +23,21 @@ enum Stamps {
 }
 
 impl LogWriter {
-    /// A new log.
+    /// A new log. A file without a complete line is none: whoever wrote it was killed before anything happened.
     ///
     /// # Errors
-    /// The file exists, or cannot be created.
+    /// The log exists, is open elsewhere, or cannot be created.
     pub fn create(path: &Path) -> Result<Self, LogError> {
-        let file = OpenOptions::new().write(true).create_new(true).open(path);
-        let file = file.map_err(|cause| LogError::file(path, "cannot create the log", cause))?;
+        let failed = |cause| LogError::file(path, "cannot create the log", cause);
+        let mut options = OpenOptions::new();
+        let options = options.read(true).write(true).create(true).truncate(false);
+        let mut file = open_alone(options, path).map_err(failed)?.ok_or_else(|| LogError::in_use(path))?;
+        let mut written = Vec::new();
+        file.read_to_end(&mut written).map_err(failed)?;
+        if written.contains(&b'\n') {
+            return Err(failed(Error::from(ErrorKind::AlreadyExists)));
+        }
+        cut(&mut file, 0).map_err(failed)?;
         // The name of a new file is kept by its folder: without this a crash may leave the file nameless.
         if let Some(folder) = path.parent().and_then(|folder| File::open(folder).ok()) {
             let _ = folder.sync_all();
@@ -36,17 +45,36 @@ impl LogWriter {
         Ok(Self { file, path: path.into(), chain: CHAIN_START.to_owned(), stamps: Stamps::None })
     }
 
-    /// A log that goes on: after `complete_bytes`, whose chain is known. What lies behind is a line that was never
-    /// completed, and is cut off.
-    pub(super) fn append(path: &Path, complete_bytes: u64, chain: String) -> Result<Self, LogError> {
-        let open = || {
-            let mut file = OpenOptions::new().write(true).open(path)?;
-            file.set_len(complete_bytes)?;
-            std::io::Seek::seek(&mut file, std::io::SeekFrom::End(0))?;
-            Ok(file)
-        };
-        let file = open().map_err(|cause| LogError::file(path, "cannot continue the log", cause))?;
+    /// Continues a log of `read_bytes` after its `complete_bytes`, whose chain is known. The rest is a line that was never completed,
+    /// and is cut off.
+    ///
+    /// # Errors
+    /// The log is open elsewhere, has changed since it was read, or cannot be written.
+    pub(super) fn append(
+        path: &Path,
+        [complete_bytes, read_bytes]: [u64; 2],
+        chain: String,
+    ) -> Result<Self, LogError> {
+        let failed = |cause| LogError::file(path, "cannot continue the log", cause);
+        let opened = open_alone(OpenOptions::new().write(true), path).map_err(failed)?;
+        let mut file = opened.ok_or_else(|| LogError::in_use(path))?;
+        if file.metadata().map_err(failed)?.len() != read_bytes {
+            return Err(LogError::in_use(path));
+        }
+        cut(&mut file, complete_bytes).map_err(failed)?;
         Ok(Self { file, path: path.into(), chain, stamps: Stamps::None })
+    }
+
+    /// Checks that no other process writes to a log.
+    ///
+    /// # Errors
+    /// [`LogProblem::InUse`], or what the system says.
+    pub(crate) fn check_free(path: &Path) -> Result<(), LogError> {
+        let opened = open_alone(OpenOptions::new().write(true), path);
+        match opened.map_err(|cause| LogError::file(path, "cannot open the log", cause))? {
+            Some(_) => Ok(()),
+            None => Err(LogError::in_use(path)),
+        }
     }
 
     /// The same, with the time of day in every line from now on.
@@ -82,4 +110,10 @@ impl LogWriter {
         self.chain = next;
         Ok(())
     }
+}
+
+/// Cuts a file off after so many bytes, and goes on there.
+fn cut(file: &mut File, bytes: u64) -> Result<(), Error> {
+    file.set_len(bytes)?;
+    file.seek(SeekFrom::End(0)).map(drop)
 }

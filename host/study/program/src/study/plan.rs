@@ -115,8 +115,12 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
 fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
     let entries = std::fs::read_dir(folder)
         .map_err(|cause| CommandError::Usage(format!("{}: {cause}", folder.display())))?;
-    let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut found: Vec<PathBuf> = files.filter(|file| file.to_string_lossy().ends_with(ENDING)).collect();
+    let entries = entries.flatten().filter(|entry| {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        name.ends_with(ENDING) && !name.starts_with('.')
+    });
+    let mut found: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     found.sort();
     match found.as_slice() {
         [one] => Ok(one.clone()),

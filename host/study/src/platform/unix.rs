@@ -1,0 +1,20 @@
+//! The same for Linux: a lock that ends with the file's last descriptor, so with the process, however it ends.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Error, ErrorKind};
+use std::path::Path;
+
+/// Opens a file that no other writer opens while this one is open; `None` if another has it. A file system without locks gives the
+/// file to all.
+///
+/// # Errors
+/// What the system says.
+pub(crate) fn open_alone(options: &OpenOptions, path: &Path) -> Result<Option<File>, Error> {
+    let file = options.open(path)?;
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Ok(None),
+        Err(TryLockError::Error(cause)) if cause.kind() == ErrorKind::Unsupported => Ok(Some(file)),
+        Err(TryLockError::Error(cause)) => Err(cause),
+    }
+}
