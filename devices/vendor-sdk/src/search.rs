@@ -20,9 +20,11 @@ pub struct Sdk {
 }
 
 impl Sdk {
-    /// Where the library may be, in order. Not real-time.
+    /// Returns the files that may be the library, in order, with absolute paths: a relative folder is one of the folder in which the
+    /// program was started, as for the loader of the system. Not real-time.
     pub(crate) fn places(&self, said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
-        let folders = platform::folders(self, said).into_iter().filter(|folder| folder.is_absolute());
+        let folders = platform::folders(self, said).into_iter();
+        let folders = folders.filter_map(|folder| std::path::absolute(folder).ok()); // an empty one is none
         folders.flat_map(|folder| platform::files(self).iter().map(move |file| folder.join(file))).collect()
     }
 }

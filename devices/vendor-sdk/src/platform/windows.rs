@@ -105,11 +105,12 @@ mod tests {
             _ => None,
         };
         let places: Vec<String> = SDK.places(said).iter().map(|place| place.display().to_string()).collect();
-        let last =
-            [r"C:\first\some64.dll", r"C:\first\some.dll", r"D:\second\some64.dll", r"D:\second\some.dll"];
+        let here = std::env::current_dir().unwrap().join("relative").display().to_string();
+        let folders = [r"C:\first", &here, r"D:\second"];
+        let files = folders.map(|folder| ["some64.dll", "some.dll"].map(|file| format!(r"{folder}\{file}")));
         assert_eq!(places[0], r"C:\some\bin\some64.dll");
-        assert_eq!(places[8..12], last);
-        assert_eq!(places[12..], [r"C:\windows\System32\some64.dll", r"C:\windows\System32\some.dll"]);
+        assert_eq!(places[8..14], files.concat());
+        assert_eq!(places[14..], [r"C:\windows\System32\some64.dll", r"C:\windows\System32\some.dll"]);
     }
 
     #[test]
