@@ -66,7 +66,9 @@ impl Program {
             )));
         }
         let Some(api) = api.filter(|api| !native.calls(*api)) else { return Ok(()) };
-        match Api::ALL.into_iter().find(|other| native.calls(*other)) {
+        // Programs of CHAI3D name the libraries of all its devices, and take one that libhdPhantom brings.
+        let others = [Api::Chai3d].into_iter().chain(Api::ALL);
+        match others.into_iter().find(|other| native.calls(*other)) {
             Some(other) => Err(CommandError::Usage(format!(
                 "`{name}` calls {}, not `--api {}`: say `--api {}`, or leave it out",
                 other.marks().join(" and "),
@@ -147,6 +149,8 @@ mod tests {
         assert!(said.contains("statically linked") && !said.contains('\n'), "{said}");
         let said = refused(plain, Some(Api::Dhd)).expect_err("it is another interface");
         assert!(said.contains("--api openhaptics") && !said.contains('\n'), "{said}");
+        let said = refused(Native { names: [false, true, true], ..plain }, Some(Api::Dhd));
+        assert!(said.as_ref().is_err_and(|said| said.contains("--api chai3d")), "{said:?}");
         assert_eq!(refused(plain, None), Ok(()));
         assert_eq!(refused(plain, Some(Api::Openhaptics)), Ok(()));
         assert_eq!(refused(Native { names: [false; 3], ..plain }, Some(Api::Chai3d)), Ok(()));
