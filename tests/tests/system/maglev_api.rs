@@ -269,6 +269,29 @@ fn a_force_whose_client_hears_no_ticks_any_more_ends_in_a_landing() {
     assert_eq!(client.plain(Function::GetVersion).status, Status::OK, "the control connection lives");
 }
 
+/// A client with one lock for both connections acknowledges no tick while a call waits for a procedure.
+#[test]
+fn a_procedure_does_not_count_as_silence() {
+    let mut controller = Controller::start("ml-api", &[]);
+    let (mut client, mut events) = (controller.client(), controller.client());
+    let Results::Token(token) = events.plain(Function::RequestToken).results else { panic!("a token") };
+    assert_eq!(client.call(&Request::MapToken(token)).status, Status::OK);
+    carried_by_a_force(&mut client);
+    assert_eq!(client.call(&Request::register(EventKind::Tick, 1)).status, Status::OK);
+    let reset = Request::OfSet(Function::ResetGainVecAxes, GainSet::Locked);
+    let waited = Instant::now();
+    for _ in 0..2 {
+        assert_eq!(client.call(&reset).status, Status::OK);
+    }
+    let procedures_ms = waited.elapsed().as_secs_f64() * 1000.0;
+    let line = controller.wait_for(&["landing why=silence"]);
+    let silence_ms =
+        line.rsplit_once("silence_ms=").and_then(|(_, number)| number.trim().parse::<f64>().ok());
+    let silence_ms = silence_ms.unwrap_or_else(|| panic!("no number in {line}"));
+    // 500 ms are its limit; a procedure takes seconds.
+    assert!(silence_ms < 0.5 * procedures_ms, "{silence_ms} ms, with {procedures_ms} ms of procedures");
+}
+
 #[test]
 fn a_flotor_that_somebody_left_in_the_air_is_taken_over() {
     if TestSize::of_this_run().leaves_out_long_tests() {

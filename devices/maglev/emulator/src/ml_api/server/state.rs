@@ -205,6 +205,10 @@ impl State {
 
     /// A force that nobody keeps up ends in a landing.
     fn watch_silence(&mut self, dt_s: f64, log: &Log) {
+        // A client whose call waits for a procedure cannot acknowledge what its handler commands in.
+        if self.controller.is_busy() {
+            return;
+        }
         let opened = self.callbacks.iter_mut().filter_map(|callback| callback.tick_open_s.as_mut());
         let lost = self.clients.iter_mut().filter_map(|client| client.ticks_lost_s.as_mut());
         opened.chain(lost).for_each(|silent_s| *silent_s += dt_s);
@@ -212,9 +216,7 @@ impl State {
         let (token, lost_s) = commander.map_or((None, None), |client| (client.callback, client.ticks_lost_s));
         let config = *self.controller.config();
         let open_s = self.callback(token).and_then(|callback| callback.tick_open_s).or(lost_s).unwrap_or(0.0);
-        // A client whose call waits for a procedure cannot acknowledge what its handler commands in.
-        let waits = self.controller.is_busy();
-        let is_silent = open_s > config.watchdog_s && self.controller.is_driven_by_forces() && !waits;
+        let is_silent = open_s > config.watchdog_s && self.controller.is_driven_by_forces();
         if is_silent && config.silence == Silence::Lands {
             log(format_args!("landing why=silence silence_ms={:.0}", open_s * 1.0e3));
             self.controller.land();
