@@ -4,6 +4,7 @@
 
 pub mod field_error;
 pub mod library;
+pub mod printed;
 pub mod process;
 pub mod program;
 pub mod scratch;

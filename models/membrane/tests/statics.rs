@@ -1,6 +1,7 @@
 //! Networks at rest against closed forms: the elastic catenary, the sheet under its weight; and how the error falls with
 //! the distance of masses.
 
+use crate::printed::assert_chapter_prints;
 use flotor_membrane::mesh::{Mesh, Sheet};
 use flotor_membrane::network::{Network, Surroundings};
 use std::f64::consts::PI;
@@ -11,6 +12,12 @@ fn at_rest(mesh: &Mesh, gravity_m_per_s2: f64, damping_per_s: f64) -> Network {
     let mut network = Network::new(mesh, surroundings);
     assert!(network.come_to_rest(2_000_000), "it does not come to rest");
     network
+}
+
+/// Holds the chapter to a row: a case, its masses, and these errors.
+fn assert_book_has(case: &str, errors: &[f64]) {
+    let errors: Vec<String> = errors.iter().map(|error| format!("{:.3} %", 100.0 * error)).collect();
+    assert_chapter_prints("membrane.md", &format!("| {case} | {} |", errors.join(", ")));
 }
 
 /// Depth of the middle of an elastic cable below its ends, m (Irvine 1981, Cable Structures, chapter 1): span `l`, unstrained
@@ -37,13 +44,10 @@ fn a_hanging_chain_is_the_elastic_catenary_and_its_error_falls_with_the_square_o
             let mesh = Mesh::chain(links, span_m, length_m, axial_n, mass_kg);
             let network = at_rest(&mesh, 9.806_65, 20.0);
             let sag_m = -network.positions_m().get(links / 2).z;
-            println!(
-                "chain of {links}: sag {sag_m} m, exact {exact_m} m, {:.4} %",
-                100.0 * (sag_m / exact_m - 1.0)
-            );
             (sag_m / exact_m - 1.0).abs()
         })
         .to_vec();
+    assert_book_has("chain, elastic catenary (Irvine 1981) | 16, 32, 64 links", &errors);
     assert!(errors[2] < 1.0e-3, "{errors:?}");
     for pair in errors.windows(2) {
         // Second order: a quarter with twice the links, and terms of fourth order beside it.
@@ -83,13 +87,10 @@ fn a_stretched_square_sags_as_a_membrane_and_its_error_falls_with_the_square_of_
             let network = at_rest(&mesh, gravity_m_per_s2, 60.0);
             let middle = nodes_per_side * nodes_per_side / 2;
             let sag_m = -network.positions_m().get(middle).z;
-            println!(
-                "sheet of {nodes_per_side}^2: sag {sag_m} m, exact {exact_m} m, {:.4} %",
-                100.0 * (sag_m / exact_m - 1.0)
-            );
             (sag_m / exact_m - 1.0).abs()
         })
         .to_vec();
+    assert_book_has("square under its weight, Poisson series | 9², 17², 33²", &errors);
     assert!(errors[2] < 1.0e-3, "{errors:?}");
     for pair in errors.windows(2) {
         assert!((pair[0] / pair[1] - 4.0).abs() < 0.4, "{errors:?}");

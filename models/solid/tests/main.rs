@@ -3,6 +3,9 @@
 mod contact;
 mod finer;
 mod mesh;
+#[allow(unreachable_pub)] // shared with the other tests
+#[path = "../../../tests/src/printed.rs"]
+mod printed;
 mod rows;
 mod several;
 mod solver;

@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::printed::assert_chapter_prints;
 use crate::sample::{Loop, Sampler, Workspace, of};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::held::{Held, HeldSpring};
@@ -159,8 +160,35 @@ fn path(spring: &Spring, preset: Preset, way: Way, sampler: &mut Sampler) -> Pat
 /// trapezoidal rule is then at least this much smaller; what a law itself generates in a lap is not.
 const SHORTER_TICKS: u32 = 8;
 
+/// Largest energy that a lap generated, as a share of its work.
+struct Made {
+    /// Where nothing slides and nothing snaps.
+    held: f64,
+    /// Where something does.
+    loose: f64,
+}
+
+impl Made {
+    fn most(&self) -> f64 {
+        self.held.max(self.loose)
+    }
+}
+
+/// Holds the chapter to a row of its table of energies, at full size.
+fn assert_book_has(option: &str, shares: &str) {
+    if of(1, 0) == 1 {
+        assert_chapter_prints("models/spring/seat-and-wire.md", &format!("| {option} | {shares} |"));
+    }
+}
+
 /// 200 laps at full size, every tick length from 1 to 100 µm.
-fn laps(name: &str, way: Way, touches: Kinks, dissipation: impl Fn(Preset, u32) -> Dissipation, law: Law) {
+fn laps(
+    name: &str,
+    way: Way,
+    touches: Kinks,
+    dissipation: impl Fn(Preset, u32) -> Dissipation,
+    law: Law,
+) -> Made {
     let (mut sampler, mut is_kept) = (Sampler::new(90), true);
     let (mut worst, mut wasted, mut eaten, mut waiting) = ([0.0f64; 2], 0.0f64, 0, 0);
     for lap in 0..of(200, 8) {
@@ -218,6 +246,7 @@ fn laps(name: &str, way: Way, touches: Kinks, dissipation: impl Fn(Preset, u32) 
         worst[0], worst[1]
     );
     assert!(is_kept && waiting == 0, "{name}: {waiting} ticks wait");
+    Made { held: worst[0], loose: worst[1] }
 }
 
 /// Springs 3 and `slender` are taken past buckling, where a bulge may swing round.
@@ -238,26 +267,33 @@ fn slides(_preset: Preset, _lap: u32) -> Dissipation {
 
 #[test]
 fn no_lap_generates_energy_with_the_default_law() {
-    laps("energy", Way::Deep, Kinks::None, snaps, |spring, _| of_law(RodBlend::new(spring)));
+    let made = laps("energy", Way::Deep, Kinks::None, snaps, |spring, _| of_law(RodBlend::new(spring)));
+    assert_book_has("`energy`", &format!("{:.1e}", made.most()));
 }
 
 #[test]
 fn no_lap_generates_energy_with_the_rod() {
-    laps("rod, tight", Way::Deep, Kinks::None, snaps, |spring, _| {
+    let made = laps("rod, tight", Way::Deep, Kinks::None, snaps, |spring, _| {
         of_law(Rod::to_rounding(spring, Coils::Pass))
     });
+    assert_book_has("`rod`, solved to rounding", &format!("{:.1e}", made.most()));
 }
 
 #[test]
 fn no_lap_generates_energy_with_the_rod_of_the_servo() {
-    laps("rod, servo", Way::Deep, Kinks::None, snaps, |spring, _| of_law(Rod::new(spring, Accuracy::Servo)));
+    let made = laps("rod, servo", Way::Deep, Kinks::None, snaps, |spring, _| {
+        of_law(Rod::new(spring, Accuracy::Servo))
+    });
+    assert_book_has("`rod`, servo setting", &format!("{:.1e}, past buckling {:.1e}", made.held, made.loose));
 }
 
 #[test]
 fn no_lap_generates_energy_with_touching_coils() {
-    laps("contact", Way::Deep, Kinks::OfCoils, snaps, |spring, _| {
+    let made = laps("contact", Way::Deep, Kinks::OfCoils, snaps, |spring, _| {
         of_law(Rod::to_rounding(spring, Coils::Touch))
     });
+    let shares = format!("{:.1e}; {:.1e}", made.held, made.loose);
+    assert_book_has("`coil_contact=on`, springs 1 and 2; past buckling", &shares);
     laps("contact, servo", Way::Deep, Kinks::OfCoils, snaps, |spring, _| {
         of_law(Rod::with_coils(spring, Accuracy::Servo, Coils::Touch))
     });
@@ -266,54 +302,67 @@ fn no_lap_generates_energy_with_touching_coils() {
 /// From rest to anywhere in one tick, on from there: what the rod loses on its way to an equilibrium nobody gets.
 #[test]
 fn no_lap_generates_energy_that_begins_with_a_jump() {
-    laps("contact, at once", Way::DeepAtOnce, Kinks::OfCoils, jumps, |spring, _| {
+    let touching = laps("contact, at once", Way::DeepAtOnce, Kinks::OfCoils, jumps, |spring, _| {
         of_law(Rod::to_rounding(spring, Coils::Touch))
     });
     laps("contact, servo, at once", Way::DeepAtOnce, Kinks::OfCoils, jumps, |spring, _| {
         of_law(Rod::with_coils(spring, Accuracy::Servo, Coils::Touch))
     });
-    laps("rod, servo, at once", Way::DeepAtOnce, Kinks::None, jumps, |spring, _| {
+    let passing = laps("rod, servo, at once", Way::DeepAtOnce, Kinks::None, jumps, |spring, _| {
         of_law(Rod::new(spring, Accuracy::Servo))
     });
+    let shares = format!("{:.1e}, {:.1e}", touching.loose, passing.loose);
+    assert_book_has("laps that begin with a jump from rest, `coil_contact=on`, `rod`", &shares);
 }
 
 #[test]
 fn no_lap_generates_energy_with_a_wire() {
-    laps("wire", Way::Deep, Kinks::None, snaps, |spring, _| of_law(wired(spring, RodBlend::new(spring))));
-    laps("wire, rod", Way::Deep, Kinks::None, snaps, |spring, _| {
+    let energy =
+        laps("wire", Way::Deep, Kinks::None, snaps, |spring, _| of_law(wired(spring, RodBlend::new(spring))));
+    let rod = laps("wire, rod", Way::Deep, Kinks::None, snaps, |spring, _| {
         of_law(wired(spring, Rod::to_rounding(spring, Coils::Pass)))
     });
+    let shares = format!("{:.1e}, {:.1e}", energy.most(), rod.most());
+    assert_book_has("`wire=on`, `energy`, `rod`", &shares);
 }
 
 #[test]
 fn no_lap_generates_energy_on_a_free_seat() {
-    laps("seat", Way::Shallow, Kinks::None, slides, |spring, lap| {
+    let energy = laps("seat", Way::Shallow, Kinks::None, slides, |spring, lap| {
         on_seat(spring, lap, RodBlend::new(spring))
     });
-    laps("seat, rod", Way::Shallow, Kinks::None, slides, |spring, lap| {
+    let rod = laps("seat, rod", Way::Shallow, Kinks::None, slides, |spring, lap| {
         on_seat(spring, lap, Rod::to_rounding(spring, Coils::Pass))
     });
+    let shares = format!("{:.1e}, {:.1e}", energy.loose, rod.loose);
+    assert_book_has("`seat=free`, `energy`, `rod`", &shares);
 }
 
 /// Pressed past buckling on a free seat a spring may fall over.
 #[test]
 fn no_lap_generates_energy_where_a_free_spring_falls_over() {
-    laps("seat, deep", Way::DeepAtOnce, Kinks::None, slides, |spring, lap| {
+    let seat = laps("seat, deep", Way::DeepAtOnce, Kinks::None, slides, |spring, lap| {
         on_seat(spring, lap, RodBlend::new(spring))
     });
-    laps("seat, contact, wire, deep", Way::DeepAtOnce, Kinks::OfCoils, slides, |spring, lap| {
+    let all = laps("seat, contact, wire, deep", Way::DeepAtOnce, Kinks::OfCoils, slides, |spring, lap| {
         on_seat(spring, lap, wired(spring, Rod::to_rounding(spring, Coils::Touch)))
     });
-    laps("seat, contact, wire, deep again", Way::Deep, Kinks::OfCoils, slides, |spring, lap| {
+    let again = laps("seat, contact, wire, deep again", Way::Deep, Kinks::OfCoils, slides, |spring, lap| {
         on_seat(spring, lap, wired(spring, Rod::to_rounding(spring, Coils::Touch)))
     });
+    let shares = format!("{:.1e}; {:.1e}; {:.1e}", seat.loose, all.loose, again.loose);
+    assert_book_has(
+        "`seat=free` past buckling, where springs fall over; all three; on their second lap",
+        &shares,
+    );
 }
 
 #[test]
 fn no_lap_generates_energy_with_everything() {
-    laps("seat, contact, wire", Way::Shallow, Kinks::OfCoils, slides, |spring, lap| {
+    let made = laps("seat, contact, wire", Way::Shallow, Kinks::OfCoils, slides, |spring, lap| {
         on_seat(spring, lap, wired(spring, Rod::to_rounding(spring, Coils::Touch)))
     });
+    assert_book_has("all three", &format!("{:.1e}", made.loose));
 }
 
 /// The largest singular value of the tangent is at least what steps along each axis, both ways, make of force and torque.

@@ -1,5 +1,6 @@
 //! One energy from two laws: what is felt is its gradient everywhere, and nothing jumps where they meet.
 
+use crate::printed::assert_chapter_prints;
 use crate::sample::{Sampler, of};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::energy::EnergyForm;
@@ -90,10 +91,10 @@ fn the_default_law_is_the_rod_to_five_millinewtons() {
     // Springs 1 and 2 to short of their solid lengths at 70 and 80 %, the others to short of buckling at 54.5 and 8.28 %.
     for (preset, most) in Preset::ALL.into_iter().zip([0.68, 0.68, 0.54, 0.082]) {
         let spring = preset.spring();
-        let (mut law, count) = (RodBlend::new(&spring), of(1000, 60));
+        let (mut law, unblended, count) = (RodBlend::new(&spring), EnergyForm::new(&spring), of(1000, 60));
         // The servo's rod errs by less than 1e-4 N, a fiftieth of the bound.
         let accuracy = if count == 1000 { Accuracy::Tight } else { Accuracy::Servo };
-        let (mut worst_n, mut worst_nm, mut answered) = (0.0f64, 0.0f64, 0);
+        let (mut worst_n, mut worst_nm, mut unblended_n, mut answered) = (0.0f64, 0.0f64, 0.0f64, 0);
         for (position_m, rotation_rad) in reached(&spring, most, count) {
             let Some(truth) = exact(&spring, accuracy, (position_m, rotation_rad)) else { continue };
             answered += 1;
@@ -103,6 +104,16 @@ fn the_default_law_is_the_rod_to_five_millinewtons() {
             assert_eq!(answer.validity, Validity::Ok, "{preset:?} {pose:?}");
             worst_n = worst_n.max((answer.force_n - truth.force_n).length());
             worst_nm = worst_nm.max((answer.torque_nm - truth.torque_nm).length());
+            let unblended = unblended.respond(&pose, Demand::Force);
+            unblended_n = unblended_n.max((unblended.force_n - truth.force_n).length());
+        }
+        if count == 1000 {
+            let name = match preset {
+                Preset::Slender => "`slender`".to_owned(),
+                thesis => thesis.name().replace("thesis-", "spring "),
+            };
+            let row = format!("| {name} | {worst_n:.1e} | {worst_nm:.1e} | {unblended_n:.1e} |");
+            assert_chapter_prints("models/spring/energy.md", &row);
         }
         let regions = [Region::Reached, Region::FarTurned, Region::NearHome];
         let [all_us, far_us, near_us] = regions.map(|region| time_us(&spring, most, region));

@@ -1,0 +1,19 @@
+//! Numbers that the book prints, for the tests that compute them.
+//!
+//! Needs nothing of this crate: crates that cannot depend on it include this file with `#[path]`.
+
+use std::path::Path;
+
+/// Holds a chapter of the book to a text, such as a row of a table; line breaks count as spaces.
+///
+/// # Panics
+/// If the chapter cannot be read, or does not have the text.
+#[track_caller]
+pub fn assert_chapter_prints(chapter: &str, text: &str) {
+    let mut folders = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    let written =
+        folders.find_map(|folder| std::fs::read_to_string(folder.join("docs/src").join(chapter)).ok());
+    let written = written.unwrap_or_else(|| panic!("no chapter {chapter}"));
+    let words: Vec<&str> = written.split_whitespace().collect();
+    assert!(words.join(" ").contains(text), "{chapter} does not print `{text}`");
+}
