@@ -7,7 +7,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <locale.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-model-that\"\nname = \"Model that\"\ndoc = \"A spring with a habit\"\n"

@@ -7,6 +7,8 @@
 use crate::platform::MachineState;
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::{enter_call, leave_call};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -98,12 +100,14 @@ pub enum Notice {
         /// When the wait ends.
         limit: Duration,
     },
-    /// It changed what belongs to the process; the host has put it back.
+    /// It changed what belongs to the process.
     Changed {
         /// Name in the scene.
         who: String,
-        /// What it changed.
-        what: Vec<&'static str>,
+        /// Parts that it changed and the host has restored.
+        restored: Vec<&'static str>,
+        /// Environment variables that it changed: other threads may read them at any time, so they stay.
+        variables: Vec<String>,
     },
     /// The watchdog process of a run has ended, and the run goes on.
     Unguarded,
@@ -115,8 +119,20 @@ impl fmt::Display for Notice {
             Self::Waiting { who, call, limit } => {
                 write!(f, "waiting for `{who}` to return from {call}, for up to {} s", limit.as_secs_f64())
             }
-            Self::Changed { who, what } => {
-                write!(f, "`{who}` changed {} of the host; restored by the host", what.join(", "))
+            Self::Changed { who, restored, variables } => {
+                write!(f, "`{who}` changed ")?;
+                if !restored.is_empty() {
+                    write!(f, "{} of the host; restored by the host", restored.join(", "))?;
+                }
+                if !variables.is_empty() {
+                    let joined = if restored.is_empty() { "" } else { "; it also changed " };
+                    write!(
+                        f,
+                        "{joined}environment variables of the host ({}), which stay",
+                        variables.join(", ")
+                    )?;
+                }
+                Ok(())
             }
             Self::Unguarded => f.write_str(
                 "the watchdog process is gone; nothing stops the devices if this program is killed",
@@ -154,13 +170,28 @@ pub(crate) fn tell(notice: &Notice) {
 
 /// Makes something with the code of a plugin; what belongs to the process is then as it was before.
 pub(crate) fn keeping_machine<T>(who: &str, make: impl FnOnce() -> T) -> T {
-    let before = MachineState::now();
+    let (before, variables) = (MachineState::now(), environment());
     let made = make();
-    let what = before.restore();
-    if !what.is_empty() {
-        tell(&Notice::Changed { who: who.to_owned(), what });
+    let (restored, variables) = (before.restore(), changed_variables(&variables, &environment()));
+    if !(restored.is_empty() && variables.is_empty()) {
+        tell(&Notice::Changed { who: who.to_owned(), restored, variables });
     }
     made
+}
+
+/// The variables of the environment, by name.
+fn environment() -> BTreeMap<OsString, OsString> {
+    std::env::vars_os().collect()
+}
+
+/// Returns the names of variables that were added, changed or removed.
+fn changed_variables(
+    before: &BTreeMap<OsString, OsString>,
+    after: &BTreeMap<OsString, OsString>,
+) -> Vec<String> {
+    let names: BTreeSet<&OsString> = before.keys().chain(after.keys()).collect();
+    let changed = names.into_iter().filter(|name| before.get(*name) != after.get(*name));
+    changed.map(|name| name.display().to_string()).collect()
 }
 
 /// True if a call did not return and its thread still runs: what a process does at its end may wait for it.

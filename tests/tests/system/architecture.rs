@@ -422,6 +422,10 @@ const UNSAFE: &[(&str, &str)] = &[
         "a filter for exceptions that nobody handles, and a callback at the end of the process",
     ),
     ("host/servo/src/platform/windows/scheduling.rs", "priority and cores of the calling thread"),
+    (
+        "host/session/src/platform/linux/locale.rs",
+        "the locale of the C library, which plugins change: no safe crate has it",
+    ),
     ("host/study/program/src/platform/windows.rs", "how much of a disk is free"),
     ("viewer/src/platform/windows.rs", "times and memory of the process"),
     ("tests/tests/realtime.rs", "an allocator that counts, to see that a tick does not allocate"),

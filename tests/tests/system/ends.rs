@@ -407,7 +407,11 @@ fn what_a_plugin_changes_of_the_process_while_it_is_made_is_put_back_and_named()
     let files = "IN_CREATE=struct rlimit few; getrlimit(RLIMIT_NOFILE, &few); few.rlim_cur = 64; setrlimit(RLIMIT_NOFILE, &few);";
     let cores = "IN_PREPARE=cpu_set_t one; CPU_ZERO(&one); CPU_SET(0, &one); sched_setaffinity(getpid(), sizeof one, &one);";
     let nice = "IN_PREPARE=setpriority(PRIO_PROCESS, getpid(), 19);";
+    let mask = "IN_CREATE=umask(0777);";
+    let locale = "IN_PREPARE=if (!setlocale(LC_ALL, \"C.UTF-8\")) { abort(); }";
     for (habit, what) in [
+        (mask, "the mode mask of new files"),
+        (locale, "the locale"),
         (folder, "the working folder"),
         (files, "the limit of open files"),
         (cores, "the cores of the main thread"),
@@ -419,6 +423,16 @@ fn what_a_plugin_changes_of_the_process_while_it_is_made_is_put_back_and_named()
         let told = format!("note: `jelly` changed {what} of the host; restored by the host\n");
         assert!(ran.stderr.starts_with(&told), "{ran:?}");
     }
+}
+
+#[test]
+fn variables_that_a_plugin_changes_are_named() {
+    let scratch = Scratch::default();
+    let habit = "IN_CREATE=setenv(\"TZ\", \"Pacific/Kiritimati\", 1); umask(0777);";
+    let ran = run(&scratch, &scene_of(&scratch, HONEST, habit, ""), "virtual");
+    let told = "note: `jelly` changed the mode mask of new files of the host; restored by the host; it also changed environment variables \
+                of the host (TZ), which stay\n";
+    assert!(ran.stderr.starts_with(told), "{ran:?}");
 }
 
 // ---------------------------------------------------------------- files

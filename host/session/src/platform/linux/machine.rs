@@ -3,8 +3,10 @@
 //! What belongs to a thread (priority, cores, floating-point environment) needs no such look: the code of a plugin runs in a
 //! thread that ends with it. The main thread is the one that others can change by the number of the process.
 
+use super::locale;
+use rustix::fs::Mode;
 use rustix::process::{Resource, Rlimit, chdir, getcwd, getpid, getrlimit, setrlimit};
-use rustix::process::{getpriority_process, setpriority_process};
+use rustix::process::{getpriority_process, setpriority_process, umask};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::ffi::CString;
 
@@ -24,6 +26,8 @@ pub(crate) struct MachineState {
     limits: [Rlimit; LIMITS.len()],
     cores: Option<CpuSet>,
     nice: Option<i32>,
+    mask: Option<Mode>,
+    locale: Option<CString>,
 }
 
 impl MachineState {
@@ -34,13 +38,15 @@ impl MachineState {
             limits: LIMITS.map(|(resource, _)| getrlimit(resource)),
             cores: sched_getaffinity(Some(getpid())).ok(),
             nice: getpriority_process(Some(getpid())).ok(),
+            mask: file_mask(),
+            locale: locale::now(),
         }
     }
 
     /// Puts back what is different now: its names. What the system refuses to put back is named all the same. Not
     /// real-time.
     pub(crate) fn restore(&self) -> Vec<&'static str> {
-        let Self { folder, limits, cores, nice } = self;
+        let Self { folder, limits, cores, nice, mask, locale } = self;
         let now = Self::now();
         let mut changed = Vec::new();
         if let Some(folder) = folder
@@ -67,8 +73,27 @@ impl MachineState {
             let _ = setpriority_process(Some(getpid()), *nice);
             changed.push("the priority of the main thread");
         }
+        if let Some(mask) = mask
+            && now.mask != Some(*mask)
+        {
+            let _ = umask(*mask);
+            changed.push("the mode mask of new files");
+        }
+        if let Some(locale) = locale
+            && now.locale.as_ref() != Some(locale)
+        {
+            locale::set(locale);
+            changed.push("the locale");
+        }
         changed
     }
+}
+
+/// Returns the mode mask of new files, from a file of the kernel: to read it with `umask` is to change it.
+fn file_mask() -> Option<Mode> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let mask = status.lines().find_map(|line| line.strip_prefix("Umask:"))?;
+    u32::from_str_radix(mask.trim(), 8).ok().map(Mode::from_raw_mode)
 }
 
 #[cfg(test)]

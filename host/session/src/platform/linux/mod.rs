@@ -1,5 +1,6 @@
 //! Linux: owners and permissions of folders, numbers of files, limits of the process.
 
+mod locale;
 mod machine;
 
 pub(crate) use machine::MachineState;

@@ -1,0 +1,21 @@
+//! The locale of the C library, by which C plugins read and write numbers.
+#![allow(unsafe_code)] // `setlocale`; tests/tests/system/architecture.rs lists it
+
+use std::ffi::{CStr, CString};
+use std::ptr::null;
+
+/// Returns the locale of the process, for all categories. Not real-time.
+pub(super) fn now() -> Option<CString> {
+    // SAFETY: asked with no name, `setlocale` changes nothing and returns a text that is valid until the next call; only plugins and
+    // this module call it, and the plugin whose code has just run has returned.
+    let text = unsafe { libc::setlocale(libc::LC_ALL, null()) };
+    // SAFETY: null, or a text that ends in a zero.
+    (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_owned())
+}
+
+/// Sets the locale that [`now`] returned. Not real-time.
+pub(super) fn set(locale: &CStr) {
+    // SAFETY: a text that ends in a zero and is there for the call. The host's own code formats nothing by the locale; the plugin
+    // that has changed it was as concurrent with other plugins.
+    unsafe { libc::setlocale(libc::LC_ALL, locale.as_ptr()) };
+}
