@@ -12,6 +12,7 @@ use std::os::unix::net::UnixStream;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Connections that an attacker holds open during the random attacks.
@@ -25,6 +26,8 @@ const MOST_KB: u64 = 64 << 10;
 const PATIENCE: Duration = Duration::from_secs(30);
 /// A user who owns no process of a test.
 const STRANGER: u32 = 65_534;
+
+static ALONE: Mutex<()> = Mutex::new(());
 
 /// Number of random attacks, and of connections that are then opened in turn.
 fn size() -> (usize, usize) {
@@ -70,6 +73,8 @@ impl Target {
 
     /// Attacks the service, then expects a client to be served; meanwhile threads and memory stay within their bounds.
     pub(crate) fn withstand(&self, request: &[u8], is_served: impl Fn(&Place) -> bool) {
+        // The descriptors of a process are for one attack at a time.
+        let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         assert!(is_served(&self.place), "before the attacks");
         let idle = self.usage();
         let mut most = Most(idle);

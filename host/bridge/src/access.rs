@@ -3,6 +3,7 @@
 use crate::keys::{Name, ROOT};
 use crate::link::MEMBER;
 use crate::request::{ANYONE, Right};
+use crate::stop_channel::new_key_line;
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
     KeyUsagePurpose, date_time_ymd,
@@ -30,6 +31,8 @@ pub const VALID: Duration = Duration::from_secs(365 * DAY_S);
 const DAY_S: u64 = 86_400;
 /// Under this key a configuration says until when its certificate is good, s since 1970.
 pub const EXPIRES: &str = "expires_s";
+/// Under this key a configuration names the file of its stop keys ([`crate::stop_channel`]).
+pub const STOP_KEYS: &str = "stop_keys";
 
 /// Why there are no keys.
 #[derive(Debug, thiserror::Error)]
@@ -79,6 +82,7 @@ pub fn write_keys(folder: &Path, members: &Members) -> Result<Vec<PathBuf>, Acce
         write(&folder.join(format!("{name}.key")), &key.serialize_pem(), Readers::Owner)
     };
     certify(BRIDGE, &members.hosts)?;
+    write_stop_keys(&folder, members)?;
     let mut written = vec![folder.join(format!("{BRIDGE}.json5"))];
     write_config(&written[0], &bridge_config(&folder, members))?;
     for (name, _) in &members.peers {
@@ -89,6 +93,19 @@ pub fn write_keys(folder: &Path, members: &Members) -> Result<Vec<PathBuf>, Acce
         written.push(file);
     }
     Ok(written)
+}
+
+/// Writes a stop key for each member, once for the member and once for the bridge.
+fn write_stop_keys(folder: &Path, members: &Members) -> Result<(), AccessError> {
+    let mut all = String::new();
+    for (name, _) in &members.peers {
+        let path = folder.join(format!("{name}.stop"));
+        let line = new_key_line(&name.to_string())
+            .map_err(|cause| AccessError::File { path: path.clone(), cause })?;
+        write(&path, &line, Readers::Owner)?;
+        all.push_str(&line);
+    }
+    if all.is_empty() { Ok(()) } else { write(&folder.join(format!("{BRIDGE}.stop")), &all, Readers::Owner) }
 }
 
 /// Who guarantees for all members, and the certificate by which they know it. Its key is thrown away: a new member means new keys
@@ -115,11 +132,12 @@ fn member(name: &str, hosts: &[String], valid: Duration) -> Result<CertificatePa
 }
 
 /// Returns the first file with a private key that others than its owner may read or write: one that the TLS part of a Zenoh
-/// configuration names, or the configuration itself if it holds a key.
-pub(crate) fn exposed_key(tls: &Value, config: Option<&Path>) -> Option<PathBuf> {
+/// configuration names, the stop keys, or the configuration itself if it holds a key.
+pub(crate) fn exposed_key(tls: &Value, metadata: &Value, config: Option<&Path>) -> Option<PathBuf> {
     let text = |key: &str| tls.get(key).and_then(Value::as_str);
     let ends = ["listen", "connect"];
-    let named = ends.iter().filter_map(|end| text(&format!("{end}_private_key"))).map(PathBuf::from);
+    let named = ends.iter().filter_map(|end| text(&format!("{end}_private_key")));
+    let named = named.chain(metadata.get(STOP_KEYS).and_then(Value::as_str)).map(PathBuf::from);
     let inline = ends.iter().filter_map(|end| text(&format!("{end}_private_key_base64")));
     let holding = inline.filter_map(|_| config.map(Path::to_path_buf));
     // Zenoh reports a file that is missing.
@@ -157,7 +175,7 @@ fn tls(folder: &Path, name: &str) -> Value {
 fn bridge_config(folder: &Path, members: &Members) -> Value {
     json!({
         "mode": "peer",
-        "metadata": metadata(BRIDGE, members),
+        "metadata": metadata(folder, BRIDGE, members),
         "listen": { "endpoints": ["tls/0.0.0.0:7447"] },
         "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
         "transport": { "link": { "protocols": ["tls"], "tls": tls(folder, BRIDGE) } },
@@ -169,16 +187,20 @@ fn peer_config(folder: &Path, name: &str, members: &Members) -> Value {
     let endpoints: Vec<String> = members.hosts.iter().map(|host| format!("tls/{host}:7447")).collect();
     json!({
         "mode": "client",
-        "metadata": metadata(name, members),
+        "metadata": metadata(folder, name, members),
         "connect": { "endpoints": endpoints },
         "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
         "transport": { "link": { "protocols": ["tls"], "tls": tls(folder, name) } },
     })
 }
 
-/// For the program that reads it: who it is, and until when.
-fn metadata(name: &str, members: &Members) -> Value {
-    json!({ MEMBER: name, EXPIRES: now_s().saturating_add(members.valid.as_secs()) })
+/// What this program reads in a configuration: name, end of the validity, and stop keys.
+fn metadata(folder: &Path, name: &str, members: &Members) -> Value {
+    let expires_s = now_s().saturating_add(members.valid.as_secs());
+    if members.peers.is_empty() {
+        return json!({ MEMBER: name, EXPIRES: expires_s });
+    }
+    json!({ MEMBER: name, EXPIRES: expires_s, STOP_KEYS: folder.join(format!("{name}.stop")) })
 }
 
 /// The access control of a bridge without keys: it cannot tell anybody apart, but nobody tells anything in its name.

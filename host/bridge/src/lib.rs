@@ -10,7 +10,7 @@
 //! [`serve`] is the one end: a watcher of the host like any other ([`flotor_live`]), whose words it puts on keys
 //! ([`keys`]) in the messages of a recording. [`remote`] is the other, [`attach`] shows what it hears as if it ran there,
 //! and [`keep`] records it. [`couple`] holds a hand here and one there together. Requests go back the same way ([`request`]); who may ask for what is Zenoh's access control, for which
-//! [`access`] writes keys and configurations.
+//! [`access`] writes keys and configurations. An emergency stop goes a second way beside Zenoh: [`stop_channel`].
 //!
 //! Not real-time: nothing here runs in the process of a servo.
 
@@ -24,3 +24,4 @@ pub mod remote;
 pub mod request;
 pub mod serve;
 pub mod status;
+pub mod stop_channel;

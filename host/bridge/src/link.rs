@@ -2,6 +2,7 @@
 
 use crate::access;
 use crate::keys::Name;
+use crate::stop_channel::{StopChannel, StopKeys};
 use clap::Args;
 use flotor_live::Directory;
 use serde_json::Value;
@@ -90,9 +91,16 @@ pub struct Link {
     session: Session,
     member: Name,
     expires_s: Option<u64>,
+    stop_channel: Option<StopChannel>,
 }
 
 impl Link {
+    /// The second way of an emergency stop, where the keys have one.
+    #[must_use]
+    pub fn stop_channel(&self) -> Option<&StopChannel> {
+        self.stop_channel.as_ref()
+    }
+
     /// As whom it asks: the name of the member in its configuration; without keys, anyone.
     #[must_use]
     pub fn member(&self) -> &Name {
@@ -161,35 +169,13 @@ fn is_loopback(endpoint: &str) -> bool {
 /// # Errors
 /// [`LinkError`].
 pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
-    let file = options.config.clone();
-    let wrong = |error: zenoh::Error| LinkError::Config { file: file.clone(), reason: error.to_string() };
-    let mut config = match &options.config {
-        Some(path) => Config::from_file(path).map_err(wrong)?,
-        None => Config::default(),
-    };
-    if options.config.is_none() {
-        config.insert_json5("mode", "\"peer\"").map_err(wrong)?;
-        config.insert_json5("scouting/multicast/enabled", "false").map_err(wrong)?;
-        config.insert_json5("scouting/gossip/enabled", "false").map_err(wrong)?;
-        // Without this, a visitor would listen on all interfaces.
-        config.insert_json5("listen/endpoints", &list(&options.listen)).map_err(wrong)?;
-        config.insert_json5("connect/endpoints", &list(&options.connect)).map_err(wrong)?;
-    } else {
-        for (key, given) in [("listen/endpoints", &options.listen), ("connect/endpoints", &options.connect)] {
-            if !given.is_empty() {
-                config.insert_json5(key, &list(given)).map_err(wrong)?;
-            }
-        }
-    }
-    let says = |config: &Config, key: &str| -> Option<Value> {
-        serde_json::from_str(&config.get_json(key).ok()?).ok()
-    };
-    if let Some(file) =
-        access::exposed_key(&says(&config, "transport/link/tls").unwrap_or_default(), file.as_deref())
-    {
+    let mut config = config_of(options)?;
+    if let Some(file) = exposed_key(options, &config) {
         return Err(LinkError::ExposedKey { file });
     }
-    let has_rules = says(&config, "access_control/enabled") == Some(Value::Bool(true));
+    let wrong =
+        |error: zenoh::Error| LinkError::Config { file: options.config.clone(), reason: error.to_string() };
+    let has_rules = has_rules(&config);
     // A configuration is somebody's own; what it means for a visitor is not known here.
     let is_known = end == End::Serving || options.config.is_none();
     if is_known && !(options.config.is_some() && has_rules) && !options.without_keys {
@@ -201,6 +187,7 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
             return Err(LinkError::WithoutKeys { endpoint });
         }
     }
+    let stop_channel = stop_channel_of(options, &config, end)?;
     if end == End::Serving && !has_rules {
         // Whoever it is: only the bridge tells.
         for (key, value) in access::of_anyone() {
@@ -208,10 +195,95 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
         }
     }
     let metadata = says(&config, "metadata").unwrap_or_default();
-    let member = metadata.get(MEMBER).and_then(Value::as_str).and_then(|name| Name::new(name).ok());
-    let expires_s = metadata.get(access::EXPIRES).and_then(Value::as_u64);
     let session = zenoh::open(config).wait().map_err(|error| LinkError::Open(error.to_string()))?;
-    Ok(Link { session, member: member.unwrap_or_else(Name::anyone), expires_s })
+    let (member, expires_s) = (member_of(&metadata), metadata.get(access::EXPIRES).and_then(Value::as_u64));
+    Ok(Link { session, member, expires_s, stop_channel })
+}
+
+/// The second way of an emergency stop of a visitor, without a session, whose opening may wait for others.
+///
+/// # Errors
+/// [`LinkError`].
+pub fn stop_channel(options: &LinkOptions) -> Result<Option<StopChannel>, LinkError> {
+    stop_channel_of(options, &config_of(options)?, End::Visiting)
+}
+
+/// The stop channel of one end. Without access control everybody has the rights of the bridge, with the key that everybody knows.
+fn stop_channel_of(
+    options: &LinkOptions,
+    config: &Config,
+    end: End,
+) -> Result<Option<StopChannel>, LinkError> {
+    let metadata = says(config, "metadata").unwrap_or_default();
+    let keys = match metadata.get(access::STOP_KEYS).and_then(Value::as_str) {
+        Some(file) => StopKeys::read(file.as_ref()).map_err(|error| LinkError::Config {
+            file: options.config.clone(),
+            reason: format!("{file}: {error}"),
+        })?,
+        None if end == End::Serving && has_rules(config) => return Ok(None),
+        None => StopKeys::of_anyone(),
+    };
+    let endpoints = match end {
+        End::Serving => "listen/endpoints",
+        End::Visiting => "connect/endpoints",
+    };
+    let endpoints = endpoints_in(&says(config, endpoints).unwrap_or_default());
+    let addresses: Vec<String> = endpoints.iter().filter_map(|endpoint| datagram_address(endpoint)).collect();
+    let expires_s = metadata.get(access::EXPIRES).and_then(Value::as_u64);
+    Ok((!addresses.is_empty()).then(|| StopChannel {
+        addresses,
+        member: member_of(&metadata),
+        keys,
+        expires_s,
+    }))
+}
+
+/// The `host:port` of an endpoint of the internet, for datagrams; none where the system chooses the port.
+fn datagram_address(endpoint: &str) -> Option<String> {
+    let (protocol, address) = endpoint.split_once('/')?;
+    let address = address.split(['?', '#']).next()?;
+    (matches!(protocol, "tcp" | "tls") && !address.ends_with(":0")).then(|| address.to_owned())
+}
+
+/// The name of the member in the metadata of a configuration; without keys, anyone.
+fn member_of(metadata: &Value) -> Name {
+    let member = metadata.get(MEMBER).and_then(Value::as_str).and_then(|name| Name::new(name).ok());
+    member.unwrap_or_else(Name::anyone)
+}
+
+fn config_of(options: &LinkOptions) -> Result<Config, LinkError> {
+    let wrong =
+        |error: zenoh::Error| LinkError::Config { file: options.config.clone(), reason: error.to_string() };
+    let Some(path) = &options.config else {
+        let mut config = Config::default();
+        config.insert_json5("mode", "\"peer\"").map_err(wrong)?;
+        config.insert_json5("scouting/multicast/enabled", "false").map_err(wrong)?;
+        config.insert_json5("scouting/gossip/enabled", "false").map_err(wrong)?;
+        // Without this, a visitor would listen on all interfaces.
+        config.insert_json5("listen/endpoints", &list(&options.listen)).map_err(wrong)?;
+        config.insert_json5("connect/endpoints", &list(&options.connect)).map_err(wrong)?;
+        return Ok(config);
+    };
+    let mut config = Config::from_file(path).map_err(wrong)?;
+    for (key, given) in [("listen/endpoints", &options.listen), ("connect/endpoints", &options.connect)] {
+        if !given.is_empty() {
+            config.insert_json5(key, &list(given)).map_err(wrong)?;
+        }
+    }
+    Ok(config)
+}
+
+fn says(config: &Config, key: &str) -> Option<Value> {
+    serde_json::from_str(&config.get_json(key).ok()?).ok()
+}
+
+fn has_rules(config: &Config) -> bool {
+    says(config, "access_control/enabled") == Some(Value::Bool(true))
+}
+
+fn exposed_key(options: &LinkOptions, config: &Config) -> Option<PathBuf> {
+    let part = |key: &str| says(config, key).unwrap_or_default();
+    access::exposed_key(&part("transport/link/tls"), &part("metadata"), options.config.as_deref())
 }
 
 /// All endpoints of a configuration, which may have some for each mode.

@@ -6,10 +6,11 @@ use flotor_bridge::attach::attach;
 use flotor_bridge::couple::couple;
 use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::keys::Name;
-use flotor_bridge::link::{End, Link, LinkError, LinkOptions, open};
+use flotor_bridge::link::{End, Link, LinkError, LinkOptions, open, stop_channel};
 use flotor_bridge::remote::{Remote, bridges};
 use flotor_bridge::request::{Request, Right};
 use flotor_bridge::serve::{Launcher, Service, serve};
+use flotor_bridge::stop_channel::press_both_ways;
 use flotor_core::terminal::escaped;
 use flotor_live::{Directory, SetValue};
 use std::error::Error;
@@ -166,9 +167,12 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {}", escaped(&error.to_string()));
-            let is_usage = error
-                .downcast_ref::<LinkError>()
-                .is_some_and(|e| matches!(e, LinkError::Config { .. } | LinkError::WithoutKeys { .. }));
+            let is_usage = error.downcast_ref::<LinkError>().is_some_and(|e| {
+                matches!(
+                    e,
+                    LinkError::Config { .. } | LinkError::WithoutKeys { .. } | LinkError::ExposedKey { .. }
+                )
+            });
             if is_usage { ExitCode::from(USAGE) } else { ExitCode::FAILURE }
         }
     }
@@ -230,6 +234,11 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
                 );
             }
         }
+        Command::Ask { name, request: RequestArgument::EmergencyStop } => {
+            let link = link.or_this_user(&directory, None);
+            let datagrams = stop_channel(&link)?;
+            press_both_ways(link, datagrams, &name)?;
+        }
         Command::Ask { name, request } => {
             let remote = Remote::listen(&visit(link)?, &name)?;
             remote.errand().run(request.into())?;
@@ -257,7 +266,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
                 println!("{}", written.display());
             }
             tell(
-                "Give each member its .json5, .pem and .key, and authority.pem; keep the .key files secret.",
+                "Give each member its .json5, .pem, .key and .stop, and authority.pem; keep the .key and .stop files secret.",
             );
         }
     }

@@ -1,30 +1,36 @@
 //! The emergency stop from the network: presses the latch of this machine at once, and is answered when every host has confirmed.
 
-use super::handler::reply;
 use flotor_live::{Directory, Latch};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
-use zenoh::query::Query;
+
+/// Sends the answer of a press: the reason of a refusal, or none.
+pub(super) type SendAnswer = Box<dyn FnOnce(Option<String>) + Send>;
 
 /// How long the hosts may take to confirm; who presses waits longer for the answer.
 const CONFIRM_WAIT: Duration = Duration::from_millis(2000);
 /// Presses that wait for an answer at most. What finds no room has pressed all the same, and is never told that it is done.
 const MOST_WAITING: usize = 1024;
 
+/// Returns the name under which a press of a member is kept.
+pub(super) fn who(member: &str, bridge: impl std::fmt::Display) -> String {
+    format!("{member} over the network (bridge {bridge})")
+}
+
 /// Presses, and lets a thread of its own ask the hosts.
 pub(super) struct Emergency {
     latch: Latch,
-    pressed: SyncSender<(Query, Option<String>)>,
+    pressed: SyncSender<(SendAnswer, Option<String>)>,
 }
 
 impl Emergency {
     pub(super) fn start(directory: &Directory) -> std::io::Result<Self> {
-        let (pressed, queries) = sync_channel(MOST_WAITING);
+        let (pressed, waiting) = sync_channel(MOST_WAITING);
         let latch = directory.latch();
         let of_thread = latch.clone();
         let thread = std::thread::Builder::new().name("flotor-emergency".to_owned());
         // Ends with the last sender.
-        thread.spawn(move || attend(&of_thread, &queries))?;
+        thread.spawn(move || attend(&of_thread, &waiting))?;
         Ok(Self { latch, pressed })
     }
 
@@ -33,18 +39,18 @@ impl Emergency {
     }
 
     /// Before anything else the latch: a run that is not yet to be seen looks at it before it energises a device.
-    pub(super) fn press(&self, who: &str, query: Query) {
+    pub(super) fn press(&self, who: &str, answer: SendAnswer) {
         let problem =
             self.latch.press(who).err().map(|error| {
                 format!("the emergency stop does not stay: a later run is not refused: {error}")
             });
-        let _ = self.pressed.try_send((query, problem));
+        let _ = self.pressed.try_send((answer, problem));
     }
 }
 
-fn attend(latch: &Latch, queries: &Receiver<(Query, Option<String>)>) {
-    while let Ok(first) = queries.recv() {
-        let together: Vec<_> = std::iter::once(first).chain(queries.try_iter()).collect();
+fn attend(latch: &Latch, waiting: &Receiver<(SendAnswer, Option<String>)>) {
+    while let Ok(first) = waiting.recv() {
+        let together: Vec<_> = std::iter::once(first).chain(waiting.try_iter()).collect();
         let missing = match latch.stop_runs(Instant::now() + CONFIRM_WAIT) {
             Ok(unconfirmed) if unconfirmed.is_empty() => None,
             Ok(unconfirmed) => {
@@ -56,8 +62,8 @@ fn attend(latch: &Latch, queries: &Receiver<(Query, Option<String>)>) {
             }
             Err(error) => Some(format!("the runs cannot be asked: {error}; check that each has stopped")),
         };
-        for (query, problem) in together {
-            reply(&query, missing.clone().or(problem));
+        for (answer, problem) in together {
+            answer(missing.clone().or(problem));
         }
     }
 }

@@ -3,7 +3,7 @@
 //! The network has two threads for all members: there only the emergency stop is read, and pressed. Everything else waits in a line
 //! for a thread of its own, which a host or a member that takes nothing in may delay.
 
-use super::emergency::Emergency;
+use super::emergency::{Emergency, who};
 use super::station::{Station, json};
 use super::{Launcher, WaitNow};
 use crate::couple::{Carried, CoupleError};
@@ -289,9 +289,9 @@ impl RequestHandler {
         // A pattern of keys names no member, and is refused.
         let asked = query.key_expr().as_str();
         if is_emergency_stop(asked, &letter) {
-            let who = format!("{} over the network (bridge {})", member(asked), self.name);
+            let who = who(member(asked), &self.name);
             drop(letter);
-            self.emergency.press(&who, query);
+            self.emergency.press(&who, Box::new(move |refused| reply(&query, refused)));
         } else {
             drop(letter);
             if line.try_send((Asked::Letter, query)).is_err() {
@@ -375,7 +375,7 @@ fn member(key: &str) -> &str {
 }
 
 /// What became of a letter. Nobody waits for whether it arrived.
-pub(super) fn reply(query: &Query, refused: Option<String>) {
+fn reply(query: &Query, refused: Option<String>) {
     let answer = json(&Answer { number: 0, refused, cause: RefusalCause::Other });
     let _ = query.reply(query.key_expr(), answer).wait_now();
 }

@@ -12,12 +12,13 @@ mod emergency;
 mod handler;
 mod launcher;
 mod station;
+mod stop_channel;
 
 pub use launcher::Launcher;
 
 use crate::couple::{CoupleError, Couplers, Side};
 use crate::keys::Name;
-use crate::link::LinkError;
+use crate::link::{Link, LinkError};
 use crate::request::Right;
 use flotor_live::{Ask, Client, Directory, Event, LiveError};
 use handler::RequestHandler;
@@ -25,7 +26,6 @@ use station::Station;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use zenoh::Session;
 
 /// How often a bridge without a run looks for one.
 const LOOK_PERIOD: Duration = Duration::from_millis(200);
@@ -50,7 +50,7 @@ pub struct Service {
 /// # Errors
 /// [`CoupleError`]: the network, or this machine, refuses what a bridge needs.
 pub fn serve(
-    session: &Session,
+    session: &Link,
     directory: &Directory,
     service: Service,
     stop: &AtomicBool,
@@ -62,6 +62,13 @@ pub fn serve(
     let handler = Arc::new(handler);
     let station = Station::declare(session, &name)?;
     let _counter = handler::open(session, &handler, allow)?;
+    let opened = session.stop_channel().map(|stop| stop_channel::open(stop, &name, directory)).transpose();
+    let _stop_channel = opened.unwrap_or_else(|error| {
+        tell(&format!(
+            "a new member's emergency stop waits for the connections before it: no UDP port of the same number: {error}"
+        ));
+        None
+    });
     // Last of all: who sees it can ask.
     let _alive = session.liveliness().declare_token(name.key("alive")).wait_now()?;
     let side = if allow >= Right::Operate { Side::Serving } else { Side::ServingDeaf };

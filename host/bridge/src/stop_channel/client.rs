@@ -1,0 +1,143 @@
+//! The member's end of a stop channel.
+
+use super::{Content, MOST_BYTES, Nonce, StopChannel, StopMessage};
+use crate::keys::Name;
+use crate::link::{End, LinkOptions, open};
+use crate::remote::Remote;
+use crate::request::Request;
+use std::io;
+use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+/// Time until a hello is sent again, and a new hello after a press: a flood may lose some.
+const HELLO_WAIT: Duration = Duration::from_millis(50);
+const PRESS_WAIT: Duration = Duration::from_millis(300);
+/// Longest time for an answer, in which the bridge asks the hosts.
+const ANSWER_WAIT: Duration = Duration::from_secs(5);
+/// Time for other endpoints to answer after the first: they may be other bridges of that name, or nobody.
+const OTHERS_WAIT: Duration = Duration::from_secs(1);
+
+/// Presses the emergency stop by datagrams and by a session at the same time; done as soon as one way has succeeded.
+///
+/// # Errors
+/// In words: why neither has.
+pub fn press_both_ways(
+    link: LinkOptions,
+    datagrams: Option<StopChannel>,
+    bridge: &Name,
+) -> Result<(), String> {
+    let (sender, outcomes) = channel();
+    if let Some(stop) = datagrams {
+        let (sender, bridge) = (sender.clone(), bridge.clone());
+        std::thread::spawn(move || sender.send(press(&stop, &bridge)));
+    }
+    let bridge = bridge.clone();
+    std::thread::spawn(move || {
+        let session = open(&link, End::Visiting).and_then(|link| Remote::listen(&link, &bridge));
+        let pressed = session.map_err(|error| error.to_string());
+        sender.send(pressed.and_then(|remote| remote.errand().run(Request::EmergencyStop)))
+    });
+    let mut problems = Vec::new();
+    for outcome in outcomes {
+        match outcome {
+            Ok(()) => return Ok(()),
+            Err(problem) => problems.push(problem),
+        }
+    }
+    Err(problems.join("; "))
+}
+
+/// Presses the emergency stop at a bridge of this name at each address, and waits for the answer.
+///
+/// # Errors
+/// In words: nobody answers, or a bridge does not confirm.
+fn press(stop: &StopChannel, bridge: &Name) -> Result<(), String> {
+    let (sender, answers) = channel();
+    for address in &stop.addresses {
+        let (sender, address, bridge, stop) =
+            (sender.clone(), address.clone(), bridge.to_string(), stop.clone());
+        std::thread::spawn(move || {
+            let answer = press_at(&address, &bridge, &stop).map_err(|error| format!("{address}: {error}"));
+            let _ = sender.send(answer);
+        });
+    }
+    drop(sender);
+    outcome(&answers)
+}
+
+/// Waits for all answers, and after the first one only for a while: done if one is and none is a refusal.
+fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), String> {
+    let mut until = Instant::now() + 2 * ANSWER_WAIT;
+    let mut is_done = false;
+    let mut problem = "no endpoint has a stop channel".to_owned();
+    loop {
+        match answers.recv_timeout(until.saturating_duration_since(Instant::now())) {
+            Ok(Ok(Some(refused))) => return Err(refused),
+            Ok(Ok(None)) => {
+                is_done = true;
+                until = until.min(Instant::now() + OTHERS_WAIT);
+            }
+            Ok(Err(error)) => problem = error,
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
+                return if is_done { Ok(()) } else { Err(problem) };
+            }
+        }
+    }
+}
+
+/// Presses at one endpoint; returns the reason of a refusal.
+fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Option<String>> {
+    let places: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
+    let of_family = |is_ipv4: bool, any: &str| {
+        let places: Vec<SocketAddr> = places.iter().copied().filter(|at| at.is_ipv4() == is_ipv4).collect();
+        (!places.is_empty()).then(|| UdpSocket::bind(any).map(|socket| (socket, places)))
+    };
+    let sockets = [of_family(true, "0.0.0.0:0"), of_family(false, "[::]:0")];
+    let sockets: Vec<_> = sockets.into_iter().flatten().collect::<io::Result<_>>()?;
+    for (socket, _) in &sockets {
+        // Several are asked in turn.
+        socket.set_read_timeout(Some(HELLO_WAIT / 4))?;
+    }
+    let message = |content| {
+        let (bridge, member) = (bridge.to_owned(), stop.member.to_string());
+        Nonce::new().map(|nonce| StopMessage { bridge, member, nonce, content })
+    };
+    let until = Instant::now() + ANSWER_WAIT;
+    let mut pending = message(Content::Hello)?;
+    // Each press that was sent may be answered, the last not before the hosts have confirmed.
+    let mut presses: Vec<Nonce> = Vec::new();
+    while Instant::now() < until {
+        let datagram = pending.sealed(&stop.keys).ok_or_else(|| io::Error::other("there is no stop key"))?;
+        for (socket, places) in &sockets {
+            for place in places {
+                // Where nobody listens the next system call reports it.
+                let _ = socket.send_to(&datagram, place);
+            }
+        }
+        let repeat = Instant::now()
+            + if matches!(pending.content, Content::Press(_)) { PRESS_WAIT } else { HELLO_WAIT };
+        let mut challenge = None;
+        while challenge.is_none() && Instant::now() < repeat {
+            let received = sockets.iter().find_map(|(socket, _)| receive(socket, stop));
+            match received.map(|received| (received.nonce, received.content)) {
+                Some((nonce, Content::Challenge(next))) if nonce == pending.nonce => challenge = Some(next),
+                Some((nonce, Content::Answer(refused))) if presses.contains(&nonce) => return Ok(refused),
+                _ => {}
+            }
+        }
+        pending = match challenge {
+            Some(challenge) => message(Content::Press(challenge))?,
+            // Something was lost, or the challenge was used by another member: once more from the beginning.
+            None => message(Content::Hello)?,
+        };
+        presses.extend(challenge.map(|_| pending.nonce));
+    }
+    Err(io::ErrorKind::TimedOut.into())
+}
+
+fn receive(socket: &UdpSocket, stop: &StopChannel) -> Option<StopMessage> {
+    let mut datagram = [0; MOST_BYTES];
+    let (length, _) = socket.recv_from(&mut datagram).ok()?;
+    StopMessage::open(datagram.get(..length)?, &stop.keys)
+}

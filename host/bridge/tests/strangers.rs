@@ -1,0 +1,251 @@
+//! Strangers at the ports of a bridge: they cost little, and a new member's emergency stop arrives in time.
+
+mod common;
+#[path = "../../../tests/src/attacks.rs"]
+mod strangers;
+
+use common::process::Owned;
+use common::{FakeHost, free_port, wait_until};
+use flotor_bridge::access::{Members, VALID, write_keys};
+use flotor_bridge::keys::Name;
+use flotor_bridge::request::Right;
+use flotor_live::Ask;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream, UdpSocket};
+use std::process::{Command, Output, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use strangers::{Place, Target};
+
+/// The bound for the stop of a new member under a flood; a busy machine gets twice the time that it needs without one.
+const IN_TIME: Duration = Duration::from_secs(1);
+
+/// How a bridge is reached.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    Tls,
+    Tcp,
+}
+
+/// A bridge in a process of its own, beside a host.
+struct Bridge {
+    host: FakeHost,
+    keys: tempfile::TempDir,
+    way: Way,
+    port: u16,
+    process: Owned,
+}
+
+fn flotor_bridge(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_flotor-bridge"));
+    command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+}
+
+impl Bridge {
+    fn start(way: Way) -> Self {
+        let host = FakeHost::start_in("flotor");
+        let keys = tempfile::tempdir().unwrap();
+        let peers = vec![(Name::new("alan").unwrap(), Right::Watch)];
+        write_keys(keys.path(), &Members { hosts: vec!["localhost".to_owned()], peers, valid: VALID })
+            .unwrap();
+        let port = free_port();
+        let mut command = flotor_bridge(&["serve", "--name", "lab"]);
+        with_keys(&mut command, way, &keys, "bridge");
+        command.args(["--listen", &endpoint(way, port)]).stderr(Stdio::null());
+        command.env("XDG_RUNTIME_DIR", host.directory.path().parent().unwrap());
+        let process = Owned::start(&mut command);
+        wait_until("the bridge listens", || TcpStream::connect(("127.0.0.1", port)).is_ok());
+        Self { host, keys, way, port, process }
+    }
+
+    /// Presses as a member that was not connected before, at a port; returns what the command said, and its time.
+    fn ask_at(&self, port: u16) -> (Output, Duration) {
+        let mut command = flotor_bridge(&["ask", "lab", "emergency-stop"]);
+        with_keys(&mut command, self.way, &self.keys, "alan");
+        let since = Instant::now();
+        let output = Owned::start(command.args(["--connect", &endpoint(self.way, port)])).output();
+        (output, since.elapsed())
+    }
+
+    /// Presses as a new member, and expects the host to be stopped; returns the time.
+    #[track_caller]
+    fn stop(&self) -> Duration {
+        let before = self.presses();
+        let (output, time) = self.ask_at(self.port);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(self.presses() > before, "the host was asked");
+        time
+    }
+
+    /// Machine stops that the host has received.
+    fn presses(&self) -> usize {
+        self.host.asked.0.lock().unwrap().iter().filter(|ask| matches!(ask, Ask::MachineStop)).count()
+    }
+
+    /// The first bytes that a member sends at a new connection.
+    fn first_bytes(&self) -> Vec<u8> {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut command = flotor_bridge(&["list"]);
+        with_keys(&mut command, self.way, &self.keys, "alan");
+        let at = endpoint(self.way, listener.local_addr().unwrap().port());
+        let _member = Owned::start(command.args(["--connect", &at]).stderr(Stdio::null()));
+        let mut bytes = vec![0; 4096];
+        let length = listener.accept().unwrap().0.read(&mut bytes).unwrap();
+        bytes.truncate(length);
+        bytes
+    }
+
+    fn target(&self) -> Target {
+        let place = Place::Port(([127, 0, 0, 1], self.port).into());
+        Target { process: self.process.pid().as_raw_nonzero().get().cast_unsigned(), place }
+    }
+}
+
+fn endpoint(way: Way, port: u16) -> String {
+    match way {
+        Way::Tls => format!("tls/localhost:{port}"),
+        Way::Tcp => format!("tcp/127.0.0.1:{port}"),
+    }
+}
+
+fn with_keys(command: &mut Command, way: Way, keys: &tempfile::TempDir, who: &str) {
+    if way == Way::Tls {
+        command.arg("--config").arg(keys.path().join(format!("{who}.json5")));
+    }
+}
+
+/// Carries out attacks without end in threads until the body returns.
+fn under<T>(threads: usize, attack: impl Fn() + Sync, body: impl FnOnce() -> T) -> T {
+    let is_over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while !is_over.load(Ordering::Relaxed) {
+                    attack();
+                }
+            });
+        }
+        let result = body();
+        is_over.store(true, Ordering::Relaxed);
+        result
+    })
+}
+
+/// Stops as a new member without strangers, then under a flood; expects the second in time.
+#[track_caller]
+fn assert_stops_in_time(bridge: &Bridge, flood: impl FnOnce(&dyn Fn() -> Duration) -> Duration, name: &str) {
+    let alone = bridge.stop();
+    let flooded = flood(&|| bridge.stop());
+    println!("{name}, {:?}: a new member's stop took {flooded:?}, {alone:?} without strangers", bridge.way);
+    assert!(flooded <= IN_TIME.max(2 * alone), "{flooded:?}, alone {alone:?}");
+}
+
+#[test]
+fn connections_that_fail_do_not_delay_the_stop_of_a_new_member() {
+    let bridge = Bridge::start(Way::Tls);
+    let connect = || {
+        let _ =
+            TcpStream::connect(("127.0.0.1", bridge.port)).map(|mut stream| stream.write_all(b"malformed"));
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    let flood = |stop: &dyn Fn() -> Duration| {
+        // Zenoh pauses for 0.1 s after each.
+        (0..200).for_each(|_| drop(TcpStream::connect(("127.0.0.1", bridge.port))));
+        under(1, connect, stop)
+    };
+    assert_stops_in_time(&bridge, flood, "50 failed connections a second");
+}
+
+#[test]
+fn held_connections_do_not_delay_the_stop_of_a_new_member() {
+    for way in [Way::Tls, Way::Tcp] {
+        let bridge = Bridge::start(way);
+        let flood = |stop: &dyn Fn() -> Duration| {
+            let _held: Vec<_> = (0..1500).map(|_| TcpStream::connect(("127.0.0.1", bridge.port))).collect();
+            stop()
+        };
+        assert_stops_in_time(&bridge, flood, "1500 held connections");
+    }
+}
+
+#[test]
+fn a_flood_of_datagrams_does_not_delay_the_stop_of_a_new_member() {
+    for way in [Way::Tls, Way::Tcp] {
+        let bridge = Bridge::start(way);
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let bytes: Vec<u8> = (0..2000_u32).flat_map(u32::to_le_bytes).collect();
+        let attack = || {
+            for length in [0, 1, 31, 32, 33, 200, 2048, 2049, 8000] {
+                let _ = socket.send_to(&bytes[..length], ("127.0.0.1", bridge.port));
+            }
+        };
+        assert_stops_in_time(&bridge, |stop| under(1, attack, stop), "a flood of datagrams");
+    }
+}
+
+/// A stranger who has read all datagrams of a press sends them again.
+#[test]
+fn a_press_cannot_be_replayed() {
+    let bridge = Bridge::start(Way::Tls);
+    // Between member and bridge; connections end here, so that the datagrams alone press.
+    let (between, towards) =
+        (UdpSocket::bind("127.0.0.1:0").unwrap(), UdpSocket::bind("127.0.0.1:0").unwrap());
+    for socket in [&between, &towards] {
+        socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
+    }
+    let port = between.local_addr().unwrap().port();
+    let is_over = AtomicBool::new(false);
+    let read = std::thread::scope(|scope| {
+        let relay = scope.spawn(|| {
+            let (mut read, mut member, mut bytes) = (Vec::new(), None, [0; 4096]);
+            while !is_over.load(Ordering::Relaxed) {
+                if let Ok((length, from)) = between.recv_from(&mut bytes) {
+                    member = Some(from);
+                    read.push(bytes[..length].to_vec());
+                    towards.send_to(&bytes[..length], ("127.0.0.1", bridge.port)).unwrap();
+                }
+                if let (Ok(length), Some(member)) = (towards.recv(&mut bytes), member) {
+                    between.send_to(&bytes[..length], member).unwrap();
+                }
+            }
+            read
+        });
+        let (output, _) = bridge.ask_at(port);
+        is_over.store(true, Ordering::Relaxed);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        relay.join().unwrap()
+    });
+    let is_hello = |datagram: &Vec<u8>| datagram.windows(5).any(|bytes| bytes == b"hello");
+    let presses = bridge.presses();
+    assert!(presses > 0 && read.iter().any(|datagram| !is_hello(datagram)), "a press was read");
+    let replay = |datagrams: &mut dyn Iterator<Item = &Vec<u8>>| {
+        datagrams.for_each(|datagram| drop(towards.send_to(datagram, ("127.0.0.1", bridge.port))));
+    };
+    replay(&mut read.iter().filter(|datagram| !is_hello(datagram)));
+    // A hello is answered after what came before it; a host would be asked within milliseconds.
+    replay(&mut read.iter().filter(|datagram| is_hello(datagram)));
+    wait_until("a hello is answered", || towards.recv(&mut [0; 4096]).is_ok());
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(bridge.presses(), presses);
+}
+
+/// Without the key of a member nothing is answered.
+#[test]
+fn a_stranger_gets_no_answer_to_a_datagram() {
+    let bridge = Bridge::start(Way::Tls);
+    let anyone = Bridge { way: Way::Tcp, ..Bridge::start(Way::Tcp) };
+    let before = bridge.presses();
+    let (output, _) = anyone.ask_at(bridge.port);
+    assert!(!output.status.success(), "nobody answers whom the bridge does not know");
+    assert_eq!(bridge.presses(), before);
+}
+
+#[test]
+fn strangers_cost_a_bridge_little() {
+    for way in [Way::Tls, Way::Tcp] {
+        let bridge = Bridge::start(way);
+        let request = bridge.first_bytes();
+        bridge.target().withstand(&request, |_| bridge.ask_at(bridge.port).0.status.success());
+    }
+}
