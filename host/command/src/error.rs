@@ -122,8 +122,8 @@ impl CommandError {
                 wrong if wrong.is_configuration() => 2,
                 // Nobody knows whether it exerts a force.
                 RunError::Calls(CallError::Unresponsive(hung)) if hung.call == Call::SafeStop => 4,
-                RunError::Calls(CallError::Stopped)
-                | RunError::Lookup(LookupError::Calls(CallError::Stopped)) => 1,
+                RunError::Calls(CallError::Stopped | CallError::NoThread)
+                | RunError::Lookup(LookupError::Calls(CallError::Stopped | CallError::NoThread)) => 1,
                 RunError::Lookup(_) | RunError::Plugin(_) | RunError::Calls(_) => 3,
                 RunError::Hung { stuck, .. } => match stuck.place {
                     Place::Model(_) => 3,

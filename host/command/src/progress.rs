@@ -2,6 +2,10 @@
 
 use crate::style::for_terminal;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::convert::Infallible;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// A progress line on a terminal, nothing in a pipe.
 #[must_use]
@@ -15,11 +19,44 @@ pub fn progress_bar(length: u64, template: &str) -> ProgressBar {
 pub fn while_preparing<T>(what: &str, work: impl FnOnce() -> T) -> T {
     let spinner = progress_bar(0, "{spinner} {msg} {elapsed}");
     spinner.set_message(format!("{}: prepares", for_terminal(what)));
-    spinner.enable_steady_tick(SPINNER_STEP);
+    let redrawn = Redrawn::every(SPINNER_STEP, &spinner);
     let result = work();
+    drop(redrawn);
     spinner.finish_and_clear();
     result
 }
 
+/// A progress line that a thread redraws until this is dropped.
+pub struct Redrawn {
+    until: Option<Sender<Infallible>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Redrawn {
+    /// Redraws a progress line in steps of this length; never in a pipe, nor where the system has no thread for that.
+    #[must_use]
+    pub fn every(step: Duration, line: &ProgressBar) -> Self {
+        if line.is_hidden() {
+            return Self { until: None, thread: None };
+        }
+        let (until, ended) = channel::<Infallible>();
+        let line = line.clone();
+        let redraw = move || {
+            while ended.recv_timeout(step) == Err(RecvTimeoutError::Timeout) && !line.is_finished() {
+                line.tick();
+            }
+        };
+        let thread = std::thread::Builder::new().name("flotor-progress".to_owned()).spawn(redraw);
+        Self { until: Some(until), thread: thread.ok() }
+    }
+}
+
+impl Drop for Redrawn {
+    fn drop(&mut self) {
+        drop(self.until.take());
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
 /// Between two pictures of the spinner; short preparations show none.
-const SPINNER_STEP: std::time::Duration = std::time::Duration::from_millis(300);
+const SPINNER_STEP: Duration = Duration::from_millis(300);

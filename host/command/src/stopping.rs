@@ -6,13 +6,13 @@
 //! A thread of its own waits for what asks. On Linux these are signals, blocked in every other thread: a plugin that installs
 //! handlers or blocks signals takes none of them away. On Windows they are events of the console, and Ctrl-Break ends a run at once.
 
-use super::note;
+use super::{CommandError, note};
 use crate::platform::{INTERRUPTED, KeyTerminal, Request, Requests, is_orphaned, outlive_requests};
 use flotor_servo::last_stop::{leave_process, stop_all, was_armed};
-use flotor_servo::{EmergencySource, StopSwitch, enter_guard_priority};
+use flotor_servo::{EmergencySource, StopSwitch, THREAD_ADVICE, enter_guard_priority};
 use std::io::{self, Read, stdin};
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Signals this close together are one request: `timeout` signals its child and then the group the child is in, a
@@ -33,16 +33,22 @@ enum First {
     InOrderOnceEnergised,
 }
 
-/// A switch that the first signal of `ENDING` uses in order and the second at once (the third ends the
+/// Returns a switch that the first signal of `ENDING` uses in order and the second at once (the third ends the
 /// process), and `SIGUSR1` at once. Called before there are other threads.
-pub fn stop_on_signals() -> StopSwitch {
-    heard(First::InOrder)
+///
+/// # Errors
+/// No thread for them.
+pub fn stop_on_signals() -> Result<StopSwitch, CommandError> {
+    take_signals(First::InOrder)
 }
 
-/// The same for a run that is yet to be prepared: as long as nothing has been energised, the first one ends the process,
-/// whatever a plugin is at.
-pub fn stop_run_on_signals() -> StopSwitch {
-    heard(First::InOrderOnceEnergised)
+/// Returns such a switch for a run that is yet to be prepared: as long as nothing has been energised, the first signal ends the
+/// process, whatever code a plugin executes.
+///
+/// # Errors
+/// No thread for them.
+pub fn stop_run_on_signals() -> Result<StopSwitch, CommandError> {
+    take_signals(First::InOrderOnceEnergised)
 }
 
 /// Whatever asks this process to end does not: it ends by itself.
@@ -52,24 +58,25 @@ pub fn outlive_signals() {
     }
 }
 
-fn heard(first: First) -> StopSwitch {
+fn take_signals(first: First) -> Result<StopSwitch, CommandError> {
     let stop = StopSwitch::default();
-    if let Err(error) = register(first, &stop) {
-        note(format_args!("cannot take signals, so signals kill the run: {error}"));
-    }
-    stop
+    register(first, &stop).map_err(|cause| {
+        CommandError::Failed(format!("cannot take signals, which end a run: {cause}; {THREAD_ADVICE}"))
+    })?;
+    Ok(stop)
 }
 
 fn register(first: First, stop: &StopSwitch) -> io::Result<()> {
     let requests = Requests::listen(stop)?;
+    let exit = Exit::prepare()?;
     let stop = stop.clone();
     let thread = std::thread::Builder::new().name("flotor-signals".to_owned());
-    thread.spawn(move || attend(&requests, first, &stop))?;
+    thread.spawn(move || attend(&requests, first, &stop, &exit))?;
     Ok(())
 }
 
 /// Waits for signals as long as the process lives.
-fn attend(requests: &Requests, first: First, stop: &StopSwitch) {
+fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
     // Above a loop that hogs its core.
     enter_guard_priority();
     let mut insistence = Insistence::default();
@@ -77,7 +84,7 @@ fn attend(requests: &Requests, first: First, stop: &StopSwitch) {
         let Some(request) = requests.next(LAST_PATIENCE) else {
             // An orphan was asked to end when its supervisor ended.
             if insistence.is_out_of_patience(Instant::now()) || is_orphaned() {
-                leave();
+                exit.take();
             }
             continue;
         };
@@ -86,26 +93,41 @@ fn attend(requests: &Requests, first: First, stop: &StopSwitch) {
             continue;
         }
         match insistence.answer(Instant::now()) {
-            Answer::InOrder if first == First::InOrderOnceEnergised && !was_armed() => leave(),
+            Answer::InOrder if first == First::InOrderOnceEnergised && !was_armed() => exit.take(),
             Answer::InOrder => stop.stop(),
             Answer::AtOnce => stop.emergency_flag().store(true, Ordering::Relaxed),
-            Answer::Leave => leave(),
+            Answer::Leave => exit.take(),
         }
     }
 }
 
-/// Stops the devices and ends the process, without what a process does at its end: that may be what hangs, and so may a
-/// device's stop.
-fn leave() -> ! {
-    let (done, stopped) = channel();
-    let stopping = std::thread::Builder::new().spawn(move || {
-        stop_all();
-        let _ = done.send(());
-    });
-    if stopping.is_ok() {
-        let _ = stopped.recv_timeout(STOP_PATIENCE);
+/// The end of a process that hangs: a thread that stops its devices, started early because the system may refuse one later.
+struct Exit {
+    stop: SyncSender<()>,
+    stopped: Receiver<()>,
+}
+
+impl Exit {
+    fn prepare() -> io::Result<Self> {
+        let (stop, asked) = sync_channel(1);
+        let (done, stopped) = sync_channel(1);
+        let thread = std::thread::Builder::new().name("flotor-exit".to_owned());
+        thread.spawn(move || {
+            if asked.recv().is_ok() {
+                stop_all();
+                let _ = done.send(());
+            }
+        })?;
+        Ok(Self { stop, stopped })
     }
-    leave_process(INTERRUPTED)
+
+    /// Stops the devices and ends the process, without what a process does at its end: that may be what hangs, and so may a
+    /// device's stop.
+    fn take(&self) -> ! {
+        let _ = self.stop.try_send(());
+        let _ = self.stopped.recv_timeout(STOP_PATIENCE);
+        leave_process(INTERRUPTED)
+    }
 }
 
 /// Answer to a signal that requests an end.

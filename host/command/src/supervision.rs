@@ -8,6 +8,7 @@
 
 use crate::platform::{die_by, divide};
 use crate::{CommandError, exit_code_of, print_error_line, style};
+use flotor_servo::THREAD_ADVICE;
 use flotor_servo::last_stop::{SignalName, report_end_to};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicU32;
@@ -56,7 +57,7 @@ pub fn supervised(command: impl FnOnce() -> Result<(), CommandError>) -> ExitCod
         }
         Ok(Side::Supervisor(end)) => ExitCode::from(code_of(end)),
         Err(cause) => exit_code_of(Err(CommandError::Failed(format!(
-            "cannot start a process for the command: {cause}; end other programs of this user, or raise `ulimit -u`"
+            "cannot start a process for the command: {cause}; {THREAD_ADVICE}"
         )))),
     }
 }

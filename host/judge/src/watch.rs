@@ -5,6 +5,7 @@
 
 use flotor_hal::Pose;
 use std::collections::BTreeMap;
+use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread;
 use std::time::Duration;
@@ -62,8 +63,11 @@ impl Drop for Calling {
 
 /// Watches all threads of this process, until one is in the same call for longer than `patience`: then it reports the
 /// pose, once, from a thread of its own.
-pub fn start(patience: Duration, on_stuck: impl FnOnce(Pose) + Send + 'static) {
-    thread::spawn(move || {
+///
+/// # Errors
+/// The system's, if there can be no thread.
+pub fn start(patience: Duration, on_stuck: impl FnOnce(Pose) + Send + 'static) -> io::Result<()> {
+    thread::Builder::new().spawn(move || {
         let mut seen = BTreeMap::new();
         loop {
             thread::sleep(patience / LOOKS);
@@ -71,7 +75,8 @@ pub fn start(patience: Duration, on_stuck: impl FnOnce(Pose) + Send + 'static) {
                 return on_stuck(pose);
             }
         }
-    });
+    })?;
+    Ok(())
 }
 
 /// The pose of a call that has been seen [`LOOKS`] times. `seen`: by thread, in which call, and how often.
@@ -110,7 +115,7 @@ mod tests {
         let far = Pose { position_m: DVec3::new(1.0, 2.0, 3.0).to_array(), ..Pose::HOME };
         let (tell, told) = mpsc::channel();
         let patience = Duration::from_millis(100);
-        start(patience, move |pose| tell.send(pose).expect("the test waits"));
+        start(patience, move |pose| tell.send(pose).expect("the test waits")).expect("a thread");
         let (end, ended) = mpsc::channel::<()>();
         // One that makes many short calls for longer than the patience lasts, then one long call.
         let worker = thread::spawn(move || {

@@ -67,7 +67,7 @@ pub struct MissedMore {
 /// Runs servo and bare loop in turns for `slices` seconds each. `progress` is called after each pair.
 ///
 /// # Errors
-/// [`RunError::Thread`] if the loop's thread cannot be had, [`RunError::Plugin`] if a device refuses to be energised.
+/// [`RunError::NoThread`] if the system has no thread for the loop, [`RunError::Plugin`] if a device refuses to be energised.
 pub fn measure(
     session: Session,
     slices: u64,
@@ -116,7 +116,7 @@ pub fn measure(
                 bins: [with_servo.lateness.bins(), bare.lateness.bins()],
             })
         });
-        let measured = measured.map_err(|_| RunError::Thread("could not be started"))?;
+        let measured = measured.map_err(|_| RunError::NoThread("the loop"))?;
         measured.join().map_err(|_| RunError::Thread("panicked"))?
     })
 }

@@ -49,7 +49,7 @@ pub use parameters::{
     ChangeReport, ChangeSender, PLUGIN, Pace, ParameterChange, ParameterQueue, ReportReceiver,
     ScheduledChange, WEIGHT,
 };
-pub use platform::PRIORITY_NAME;
+pub use platform::{PRIORITY_NAME, THREAD_ADVICE};
 pub use queue::{drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
 pub use realtime::{enter_guard_priority, enter_real_time, enter_worker_priority, probe_real_time};

@@ -2,7 +2,7 @@
 
 use crate::guest::is_guest;
 use crate::platform::scheduling::{
-    self, CORE_ADVICE, Duty, MEMORY_ADVICE, MOST_CORES, NoSuchCore, PRIORITY_ADVICE,
+    self, CORE_ADVICE, Duty, MEMORY_ADVICE, MOST_CORES, NoSuchCore, PRIORITY_ADVICE, THREAD_ADVICE,
 };
 
 /// A core of the machine, by the number the system gives it.
@@ -117,12 +117,18 @@ fn enter_priority(duty: Duty) -> Privilege {
 
 /// Asks on a thread of its own, so that the caller's priority stays what it is. Not real-time.
 pub fn probe_real_time() -> RealTimeReport {
-    let asked = std::thread::spawn(|| {
+    let asked = std::thread::Builder::new().spawn(|| {
         let report = enter_real_time(None);
         scheduling::unlock_memory();
         report
     });
-    asked.join().unwrap_or_else(|_| RealTimeReport::not_asked())
+    match asked {
+        Ok(asked) => asked.join().unwrap_or_else(|_| RealTimeReport::not_asked()),
+        Err(cause) => {
+            let refused = || Privilege::Refused(format!("no thread: {cause}; {THREAD_ADVICE}"));
+            RealTimeReport { fifo: refused(), memory_lock: refused(), core: Privilege::NotAsked }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -4,16 +4,20 @@
 //! needs the result waits no longer than a limit, and then leaves the thread behind and names the plugin. In the
 //! loop the watchdog does the same. Not real-time.
 
+pub(crate) use end::{EndCalls, EndReserve};
+
+mod end;
+
 use crate::platform::MachineState;
-use flotor_servo::StopSwitch;
-use flotor_servo::last_stop::{enter_call, leave_call};
+use flotor_servo::last_stop::{enter_call, leave_call, prepare_for_calls};
+use flotor_servo::{StopSwitch, THREAD_ADVICE};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Environment variable with the longest time a call may take before a run, in seconds.
@@ -265,43 +269,34 @@ impl Progress {
     }
 }
 
-/// Calls that run on a thread of their own.
+/// Calls of plugins on a thread of their own, and their result.
 pub(crate) struct Attended<T> {
-    result: Receiver<T>,
-    thread: JoinHandle<()>,
+    result: Receiver<std::thread::Result<T>>,
     progress: Progress,
     limit: Duration,
 }
 
 impl<T: Send + 'static> Attended<T> {
-    /// Starts them; `body` says in the progress what it is at.
+    /// Starts a thread for the calls; `body` notes each in the progress.
     ///
     /// # Errors
-    /// What the system says if there can be no thread.
+    /// The system's, if there can be no thread.
     pub(crate) fn start(
         limit: Duration,
         body: impl FnOnce(&Progress) -> T + Send + 'static,
     ) -> std::io::Result<Self> {
-        let progress = Progress::default();
-        let (sender, result) = sync_channel(1);
-        let thread = std::thread::Builder::new().name("flotor-calls".to_owned());
-        let inside = progress.clone();
-        let thread = thread.spawn(move || {
-            let value = body(&inside);
-            inside.leave();
-            // Nobody takes it where nobody waits any more: it is dropped here.
-            let _ = sender.send(value);
-        })?;
-        Ok(Self { result, thread, progress, limit })
+        Ok(CallThread::start()?.attend(limit, body))
     }
 
-    /// The result, if it comes within `time`, or that it will not come.
+    /// Returns the result, if it comes within `time`, or the call that does not return.
     pub(crate) fn look(&self, time: Duration) -> Option<Result<T, Unresponsive>> {
         match self.result.recv_timeout(time) {
-            Ok(value) => Some(Ok(value)),
-            Err(RecvTimeoutError::Timeout) => self.progress.look(self.limit).err().map(Err),
-            // Only a panic of the host's own code ends the thread without a result.
-            Err(RecvTimeoutError::Disconnected) => None,
+            Ok(Ok(value)) => Some(Ok(value)),
+            // Only the host's own code panics here.
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
+                self.progress.look(self.limit).err().map(Err)
+            }
         }
     }
 
@@ -311,37 +306,64 @@ impl<T: Send + 'static> Attended<T> {
     /// Which call did not return; `None` if the result is not wanted any more.
     pub(crate) fn wait_while(self, is_wanted: impl Fn() -> bool) -> Result<T, Option<Unresponsive>> {
         while is_wanted() {
-            match self.look(LOOK) {
-                Some(result) => return result.map_err(Some),
-                None if self.thread.is_finished() => {
-                    return self.result.try_recv().map_err(|_| match self.thread.join() {
-                        Err(panic) => std::panic::resume_unwind(panic),
-                        Ok(()) => None,
-                    });
-                }
-                None => {}
+            if let Some(result) = self.look(LOOK) {
+                return result.map_err(Some);
             }
         }
-        LEFT_BEHIND.fetch_or(!self.thread.is_finished(), Ordering::Relaxed);
+        if matches!(self.result.try_recv(), Err(TryRecvError::Empty)) {
+            leave_behind();
+        }
         Err(None)
     }
 }
 
-/// Runs calls of plugins, `body`, on a thread of their own, each for no longer than `limit`.
-///
-/// # Errors
-/// Which call did not return.
-pub(crate) fn attended<T: Send + 'static>(
-    limit: Duration,
-    body: impl FnOnce(&Progress) -> T + Send + 'static,
-) -> Result<T, CallError> {
-    attended_while(limit, || true, body)
+type Job = Box<dyn FnOnce() + Send>;
+
+/// A thread for calls of plugins. It ends when this is dropped, after the calls that it has begun.
+pub(super) struct CallThread {
+    jobs: SyncSender<Job>,
 }
 
-/// The same only while the result is wanted.
+impl CallThread {
+    /// Starts the thread, with the stack on which it would end the process.
+    ///
+    /// # Errors
+    /// The system's, if there can be no thread.
+    pub(super) fn start() -> std::io::Result<Self> {
+        let (jobs, waiting) = sync_channel::<Job>(1);
+        let thread = std::thread::Builder::new().name("flotor-calls".to_owned());
+        thread.spawn(move || {
+            prepare_for_calls();
+            waiting.into_iter().for_each(|job| job());
+        })?;
+        Ok(Self { jobs })
+    }
+
+    /// Executes calls on this thread, after those before; `body` notes each in the progress.
+    pub(super) fn attend<T: Send + 'static>(
+        &self,
+        limit: Duration,
+        body: impl FnOnce(&Progress) -> T + Send + 'static,
+    ) -> Attended<T> {
+        let progress = Progress::default();
+        let (sender, result) = sync_channel(1);
+        let inside = progress.clone();
+        let job = move || {
+            let value = catch_unwind(AssertUnwindSafe(|| body(&inside)));
+            inside.leave();
+            // Nobody takes the value where nobody waits any more: it is dropped here.
+            let _ = sender.send(value);
+        };
+        // The thread ends after this sender only.
+        let _ = self.jobs.send(Box::new(job));
+        Attended { result, progress, limit }
+    }
+}
+
+/// Runs calls of plugins, `body`, on a thread of their own, each for no longer than `limit`, and only while the result is wanted.
 ///
 /// # Errors
-/// Which call did not return.
+/// Which call did not return, or no thread.
 pub(crate) fn attended_while<T: Send + 'static>(
     limit: Duration,
     is_wanted: impl Fn() -> bool,
@@ -358,7 +380,7 @@ pub enum CallError {
     #[error(transparent)]
     Unresponsive(#[from] Unresponsive),
     /// The system has no thread for it.
-    #[error("cannot start a thread for the calls of a plugin")]
+    #[error("cannot start a thread for the calls of a plugin; {THREAD_ADVICE}")]
     NoThread,
     /// The run it was for was stopped or over before.
     #[error("the run was stopped before `create`, `open` or the like returned")]
@@ -373,22 +395,30 @@ mod tests {
 
     #[test]
     fn a_result_comes_back_and_each_call_has_the_whole_limit() {
-        let made = attended(Duration::from_secs(600), |progress| {
-            progress.enter("jelly", Call::Create);
-            progress.enter("jelly", Call::Prepare);
-            7
-        });
+        let made = attended_while(
+            Duration::from_secs(600),
+            || true,
+            |progress| {
+                progress.enter("jelly", Call::Create);
+                progress.enter("jelly", Call::Prepare);
+                7
+            },
+        );
         assert_eq!(made, Ok(7));
     }
 
     #[test]
     fn who_does_not_return_is_named_and_left_behind() {
         let (release, held) = sync_channel::<()>(0);
-        let made = attended(SHORT, move |progress| {
-            progress.enter("jelly", Call::Create);
-            progress.enter("rubber", Call::Prepare);
-            held.recv()
-        });
+        let made = attended_while(
+            SHORT,
+            || true,
+            move |progress| {
+                progress.enter("jelly", Call::Create);
+                progress.enter("rubber", Call::Prepare);
+                held.recv()
+            },
+        );
         let told = Unresponsive { who: "rubber".to_owned(), call: Call::Prepare, limit: SHORT };
         assert_eq!(made.map(|_| ()), Err(CallError::Unresponsive(told)));
         assert!(is_left_behind());
@@ -397,11 +427,15 @@ mod tests {
 
     #[test]
     fn the_hosts_own_code_has_no_limit() {
-        let made = attended(SHORT, |progress| {
-            progress.enter("jelly", Call::Create);
-            progress.leave();
-            std::thread::sleep(4 * SHORT);
-        });
+        let made = attended_while(
+            SHORT,
+            || true,
+            |progress| {
+                progress.enter("jelly", Call::Create);
+                progress.leave();
+                std::thread::sleep(4 * SHORT);
+            },
+        );
         assert_eq!(made, Ok(()));
     }
 

@@ -32,6 +32,7 @@ pub use calls::{
     Call, CallError, LIMIT_VARIABLE, Notice, Unresponsive, is_left_behind, stop_waits_with, tell_notices,
 };
 pub use estimates::estimates;
+pub use flotor_servo::THREAD_ADVICE;
 pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue, Observer,

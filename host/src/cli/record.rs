@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &RecordArguments) -> Result<(), CommandError> {
 }
 
 fn record_local(out: &Path) -> Result<(), CommandError> {
-    let stop = stop_on_signals();
+    let stop = stop_on_signals()?;
     let client =
         Client::find(&Directory::of_this_user()).map_err(|error| CommandError::Usage(error.to_string()))?;
     eprintln!("recording `{}` (Ctrl-C ends)", client.greeting().title);

@@ -112,7 +112,7 @@ const ML_API: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"ml-api\
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // First of all: a signal during loading ends the run, too. One that serves a program ends with a summary, however short the
     // program was.
-    let stop = if arguments.is_lent() { stop_on_signals() } else { stop_run_on_signals() };
+    let stop = if arguments.is_lent() { stop_on_signals()? } else { stop_run_on_signals()? };
     stop_waits_with(&stop);
     if arguments.json.is_on_standard_output() {
         keep_results_apart()?;

@@ -121,8 +121,11 @@ impl Cohort {
             Ok(())
         };
         let results: Vec<Result<(), CohortError>> = std::thread::scope(|scope| {
-            let threads: Vec<_> = (0..jobs.get()).map(|_| scope.spawn(work)).collect();
-            threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+            // Where the system has too few threads, this one does the rest.
+            let start = |_| std::thread::Builder::new().spawn_scoped(scope, work).ok();
+            let threads: Vec<_> = (1..jobs.get()).filter_map(start).collect();
+            let own = std::iter::once(work());
+            own.chain(threads.into_iter().filter_map(|thread| thread.join().ok())).collect()
         });
         results.into_iter().collect::<Result<(), _>>()?;
         Ok(dataset.write_tables()?)

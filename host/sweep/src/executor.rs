@@ -42,11 +42,14 @@ pub fn execute(
         Ok(())
     };
     std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..jobs.get()).map(|_| scope.spawn(work)).collect();
-        let results = workers
+        // Where the system has too few threads, this one does the rest.
+        let start = |_| std::thread::Builder::new().spawn_scoped(scope, work).ok();
+        let workers: Vec<_> = (1..jobs.get()).filter_map(start).collect();
+        let own = std::iter::once(work());
+        let others = workers
             .into_iter()
             .map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-        results.collect::<Result<Vec<()>, StoreError>>()
+        own.chain(others).collect::<Result<Vec<()>, StoreError>>()
     })?;
     let done = done.into_inner();
     Ok(Progress { found: found.len(), done, stopped: done < open.len() })

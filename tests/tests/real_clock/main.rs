@@ -7,6 +7,7 @@ mod first_moment;
 mod groups;
 mod jitter;
 mod lateness;
+mod scarcity;
 mod signals;
 
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};

@@ -6,7 +6,7 @@ use crate::sensor::{ForceSensor, SERIAL_SENSOR};
 use clap::{ArgGroup, Args};
 use flotor_command::options::{KeyValue, PluginPathOption, duration_s, number, settings, whole};
 use flotor_command::stopping::stop_on_signals;
-use flotor_command::{CommandError, progress_bar};
+use flotor_command::{CommandError, Redrawn, progress_bar};
 use flotor_hal::abi::PluginKind;
 use flotor_servo::StopSwitch;
 use flotor_session::{LatchGuard, LatchWatch};
@@ -72,7 +72,7 @@ impl RigArguments {
     /// The device and its sensor, and a progress bar over this many stops that shows the next height of the sensor.
     pub(super) fn device_rig(&self, stops: u64) -> Result<(DeviceRig<Guide>, ProgressBar), CommandError> {
         // Before a plugin is loaded: a thread that is there already would still take Ctrl-C.
-        let stop = stop_on_signals();
+        let stop = stop_on_signals()?;
         let registry = self.plugin_path.registry();
         let plugin = registry.load(self.plugin(), PluginKind::Device)?;
         let sensor_plugin = registry.load(&self.sensor_plugin, PluginKind::Device)?;
@@ -87,7 +87,6 @@ impl RigArguments {
         let sensor = ForceSensor::open(&sensor_plugin, port, sensor_settings).map_err(refused)?;
         let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
-        progress.enable_steady_tick(REDRAWN);
         let watch = LatchGuard::of_this_user().obey(&stop)?;
         let guide = guide(&progress, &stop, watch);
         let rig = DeviceRig::open(&plugin, &device_settings, sensor, close_m, patience, stop, guide);
@@ -98,8 +97,9 @@ impl RigArguments {
 /// The latch is watched for as long as there is a guide, and so a rig.
 fn guide(progress: &ProgressBar, stop: &StopSwitch, watch: LatchWatch) -> Guide {
     let (progress, stop) = (progress.clone(), stop.clone());
+    let redrawn = Redrawn::every(REDRAWN, &progress);
     Box::new(move |waiting| {
-        let _ = &watch;
+        let _ = (&watch, &redrawn);
         match waiting {
             Some(Waiting { target_m, height_m, command_n }) => {
                 let (target_mm, height_mm) = (target_m * 1.0e3, height_m * 1.0e3);

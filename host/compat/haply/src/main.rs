@@ -104,7 +104,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<(), CommandError> {
     // First of all: a signal while the scene is prepared ends the run, too.
-    let stop = stop_on_signals();
+    let stop = stop_on_signals()?;
     let mut settings = Settings::from_environment().map_err(CommandError::Usage)?.of_own_process();
     settings.scene = arguments.scene.or(settings.scene);
     settings.plugin_folders = arguments.plugin_path.folders().to_vec();

@@ -165,7 +165,7 @@ impl Delivery {
 /// input. A call that takes longer than `patience` ends the process. Not real-time.
 ///
 /// # Errors
-/// Standard input is no such file.
+/// Standard input is no such file, or the system has no thread.
 pub fn deliver(
     plugin: &Plugin,
     settings: &[Setting],
@@ -178,7 +178,7 @@ pub fn deliver(
         // Whether or not that can be told: nothing else ends a call that does not return.
         Delivery::Stuck(PoseRecord::from(pose)).write().ok();
         end_at_once();
-    });
+    })?;
     let measured = plugin.create_model(settings).and_then(|model| {
         let part_of_full = part_of(options.size, model.memory());
         measure(&Setup { plugin, settings, options: *options, part: part_of_full, progress }, part)

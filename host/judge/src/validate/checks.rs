@@ -10,6 +10,7 @@ use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, Setting, read_metadata};
 use flotor_hal::conformance::Rule;
 use flotor_hal::{Parameter, ParameterKind, RefusalKind};
+use flotor_session::THREAD_ADVICE;
 use flotor_session::registry::load_file;
 use flotor_session::scene::KeyValue;
 use std::path::Path;
@@ -68,6 +69,11 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
 }
 
 impl Seen {
+    /// Nothing is known of the rule where the system has no thread for its check.
+    pub(crate) fn no_thread(cause: &std::io::Error) -> Self {
+        Self::Missing(format!("the check needs a thread: {cause}; {THREAD_ADVICE}"))
+    }
+
     /// The rule does not apply, for this reason.
     pub(super) fn nothing_to_judge(why: &str) -> Self {
         Self::NothingToJudge(why.to_owned())

@@ -1,5 +1,6 @@
 //! Rules of a device: its description, its life cycle, and its stop.
 
+use super::Seen;
 use super::path::CONFIG;
 use flotor_core::plausibility::{PoseBounds, is_rotation};
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
@@ -93,7 +94,7 @@ fn within(call: &str, took: Duration, limit: Duration) -> Result<(), String> {
     if took <= limit { Ok(()) } else { Err(format!("{call} takes {took:?}, above the limit of {limit:?}")) }
 }
 
-pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), String> {
+pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Seen> {
     let push = push(&device.capabilities().map_err(|refusal| refusal.to_string())?);
     // Only its description is checked: the message is for a device that has no host any more.
     let _ = device.independent_stop().map_err(|refusal| refusal.to_string())?;
@@ -102,8 +103,10 @@ pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), String> {
     if push != Wrench::ZERO {
         running.feel(&push)?;
     }
-    std::thread::spawn(move || stopper.safe_stop()).join().map_err(|_| "safe_stop panicked".to_owned())?;
-    running.feel_nothing(&push)
+    let stopping = std::thread::Builder::new().spawn(move || stopper.safe_stop());
+    let stopping = stopping.map_err(|cause| Seen::no_thread(&cause))?;
+    stopping.join().map_err(|_| "safe_stop panicked".to_owned())?;
+    Ok(running.feel_nothing(&push)?)
 }
 
 /// What to push with: no more than a newton, along the first axis that is driven; nothing where none is.

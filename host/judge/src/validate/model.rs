@@ -146,22 +146,27 @@ fn walked(models: &mut [&mut Model]) -> Result<Vec<Vec<Wrench>>, String> {
     Ok(wrenches)
 }
 
-pub(super) fn independent(subject: &Subject) -> Result<(), String> {
+pub(super) fn independent(subject: &Subject) -> Result<(), Seen> {
     let make = || subject.prepared_model();
     let alone = walked(&mut [&mut make()?])?;
     let alone = alone.first().cloned().unwrap_or_default();
     let in_turns = walked(&mut [&mut make()?, &mut make()?])?;
     if in_turns.iter().any(|wrenches| *wrenches != alone) {
-        return Err("two instances stepped alternately give other answers than one alone".to_owned());
+        return Err("two instances stepped alternately give other answers than one alone".to_owned().into());
     }
     // Made here, used there: a loop has a thread of its own.
-    let elsewhere: Vec<_> = [make()?, make()?]
-        .map(|mut model| std::thread::spawn(move || walked(&mut [&mut model])))
+    let start = |mut model: Model| {
+        let thread = std::thread::Builder::new().spawn(move || walked(&mut [&mut model]));
+        thread.map_err(|cause| Seen::no_thread(&cause))
+    };
+    let elsewhere: Vec<_> = [start(make()?), start(make()?)]
         .into_iter()
-        .map(|thread| thread.join().map_err(|_| "a thread panicked".to_owned())?)
-        .collect::<Result<_, String>>()?;
+        .map(|thread| Ok(thread?.join().map_err(|_| "a thread panicked".to_owned())??))
+        .collect::<Result<_, Seen>>()?;
     if elsewhere.iter().flatten().any(|wrenches| *wrenches != alone) {
-        return Err("two instances stepped on two threads give other answers than one alone".to_owned());
+        return Err("two instances stepped on two threads give other answers than one alone"
+            .to_owned()
+            .into());
     }
     Ok(())
 }

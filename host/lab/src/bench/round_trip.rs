@@ -4,6 +4,7 @@
 use super::TickCost;
 use crate::platform::{wait, wake};
 use flotor_judge::call_timer::{net_ns, quantile};
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
@@ -38,17 +39,19 @@ fn await_other(word: &AtomicU32, last: u32) -> u32 {
 }
 
 /// Times so many batches of round trips between two threads, ns each. Not real-time.
-#[must_use]
-pub fn time_round_trips(batches: usize) -> TickCost {
+///
+/// # Errors
+/// The system's, if there can be no second thread.
+pub fn time_round_trips(batches: usize) -> io::Result<TickCost> {
     let words = Arc::new(Words::default());
     let other = Arc::clone(&words);
-    let echo = std::thread::spawn(move || {
+    let echo = std::thread::Builder::new().spawn(move || {
         let mut last = 0;
         while last != OVER {
             last = await_other(&other.there, last);
             send(&other.back, last);
         }
-    });
+    })?;
     let mut number = 0;
     let mut batch = |_| {
         let begin = Instant::now();
@@ -63,7 +66,7 @@ pub fn time_round_trips(batches: usize) -> TickCost {
     send(&words.there, OVER);
     let _ = echo.join();
     let [median_ns, fastest_ns, p99_ns] = [0.5, 0.0, 0.99].map(|part| quantile(&mut times_ns, part));
-    TickCost { median_ns, fastest_ns, p99_ns }
+    Ok(TickCost { median_ns, fastest_ns, p99_ns })
 }
 
 #[cfg(test)]
@@ -72,7 +75,7 @@ mod tests {
 
     #[test]
     fn every_round_trip_comes_back() {
-        let cost = time_round_trips(3);
+        let cost = time_round_trips(3).expect("a thread");
         assert!(cost.fastest_ns > 0.0 && cost.fastest_ns <= cost.median_ns, "{cost:?}");
     }
 }

@@ -12,6 +12,7 @@ use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::Detail;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_servo::THREAD_ADVICE;
 use flotor_session::registry::Registry;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -159,7 +160,10 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
         Ok(TickRow { device, cost })
     };
     let rows = BenchDevice::ALL.into_iter().map(row).collect::<Result<Vec<_>, CommandError>>()?;
-    let report = TickReport::new(rows, time_round_trips(batches / SLOWER));
+    let round_trips = time_round_trips(batches / SLOWER).map_err(|cause| {
+        CommandError::Failed(format!("cannot start a second thread: {cause}; {THREAD_ADVICE}"))
+    })?;
+    let report = TickReport::new(rows, round_trips);
     let text = || {
         let title = format!("a tick with `{}`, trace on, virtual clock: ns", arguments.model);
         let cells = |name: &str, cost: &TickCost| {

@@ -48,7 +48,7 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let slices = ((arguments.duration / 2.0).ceil() as u64).max(1);
     let progress = progress_bar(slices, "{percent:>3} %  pair {pos} of {len}");
-    let stop = stop_on_signals();
+    let stop = stop_on_signals()?;
     let report = measure(session, slices, &stop, |done| progress.set_position(done))?;
     progress.finish_and_clear();
 

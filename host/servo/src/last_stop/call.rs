@@ -11,12 +11,17 @@ thread_local! {
     static HAS_HANDLERS: Cell<bool> = const { Cell::new(false) };
 }
 
-/// From now on this thread is in a call of a plugin: if it crashes there, or calls `exit`, one line names both, and the process
-/// ends with code 3. Not real-time.
-pub fn enter_call(who: &str, call: impl Display) {
+/// Installs the handlers of a crash, with a stack for them, in this thread, unless they are. Not real-time.
+pub fn prepare_for_calls() {
     if !HAS_HANDLERS.replace(true) {
         install_for_crashes();
     }
+}
+
+/// From now on this thread is in a call of a plugin: if it crashes there, or calls `exit`, one line names both, and the process
+/// ends with code 3. Not real-time.
+pub fn enter_call(who: &str, call: impl Display) {
+    prepare_for_calls();
     let mut line = Line::EMPTY;
     // A name that is too long is cut, and the call with it.
     let _ = write!(line, "`{who}` ended the process in {call}");

@@ -15,7 +15,7 @@ pub(crate) use crate::platform::last_stop::take_sent;
 pub use crate::platform::last_stop::{
     SignalGuard, SignalName, TakenSignals, ignore_no_signal, spawn_unblocked,
 };
-pub use call::{enter_call, leave_call};
+pub use call::{enter_call, leave_call, prepare_for_calls};
 pub use end_report::{ReportedEnd, report_end, report_end_to};
 
 use crate::platform::last_stop as system;

@@ -2,7 +2,7 @@
 
 use super::controls::Settled;
 use super::{Controls, DeviceOutcome, Finished, Outcome, Remains};
-use crate::calls::{Call, CallError, Progress, Unresponsive, attended, end_limit};
+use crate::calls::{Call, CallError, EndCalls, EndReserve, Progress, Unresponsive, end_limit};
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
 use flotor_servo::{Dismantled, Forces, Heartbeat, Layer, LayerReport, Reported};
 use std::time::Instant;
@@ -14,12 +14,14 @@ pub(super) struct Epilogue {
     pub(super) heart: Heartbeat,
     pub(super) names: Vec<String>,
     pub(super) controls: Controls,
+    pub(super) reserve: EndReserve,
 }
 
 impl Epilogue {
     /// De-energises the devices and puts together what is known of the run.
     pub(super) fn conclude(self, finished: Finished) -> Outcome {
-        let Self { started, mut warnings, heart, names, controls } = self;
+        let Self { started, mut warnings, heart, names, controls, reserve } = self;
+        let mut calls = reserve.begin();
         let Finished { servo, end, elapsed_ns, dropped_records, real_time, warning } = finished;
         warnings.extend(warning);
         let known_before = warnings.len();
@@ -28,21 +30,22 @@ impl Epilogue {
         let (mut told, mut closing) = (Vec::new(), Vec::new());
         let model_names = names.get(devices.len()..).unwrap_or_default();
         for (name, (device, reported)) in names.iter().zip(devices) {
-            let (outcome, opened) = deactivate(name, device, reported, &mut unresponsive);
+            let (outcome, opened) = deactivate(&mut calls, name, (device, reported), &mut unresponsive);
             told.push(outcome);
             closing.extend(opened.map(|opened| (name.clone(), opened)));
         }
         let couplings = forces.coupling_outcomes();
         // No tick will take them any more.
         let waiting = swaps.into_layers().into_iter();
-        let (layers, reports) = last_words(model_names, (forces, controls.take_retired()), &mut unresponsive);
+        let (layers, reports) =
+            last_words(&mut calls, model_names, (forces, controls.take_retired()), &mut unresponsive);
         let Settled { first: health, misbehaved, replacements, hung } = controls.settle(reports);
         unresponsive = unresponsive.or(hung);
         let models = model_names.iter().cloned().zip(health);
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
         let name = |number: usize| model_names.get(number).cloned().unwrap_or_default();
         let layers = layers.into_iter().chain(waiting).map(|(number, layer)| (name(number), layer)).collect();
-        let remains = Remains::new(closing, layers, last_stop);
+        let remains = Remains::new(closing, layers, last_stop, calls);
         let wall_s = started.elapsed().as_secs_f64();
         warnings.extend(controls.warnings());
         let taken = heart.signals_taken();
@@ -73,13 +76,13 @@ impl Epilogue {
 
 /// De-energises a device that was told to stop: what it says of the run, and the device unless its plugin broke or hangs.
 fn deactivate(
+    calls: &mut EndCalls,
     name: &str,
-    mut device: ActiveDevice,
-    reported: Reported,
+    (mut device, reported): (ActiveDevice, Reported),
     unresponsive: &mut Option<Unresponsive>,
 ) -> (DeviceOutcome, Option<OpenedDevice>) {
     let (who, float_changes) = (name.to_owned(), device.float_changes());
-    let told = attended(end_limit(), move |progress| {
+    let told = calls.attended(end_limit(), move |progress| {
         progress.enter(&who, Call::Deactivate);
         let ledger = device.energy_ledger();
         let words = device.last_message();
@@ -102,12 +105,13 @@ type Layers = Vec<(usize, Box<Layer>)>;
 /// What became of each layer in the loop and of those it handed back, with the last words of those that did not behave; and
 /// the layers, unless one of those hangs.
 fn last_words(
+    calls: &mut EndCalls,
     names: &[String],
     (mut forces, mut retired): (Forces, Layers),
     unresponsive: &mut Option<Unresponsive>,
 ) -> (Layers, Vec<LayerReport>) {
     let names = names.to_vec();
-    let told = attended(end_limit(), move |progress: &Progress| {
+    let told = calls.attended(end_limit(), move |progress: &Progress| {
         let asks =
             |model: usize| progress.enter(names.get(model).map_or("", String::as_str), Call::LastMessage);
         let mut reports: Vec<LayerReport> =

@@ -11,8 +11,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Why there is no run without a thread that watches.
-pub(super) const NO_WATCH: &str = "got no watch over the emergency stop of the machine";
+/// Purpose of the thread without which nothing is energised.
+pub(super) const WATCH: &str = "the emergency stop of the machine";
 /// Pause between two looks at the latch.
 const LOOK_PERIOD: Duration = Duration::from_millis(5);
 /// Time in which the other runs confirm an emergency stop.
@@ -115,7 +115,7 @@ impl LatchGuard {
     /// # Errors
     /// [`RunError::Latched`], or no thread.
     pub fn obey(&self, stop: &StopSwitch) -> Result<LatchWatch, RunError> {
-        let watch = self.watch(stop).map_err(|_| RunError::Thread(NO_WATCH))?;
+        let watch = self.watch(stop).map_err(|_| RunError::NoThread(WATCH))?;
         self.check().map(|()| watch)
     }
 

@@ -5,6 +5,7 @@ use super::{
     ChangeLog, Controls, Epilogue, Finished, Observer, Outcome, RealTimeReport, RunError, Session, TapEnds,
     publish_to,
 };
+use crate::calls::EndReserve;
 use flotor_core::demand::DemandRequest;
 use flotor_hal::Demand;
 use flotor_hal::abi::loader::Stopper;
@@ -37,7 +38,7 @@ impl Session {
     /// # Errors
     /// [`RunError`] if a device refuses to be energised; then none is.
     pub fn into_lockstep(self) -> Result<Lockstep, RunError> {
-        let epilogue = self.epilogue();
+        let epilogue = self.epilogue(EndReserve::default());
         let Session { standby, controls, changes, taps, period_ns, duration_ns, plugins, .. } = self;
         let stoppers = Stoppers(standby.stoppers());
         let asked = standby.observers().request(Demand::FORCE);

@@ -19,7 +19,7 @@ pub use prepare::prepare_model;
 pub use remains::Remains;
 pub use steps::Steps;
 
-use crate::calls::{Call, CallError, Progress, Unresponsive, end_limit, leave_behind, limit};
+use crate::calls::{Call, CallError, EndReserve, Progress, Unresponsive, end_limit, leave_behind, limit};
 use crate::registry::{LookupError, Registry};
 use crate::scene::{Pacing, Scene, SceneError};
 use ceiling::{norm_notice, under_ceiling};
@@ -45,7 +45,7 @@ use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
     Clock, Core, Coupled, CouplingOutcome, Envelope, EnvelopeEffects, Forces, Guarded, Loop, ModelHealth,
     ParameterQueue, Place, RealTimeReport, RunConfig, RunEnd, Schedule, Servo, SpinWindow, Standby,
-    StopSwitch, Stuck, Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
+    StopSwitch, Stuck, THREAD_ADVICE, Timing, drain, enter_real_time, queue, start_watchdog, swap_queues,
 };
 use prepare::{Scheduled, activate, activate_here};
 use std::sync::Arc;
@@ -87,9 +87,12 @@ pub enum RunError {
     /// A plugin did not return from a call before the run.
     #[error(transparent)]
     Calls(#[from] CallError),
-    /// The servo's thread could not be started or died.
+    /// The servo thread died.
     #[error("the servo thread {0}; no device was moved")]
     Thread(&'static str),
+    /// The system has no thread for a part of the run, which is named.
+    #[error("cannot start the thread for {0}, so no device was moved; {THREAD_ADVICE}")]
+    NoThread(&'static str),
     /// The scene requires a stop that does not depend on this process, and there is none.
     #[error(
         "no watchdog process: {0}; `[limits] require_independent_stop = true` requires one; correct the cause, or remove that line"
@@ -136,6 +139,7 @@ impl RunError {
             | Self::Lookup(LookupError::Unknown { .. } | LookupError::Ambiguous { .. }) => true,
             Self::Lookup(LookupError::Refused(error)) | Self::Plugin(error) => error.is_configuration(),
             Self::Thread(_)
+            | Self::NoThread(_)
             | Self::Hung { .. }
             | Self::WatchdogProcess(_)
             | Self::Calls(_)
@@ -623,11 +627,12 @@ impl Session {
     /// Runs until the duration is over, somebody uses `stop`, or the device faults.
     ///
     /// # Errors
-    /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::Thread`] if the servo's thread cannot be had,
+    /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::NoThread`] if the system has no thread for a part of the run,
     /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon;
     /// [`RunError::Latched`] if the emergency stop of the machine is pressed, on the real clock.
     pub fn run(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
-        let epilogue = self.epilogue();
+        let reserve = EndReserve::take().map_err(|_| RunError::NoThread("the end of the run"))?;
+        let epilogue = self.epilogue(reserve);
         let finished = match self.clock {
             Clock::Virtual => self.run_virtual(observer, stop)?,
             Clock::Real => self.run_real(observer, stop)?,
@@ -636,8 +641,9 @@ impl Session {
     }
 
     /// What the end of this run needs to know of its beginning.
-    fn epilogue(&self) -> Epilogue {
+    fn epilogue(&self, reserve: EndReserve) -> Epilogue {
         Epilogue {
+            reserve,
             started: Instant::now(),
             warnings: self.warnings.clone(),
             heart: self.standby.heart(),
@@ -699,7 +705,7 @@ impl Session {
         let mut guardian = Guardian::of(watchdog_process.as_ref(), requires_independent_stop);
         // Before the look at the latch that counts: a press after that is seen here.
         let watch = latch.as_ref().map(|latch| latch.watch(stop)).transpose();
-        let _watch = watch.map_err(|_| RunError::Thread(latch::NO_WATCH))?;
+        let _watch = watch.map_err(|_| RunError::NoThread(latch::WATCH))?;
         let mut asked = standby.observers().request(observer.demand());
         let mut look = |observer: &mut dyn Observer, record: TickRecord| {
             changes.up_to(record.tick, |change| observer.change(change));
@@ -762,10 +768,10 @@ impl Session {
             if let Ok(watchdog) = &watchdog {
                 wait_for_end_of(watchdog);
             }
-            watchdog.map_err(|_| RunError::Thread("got no watchdog"))?;
+            watchdog.map_err(|_| RunError::NoThread("the watchdog"))?;
             Ok::<_, RunError>(Finished::of(runner, dropped_records, real_time))
         });
-        let servo_thread = servo_thread.map_err(|_| RunError::Thread("could not be started"))?;
+        let servo_thread = servo_thread.map_err(|_| RunError::NoThread("the loop"))?;
         let mut bitten = None;
         let mut stopping_since = None;
         while !servo_thread.is_finished() {

@@ -3,7 +3,7 @@
 //! That code may hang or end the process, and nothing of the run depends on it any more. So whoever has a recording to close
 //! and a summary to print does that before.
 
-use crate::calls::{Call, CallError, Unresponsive, attended, end_limit};
+use crate::calls::{Call, CallError, EndCalls, Unresponsive, end_limit};
 use flotor_hal::abi::loader::OpenedDevice;
 use flotor_servo::{LastStop, Layer};
 
@@ -14,6 +14,7 @@ pub struct Remains {
     models: Vec<(String, Box<Layer>)>,
     /// Holds the devices too, and closes one that nobody else holds.
     last_stop: Option<LastStop>,
+    calls: EndCalls,
 }
 
 impl Remains {
@@ -21,8 +22,9 @@ impl Remains {
         devices: Vec<(String, OpenedDevice)>,
         models: Vec<(String, Box<Layer>)>,
         last_stop: Option<LastStop>,
+        calls: EndCalls,
     ) -> Self {
-        Self { devices, models, last_stop }
+        Self { devices, models, last_stop, calls }
     }
 
     /// Closes the devices and frees the models, each for no longer than 5 s. Not real-time.
@@ -35,12 +37,12 @@ impl Remains {
 
     fn free_all(&mut self) -> Result<(), Unresponsive> {
         // Nothing is energised any more. Of a device whose plugin broke this is all that is left.
-        let mut first = free("a device".to_owned(), Call::Close, self.last_stop.take());
+        let mut first = free(&mut self.calls, "a device".to_owned(), Call::Close, self.last_stop.take());
         for (who, device) in self.devices.drain(..) {
-            first = first.and(free(who, Call::Close, device));
+            first = first.and(free(&mut self.calls, who, Call::Close, device));
         }
         for (who, layer) in self.models.drain(..) {
-            first = first.and(free(who, Call::Destroy, layer));
+            first = first.and(free(&mut self.calls, who, Call::Destroy, layer));
         }
         first
     }
@@ -54,8 +56,13 @@ impl Drop for Remains {
 }
 
 /// Drops what only the code of a plugin can free.
-fn free<T: Send + 'static>(who: String, call: Call, what: T) -> Result<(), Unresponsive> {
-    let freed = attended(end_limit(), move |progress| {
+fn free<T: Send + 'static>(
+    calls: &mut EndCalls,
+    who: String,
+    call: Call,
+    what: T,
+) -> Result<(), Unresponsive> {
+    let freed = calls.attended(end_limit(), move |progress| {
         progress.enter(&who, call);
         drop(what);
     });

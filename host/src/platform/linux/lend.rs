@@ -209,7 +209,7 @@ impl Drop for Folder {
 }
 
 pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
-    let stop = stop_on_signals();
+    let stop = stop_on_signals()?;
     let [name, rest @ ..] = arguments.program.as_slice() else {
         return Err(CommandError::Usage(
             "which program? `flotor lend [SCENE] -- PROGRAM ARGUMENTS`".to_owned(),

@@ -478,7 +478,7 @@ fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) 
     };
     let about = u64::from(common.subjects) * cohort.protocol.presentations_about();
     let progress = progress_bar(about, "{wide_bar} {pos} of about {len} presentations  {elapsed}");
-    let stop = stop_on_signals().stop_flag();
+    let stop = stop_on_signals()?.stop_flag();
     let jobs = common.jobs.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
     let dataset = Dataset::at(&common.out);
     let kinematics = common.kinematics.unwrap_or(Kinematics::Summary);

@@ -42,8 +42,14 @@ pub(crate) fn divide() -> io::Result<Side> {
     // Signals wait until there is a child to forward them to.
     let before = set_blocked(&every_signal());
     // SAFETY: this process has one thread, so that no lock is held in the child.
-    match unsafe { libc::fork() } {
-        0 => {
+    let child = unsafe { libc::fork() };
+    if child < 0 {
+        let cause = io::Error::last_os_error();
+        set_blocked(&before);
+        return Err(cause);
+    }
+    match Pid::from_raw(child) {
+        None => {
             SUPERVISOR.store(parent.as_raw_nonzero().get(), Ordering::Relaxed);
             set_parent_process_death_signal(Some(Signal::TERM))?;
             set_blocked(&before);
@@ -52,14 +58,7 @@ pub(crate) fn divide() -> io::Result<Side> {
             }
             Ok(Side::Child { supervisor: parent.as_raw_nonzero().get().cast_unsigned(), report })
         }
-        child => match Pid::from_raw(child).filter(|_| child > 0) {
-            Some(child) => Ok(Side::Supervisor(supervise(child, report))),
-            None => {
-                let cause = io::Error::last_os_error();
-                set_blocked(&before);
-                Err(cause)
-            }
-        },
+        Some(child) => Ok(Side::Supervisor(supervise(child, report))),
     }
 }
 

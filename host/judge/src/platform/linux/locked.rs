@@ -59,7 +59,8 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Seen> {
     let stage = Arc::new(AtomicU8::new(WAITING));
     let (ready, told) = channel();
     let of_thread = Arc::clone(&stage);
-    let _ = std::thread::spawn(move || walk_locked_in(model, &ready, &of_thread));
+    let walking = std::thread::Builder::new().spawn(move || walk_locked_in(model, &ready, &of_thread));
+    walking.map_err(|cause| Seen::no_thread(&cause))?;
     let ended = |_| Seen::Violation("its thread ended before the test".to_owned());
     let thread = told.recv().map_err(ended)?;
     let folder = PathBuf::from(format!("/proc/self/task/{thread}"));

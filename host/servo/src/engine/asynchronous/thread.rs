@@ -3,7 +3,7 @@
 //! Loop and thread share two latest-value cells, a queue of orders and two flags; neither waits for the other.
 
 use super::Arrival;
-use crate::{Engine, Stepped, enter_worker_priority};
+use crate::{Engine, Stepped, THREAD_ADVICE, enter_worker_priority};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Input, LinearField, Pose, Refusal, Twist, Wrench};
 use flotor_sync::{Observer, Publisher, Words, latest};
@@ -139,7 +139,9 @@ impl ModelThread {
         // Never joined: a model that hangs must not delay its owner.
         let started = thread.spawn(move || computer.run(Duration::from_nanos(period_ns)));
         started.map_err(|error| {
-            Refusal::resource(format!("cannot start a thread for an asynchronous model: {error}"))
+            Refusal::resource(format!(
+                "cannot start a thread for an asynchronous model: {error}; {THREAD_ADVICE}"
+            ))
         })?;
         Ok(Self { looks, fields, orders, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
     }

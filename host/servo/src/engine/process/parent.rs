@@ -5,8 +5,8 @@ use super::memory::{SharedMemory, create_file};
 use super::shared_words::{DEMANDS, NO_DEMAND, Order, wait_for_change};
 use super::{Greeting, Reply};
 use crate::last_stop::spawn_unblocked;
-use crate::monotonic_ns;
 use crate::platform::processes;
+use crate::{THREAD_ADVICE, monotonic_ns};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
     ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind,
@@ -15,9 +15,9 @@ use flotor_hal::{
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
-use std::sync::OnceLock;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Sender, channel};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// What a worker is to be.
@@ -69,7 +69,7 @@ impl Worker {
         command.stdin(file).stdout(io::stderr());
         // What a terminal sends is the host's affair: it still needs the model while the force fades out.
         processes::keep_from_terminal(&mut command);
-        let child = spawn(command).map_err(no_worker)?;
+        let child = spawn(command).map_err(|error| no_worker(with_advice(error)))?;
         let mut worker = Self {
             child,
             memory,
@@ -282,22 +282,38 @@ type Start = (Command, Sender<io::Result<Child>>);
 /// Starts a process from a thread that stays as long as this process: a worker ends with the *thread* that started it, and
 /// one that exchanges a model may be gone before the run is.
 fn spawn(command: Command) -> io::Result<Child> {
-    static STARTER: OnceLock<Sender<Start>> = OnceLock::new();
-    let gone = || io::Error::other("the thread that starts processes is gone");
-    let starter = STARTER.get_or_init(|| {
-        let (starter, orders) = channel::<Start>();
-        let thread = std::thread::Builder::new().name("flotor-starter".to_owned());
-        // Without the thread nobody listens, and `send` says so.
-        let _ = thread.spawn(move || {
-            for (mut command, reply) in orders {
-                let _ = reply.send(spawn_unblocked(&mut command));
-            }
-        });
-        starter
-    });
+    static STARTER: Mutex<Option<Sender<Start>>> = Mutex::new(None);
     let (reply, child) = channel();
-    starter.send((command, reply)).map_err(|_| gone())?;
-    child.recv().map_err(|_| gone())?
+    {
+        let mut starter = STARTER.lock().unwrap_or_else(PoisonError::into_inner);
+        let starter = match &mut *starter {
+            Some(starter) => starter,
+            none => none.insert(start_starter()?),
+        };
+        let _ = starter.send((command, reply)); // the thread ends after this sender
+    }
+    child.recv().map_err(|_| io::Error::other("the thread that starts processes is gone"))?
+}
+
+/// Starts the thread that starts processes.
+fn start_starter() -> io::Result<Sender<Start>> {
+    let (starter, orders) = channel::<Start>();
+    let thread = std::thread::Builder::new().name("flotor-starter".to_owned());
+    thread.spawn(move || {
+        for (mut command, reply) in orders {
+            let _ = reply.send(spawn_unblocked(&mut command));
+        }
+    })?;
+    Ok(starter)
+}
+
+/// Adds the remedy to the system's refusal of a process or a thread.
+fn with_advice(error: io::Error) -> io::Error {
+    if error.kind() == io::ErrorKind::WouldBlock {
+        io::Error::other(format!("{error}; {THREAD_ADVICE}"))
+    } else {
+        error
+    }
 }
 
 /// The program that can be a worker: this one, or, for a program that only uses the library, `flotor` beside it or

@@ -1,11 +1,17 @@
 //! Priorities, cores and locked memory.
 
+use rustix::fs::readlink;
 use rustix::mm::{MlockAllFlags, mlockall};
-use rustix::thread::{CpuSet, sched_setaffinity};
+use rustix::process::{Resource, getrlimit};
+use rustix::thread::{CapabilitySet, CpuSet, capabilities, sched_setaffinity};
 use thread_priority::unix::{
     RealtimeThreadSchedulePolicy, ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 use thread_priority::{Error, ThreadPriority, ThreadPriorityValue};
+
+/// How a user gets room for a thread or a process that the system has refused.
+pub const THREAD_ADVICE: &str =
+    "end other programs of this user, or raise its limit (`ulimit -u`, or `pids.max` of its control group)";
 
 /// Cores that the system can name.
 pub(crate) const MOST_CORES: usize = CpuSet::MAX_CPU;
@@ -24,6 +30,9 @@ pub(crate) const CORE_ADVICE: &str = "`grep Cpus_allowed_list /proc/self/status`
 /// Priority of the loop: below the kernel's own threads (99), above everything ordinary.
 const LOOP_PRIORITY: u8 = 80;
 
+/// Name of the user namespace that a kernel starts with, a constant of its interface.
+const FIRST_USER_NAMESPACE: &[u8] = b"user:[4026531837]";
+
 /// What a thread of the host is for, which its priority follows from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Duty {
@@ -35,12 +44,23 @@ pub(crate) enum Duty {
     Watchdog,
 }
 
-/// Locks the memory of the process, what it has and what it will have; `None` where the system locks no process. Not real-time.
+/// Locks the memory that the process has; also what it will have, unless a limit would then refuse memory to the process. `None`
+/// where the system locks no process. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// The system's.
 pub(crate) fn lock_memory() -> Option<Result<(), String>> {
-    Some(mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| error.to_string()))
+    let future = if may_lock_any_memory() { MlockAllFlags::FUTURE } else { MlockAllFlags::empty() };
+    Some(mlockall(MlockAllFlags::CURRENT | future).map_err(|error| error.to_string()))
+}
+
+/// Whether no limit on locked memory holds for this process. A capability lifts it in the first user namespace only.
+fn may_lock_any_memory() -> bool {
+    let is_first = || {
+        readlink("/proc/self/ns/user", Vec::new()).is_ok_and(|name| name.as_bytes() == FIRST_USER_NAMESPACE)
+    };
+    let is_capable = || capabilities(None).is_ok_and(|sets| sets.effective.contains(CapabilitySet::IPC_LOCK));
+    getrlimit(Resource::Memlock).current.is_none() || is_capable() && is_first()
 }
 
 /// Takes it back. Not real-time.

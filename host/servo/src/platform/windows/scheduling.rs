@@ -7,6 +7,9 @@ use windows_sys::Win32::System::Threading::{
     THREAD_PRIORITY_TIME_CRITICAL,
 };
 
+/// How a user gets room for a thread or a process that the system has refused.
+pub const THREAD_ADVICE: &str = "end other programs";
+
 /// Cores that the system can name in one group of processors.
 pub(crate) const MOST_CORES: usize = usize::BITS as usize;
 

@@ -118,12 +118,15 @@ impl Served {
     fn wait(mut child: Child, service: Service) -> Result<Self, CommandError> {
         let mut output = child.stdout.take().map(BufReader::new);
         let address = output.as_mut().and_then(listening);
-        let said = output.map(|mut output| {
-            std::thread::spawn(move || {
+        let said = output.and_then(|mut output| {
+            // Without the thread its words are lost, and it goes on all the same.
+            let thread = std::thread::Builder::new().name("flotor-service".to_owned());
+            let read = move || {
                 let mut rest = String::new();
                 let _ = output.read_to_string(&mut rest);
                 rest
-            })
+            };
+            thread.spawn(read).ok()
         });
         let mut served = Self { child, said };
         let Some(address) = address else {

@@ -57,7 +57,7 @@ pub(super) struct ExploreArguments {
 }
 
 pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
-    let stop = stop_on_signals();
+    let stop = stop_on_signals()?;
     let scene = scene(arguments)?;
     let registry = Registry::search(&scene.plugin_folders);
     let options = RunOptions { clock: Clock::Real, seed: 0 };
@@ -84,13 +84,14 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
         mapping,
     };
     let (switch, mut observers) = (stop.clone(), Watched { observer: watch, publication: publication.ok() });
-    let run = std::thread::spawn(move || {
+    let run = std::thread::Builder::new().name("flotor-study".to_owned()).spawn(move || {
         let outcome = session.run(&mut observers, &switch);
         let is_in_order = outcome.as_ref().is_ok_and(|outcome| outcome.end.is_in_order());
         let kind = if is_in_order { EndKind::InOrder } else { EndKind::Failed };
         observers.end("the exploration ended", kind);
         outcome
     });
+    let run = run.map_err(|_| RunError::NoThread("the exploration"))?;
     say!("{}", style::title(&scene.title));
     say!("  type a parameter and its value; ? lists them, q ends{hint}");
     let lines = lines_of(BufReader::new(stdin())).map_err(|error| CommandError::Failed(error.to_string()))?;

@@ -57,7 +57,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let trials = protocol.presentations_about().saturating_sub(presented as u64).max(1) as f64;
     let bytes_per_s = if kinematics == Kinematics::Full { apparatus.recording_bytes_per_s() } else { 0.0 };
     space::check(&common.out, Need { stimuli: trials * protocol.stimuli_in_a_trial(), bytes_per_s })?;
-    let stop = stop_on_signals();
+    let stop = stop_on_signals()?;
     let noise = noise(common)?;
     let mut rig = RealTimeRig::start(apparatus, kinematics, &stop)
         .map_err(|error| super::outside(error.as_ref(), &error))?;
