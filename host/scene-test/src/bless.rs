@@ -1,4 +1,4 @@
-//! `--bless`: expected numbers become those of the runs, in the file, and each change is told.
+//! `--bless`: expected numbers become those of the runs, in the file; each change is printed, and each failure that it cannot change.
 
 use crate::bound::Bound;
 use crate::case::{Case, Check};
@@ -72,8 +72,14 @@ pub(crate) fn bless(
         digests(file, cases, &own, outcomes, blessed, &mut text)?;
         for index in own {
             let outcome = &mut outcomes[index];
-            outcome.passed = outcome.failures.is_empty();
-            outcome.repeat.take_if(|_| outcome.passed);
+            outcome.settle();
+            for failure in &outcome.failures {
+                note(format!(
+                    "{}: {}: not blessed, which changes the value of {{ value, within }} alone; edit the file, or correct the model",
+                    outcome.case,
+                    failure.line()
+                ));
+            }
         }
         if text != file.text {
             write_whole(&file.path, &text)?;

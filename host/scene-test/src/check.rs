@@ -1,6 +1,6 @@
 //! Carrying out a case, and judging what comes of it.
 
-use crate::bound::{Bound, Miss};
+use crate::bound::Bound;
 use crate::case::{Case, Check, combinations};
 use crate::curve::POSE;
 use crate::file::{MeasureDemand, TestFile, Validate};
@@ -13,6 +13,7 @@ use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// What came of a case.
 #[derive(Debug, Serialize)]
@@ -23,13 +24,37 @@ pub(crate) struct Outcome {
     pub(crate) failures: Vec<Failure>,
     /// The values that were judged, by path.
     pub(crate) values: BTreeMap<String, Value>,
-    /// The command that shows the failure again.
+    /// The command that judges the case again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) repeat: Option<String>,
+    /// A command that shows what failed by itself: a pose, a rule, a measure, or a run as far as its fault.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) detail: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) picture: Option<PathBuf>,
     #[serde(skip)]
     pub(crate) digest: Option<String>,
+    /// The test file.
+    #[serde(skip)]
+    pub(crate) file: PathBuf,
+    /// How long it took.
+    #[serde(skip)]
+    pub(crate) took: Duration,
+}
+
+impl Outcome {
+    /// Removes what is said of a failure where none remains.
+    pub(crate) fn settle(&mut self) {
+        self.passed = self.failures.is_empty();
+        if self.passed {
+            (self.repeat, self.detail) = (None, None);
+        }
+    }
+
+    /// The commands for a failure, the one that judges first.
+    pub(crate) fn commands(&self) -> impl Iterator<Item = &String> {
+        self.repeat.iter().chain(&self.detail)
+    }
 }
 
 /// One expectation that was not met.
@@ -38,13 +63,11 @@ pub(crate) struct Failure {
     pub(crate) what: String,
     pub(crate) expected: String,
     pub(crate) got: String,
-    #[serde(skip)]
-    pub(crate) miss: Option<Miss>,
 }
 
 impl Failure {
     fn new(what: impl Into<String>, expected: impl Into<String>, got: impl Into<String>) -> Self {
-        Self { what: what.into(), expected: expected.into(), got: got.into(), miss: None }
+        Self { what: what.into(), expected: expected.into(), got: got.into() }
     }
 
     /// As one line, for people.
@@ -117,10 +140,14 @@ pub(crate) fn check(
         passed: false,
         failures: Vec::new(),
         values: BTreeMap::new(),
-        repeat: None,
+        repeat: Some(judging_again(case)),
+        detail: None,
         picture: None,
         digest: None,
+        file: case.file.path.clone(),
+        took: Duration::ZERO,
     };
+    let begun = Instant::now();
     // A check of a plugin has no picture of its own: the scene shows what the plugin does.
     let settings = combinations(&case.file.set).swap_remove(0);
     let scene = run_arguments(case.file, case.file.seeds[0], &settings, case.file.duration.as_deref());
@@ -130,7 +157,8 @@ pub(crate) fn check(
             let judged = run(flotor, case, *seed, set, case.file.duration.as_deref());
             let arguments = run_arguments(case.file, *seed, set, case.file.duration.as_deref());
             if let Some(first) = judged.failures.first() {
-                outcome.repeat = Some(command_line(&shortest(flotor, case, first, judged.json.as_ref())));
+                let shortest = shortest(flotor, case, first, judged.json.as_ref());
+                outcome.detail = shortest.as_deref().map(command_line);
             }
             if let Some(json) = &judged.json {
                 let paths = case.file.expect.iter().map(|expectation| &expectation.path);
@@ -146,15 +174,29 @@ pub(crate) fn check(
         (Check::Validate, Ok(models)) => validate(flotor, case.file, models, &mut outcome),
         (Check::Stress, Ok(models)) => plotted = stress(flotor, case.file, models, &mut outcome),
     }
-    outcome.passed = outcome.failures.is_empty();
+    outcome.settle();
+    outcome.took = begun.elapsed();
     if let (false, Some(folder), Some(mut arguments)) = (outcome.passed, plots, plotted) {
-        let plain = |c: char| if c.is_alphanumeric() || "-_.=".contains(c) { c } else { '-' };
-        let picture = folder.join(outcome.case.chars().map(plain).collect::<String>() + ".svg");
+        let picture = picture(folder, case);
         arguments.extend(["--plot".to_owned(), picture.display().to_string()]);
         let _ = flotor.run(arguments, "");
         outcome.picture = picture.is_file().then_some(picture);
     }
     outcome
+}
+
+/// The command that judges a case again.
+fn judging_again(case: &Case<'_>) -> String {
+    let file = case.file.path.display().to_string();
+    let folders = case.file.plugin_path.arguments().map(|word| word.to_string_lossy().into_owned());
+    let words = ["test".to_owned(), file, "--filter".to_owned(), case.name()];
+    command_line(&words.into_iter().chain(folders).collect::<Vec<_>>())
+}
+
+/// The file of a case's picture.
+pub(crate) fn picture(folder: &Path, case: &Case<'_>) -> PathBuf {
+    let plain = |c: char| if c.is_alphanumeric() || "-_.=".contains(c) { c } else { '-' };
+    folder.join(case.name().chars().map(plain).collect::<String>() + ".svg")
 }
 
 /// A run, judged.
@@ -220,13 +262,15 @@ fn judge(case: &Case<'_>, ran: &Ran, json: &Value) -> Vec<Failure> {
 }
 
 fn missed(what: &str, bound: &Bound, value: Option<&Value>) -> Option<Failure> {
-    let miss = bound.missed_by(value)?;
+    if bound.is_met_by(value) {
+        return None;
+    }
     let got = match value {
         None => "no value".to_owned(),
         Some(Value::String(word)) => word.clone(),
         Some(value) => value.to_string(),
     };
-    Some(Failure { miss: Some(miss), ..Failure::new(what, bound.text(), got) })
+    Some(Failure::new(what, bound.text(), got))
 }
 
 fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outcome) {
@@ -262,7 +306,7 @@ fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outco
             outcome.failures.push(Failure::new(format!("{} at {place}", worst.column), expected, got));
             let header = POSE.join(",");
             let eval = command_line(&arguments);
-            outcome.repeat = Some(format!("printf '{header}\\n{}\\n' | {eval}", pose.join(",")));
+            outcome.detail = Some(format!("printf '{header}\\n{}\\n' | {eval}", pose.join(",")));
         }
     }
 }
@@ -273,7 +317,7 @@ fn golden(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
     for folder in models.iter().filter_map(|model| Path::new(&model.file).parent()) {
         arguments.extend(["--plugin-path".to_owned(), folder.display().to_string()]);
     }
-    outcome.repeat = Some(command_line(&arguments));
+    outcome.detail = Some(command_line(&arguments));
     let asked: Vec<String> = arguments.iter().cloned().chain(["--json".to_owned(), "-".to_owned()]).collect();
     let answered = flotor.run(asked, "");
     let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
@@ -296,7 +340,6 @@ fn golden(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
             outcome.failures.extend(complete);
         }
     }
-    outcome.repeat.take_if(|_| outcome.failures.is_empty());
     Some(arguments)
 }
 
@@ -322,7 +365,7 @@ fn validate(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Ou
                 Told::Fails { rule, text, seen } => {
                     outcome.failures.push(Failure::new(format!("rule {rule}"), text, seen));
                     let arguments = ["validate", &plugin, "--only", rule].map(str::to_owned);
-                    outcome.repeat.get_or_insert_with(|| command_line(&arguments));
+                    outcome.detail.get_or_insert_with(|| command_line(&arguments));
                 }
             }
         }
@@ -359,7 +402,7 @@ fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
             failing.get_or_insert([score, only(&failed)].concat());
         }
     }
-    outcome.repeat = failing.as_deref().map(command_line);
+    outcome.detail = failing.as_deref().map(command_line);
     failing
 }
 
@@ -371,12 +414,15 @@ fn measure(json: &Value, id: &str, demand: MeasureDemand) -> Option<Failure> {
         return Some(Failure::new(id, "a measure", "none"));
     };
     let word = |key: &str| found.get(key).and_then(Value::as_str).unwrap_or_default();
-    let number = |key: &str| found.get(key).map_or(String::new(), ToString::to_string);
+    let number = |key: &str| found.get(key).and_then(Value::as_f64).map(|_| found[key].to_string());
     let failed = || {
+        let name = format!("{id} {}", word("name"));
+        let (Some(value), Some(bound)) = (number("value"), number("bound")) else {
+            return Failure::new(name, "a value", word("remark"));
+        };
         let unit = word("unit");
-        let expected = format!("at most {} {unit}", number("bound"));
-        let got = format!("{} {unit} ({})", number("value"), word("remark"));
-        Failure::new(format!("{id} {}", word("name")), expected.trim_end(), got)
+        let expected = format!("at most {bound} {unit}");
+        Failure::new(name, expected.trim_end(), format!("{value} {unit} ({})", word("remark")))
     };
     match word("verdict") {
         "pass" | "note" => None,

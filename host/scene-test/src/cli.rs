@@ -2,7 +2,7 @@
 
 use crate::bless::{Blessed, bless};
 use crate::case::{Case, Check, Shard, combinations};
-use crate::check::{Model, check, models, run_arguments};
+use crate::check::{Model, check, models, picture, run_arguments};
 use crate::file::{SUFFIX, TestFile};
 use crate::numbers::misspelt;
 use crate::process::{Flotor, Ran};
@@ -46,7 +46,7 @@ struct TestArguments {
     /// Files NAME.test.toml, or folders with some (default: this folder); folders named `target` are left out
     #[arg(value_name = "FOLDER|FILE")]
     paths: Vec<PathBuf>,
-    /// Only cases whose name contains this
+    /// Only the case of this name, or those whose name contains this
     #[arg(long, value_name = "TEXT")]
     filter: Option<String>,
     /// List the cases, and run none
@@ -98,8 +98,17 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     let files = all_or_errors(
         found(&arguments.paths)?.iter().map(|path| TestFile::read(path, &arguments.plugin_path)),
     )?;
-    let cases: Vec<Case<'_>> =
-        files.iter().flat_map(Case::of).filter(|case| chosen(case, arguments)).collect();
+    let all: Vec<Case<'_>> = files.iter().flat_map(Case::of).collect();
+    if let Some(folder) = &arguments.plots {
+        all.iter().try_for_each(|case| remove(&picture(folder, case)))?;
+    }
+    let filter = arguments.filter.as_ref().map(|text| Filter::of(text, &all));
+    let is_chosen = |case: &Case<'_>| {
+        let name = case.name();
+        filter.as_ref().is_none_or(|filter| filter.has(&name))
+            && arguments.shard.is_none_or(|shard| shard.has(&name))
+    };
+    let cases: Vec<Case<'_>> = all.into_iter().filter(is_chosen).collect();
     if cases.is_empty() && arguments.shard.is_none() {
         return Err(CommandError::Usage("no case to run; `flotor test --list` names them".to_owned()));
     }
@@ -131,10 +140,25 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     }
 }
 
-fn chosen(case: &Case<'_>, arguments: &TestArguments) -> bool {
-    let name = case.name();
-    arguments.filter.as_ref().is_none_or(|text| name.contains(text))
-        && arguments.shard.is_none_or(|shard| shard.has(&name))
+/// Cases chosen by name.
+enum Filter<'t> {
+    /// The case of this name.
+    Whole(&'t str),
+    /// Those with this in their name.
+    Part(&'t str),
+}
+
+impl<'t> Filter<'t> {
+    fn of(text: &'t str, cases: &[Case<'_>]) -> Self {
+        if cases.iter().any(|case| case.name() == text) { Self::Whole(text) } else { Self::Part(text) }
+    }
+
+    fn has(&self, name: &str) -> bool {
+        match self {
+            Self::Whole(text) => name == *text,
+            Self::Part(text) => name.contains(text),
+        }
+    }
 }
 
 /// All results, or the first error after the others were printed.

@@ -1,6 +1,6 @@
 //! The results: for people, as JSON, and as JUnit XML.
 //!
-//! Nothing in them depends on time or on the number of jobs. A file of results appears whole, at the end, or not at all.
+//! Nothing in them but the times of JUnit depends on time or on the number of jobs. A file of results appears whole, at the end, or not at all.
 
 use crate::check::Outcome;
 use crate::platform::readable_by_all;
@@ -9,6 +9,7 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
+use std::time::Duration;
 
 /// The results of all cases, in the order of the cases.
 #[derive(Serialize)]
@@ -31,7 +32,7 @@ impl Report {
             let word = if case.passed { "ok    ".to_owned() } else { style::error("FAILED") };
             lines.push(format!("{word}  {}", case.case));
             lines.extend(case.failures.iter().map(|failure| format!("          {}", failure.line())));
-            lines.extend(case.repeat.iter().map(|command| format!("          $ {command}")));
+            lines.extend(case.commands().map(|command| format!("          $ {command}")));
             lines.extend(case.picture.iter().map(|file| format!("          see {}", file.display())));
         }
         let count = self.cases.len();
@@ -42,29 +43,41 @@ impl Report {
         lines.join("\n")
     }
 
-    /// JUnit XML: a suite, a case for each of ours.
+    /// JUnit XML: a suite, and a case for each case, with its file, its time, and on failure its commands and picture.
     pub(crate) fn to_junit(&self) -> String {
         let (tests, failures) = (self.cases.len(), self.failed);
+        let seconds = |took: Duration| format!("{:.3}", took.as_secs_f64());
+        let time = seconds(self.cases.iter().map(|case| case.took).sum());
         let mut text = format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"{tests}\" failures=\"{failures}\">\n  \
-             <testsuite name=\"flotor\" tests=\"{tests}\" failures=\"{failures}\" errors=\"0\" skipped=\"0\">\n"
+             <testsuite name=\"flotor\" tests=\"{tests}\" failures=\"{failures}\" errors=\"0\" skipped=\"0\" \
+             time=\"{time}\">\n"
         );
         for case in &self.cases {
             let (suite, label) = case.case.split_once(": ").unwrap_or(("", &case.case));
             // Writing to a string cannot fail.
-            let _ =
-                write!(text, "    <testcase classname=\"{}\" name=\"{}\"", escaped(suite), escaped(label));
+            let _ = write!(
+                text,
+                "    <testcase classname=\"{}\" name=\"{}\" file=\"{}\" time=\"{}\"",
+                escaped(suite),
+                escaped(label),
+                escaped(&case.file.display().to_string()),
+                seconds(case.took)
+            );
             let Some(first) = case.failures.first() else {
                 text.push_str("/>\n");
                 continue;
             };
             let details: Vec<String> = case.failures.iter().map(|failure| failure.line()).collect();
-            let repeat = case.repeat.iter().map(|command| format!("\n$ {command}")).collect::<String>();
-            let details = escaped(&(details.join("\n") + &repeat));
-            let message = escaped(&first.line());
+            let commands = case.commands().map(|command| format!("$ {command}"));
+            let picture = case.picture.iter().map(|file| format!("see {}", file.display()));
+            let output = commands.chain(picture).collect::<Vec<_>>().join("\n");
+            let [message, details, output] =
+                [&first.line(), &details.join("\n"), &output].map(|text| escaped(text));
             let _ = writeln!(
                 text,
-                ">\n      <failure message=\"{message}\">{details}</failure>\n    </testcase>"
+                ">\n      <failure message=\"{message}\">{details}</failure>\n      \
+                 <system-out>{output}</system-out>\n    </testcase>"
             );
         }
         text + "  </testsuite>\n</testsuites>\n"
