@@ -47,23 +47,50 @@ const STEPS_NS: [u64; 4] = [1_000_000, 500_000, 250_000, 125_000];
 const TIMED_RUN_NS: u64 = 100_000_000;
 const TIMED_RUNS: usize = 50;
 
-fn main() -> std::io::Result<()> {
+/// In the order of the table.
+const METHODS: [(&str, Method); 4] = [
+    ("explicit Euler", |step_ns, run_ns| stepped(step_ns, run_ns, euler)),
+    ("implicit midpoint (geometric)", |step_ns, run_ns| stepped(step_ns, run_ns, midpoint)),
+    ("classical Runge-Kutta", |step_ns, run_ns| stepped(step_ns, run_ns, runge_kutta_4)),
+    ("Butcher, order 6 (the plant)", with_plant),
+];
+
+/// Method with a step, and its error.
+pub(crate) struct Error {
+    method: usize,
+    step_ns: u64,
+    error_rad: f64,
+}
+
+impl Error {
+    /// Returns the line of the table without the time.
+    pub(crate) fn line(&self) -> String {
+        let (name, _) = METHODS[self.method];
+        format!("\"{name}\",{},{:.1e}", self.step_ns as f64 * 1.0e-9, self.error_rad)
+    }
+}
+
+/// Computes the errors of all methods, method by method.
+pub(crate) fn errors() -> Vec<Error> {
     let exact = with_plant(62_500, RUN_NS);
+    let error = |method: usize, step_ns: u64| {
+        let end = METHODS[method].1(step_ns, RUN_NS);
+        Error { method, step_ns, error_rad: 2.0 * (end.conjugate() * exact).xyz().length() }
+    };
+    let of_method = |method| STEPS_NS.map(|step_ns| error(method, step_ns));
+    (0..METHODS.len()).flat_map(of_method).collect()
+}
+
+fn main() -> std::io::Result<()> {
     println!("method,step_s,error_rad,ns_per_ms");
-    let methods: [(&str, Method); 4] = [
-        ("explicit Euler", |step_ns, run_ns| stepped(step_ns, run_ns, euler)),
-        ("implicit midpoint (geometric)", |step_ns, run_ns| stepped(step_ns, run_ns, midpoint)),
-        ("classical Runge-Kutta", |step_ns, run_ns| stepped(step_ns, run_ns, runge_kutta_4)),
-        ("Butcher, order 6 (the plant)", with_plant),
-    ];
     let mut panel = Panel::new(Axis::log("Attitude error after 2 s", "rad"));
-    for (name, run) in methods {
+    for errors in errors().chunk_by(|one, next| one.method == next.method) {
+        let (name, run) = METHODS[errors[0].method];
         let mut points = Vec::new();
-        for step_ns in STEPS_NS {
-            let (end, ns_per_ms) = (run(step_ns, RUN_NS), time_ns_per_ms(run, step_ns));
-            let error_rad = 2.0 * (end.conjugate() * exact).xyz().length();
-            println!("\"{name}\",{},{error_rad:.1e},{ns_per_ms:.0}", step_ns as f64 * 1.0e-9);
-            points.push((ns_per_ms, error_rad));
+        for error in errors {
+            let ns_per_ms = time_ns_per_ms(run, error.step_ns);
+            println!("{},{ns_per_ms:.0}", error.line());
+            points.push((ns_per_ms, error.error_rad));
         }
         panel = panel.series(Series::line(name, points));
     }

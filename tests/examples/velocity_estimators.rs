@@ -30,41 +30,55 @@ const SETTLED: usize = 200;
 /// Steady acceleration, m/s²: 8 mm in the ticks of a run.
 const ACCELERATION_M_PER_S2: f64 = 0.1;
 
-/// An estimate, and the number it is set to, if it has one.
-type Setting = (Option<f64>, EstimatorKind);
+/// Estimator with its setting, and what it trades.
+pub(crate) struct Trade {
+    family: &'static str,
+    /// Hz or m/s², where there is one.
+    setting: Option<f64>,
+    noise_mm_per_s: f64,
+    lag_ms: f64,
+}
 
-fn main() -> Result<(), Box<dyn Error>> {
+impl Trade {
+    fn measured(
+        family: &'static str,
+        setting: Option<f64>,
+        kind: EstimatorKind,
+    ) -> Result<Self, InvalidParameter> {
+        let (noise_mm_per_s, lag_ms) = (noise_m_per_s(kind)? * 1.0e3, lag_s(kind)? * 1.0e3);
+        Ok(Self { family, setting, noise_mm_per_s, lag_ms })
+    }
+
+    /// Returns the line of the table.
+    pub(crate) fn line(&self) -> String {
+        let setting = self.setting.map_or_else(String::new, |number| number.to_string());
+        format!("{},{setting},{:.3},{:.2}", self.family, self.noise_mm_per_s, self.lag_ms)
+    }
+}
+
+/// Measures all estimators, family by family.
+pub(crate) fn trades() -> Result<Vec<Trade>, InvalidParameter> {
     // Deviation of a coordinate of preset `full`: its noise, and its steps evenly distributed.
     let noise_m = SensingParameters::MAGLEV.noise_m.hypot(SensingParameters::MAGLEV.step_m / 12.0_f64.sqrt());
-    let low_pass = [500.0, 200.0, 100.0, 50.0, 20.0, 10.0, 5.0];
-    let kalman = [200.0, 50.0, 20.0, 5.0, 2.0, 0.5, 0.2];
-    let families: [(&str, Vec<Setting>); 3] = [
-        ("difference", vec![(None, EstimatorKind::Difference)]),
-        (
-            "low-pass",
-            low_pass
-                .map(|bandwidth_hz| (Some(bandwidth_hz), EstimatorKind::LowPass { bandwidth_hz }))
-                .to_vec(),
-        ),
-        (
-            "kalman",
-            kalman
-                .map(|acceleration_m_per_s2| {
-                    (Some(acceleration_m_per_s2), EstimatorKind::Kalman { noise_m, acceleration_m_per_s2 })
-                })
-                .to_vec(),
-        ),
-    ];
+    let low_pass = [500.0, 200.0, 100.0, 50.0, 20.0, 10.0, 5.0].map(|bandwidth_hz| {
+        Trade::measured("low-pass", Some(bandwidth_hz), EstimatorKind::LowPass { bandwidth_hz })
+    });
+    let kalman = [200.0, 50.0, 20.0, 5.0, 2.0, 0.5, 0.2].map(|acceleration_m_per_s2| {
+        let kind = EstimatorKind::Kalman { noise_m, acceleration_m_per_s2 };
+        Trade::measured("kalman", Some(acceleration_m_per_s2), kind)
+    });
+    let difference = Trade::measured("difference", None, EstimatorKind::Difference);
+    std::iter::once(difference).chain(low_pass).chain(kalman).collect()
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let trades = trades()?;
     println!("estimate,setting,noise_mm_per_s,lag_ms");
+    trades.iter().for_each(|trade| println!("{}", trade.line()));
     let mut panel = Panel::new(Axis::log("Noise at rest, rms", "mm/s"));
-    for (name, kinds) in families {
-        let mut points = Vec::new();
-        for (setting, kind) in kinds {
-            let (noise_mm_per_s, lag_ms) = (noise_m_per_s(kind)? * 1.0e3, lag_s(kind)? * 1.0e3);
-            let setting = setting.map_or_else(String::new, |number| number.to_string());
-            println!("{name},{setting},{noise_mm_per_s:.3},{lag_ms:.2}");
-            points.push((lag_ms, noise_mm_per_s));
-        }
+    for family in trades.chunk_by(|one, next| one.family == next.family) {
+        let points: Vec<_> = family.iter().map(|trade| (trade.lag_ms, trade.noise_mm_per_s)).collect();
+        let name = family[0].family;
         panel = panel.series(if points.len() > 1 {
             Series::line(name, points)
         } else {

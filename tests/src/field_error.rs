@@ -37,7 +37,7 @@ pub struct FieldError {
 }
 
 /// How the hand moves in [`field_error`]'s scene.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
     /// How often it goes up and down, Hz.
     pub frequency_hz: f64,

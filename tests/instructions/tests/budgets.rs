@@ -7,10 +7,14 @@
 //! cargo test --release -p flotor-instructions --features budgets -- --nocapture
 //! ```
 
+#[allow(unreachable_pub)] // shared with the other tests
+#[path = "../../src/printed.rs"]
+mod printed;
 #[allow(dead_code, unreachable_pub)] // the other tests use the rest
 #[path = "../../src/tools.rs"]
 mod tools;
 
+use printed::assert_chapter_prints;
 use std::path::Path;
 use std::process::Command;
 use tools::Tool;
@@ -81,10 +85,7 @@ fn budgets<const N: usize>(names: [&str; N]) -> [f64; N] {
 /// The chapter on speed prints the counts of `budgets.toml`, and shares that follow from them.
 #[test]
 fn the_book_prints_these_counts() {
-    let chapter = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/bench.md");
-    let chapter = std::fs::read_to_string(chapter).expect("the chapter is there");
-    let words = chapter.split_whitespace().collect::<Vec<_>>().join(" ");
-    let prints = |text: &str| assert!(words.contains(text), "the chapter does not print `{text}`");
+    let prints = |text: &str| assert_chapter_prints("bench.md", text);
     let [printed, closed, energy, blending, closed_batch, energy_batch, rod_mean, rod_worst] = budgets([
         "law_printed",
         "law_closed_form",
@@ -110,6 +111,15 @@ fn the_book_prints_these_counts() {
         rod_mean / printed
     ));
     prints(&format!("| `rod`, servo, worst of them | {rod_worst} | {:.0} |", rod_worst / printed));
+    for name in ["flotor_plain", "flotor_full"] {
+        let [steps] = budgets([name]);
+        assert_chapter_prints("simulated-flotor.md", &format!("{name} = {steps:.2}"));
+    }
+    let (times, thousands) = (rod_worst / rod_mean, rod_mean * 1.0e-3);
+    assert_chapter_prints(
+        "models/spring/rod.md",
+        &format!("worst tick of a smooth hand is {times:.1} times the mean of {thousands:.1} thousand"),
+    );
     let [scripted, simulated] = budgets(["tick_scripted", "tick_simulated"]);
     prints(&format!(
         "`tests/instructions/budgets.toml`: {scripted} on the scripted device, {energy} of them the law of the spring, and {simulated} on"
@@ -269,12 +279,10 @@ fn a_step_for_force_alone_saves_what_only_torque_and_energy_need() {
 /// The chapter on demand prints the counts of `budgets.toml`, and the share that is saved.
 #[test]
 fn the_book_prints_what_a_demand_saves() {
-    let chapter = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/bench.md");
-    let chapter = std::fs::read_to_string(chapter).expect("the chapter is there");
     for (name, _) in DEMANDS {
         let counts = demand_budget(name);
         let [force, wrench, all] = counts;
         let row = format!("| {name} | {force} | {wrench} | {all} | {:.0} % |", saved_percent(counts));
-        assert!(chapter.contains(&row), "the chapter does not print `{row}`");
+        assert_chapter_prints("bench.md", &row);
     }
 }

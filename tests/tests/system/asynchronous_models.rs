@@ -8,6 +8,7 @@ use flotor_servo::RunEnd;
 use flotor_session::scene::Scene;
 use flotor_tests::TestSize;
 use flotor_tests::field_error::{FieldError, Swing, field_error};
+use flotor_tests::printed::assert_chapter_prints;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{watch, watch_on};
@@ -38,6 +39,16 @@ fn a_field_makes_no_step_that_a_slew_limit_would_have_to_cut() {
         assert!(seen.peak_n > 0.1, "the hand was in the sheet: {} N", seen.peak_n);
         assert_eq!(seen.slewed_ticks, 0);
         assert!(seen.largest_step_n <= step_n);
+        if swing == FAST {
+            let [felt, sheet, held] = [seen.largest_step_n, seen.direct_step_n, seen.held_step_n]
+                .map(|step_n| format!("{:.1} mN", 1.0e3 * step_n));
+            assert_chapter_prints(
+                "membrane.md",
+                &format!(
+                    "changes by at most {felt} from one tick to the next, the sheet itself by {sheet}, and a zero-order hold by {held}"
+                ),
+            );
+        }
     }
 }
 
@@ -52,7 +63,10 @@ fn a_field_is_nearer_to_the_membrane_than_a_force_that_is_held() {
         errors.iter().map(|seen| of(seen) / seen.peak_n).collect()
     };
     let (field, held) = (shares(|seen| seen.rms_n), shares(|seen| seen.held_rms_n));
-    println!("rms of the error at 50, 100, 200 Hz, over the largest force: {field:?}, held {held:?}");
+    for (row, shares) in [("local linear model", &field), ("zero-order hold of the force", &held)] {
+        let cells: Vec<String> = shares.iter().map(|share| format!("{:.1} %", 100.0 * share)).collect();
+        assert_chapter_prints("membrane.md", &format!("| {row} | {} |", cells.join(" | ")));
+    }
     assert!(field.iter().zip(&held).all(|(field, held)| field < held), "{field:?}, held {held:?}");
     assert!(field[1] < field[0] && field[2] < field[0], "{field:?}");
     // Extrapolated by its slope the field is not late by more than the period it was computed for.

@@ -2,8 +2,9 @@
 
 use flotor_core::limits::{Bound, Boundary};
 use flotor_core::rendered_boundary::RenderedBoundary;
-use flotor_hal::Capabilities;
+use flotor_hal::{Capabilities, Damper, SampledLoop};
 use flotor_servo::{Clock, RunEnd};
+use flotor_tests::printed::assert_chapter_prints;
 use flotor_tests::watched::{prepared, watch};
 
 /// Run of an open hand that starts at the wall, under a load.
@@ -80,4 +81,32 @@ fn a_softer_wall_than_the_scene_says_is_reported_at_the_start() {
     assert_eq!(notices("plain"), Vec::<String>::new());
     let told = notices("full");
     assert!(told.iter().any(|told| told.contains("2500 N/m instead of 7500")), "{told:?}");
+}
+
+/// The chapter prints the limit, the wall of the flotor, and the force where that is less than 5 N, by rate and latency.
+#[test]
+fn the_book_prints_the_walls_of_the_flotor() {
+    let boundary = Boundary::default();
+    for (rate_hz, latency_ticks, loop_text) in [
+        (1000, 0, "1 kHz, no latency"),
+        (1000, 1, "1 kHz, 1 ms"),
+        (1000, 2, "1 kHz, 2 ms"),
+        (1000, 3, "1 kHz, 3 ms"),
+        (250, 0, "250 Hz, no latency"),
+        (100, 0, "100 Hz, no latency"),
+    ] {
+        let wall = wall(latency_ticks, rate_hz);
+        let sampled =
+            SampledLoop { period_s: 1.0 / f64::from(rate_hz), latency_s: f64::from(latency_ticks) * 1.0e-3 };
+        let limit = sampled.stability_limit(0.0, Damper::OneWay(boundary.damping_ns_per_m));
+        let [limit, stiffness] = [limit, wall.stiffness_n_per_m]
+            .map(|stiffness| format!("{:.1}", stiffness * 1.0e-3).trim_end_matches(".0").to_owned());
+        let takes =
+            if wall.takes_n < 4.999 { format!(", takes {:.1} N", wall.takes_n) } else { String::new() };
+        let begins_mm = wall.begins_m[2] * 1.0e3;
+        assert_chapter_prints(
+            "safety-envelope.md",
+            &format!("| {loop_text} | {limit} kN/m | {stiffness} kN/m | {begins_mm:.1} mm{takes} |"),
+        );
+    }
 }

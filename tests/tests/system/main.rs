@@ -42,6 +42,7 @@ mod passivity;
 mod physics;
 mod planted;
 mod plugins;
+mod printed;
 mod reach;
 mod recording_files;
 mod reference;

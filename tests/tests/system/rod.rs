@@ -9,6 +9,7 @@ use flotor_hal::{DVec3, Demand, Input, Output, Pose, StepStatus, orientation_fro
 use flotor_session::registry::load_file;
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
+use flotor_tests::printed::assert_chapter_prints;
 use flotor_tests::tables::{Answer, Row, compared, evaluate, number, rod_pose, rod_wrench, spring, table};
 
 /// Largest deviations of force, N, and torque, N m, over all rows; every answer must be that of a stable equilibrium.
@@ -32,6 +33,11 @@ fn rod(file: &str, accuracy: &str, seat: &str, keep: fn(&Row) -> bool) -> Vec<(R
 
 // ---------------------------------------------------------------- tables
 
+/// Holds the chapter on the rod to the beginning of a row.
+fn assert_book_has(row: &str) {
+    assert_chapter_prints("models/spring/rod.md", &format!("| {row} |"));
+}
+
 #[test]
 fn tight_rod_is_the_reference_before_buckling() {
     if TestSize::of_this_run().leaves_out_long_tests() {
@@ -39,6 +45,7 @@ fn tight_rod_is_the_reference_before_buckling() {
     }
     let (force_n, torque_nm) = worst(&rod("b_exact_rod_prebuckling.csv", "tight", "fixed", |_| true));
     assert!(force_n <= 1.0e-9 && torque_nm <= 1.0e-11, "{force_n} N, {torque_nm} N m");
+    assert_book_has(&format!("before buckling | {force_n:.0e} N, {torque_nm:.0e} N·m"));
 }
 
 #[test]
@@ -48,6 +55,7 @@ fn servo_rod_meets_its_bounds_before_buckling() {
     assert!(force_n <= 4.0e-5, "{force_n} N");
     let (force_n, _) = worst(&rod("b_exact_rod_prebuckling.csv", "servo", "fixed", |_| true));
     assert!(force_n <= 1.0e-4, "{force_n} N");
+    assert_book_has(&format!("before buckling, `servo` | {force_n:.0e} N"));
 }
 
 /// Reached by going there step by step from rest: the plates force the rod through its buckling.
@@ -57,16 +65,19 @@ fn tight_rod_is_the_reference_past_buckling() {
         return;
     }
     let stable = |row: &Row| row["stable_spatial"] == "1";
-    for compared in [
+    let [_, (force_n, torque_nm)] = [
         rod("c_postbuckling_planar.csv", "tight", "fixed", stable),
         rod("c2_postbuckling_spatial.csv", "tight", "fixed", |_| true),
-    ] {
+    ]
+    .map(|compared| {
         for (row, answer) in &compared {
             assert_eq!(answer.details["branch"], "buckled", "{}", row["id"]);
         }
         let (force_n, torque_nm) = worst(&compared);
         assert!(force_n <= 1.0e-8 && torque_nm <= 1.0e-10, "{force_n} N, {torque_nm} N m");
-    }
+        (force_n, torque_nm)
+    });
+    assert_book_has(&format!("past buckling, in space | {force_n:.0e} N, {torque_nm:.0e} N·m"));
 }
 
 #[test]
