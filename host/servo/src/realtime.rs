@@ -2,7 +2,7 @@
 
 use crate::guest::is_guest;
 use crate::platform::scheduling::{
-    self, CORE_ADVICE, Duty, MEMORY_ADVICE, MOST_CORES, NoSuchCore, PRIORITY_ADVICE, THREAD_ADVICE,
+    self, CORE_ADVICE, Duty, MEMORY_ADVICE, MOST_CORES, NoSuchCore, THREAD_ADVICE, priority_advice,
 };
 
 /// A core of the machine, by the number the system gives it.
@@ -66,7 +66,7 @@ impl RealTimeReport {
     pub fn advice(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if let Privilege::Refused(reason) = &self.fifo {
-            lines.push(format!("no real-time priority ({reason}): expect late ticks; {PRIORITY_ADVICE}"));
+            lines.push(format!("no real-time priority ({reason}): expect late ticks; {}", priority_advice()));
         }
         if let Privilege::Refused(reason) = &self.memory_lock {
             lines.push(format!("memory is not locked ({reason}): paging may delay a tick; {MEMORY_ADVICE}"));

@@ -2,7 +2,7 @@
 
 mod device;
 
-use crate::platform::doctor::{MEMORY_REMEDY, PRIORITY_REMEDY, of_the_system};
+use crate::platform::doctor::{MEMORY_REMEDY, core_remedy, of_the_system, priority_remedy};
 use crate::platform::usb;
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, PluginPathOption};
@@ -11,7 +11,7 @@ use flotor_command::{CommandError, style, write_json};
 use flotor_servo::{PRIORITY_NAME, Privilege, RealTimeReport, probe_real_time};
 use flotor_session::registry::Registry;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Check this machine's real-time configuration, or why a device does not start, and suggest fixes.
 #[derive(Args)]
@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
             device::diagnose(&registry, id, &arguments.sets, &usb::Machine::at(&arguments.root))?,
             "to start this device",
         ),
-        None => (machine(&registry), "for real time"),
+        None => (machine(&registry, &arguments.root), "for real time"),
     };
     if let Some(file) = arguments.json.file() {
         write_json(file, &diagnoses)?;
@@ -112,35 +112,35 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
 }
 
 /// The real-time configuration.
-fn machine(registry: &Registry) -> Vec<Diagnosis> {
-    let mut diagnoses = vec![cores()];
-    diagnoses.extend(of_the_system());
-    diagnoses.extend(privileges(&probe_real_time()));
+fn machine(registry: &Registry, root: &Path) -> Vec<Diagnosis> {
+    let mut diagnoses = vec![cores(root)];
+    diagnoses.extend(of_the_system(root));
+    diagnoses.extend(privileges(&probe_real_time(), root));
     diagnoses.push(plugins(registry));
     diagnoses
 }
 
-fn cores() -> Diagnosis {
+fn cores(root: &Path) -> Diagnosis {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     match cores {
         1 => Diagnosis::note(
             "cores",
             "1",
-            "the loop shares its core with all other programs; use a machine with two cores or more",
+            format!("the loop shares its core with all other programs; {}", core_remedy(root)),
         ),
         _ => Diagnosis::good("cores", cores.to_string()),
     }
 }
 
-fn privileges(report: &RealTimeReport) -> [Diagnosis; 2] {
-    let diagnose = |what, privilege: &Privilege, remedy: &'static str| match privilege {
+fn privileges(report: &RealTimeReport, root: &Path) -> [Diagnosis; 2] {
+    let diagnose = |what, privilege: &Privilege, remedy: String| match privilege {
         Privilege::Granted => Diagnosis::good(what, "granted"),
         Privilege::Refused(reason) => Diagnosis::bad(what, reason.clone(), remedy),
         Privilege::NotAsked => Diagnosis::note(what, "not requested", remedy),
     };
     [
-        diagnose(PRIORITY_NAME, &report.fifo, PRIORITY_REMEDY),
-        diagnose("memory lock", &report.memory_lock, MEMORY_REMEDY),
+        diagnose(PRIORITY_NAME, &report.fifo, priority_remedy(root)),
+        diagnose("memory lock", &report.memory_lock, MEMORY_REMEDY.to_owned()),
     ]
 }
 

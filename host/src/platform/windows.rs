@@ -34,15 +34,24 @@ pub(crate) mod doctor {
     //! What `flotor doctor` finds in the system.
 
     use crate::cli::doctor::Diagnosis;
+    use std::path::Path;
 
-    /// How a user gets a priority.
-    pub(crate) const PRIORITY_REMEDY: &str = "start the program with normal priority";
+    /// Returns how a user gets a priority.
+    pub(crate) fn priority_remedy(_: &Path) -> String {
+        "start the program with normal priority".to_owned()
+    }
+
+    /// Returns how a user gets a second core.
+    pub(crate) fn core_remedy(_: &Path) -> String {
+        "use a machine with two cores or more".to_owned()
+    }
+
     /// How a user gets locked memory.
     pub(crate) const MEMORY_REMEDY: &str =
         "Windows locks the memory of no whole program; keep some memory free";
 
-    /// What this system has to say beside its cores.
-    pub(crate) fn of_the_system() -> Vec<Diagnosis> {
+    /// Returns the findings beside cores and privileges.
+    pub(crate) fn of_the_system(_: &Path) -> Vec<Diagnosis> {
         vec![Diagnosis::note(
             "system",
             "Windows",

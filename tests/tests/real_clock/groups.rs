@@ -3,7 +3,7 @@
 
 use crate::board::{Board, FELT_N, PAST, Where, dies, run_on, run_with, wait_until};
 use flotor_tests::TestSize;
-use flotor_tests::program::exit_code;
+use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use std::io::Write;
@@ -74,6 +74,34 @@ impl Drop for ControlGroup {
             }
             std::thread::sleep(std::time::Duration::from_millis(10));
         }
+    }
+}
+
+/// A budget of zero refuses real-time priority, whatever the permissions.
+#[test]
+fn a_run_names_the_control_group_that_refuses_real_time_priority() {
+    let _turn = crate::alone();
+    let mut groups = ControlGroup::in_each_hierarchy().into_iter();
+    let Some(group) = groups.find(|group| group.0.join("cpu.rt_runtime_us").exists()) else {
+        let _ =
+            writeln!(std::io::stderr(), "skipped: no group with a budget for real-time threads can be made");
+        return;
+    };
+    let file = group.0.join("cpu.rt_runtime_us");
+    let enter = format!("echo $$ > {}; exec \"$@\"", group.list().display());
+    let run = || Flotor::with(["run", "--duration", "0.1"]).through_shell(&enter).run();
+    let named = format!(
+        "its control group has no budget for real-time threads, and no other permission helps: as root `echo 950000 > {}`",
+        file.display()
+    );
+    let refused = run();
+    assert!(refused.stderr.contains(&named), "{refused:?}");
+    let told = Flotor::with(["doctor"]).through_shell(&enter).run().stdout;
+    assert!(told.contains("RT budget") && told.contains(&named), "{told}");
+    // The remedy, where the outer group gives that much.
+    if std::fs::write(&file, "100000").is_ok() {
+        let granted = run();
+        assert!(!granted.stderr.contains("no real-time priority"), "{granted:?}");
     }
 }
 

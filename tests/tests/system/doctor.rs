@@ -184,3 +184,90 @@ fn an_inverse3_that_is_well_is_ready_with_what_was_found() {
     finds(&told, "good", "without its host", "stops by itself", "");
     bad(&told, 0);
 }
+
+/// A machine whose control groups have these files, in the folder of the hierarchy.
+fn grouped(groups: &str, mounts: &str, files: &[(&str, &str)]) -> Scratch {
+    let machine = Scratch::default();
+    let own = [("proc/self/cgroup", groups), ("proc/self/mountinfo", mounts)];
+    for (file, text) in own.iter().chain(files) {
+        let file = machine.path().join(file);
+        std::fs::create_dir_all(file.parent().expect("a folder")).expect("there is room");
+        std::fs::write(file, text).expect("there is room");
+    }
+    machine
+}
+
+fn machine_doctor(machine: &Scratch) -> String {
+    let root = machine.path().display().to_string();
+    let ran = Flotor::with(["doctor", "--root", &root]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    ran.stdout
+}
+
+#[test]
+fn limits_of_control_groups_are_named_with_the_remedy_that_helps() {
+    let machine = grouped(
+        "3:cpu:/docker/a\n2:memory:/docker/a\n1:pids:/docker/a\n",
+        "31 24 0:27 / /cg/cpu rw - cgroup cgroup rw,cpu\n32 24 0:28 / /cg/memory rw - cgroup cgroup rw,memory\n\
+         33 24 0:29 / /cg/pids rw - cgroup cgroup rw,pids\n",
+        &[
+            ("cg/cpu/cpu.rt_runtime_us", "950000\n"),
+            ("cg/cpu/cpu.rt_period_us", "1000000\n"),
+            ("cg/cpu/docker/cpu.rt_runtime_us", "0\n"),
+            ("cg/cpu/docker/cpu.rt_period_us", "1000000\n"),
+            ("cg/cpu/docker/a/cpu.rt_runtime_us", "0\n"),
+            ("cg/cpu/docker/a/cpu.rt_period_us", "1000000\n"),
+            ("cg/cpu/docker/cpu.cfs_quota_us", "-1\n"),
+            ("cg/cpu/docker/cpu.cfs_period_us", "100000\n"),
+            ("cg/cpu/docker/a/cpu.cfs_quota_us", "15000\n"),
+            ("cg/cpu/docker/a/cpu.cfs_period_us", "100000\n"),
+            ("cg/memory/memory.limit_in_bytes", "9223372036854771712\n"),
+            ("cg/memory/memory.usage_in_bytes", "900000000\n"),
+            ("cg/memory/docker/a/memory.limit_in_bytes", "104857600\n"),
+            ("cg/memory/docker/a/memory.usage_in_bytes", "103809024\n"),
+            ("cg/pids/docker/a/pids.max", "20\n"),
+            ("cg/pids/docker/a/pids.current", "7\n"),
+        ],
+    );
+    let told = machine_doctor(&machine);
+    let folder = machine.path().display().to_string();
+    // The outer group, without which the inner ones take none.
+    finds(
+        &told,
+        "bad",
+        "RT budget",
+        "none in the control group",
+        &format!("> {folder}/cg/cpu/docker/cpu.rt_runtime_us"),
+    );
+    finds(
+        &told,
+        "bad",
+        "CPU quota",
+        "0.15 cores",
+        &format!("echo -1 > {folder}/cg/cpu/docker/a/cpu.cfs_quota_us"),
+    );
+    finds(&told, "bad", "memory limit", "100 MiB in the control group", "99 MiB in use");
+    finds(&told, "bad", "threads", "20 in the control group", "--pids-limit");
+}
+
+#[test]
+fn limits_of_control_groups_of_version_2_are_named() {
+    let mounts = "31 24 0:27 / /cg rw - cgroup2 cgroup2 rw\n";
+    let cases = [
+        ("cpu.max", "50000 100000", "bad", "CPU quota", "0.50 cores", "echo max > "),
+        ("cpu.max", "400000 100000", "note", "CPU quota", "4.00 cores", "echo max > "),
+        ("memory.max", "1073741824", "note", "memory limit", "1024 MiB", "MemoryMax="),
+        ("memory.high", "536870912", "note", "memory threshold", "512 MiB", "MemoryHigh="),
+        ("pids.max", "5000", "good", "threads", "5000 in the control group", ""),
+    ];
+    for (file, text, grade, what, found, remedy) in cases {
+        let file = format!("cg/a/{file}");
+        let files = [(file.as_str(), text), ("cg/a/memory.current", "0"), ("cg/a/pids.current", "9")];
+        finds(&machine_doctor(&grouped("0::/a\n", mounts, &files)), grade, what, found, remedy);
+    }
+    let unlimited = ["cpu.max", "memory.max", "memory.high", "pids.max"].map(|file| format!("cg/a/{file}"));
+    let texts = ["max 100000", "max", "max", "max"];
+    let files: Vec<_> = unlimited.iter().map(String::as_str).zip(texts).collect();
+    let told = machine_doctor(&grouped("0::/a\n", mounts, &files));
+    assert!(!told.contains("control group ("), "{told}");
+}

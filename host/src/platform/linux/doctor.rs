@@ -1,11 +1,13 @@
 //! What `flotor doctor` finds in the files of the kernel.
 
 use crate::cli::doctor::Diagnosis;
+use flotor_servo::platform::{GroupLimit, LimitValue, Use, group_limits, real_time_budget_advice};
 use flotor_servo::watchdog_process::probe_shared_group;
 use std::fs::read_to_string;
+use std::path::Path;
 
-/// How a user gets real-time priority.
-pub(crate) const PRIORITY_REMEDY: &str = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - rtprio 99` in \
+/// How a user gets real-time priority where no control group refuses it.
+const PRIORITY_REMEDY: &str = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - rtprio 99` in \
                 /etc/security/limits.conf; then log in again";
 /// How a user gets locked memory.
 pub(crate) const MEMORY_REMEDY: &str = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - memlock unlimited` \
@@ -16,9 +18,110 @@ const SHARED_GROUP_REMEDY: &str = "start the run where systemd's user or system 
                                    group with a writable outer group. In a service: `KillMode=mixed`, `OOMPolicy=continue`, \
                                    `ManagedOOMPreference=avoid`. In a container: end the run with a signal before the container";
 
-/// What this system has to say beside its cores.
-pub(crate) fn of_the_system() -> Vec<Diagnosis> {
-    vec![isolated_cores(), kernel(), throttling(), governor(), killed_together()]
+/// Share of a core that a loop with real-time priority may need: that of the whole machine by default.
+const SOUND_SHARE: f64 = 0.9;
+/// Threads and processes that a run starts, with a margin.
+const NEEDED_THREADS: u64 = 32;
+
+/// Returns the findings beside cores and privileges; those of control groups from the files below `root`.
+pub(crate) fn of_the_system(root: &Path) -> Vec<Diagnosis> {
+    let own = [isolated_cores(), kernel(), throttling(), governor(), killed_together()];
+    own.into_iter().chain(group_limits(root).iter().filter_map(of_limit)).collect()
+}
+
+/// Returns how a user gets real-time priority.
+pub(crate) fn priority_remedy(root: &Path) -> String {
+    let without = group_limits(root).into_iter().find(|limit| limit.value == LimitValue::RealTimeShare(0.0));
+    without.map_or_else(|| PRIORITY_REMEDY.to_owned(), |limit| real_time_budget_advice(&limit.file))
+}
+
+/// Returns how a user gets a second core, where the loop shares its core with all other programs.
+pub(crate) fn core_remedy(root: &Path) -> String {
+    let limits = group_limits(root);
+    let is_one = |limit: &&GroupLimit| match limit.value {
+        LimitValue::Cores(cores) => cores < 2.0,
+        LimitValue::CoreCount(cores) => cores < 2,
+        _ => false,
+    };
+    match limits.iter().find(is_one) {
+        Some(limit) if !has_one_core() => {
+            format!(
+                "its control group allows no more, the machine has more: raise `{}`",
+                limit.file.display()
+            )
+        }
+        None if !has_one_core() => "the machine has more: start it without `taskset`".to_owned(),
+        _ => "use a machine with two cores or more".to_owned(),
+    }
+}
+
+/// Whether this machine has one core.
+fn has_one_core() -> bool {
+    read_to_string("/sys/devices/system/cpu/online").is_ok_and(|list| list.trim() == "0")
+}
+
+/// Returns the finding on a limit of a control group, unless another finding covers it.
+fn of_limit(limit: &GroupLimit) -> Option<Diagnosis> {
+    let file = limit.file.display();
+    Some(match limit.value {
+        LimitValue::RealTimeShare(0.0) => {
+            let found = format!("none in the control group (`{file}` is 0)");
+            Diagnosis::bad("RT budget", found, real_time_budget_advice(&limit.file))
+        }
+        LimitValue::RealTimeShare(share) if share < SOUND_SHARE => Diagnosis::note(
+            "RT budget",
+            format!("{:.0} % of a core in the control group (`{file}`)", share * 100.0),
+            "the kernel suspends a loop that needs more processor time: raise it",
+        ),
+        LimitValue::RealTimeShare(share) => {
+            Diagnosis::good("RT budget", format!("{:.0} % of a core in the control group", share * 100.0))
+        }
+        LimitValue::Cores(cores) => {
+            let found = format!("{cores:.2} cores in the control group (`{file}`)");
+            let remedy = format!(
+                "the kernel suspends the program whenever the quota of a period is used up, and ticks are missed; only a loop with \
+                 real-time priority goes on: `echo {} > {file}` as root, or without `docker run --cpus`, `CPUQuota=`",
+                if limit.file.ends_with("cpu.max") { "max" } else { "-1" }
+            );
+            if cores < 1.0 {
+                Diagnosis::bad("CPU quota", found, remedy)
+            } else {
+                Diagnosis::note("CPU quota", found, remedy)
+            }
+        }
+        LimitValue::CoreCount(_) => return None,
+        LimitValue::Memory(memory) => {
+            let remedy = "the kernel ends the program when the limit is reached: raise it (`docker run --memory`, `MemoryMax=`)";
+            of_memory("memory limit", memory, &limit.file, remedy)
+        }
+        LimitValue::DelayingMemory(memory) => {
+            let remedy = "the kernel delays the program above the limit, and ticks are missed: raise it (`MemoryHigh=`)";
+            of_memory("memory threshold", memory, &limit.file, remedy)
+        }
+        LimitValue::Threads(Use { most, now }) => {
+            let found = format!("{most} in the control group (`{file}`), {now} in use");
+            if most.saturating_sub(now) < NEEDED_THREADS {
+                let remedy = format!(
+                    "a run starts up to {NEEDED_THREADS}: raise the limit (`docker run --pids-limit`, `TasksMax=`)"
+                );
+                Diagnosis::bad("threads", found, remedy)
+            } else {
+                Diagnosis::good("threads", found)
+            }
+        }
+    })
+}
+
+/// Returns the finding on a limit of memory: bad where a tenth of it is left.
+fn of_memory(what: &'static str, Use { most, now }: Use, file: &Path, remedy: &str) -> Diagnosis {
+    let mib = |bytes: u64| bytes >> 20;
+    let found =
+        format!("{} MiB in the control group (`{}`), {} MiB in use", mib(most), file.display(), mib(now));
+    if now > most / 10 * 9 {
+        Diagnosis::bad(what, found, remedy)
+    } else {
+        Diagnosis::note(what, found, remedy)
+    }
 }
 
 /// Whether a kill of all processes of a control group ends the watchdog process with the host.

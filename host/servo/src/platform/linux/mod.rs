@@ -1,6 +1,8 @@
 //! Linux: absolute sleeps, SCHED_FIFO, handlers of signals, anonymous files, handles that go from process to process.
 
 pub(crate) mod clock;
+mod control_group;
+pub(crate) mod group_limits;
 pub(crate) mod last_stop;
 pub(crate) mod processes;
 pub(crate) mod scheduling;

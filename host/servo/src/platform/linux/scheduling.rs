@@ -1,9 +1,11 @@
 //! Priorities, cores and locked memory.
 
+use super::group_limits::file_without_real_time;
 use rustix::fs::readlink;
 use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::process::{Resource, getrlimit};
 use rustix::thread::{CapabilitySet, CpuSet, capabilities, sched_setaffinity};
+use std::path::Path;
 use thread_priority::unix::{
     RealtimeThreadSchedulePolicy, ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
@@ -13,13 +15,28 @@ use thread_priority::{Error, ThreadPriority, ThreadPriorityValue};
 pub const THREAD_ADVICE: &str =
     "end other programs of this user, or raise its limit (`ulimit -u`, or `pids.max` of its control group)";
 
+/// Returns how a user allows the priority of a loop. Not real-time.
+pub(crate) fn priority_advice() -> String {
+    file_without_real_time().map_or_else(|| PRIORITY_ADVICE.to_owned(), |file| real_time_budget_advice(&file))
+}
+
+/// Returns how a user gets real-time priority where this file of a control group gives it no budget.
+#[must_use]
+pub fn real_time_budget_advice(file: &Path) -> String {
+    let file = file.display();
+    format!(
+        "its control group has no budget for real-time threads, and no other permission helps: as root `echo 950000 > {file}`, then the \
+         same in the groups inside it (`docker run --cpu-rt-runtime=950000`), or start the run outside of the group"
+    )
+}
+
 /// Cores that the system can name.
 pub(crate) const MOST_CORES: usize = CpuSet::MAX_CPU;
 
 /// How this system calls the priority that a loop asks for.
 pub const PRIORITY_NAME: &str = "SCHED_FIFO";
-/// How a user allows it.
-pub(crate) const PRIORITY_ADVICE: &str = "allow it with `@realtime - rtprio 99` in /etc/security/limits.conf, or `setcap \
+/// How a user allows it where no control group refuses it.
+const PRIORITY_ADVICE: &str = "allow it with `@realtime - rtprio 99` in /etc/security/limits.conf, or `setcap \
                                    cap_sys_nice+ep` on the executable";
 /// How a user allows locked memory.
 pub(crate) const MEMORY_ADVICE: &str =

@@ -15,9 +15,11 @@ pub(crate) const MOST_CORES: usize = usize::BITS as usize;
 
 /// How this system calls the priority that a loop asks for.
 pub const PRIORITY_NAME: &str = "time-critical priority";
-/// How a user allows it.
-pub(crate) const PRIORITY_ADVICE: &str =
-    "Windows refuses it to programs in the background mode of their priority only";
+/// Returns how a user allows it.
+pub(crate) fn priority_advice() -> String {
+    "Windows refuses it to programs in the background mode of their priority only".to_owned()
+}
+
 /// How a user allows locked memory.
 pub(crate) const MEMORY_ADVICE: &str = "Windows locks the memory of no whole program";
 /// How a user finds the cores that a process may use.

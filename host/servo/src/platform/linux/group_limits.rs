@@ -1,0 +1,146 @@
+//! Limits that the control groups of this process set, each as its tightest group has it.
+
+use super::control_group::{Group, Mount, groups};
+use std::fs::read_to_string;
+use std::path::{Path, PathBuf};
+
+/// A limit of a control group.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroupLimit {
+    /// File of the group that sets it.
+    pub file: PathBuf,
+    /// The limit.
+    pub value: LimitValue,
+}
+
+/// What a control group limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LimitValue {
+    /// Share of a core that real-time threads of the group may take, where none means that the system refuses real-time priority.
+    RealTimeShare(f64),
+    /// Processor time of the group, cores.
+    Cores(f64),
+    /// Cores that the group may use.
+    CoreCount(usize),
+    /// Memory at which the system ends processes of the group, and memory in use, bytes.
+    Memory(Use),
+    /// Memory from which the system delays the group, and memory in use, bytes.
+    DelayingMemory(Use),
+    /// Threads that the group may have, and has.
+    Threads(Use),
+}
+
+/// A limit and how much of it is in use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Use {
+    /// The limit.
+    pub most: u64,
+    /// Part of it in use.
+    pub now: u64,
+}
+
+/// Bytes from which version 1 means no limit, for pages of any size.
+const NO_MEMORY_LIMIT: u64 = 1 << 62;
+
+/// Returns the limits of the control groups of this process that bind it, in the files below `root`. Not real-time.
+#[must_use]
+pub fn group_limits(root: &Path) -> Vec<GroupLimit> {
+    let file = |name: &str| read_to_string(root.join("proc/self").join(name)).unwrap_or_default();
+    let mounts: Vec<Mount> = file("mountinfo").lines().filter_map(Mount::parse).collect();
+    let below_root = |folder: PathBuf| root.join(folder.strip_prefix("/").unwrap_or(&folder));
+    let groups = groups(&file("cgroup"), &mounts);
+    let folders: Vec<PathBuf> = groups.iter().flat_map(Group::folders).map(below_root).collect();
+    let readers: [Reader; 6] = [real_time_share, cores, core_count, memory, delaying_memory, threads];
+    readers.into_iter().filter_map(|read| tightest(&folders, read)).collect()
+}
+
+/// Returns the file in which a control group of this process gives real-time threads no budget, so that the system refuses real-time
+/// priority. Not real-time.
+pub(crate) fn file_without_real_time() -> Option<PathBuf> {
+    let is_none = |limit: &GroupLimit| limit.value == LimitValue::RealTimeShare(0.0);
+    group_limits(Path::new("/")).into_iter().find(is_none).map(|limit| limit.file)
+}
+
+/// Reads a limit of one group: the file that sets it, and its value.
+type Reader = fn(&Path) -> Option<(&'static str, LimitValue)>;
+
+/// Returns the limit that leaves least; of equal ones the outermost, without which the inner ones change nothing.
+fn tightest(folders: &[PathBuf], read: Reader) -> Option<GroupLimit> {
+    let limits = folders.iter().rev().filter_map(|folder| {
+        let (file, value) = read(folder)?;
+        Some(GroupLimit { file: folder.join(file), value })
+    });
+    limits.min_by(|a, b| a.value.room().total_cmp(&b.value.room()))
+}
+
+impl LimitValue {
+    /// Returns what is left of the limit.
+    #[allow(clippy::cast_precision_loss)] // only compared
+    fn room(&self) -> f64 {
+        match *self {
+            Self::RealTimeShare(share) | Self::Cores(share) => share,
+            Self::CoreCount(cores) => cores as f64,
+            Self::Memory(Use { most, now })
+            | Self::DelayingMemory(Use { most, now })
+            | Self::Threads(Use { most, now }) => most.saturating_sub(now) as f64,
+        }
+    }
+}
+
+fn text(folder: &Path, name: &str) -> Option<String> {
+    read_to_string(folder.join(name)).ok().map(|text| text.trim().to_owned())
+}
+
+fn number<T: std::str::FromStr>(folder: &Path, name: &str) -> Option<T> {
+    text(folder, name)?.parse().ok()
+}
+
+fn real_time_share(folder: &Path) -> Option<(&'static str, LimitValue)> {
+    let file = "cpu.rt_runtime_us";
+    let (runtime_us, period_us): (f64, f64) = (number(folder, file)?, number(folder, "cpu.rt_period_us")?);
+    (runtime_us >= 0.0).then_some((file, LimitValue::RealTimeShare(runtime_us / period_us)))
+}
+
+fn cores(folder: &Path) -> Option<(&'static str, LimitValue)> {
+    if let Some(both) = text(folder, "cpu.max") {
+        let (quota_us, period_us) = both.split_once(' ')?;
+        let cores = quota_us.parse::<f64>().ok()? / period_us.parse::<f64>().ok()?;
+        return Some(("cpu.max", LimitValue::Cores(cores)));
+    }
+    let file = "cpu.cfs_quota_us";
+    let (quota_us, period_us): (f64, f64) = (number(folder, file)?, number(folder, "cpu.cfs_period_us")?);
+    (quota_us > 0.0).then_some((file, LimitValue::Cores(quota_us / period_us)))
+}
+
+fn core_count(folder: &Path) -> Option<(&'static str, LimitValue)> {
+    let files = [("cpuset.cpus", "cpuset.cpus.effective"), ("cpuset.cpus", "cpuset.effective_cpus")];
+    let (file, list) =
+        files.into_iter().find_map(|(file, effective)| Some((file, text(folder, effective)?)))?;
+    let count = |part: &str| {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        Some(last.parse::<usize>().ok()?.checked_sub(first.parse().ok()?)? + 1)
+    };
+    Some((file, LimitValue::CoreCount(list.split(',').map(count).sum::<Option<usize>>()?)))
+}
+
+fn memory(folder: &Path) -> Option<(&'static str, LimitValue)> {
+    if let Some(most) = number(folder, "memory.max") {
+        let now = number(folder, "memory.current")?;
+        return Some(("memory.max", LimitValue::Memory(Use { most, now })));
+    }
+    let file = "memory.limit_in_bytes";
+    let most: u64 = number(folder, file)?;
+    let now = number(folder, "memory.usage_in_bytes")?;
+    (most < NO_MEMORY_LIMIT).then_some((file, LimitValue::Memory(Use { most, now })))
+}
+
+fn delaying_memory(folder: &Path) -> Option<(&'static str, LimitValue)> {
+    let most = number(folder, "memory.high")?;
+    let now = number(folder, "memory.current")?;
+    Some(("memory.high", LimitValue::DelayingMemory(Use { most, now })))
+}
+
+fn threads(folder: &Path) -> Option<(&'static str, LimitValue)> {
+    let most = number(folder, "pids.max")?;
+    Some(("pids.max", LimitValue::Threads(Use { most, now: number(folder, "pids.current")? })))
+}
