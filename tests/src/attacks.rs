@@ -228,6 +228,11 @@ impl Attackers {
         }
     }
 
+    /// Closes all connections.
+    pub(crate) fn leave(&mut self) {
+        self.held.clear();
+    }
+
     /// Opens a silent connection, and holds as many as this process may; returns whether it came about.
     fn hold_one_more(&mut self) -> bool {
         if self.held.len() >= self.most_held {

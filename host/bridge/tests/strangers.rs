@@ -8,7 +8,9 @@ use common::process::Owned;
 use common::{FakeHost, free_port, wait_until};
 use flotor_bridge::access::{Members, VALID, write_keys};
 use flotor_bridge::keys::Name;
-use flotor_bridge::request::Right;
+use flotor_bridge::link::{End, LinkOptions, open};
+use flotor_bridge::remote::Remote;
+use flotor_bridge::request::{Request, Right};
 use flotor_live::Ask;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream, UdpSocket};
@@ -181,6 +183,47 @@ fn a_flood_of_datagrams_does_not_delay_the_stop_of_a_new_member() {
             }
         };
         assert_stops_in_time(&bridge, |stop| under(1, attack, stop), "a flood of datagrams");
+    }
+}
+
+/// The bound for the stop of a member that is connected, and the number of stops.
+const CONNECTED_IN_TIME: Duration = Duration::from_millis(50);
+const STOPS: usize = 5;
+
+#[test]
+fn failed_connections_do_not_delay_the_stop_of_a_member_that_is_connected() {
+    for way in [Way::Tls, Way::Tcp] {
+        let bridge = Bridge::start(way);
+        let config = (way == Way::Tls).then(|| bridge.keys.path().join("alan.json5"));
+        let link =
+            LinkOptions { config, connect: vec![endpoint(way, bridge.port)], ..LinkOptions::default() };
+        let remote =
+            Remote::listen(&open(&link, End::Visiting).unwrap(), &Name::new("lab").unwrap()).unwrap();
+        wait_until("the member is connected", || remote.status().unwrap().is_some());
+        // The same strangers at a port of this process.
+        let stand_in = TcpListener::bind("127.0.0.1:0").unwrap();
+        let elsewhere = stand_in.local_addr().unwrap().port();
+        std::thread::spawn(move || while stand_in.accept().is_ok() {});
+        let [mut flooded, mut alone] = [bridge.port, elsewhere].map(|port| {
+            let connect = || {
+                let _ =
+                    TcpStream::connect(("127.0.0.1", port)).map(|mut stream| stream.write_all(b"malformed"));
+                std::thread::sleep(Duration::from_millis(20));
+            };
+            let stop = |_| {
+                let since = Instant::now();
+                assert_eq!(remote.errand().run(Request::EmergencyStop), Ok(()));
+                since.elapsed()
+            };
+            under(1, connect, || (0..STOPS).map(stop).collect::<Vec<Duration>>())
+        });
+        flooded.sort_unstable();
+        alone.sort_unstable();
+        println!(
+            "{way:?}: a connected member's stop took {flooded:?}, with the strangers elsewhere {alone:?}"
+        );
+        let [flooded, alone] = [flooded[STOPS / 2], alone[STOPS / 2]];
+        assert!(flooded <= CONNECTED_IN_TIME.max(2 * alone), "{flooded:?}, elsewhere {alone:?}");
     }
 }
 

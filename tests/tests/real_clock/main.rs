@@ -9,6 +9,7 @@ mod jitter;
 mod lateness;
 mod scarcity;
 mod signals;
+mod strangers;
 
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 

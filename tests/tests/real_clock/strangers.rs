@@ -1,0 +1,309 @@
+//! Strangers at the ports of a run: what they cost its process, its loop and its stops, compared with the same strangers at a port of this
+//! process, in turn.
+
+#[path = "../../src/attacks.rs"]
+mod attacks;
+
+use crate::board::{Board, PAST, Where, dies, run_on, wait_until};
+use attacks::{Attackers, Listening, Place, Target};
+use flotor_live::{Ask, Client, Directory, Event, Kind, Request, frame};
+use flotor_tests::TestSize;
+use flotor_tests::library::build_folder;
+use flotor_tests::program::{Flotor, Running, exit_code};
+use flotor_tests::scratch::Scratch;
+use rustix::process::Signal;
+use std::collections::VecDeque;
+use std::io::Read;
+use std::net::TcpListener;
+use std::os::unix::net::UnixListener;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// Threads of attackers, each with up to a hundred connections, and the pause after an attack of each.
+const ATTACKERS: usize = 2;
+const PAUSE: Duration = Duration::from_millis(1);
+/// Connections that a stand-in holds, as a live socket does.
+const HELD: usize = 24;
+
+/// A request to watch, of which attackers send parts.
+fn request() -> Vec<u8> {
+    let request = Request { number: 1, ask: Ask::Watch { every: 1 } };
+    frame(Kind::Request, &serde_json::to_vec(&request).expect("it is JSON"))
+}
+
+/// The run folder of a run, and its socket.
+fn directory(scratch: &Scratch) -> Directory {
+    Directory::at(scratch.path().join("flotor"))
+}
+
+fn socket(directory: &Directory) -> PathBuf {
+    let first = || directory.runs().into_iter().next();
+    wait_until("the run has a socket", || first().is_some());
+    first().expect("it is there").path
+}
+
+/// Carries out attacks on the place that a number selects, until the body returns.
+fn under_attack<T>(places: &[Place], request: &[u8], selected: &AtomicUsize, body: impl FnOnce() -> T) -> T {
+    /// Ends the attackers, also by a panic.
+    struct End<'e>(&'e AtomicBool);
+    impl Drop for End<'_> {
+        fn drop(&mut self) {
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
+    let is_over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let _end = End(&is_over);
+        for _ in 0..ATTACKERS {
+            scope.spawn(|| {
+                let attackers = |place: &Place| Attackers::new(place.clone(), request);
+                let mut attackers: Vec<_> = places.iter().map(attackers).collect();
+                while !is_over.load(Ordering::Relaxed) {
+                    let place = selected.load(Ordering::Relaxed);
+                    attackers[place].attack();
+                    // Nobody stays at the other place.
+                    attackers[1 - place].leave();
+                    std::thread::sleep(PAUSE);
+                }
+            });
+        }
+        body()
+    })
+}
+
+/// A port of this process that accepts, and holds some connections: of the family of the place that it stands in for.
+fn stand_in(place: &Place, scratch: &Scratch) -> Place {
+    fn hold<T>(mut accept: impl FnMut() -> std::io::Result<T> + Send + 'static)
+    where
+        T: 'static,
+    {
+        std::thread::spawn(move || {
+            let mut held = VecDeque::new();
+            while let Ok(stream) = accept() {
+                held.push_back(stream);
+                if held.len() > HELD {
+                    held.pop_front();
+                }
+            }
+        });
+    }
+    match place {
+        Place::Socket(_) => {
+            let path = scratch.path().join("stand-in");
+            let listener = UnixListener::bind(&path).expect("a scratch folder takes a socket");
+            hold(move || listener.accept().map(|(stream, _)| stream));
+            Place::Socket(path)
+        }
+        Place::Port(_) => {
+            let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
+            let at = listener.local_addr().expect("it is bound");
+            hold(move || listener.accept().map(|(stream, _)| stream));
+            Place::Port(at)
+        }
+    }
+}
+
+/// A run on the simulated device for longer than any test.
+fn start(scratch: &Scratch, models: &str) -> Running {
+    let scene = format!("duration_s = 3000\n[device]\nplugin = \"simulated\"\n{models}");
+    let scene = scratch.patient_scene(&scene).display().to_string();
+    Flotor::with(["run", &scene]).env("XDG_RUNTIME_DIR", &scratch.path().display().to_string()).start()
+}
+
+#[test]
+fn strangers_at_the_live_socket_cost_little() {
+    let _turn = crate::among_idle_ones();
+    let scratch = Scratch::default();
+    let run = start(&scratch, "[[model]]\nplugin = \"spring\"\n");
+    let place = Place::Socket(socket(&directory(&scratch)));
+    let process = run.host().as_raw_nonzero().get().cast_unsigned();
+    // The greeting comes by itself.
+    let is_served = |place: &Place| {
+        let greeted = place.connect().and_then(|mut stream| {
+            stream.set_read_timeout(Some(Duration::from_secs(1)))?;
+            stream.read(&mut [0; 16])
+        });
+        greeted.is_ok_and(|length| length > 0)
+    };
+    Target { process, place }.withstand(&request(), is_served);
+    run.signal(Signal::INT);
+    assert_eq!(run.wait().code, Some(exit_code::OK));
+}
+
+// ---------------------------------------------------------------- stops
+
+/// How a run is stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stop {
+    Signal,
+    /// Over a connection that is made for it.
+    Socket,
+    /// Over the connection of a client that watches since before the attack.
+    Connected,
+}
+
+/// The time from a stop to the first command of a device without force, by the log of the device.
+fn stop_time(stop: Stop, selected: usize) -> Duration {
+    let (board, scratch) = (Board::start(), Scratch::default());
+    let runtime = scratch.path().display().to_string();
+    let run = run_on(&board, &scratch, dies(), Where::InTheHost).env("XDG_RUNTIME_DIR", &runtime).start();
+    let path = socket(&directory(&scratch));
+    let watching = Client::connect(&path).expect("the run answers");
+    let connected = watching.asker();
+    let _ = connected.ask(Ask::Watch { every: 1 }).expect("likewise");
+    board.wait_for_force(PAST);
+    let place = Place::Socket(path.clone());
+    let places = [place.clone(), stand_in(&place, &scratch)];
+    let since = under_attack(&places, &request(), &AtomicUsize::new(selected), || {
+        std::thread::sleep(Duration::from_millis(300));
+        let since = Instant::now();
+        match stop {
+            Stop::Signal => run.signal(Signal::USR1),
+            Stop::Connected => drop(connected.ask(Ask::EmergencyStop).expect("the connection is there")),
+            Stop::Socket => {
+                let client = Client::connect(&path).expect("the run answers");
+                let _ = client.asker().ask(Ask::EmergencyStop).expect("likewise");
+            }
+        }
+        wait_until("there is no force", || board.force_n() == 0.0);
+        since
+    });
+    let _ = board.assert_stopped(&format!("{stop:?}"));
+    assert_eq!(run.wait().code, Some(exit_code::DEVICE_FAULT), "{stop:?}");
+    let log = board.log();
+    let felt = log.iter().rposition(|(_, force_n)| *force_n > 0.0).expect("there was force");
+    log[felt + 1].0.duration_since(since)
+}
+
+/// The bound of a stop where a machine without strangers is faster.
+const IN_TIME: Duration = Duration::from_millis(50);
+
+#[test]
+fn strangers_at_the_live_socket_delay_no_stop() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let _turn = crate::alone();
+    let trials = TestSize::of_this_run().pick(3, 9);
+    for stop in [Stop::Signal, Stop::Socket, Stop::Connected] {
+        let mut times = [Vec::new(), Vec::new()];
+        for _ in 0..trials {
+            for (selected, times) in times.iter_mut().enumerate() {
+                times.push(stop_time(stop, selected));
+            }
+        }
+        times.iter_mut().for_each(|times| times.sort_unstable());
+        let [at_the_run, elsewhere] = [0, 1].map(|place| times[place][trials / 2]);
+        println!(
+            "{stop:?}: {at_the_run:?} (worst {:?}), strangers elsewhere {elsewhere:?}",
+            times[0][trials - 1]
+        );
+        assert!(at_the_run <= IN_TIME.max(2 * elsewhere), "{stop:?}: {times:?}");
+    }
+}
+
+// ---------------------------------------------------------------- lateness
+
+/// Time of a window, and the beginning of it that is not judged: batches of ticks come up to 10 ms late.
+const WINDOW: Duration = Duration::from_millis(1500);
+const SETTLING: Duration = Duration::from_millis(100);
+
+/// Lateness of the ticks, ns, of each window; the strangers are at the run in the even ones, elsewhere in the others.
+fn windows(
+    directory: &Directory,
+    place: &Place,
+    scratch: &Scratch,
+    request: &[u8],
+    count: usize,
+) -> Vec<Vec<u64>> {
+    let mut client = Client::connect(&socket(directory)).expect("the run answers");
+    let _ = client.asker().ask(Ask::Watch { every: 1 }).expect("likewise");
+    let places = [place.clone(), stand_in(place, scratch)];
+    let selected = AtomicUsize::new(0);
+    under_attack(&places, request, &selected, || {
+        let mut windows = Vec::new();
+        for number in 0..count {
+            selected.store(number % 2, Ordering::Relaxed);
+            let (begun, mut window) = (Instant::now(), Vec::new());
+            while begun.elapsed() < WINDOW {
+                let event = client.next(Duration::from_millis(20)).expect("the run goes on");
+                if let Some(Event::Ticks { records, .. }) = event
+                    && begun.elapsed() > SETTLING
+                {
+                    window.extend(records.iter().map(|record| record.lateness_ns));
+                }
+            }
+            windows.push(window);
+        }
+        windows
+    })
+}
+
+/// The median, and its standard error from the spread of the values.
+fn median(mut values: Vec<f64>) -> (f64, f64) {
+    fn middle(values: &mut [f64]) -> f64 {
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    }
+    let centre = middle(&mut values);
+    let mut distances: Vec<f64> = values.iter().map(|value| (value - centre).abs()).collect();
+    // Of a normal distribution: 1.4826 distances are a standard deviation, and the median varies by 1.2533 / sqrt(n) of it.
+    let error = 1.4826 * 1.2533 * middle(&mut distances) / (values.len() as f64).sqrt();
+    (centre, error)
+}
+
+/// The ratio of the 99th percentiles of the lateness, strangers at the run to strangers elsewhere, and its standard error.
+#[track_caller]
+fn judge(name: &str, windows: &[Vec<u64>]) {
+    let p99 = |window: &Vec<u64>| {
+        let mut window = window.clone();
+        window.sort_unstable();
+        assert!(window.len() > 200, "{name}: ticks come: {}", window.len());
+        window[window.len() * 99 / 100] as f64
+    };
+    let of = |first: usize| median(windows.iter().skip(first).step_by(2).map(p99).collect());
+    let ((at_the_run, error), (elsewhere, error_elsewhere)) = (of(0), of(1));
+    let ratio = at_the_run / elsewhere;
+    let ratio_error = ratio * ((error / at_the_run).powi(2) + (error_elsewhere / elsewhere).powi(2)).sqrt();
+    println!(
+        "{name}: lateness p99 {:.0} µs, strangers elsewhere {:.0} µs, ratio {ratio:.2} +- {ratio_error:.2}",
+        at_the_run * 1e-3,
+        elsewhere * 1e-3
+    );
+    // Beyond twice its standard error the ratio is none of chance.
+    assert!(ratio - 2.0 * ratio_error <= 1.2, "{name}: {ratio:.2} +- {ratio_error:.2}");
+}
+
+#[test]
+fn strangers_at_a_port_of_the_loops_process_do_not_make_it_later() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let _turn = crate::alone();
+    let count = TestSize::of_this_run().pick(12, 40);
+    let scratch = Scratch::default();
+    let port =
+        TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a free port");
+    let run = start(
+        &scratch,
+        &format!("[[model]]\nplugin = \"ml-api\"\n[model.parameters]\nlisten = \"{port}\"\n"),
+    );
+    let here = directory(&scratch);
+    let live = Place::Socket(socket(&here));
+    judge("live socket", &windows(&here, &live, &scratch, &request(), count));
+    let get_version =
+        flotor_maglev::ml_api::Request::Plain(flotor_maglev::ml_api::Function::GetVersion).encode();
+    judge("ml-api", &windows(&here, &Place::Port(port), &scratch, get_version.bytes(), count));
+    run.signal(Signal::INT);
+    assert_eq!(run.wait().code, Some(exit_code::OK));
+
+    let scratch = Scratch::default();
+    let program = build_folder().join("flotor-haply-service-emulator").display().to_string();
+    let runtime = format!("XDG_RUNTIME_DIR={}", scratch.path().display());
+    let arguments = [&*runtime, &program, "--listen", "127.0.0.1:0", "--events", "127.0.0.1:0"];
+    let service = Listening::start("env", &arguments, "listening ws://");
+    let request = b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n";
+    let here = directory(&scratch);
+    judge("haply-service", &windows(&here, &service.target.place, &scratch, request, count));
+}
