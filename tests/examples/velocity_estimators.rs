@@ -32,11 +32,11 @@ const ACCELERATION_M_PER_S2: f64 = 0.1;
 
 /// Estimator with its setting, and what it trades.
 pub(crate) struct Trade {
-    family: &'static str,
+    pub(crate) family: &'static str,
     /// Hz or m/s², where there is one.
-    setting: Option<f64>,
-    noise_mm_per_s: f64,
-    lag_ms: f64,
+    pub(crate) setting: Option<f64>,
+    pub(crate) noise_mm_per_s: f64,
+    pub(crate) lag_ms: f64,
 }
 
 impl Trade {

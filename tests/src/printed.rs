@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-/// Holds a chapter of the book to a text, such as a row of a table; line breaks count as spaces.
+/// Holds a chapter of the book to a text, such as a row of a table; any white space counts as one space.
 ///
 /// # Panics
 /// If the chapter cannot be read, or does not have the text.
@@ -14,6 +14,7 @@ pub fn assert_chapter_prints(chapter: &str, text: &str) {
     let written =
         folders.find_map(|folder| std::fs::read_to_string(folder.join("docs/src").join(chapter)).ok());
     let written = written.unwrap_or_else(|| panic!("no chapter {chapter}"));
-    let words: Vec<&str> = written.split_whitespace().collect();
-    assert!(words.join(" ").contains(text), "{chapter} does not print `{text}`");
+    let [written, text] =
+        [written.as_str(), text].map(|text| text.split_whitespace().collect::<Vec<_>>().join(" "));
+    assert!(written.contains(&text), "{chapter} does not print `{text}`");
 }

@@ -1,4 +1,5 @@
-//! Numbers of the simulated flotor that the book prints: tables of two examples, and what the plugin declares.
+//! Numbers that the book prints and no other test computes: tables of examples, what the simulated flotor declares, the size of a
+//! recording.
 
 use flotor_hal::abi::loader::Setting;
 use flotor_session::registry::load_file;
@@ -7,10 +8,16 @@ use flotor_simulated::plant::FlotorParameters;
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;
 use flotor_tests::printed::assert_chapter_prints;
+use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::scratch::Scratch;
+use std::f64::consts::TAU;
 
 #[allow(dead_code)] // times and picture
 #[path = "../../examples/integrators.rs"]
 mod integrators;
+#[allow(dead_code)] // its `main`
+#[path = "../../../devices/maglev/examples/penetration.rs"]
+mod penetration;
 #[allow(dead_code)] // the picture
 #[path = "../../examples/velocity_estimators.rs"]
 mod velocity_estimators;
@@ -34,6 +41,29 @@ fn the_book_prints_noise_and_lag_of_the_velocity_estimates() {
     }
     for trade in velocity_estimators::trades().expect("physical parameters") {
         assert_chapter_prints(CHAPTER, &trade.line());
+    }
+}
+
+/// A low-pass that takes the share `a` of a difference has `a / sqrt(2 - a)` of its noise and lags by `T (1 - a) / a` more.
+#[test]
+fn noise_and_lag_of_the_low_pass_are_its_closed_forms() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let trades = velocity_estimators::trades().expect("physical parameters");
+    let [difference, ..] = trades.as_slice() else { panic!("no estimates") };
+    let low_pass: Vec<_> = trades.iter().filter(|trade| trade.family == "low-pass").collect();
+    assert!(low_pass.len() > 3, "{}", low_pass.len());
+    for trade in low_pass {
+        let share = 1.0 - (-TAU * trade.setting.expect("a bandwidth") * 1.0e-3).exp();
+        let lag_ms = (1.0 - share) / share + 0.5;
+        // The first difference of a run has faded to e^-12 at the end.
+        assert!((trade.lag_ms / lag_ms - 1.0).abs() < 1.0e-3, "{}, not {lag_ms} ms", trade.line());
+        let noise_mm_per_s = difference.noise_mm_per_s * share / (2.0 - share).sqrt();
+        // Of 20 000 estimates about the share is independent: six deviations of their mean square's root.
+        let bound = 6.0 / (2.0 * 20_000.0 * share).sqrt();
+        let is_close = (trade.noise_mm_per_s / noise_mm_per_s - 1.0).abs() < bound;
+        assert!(is_close, "{}, not {noise_mm_per_s} mm/s", trade.line());
     }
 }
 
@@ -77,4 +107,27 @@ fn the_book_prints_the_hands_and_the_flotor() {
     ] {
         assert_chapter_prints(CHAPTER, &row);
     }
+}
+
+#[test]
+fn the_book_prints_how_far_a_push_gets_into_the_wall_of_the_maglev_device() {
+    for line in penetration::table(5.0) {
+        assert_chapter_prints("devices/maglev.md", &line);
+    }
+}
+
+/// Measured times are part of a tick and compress differently from run to run.
+#[test]
+fn a_recording_has_the_size_that_the_book_prints() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let scratch = Scratch::default();
+    let file = scratch.path().join("run.mcap");
+    let recording = file.display().to_string();
+    let ran = Flotor::with(["run", "--clock", "virtual", "--duration", "30s", "--record", &recording]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let bytes = std::fs::metadata(file).expect("it was written").len() as f64 / 30_000.0;
+    assert!((bytes / 463.0 - 1.0).abs() < 0.05, "{bytes} a tick");
+    assert_chapter_prints("sizing.md", "| A recording | | 463 a tick: 0.46 MB/s at 1 kHz |");
 }
