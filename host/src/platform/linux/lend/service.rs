@@ -119,7 +119,7 @@ impl Served {
         let mut output = child.stdout.take().map(BufReader::new);
         let address = output.as_mut().and_then(listening);
         let said = output.and_then(|mut output| {
-            // Without the thread its words are lost, and it goes on all the same.
+            // Without the thread the output of the service is lost; the service continues.
             let thread = std::thread::Builder::new().name("flotor-service".to_owned());
             let read = move || {
                 let mut rest = String::new();
