@@ -42,7 +42,7 @@ impl Hand {
 }
 
 /// A motion through all of a workspace, a ball of positions and a ball of rotations about home. The time in each part of
-/// it is proportional to the part's volume, so a mean over the motion is one over uniformly distributed poses.
+/// it is proportional to the part's volume, so a mean over many sweeps is one over uniformly distributed poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workspace {
     /// Radius of the ball of positions, m.
