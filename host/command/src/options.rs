@@ -55,6 +55,21 @@ impl StrengthOption {
     }
 }
 
+/// `--accept-shared-control-group`, of each command that runs a scene on a device.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct ControlGroupOption {
+    /// Run although a kill of this program's control group ends the watchdog process with it, which alone stops a device then
+    #[arg(long)]
+    accept_shared_control_group: bool,
+}
+
+impl ControlGroupOption {
+    /// Adds the consent to that of the scene.
+    pub fn apply(self, scene: &mut Scene) {
+        scene.limits.accept_shared_control_group |= self.accept_shared_control_group;
+    }
+}
+
 /// `--plugin-path`, of each command that searches for plugins.
 #[derive(Args, Clone, Debug, Default)]
 pub struct PluginPathOption {

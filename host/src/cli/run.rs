@@ -4,8 +4,8 @@ use crate::platform::most_open_files;
 use crate::run_picture::RunPicture;
 use clap::{Args, ValueEnum};
 use flotor_command::options::{
-    ClockOption, JsonOption, PluginKeyValue, PluginPathOption, StrengthOption, core, duration_s, mcap_file,
-    rate_hz, svg_file, whole,
+    ClockOption, ControlGroupOption, JsonOption, PluginKeyValue, PluginPathOption, StrengthOption, core,
+    duration_s, mcap_file, rate_hz, svg_file, whole,
 };
 use flotor_command::stopping::{Keys, stop_on_signals, stop_run_on_signals};
 use flotor_command::{
@@ -76,9 +76,8 @@ pub(crate) struct RunArguments {
     plugin_path: PluginPathOption,
     #[command(flatten)]
     strength: StrengthOption,
-    /// Run although a kill of this program's control group ends the watchdog process with it, which alone stops a device then
-    #[arg(long)]
-    accept_shared_control_group: bool,
+    #[command(flatten)]
+    control_group: ControlGroupOption,
 }
 
 impl RunArguments {
@@ -311,7 +310,7 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
         let added = Scene::parse(Path::new("--ml-api"), ML_API).map_err(RunError::Scene)?.models;
         scene.models.extend(added.iter().map(|model| model.replaced_by(None, &[("listen", listen)])));
     }
-    scene.limits.accept_shared_control_group |= arguments.accept_shared_control_group;
+    arguments.control_group.apply(&mut scene);
     arguments.plugin_path.put_before_those_of(&mut scene);
     for set in &arguments.sets {
         set.apply(&mut scene).map_err(CommandError::Usage)?;

@@ -253,3 +253,40 @@ fn a_device_that_nothing_stops_is_named_and_refused_where_the_scene_requires_a_s
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     assert!(ran.error().contains("`limits.require_independent_stop` must be true or false"), "{ran:?}");
 }
+
+#[test]
+fn a_study_names_a_device_that_nothing_stops_and_takes_the_consent_to_a_shared_control_group() {
+    let _turn = crate::among_idle_ones();
+    let scratch = Scratch::default();
+    let library = scratch.path().join("libpost.so");
+    flotor_tests::library::compile_c_file(&workspace_root().join("tests/c/post.c"), &[], &library);
+    let scene = format!(
+        "[device]\nplugin = \"{}\"\n[[model]]\nplugin = \"spring\"\n[[model]].parameters\nmode = \"gamma\"\n",
+        library.display()
+    )
+    .replace("[[model]].parameters", "[model.parameters]");
+    let scene = scratch.file("study.toml", scene).display().to_string();
+    let data = scratch.path().join("data").display().to_string();
+    let consent = "--accept-shared-control-group";
+    let explore = ["study", "explore", "--scene", &scene, consent];
+    let sit = [
+        "study",
+        "jnd",
+        "--observer",
+        "human",
+        "--screen",
+        "terminal",
+        "--noise=off",
+        "--no-demo",
+        "--scene",
+        &scene,
+        "--out",
+        &data,
+        consent,
+    ];
+    for arguments in [&explore[..], &sit[..]] {
+        let ran = flotor_tests::program::Flotor::with(arguments).reading("q\n").run();
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        assert!(ran.stderr.contains("note: nothing stops `device` if this program is killed"), "{ran:?}");
+    }
+}

@@ -45,6 +45,8 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     let options = RunOptions { clock: Clock::Real, seed: 0 };
     let session = Session::prepare(&scene, &Registry::search(&scene.plugin_folders), &options)?;
     let session = session.on_core(arguments.core);
+    session.notices().into_iter().for_each(note);
+    session.warnings().iter().for_each(note);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let slices = ((arguments.duration / 2.0).ceil() as u64).max(1);
     let progress = progress_bar(slices, "{percent:>3} %  pair {pos} of {len}");

@@ -16,7 +16,7 @@ use choices::{
 };
 use clap::{Args, Subcommand, ValueEnum};
 use flotor_command::options::{
-    PluginKeyValue, PluginPathOption, StrengthOption, count, duration_s, real, whole,
+    ControlGroupOption, PluginKeyValue, PluginPathOption, StrengthOption, count, duration_s, real, whole,
 };
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
@@ -184,6 +184,8 @@ struct Common {
     plugin_path: PluginPathOption,
     #[command(flatten)]
     strength: StrengthOption,
+    #[command(flatten)]
+    control_group: ControlGroupOption,
 }
 
 #[derive(Args)]
@@ -373,6 +375,7 @@ impl Common {
         };
         let mut scene = scene.map_err(RunError::Scene)?;
         self.plugin_path.put_before_those_of(&mut scene);
+        self.control_group.apply(&mut scene);
         set(&mut scene, hand.unwrap_or_default())?;
         self.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
         set(&mut scene, way.map(ForceWay::load).unwrap_or_default())?;

@@ -32,6 +32,8 @@ pub struct RealTimeRig<'a> {
     stop: StopSwitch,
     shared: Shared,
     unseen: Option<String>,
+    /// Warnings of the run.
+    warnings: Vec<String>,
     run: Option<JoinHandle<Result<Outcome, RunError>>>,
     /// How the run ended, once that is known.
     ended: Option<RunEnd>,
@@ -72,7 +74,7 @@ impl<'a> RealTimeRig<'a> {
         let options = RunOptions { clock: Clock::Real, seed: 0 };
         let session = Session::prepare(apparatus.scene(), apparatus.registry(), &options)?;
         let session = session.with_strength(apparatus.strength());
-        let controls = session.controls();
+        let (controls, warnings) = (session.controls(), session.warnings().to_vec());
         apparatus.show(&controls, false)?;
         let (shared, stop) = (Shared::default(), stop.clone());
         let run = apparatus.describe(apparatus.scene(), Clock::Real, 0);
@@ -97,6 +99,7 @@ impl<'a> RealTimeRig<'a> {
             stop,
             shared,
             unseen,
+            warnings,
             run: Some(run),
             ended: None,
         })
@@ -105,6 +108,12 @@ impl<'a> RealTimeRig<'a> {
     /// From now on keeps every tick of every trial, in a file for each.
     pub fn record_into(&mut self, files: TrialFiles) {
         self.files = Some(files);
+    }
+
+    /// Returns the warnings of the run, on its stops and its devices, for people before the first trial.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Why no window can watch the run, if so.

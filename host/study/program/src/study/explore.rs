@@ -3,7 +3,7 @@
 
 use super::front::lines_of;
 use clap::Args;
-use flotor_command::options::{PluginKeyValue, PluginPathOption, StrengthOption};
+use flotor_command::options::{ControlGroupOption, PluginKeyValue, PluginPathOption, StrengthOption};
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note, style};
@@ -54,6 +54,8 @@ pub(super) struct ExploreArguments {
     plugin_path: PluginPathOption,
     #[command(flatten)]
     strength: StrengthOption,
+    #[command(flatten)]
+    control_group: ControlGroupOption,
 }
 
 pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
@@ -64,6 +66,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let session = Session::prepare(&scene, &registry, &options)?;
     let session = session.with_strength(arguments.strength.strength());
     session.notices().into_iter().for_each(note);
+    session.warnings().iter().for_each(note);
     let model =
         scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
             CommandError::Usage(format!("{}: the scene has no model to explore", scene.title))
@@ -138,6 +141,7 @@ fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
     };
     let mut scene = scene.map_err(RunError::Scene)?;
     arguments.plugin_path.put_before_those_of(&mut scene);
+    arguments.control_group.apply(&mut scene);
     arguments.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
     scene.duration_s = 86_400.0;
     Ok(scene)

@@ -61,6 +61,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let noise = noise(common)?;
     let mut rig = RealTimeRig::start(apparatus, kinematics, &stop)
         .map_err(|error| super::outside(error.as_ref(), &error))?;
+    rig.warnings().iter().for_each(note);
     let mut front = Front::open(common, &rig)?;
 
     let is_answered_anew = earlier.as_ref().is_some_and(|log| log.is_answered_anew());
