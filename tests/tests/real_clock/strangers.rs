@@ -281,7 +281,7 @@ fn strangers_at_a_port_of_the_loops_process_do_not_make_it_later() {
         return;
     }
     let _turn = crate::alone();
-    let count = TestSize::of_this_run().pick(12, 40);
+    let count = TestSize::of_this_run().pick(12, 80);
     let scratch = Scratch::default();
     let port =
         TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a free port");
