@@ -8,11 +8,18 @@
 //! other) stands behind `if R::any(mask)`: for one pose an ordinary branch, for several a branch taken when one of
 //! them needs it, with [`Real::select`] keeping the others as they were.
 //!
+//! [`angle`] gives squared angles and twists, [`arctangent`] angles from sides, [`saturation`] keeps a quantity short of a pole: polynomials
+//! over [`Real`], without the functions of a math library.
+//!
 //! The lanes come from the crate `pulp`, which finds the instruction set of the machine at run time.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
+
+pub mod angle;
+pub mod arctangent;
+pub mod saturation;
 
 /// Functions that are always inlined. In lanes they must be: only where the code around them is compiled for a set of
 /// instructions do they become those. With `#[inline]` alone a batch takes ten times as many (`energy` 3436 a pose instead

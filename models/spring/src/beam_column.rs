@@ -12,9 +12,9 @@
 
 use crate::entire::EntireFunctions;
 use crate::rigidity::Rigidities;
-use crate::saturation::saturate_above;
 use flotor_hal::math;
 use flotor_lanes::Real;
+use flotor_lanes::saturation::saturate_above;
 
 /// Argument from which on a law of the linear column is not trusted, rounded down: `G0` is 0.3, and its torque 3 to 5 % wrong
 /// (spring 3).

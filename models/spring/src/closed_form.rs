@@ -15,12 +15,12 @@
 //! In the source's letters X, Z are horizontal and Y is vertical; here x = X, y = Z, z = Y. Its tilt angles
 //! enter as `psi_Uz = psi_Lz - ry` and `psi_Ux = psi_Lx + rx` with the right-handed rotation vector (rx, ry, rz).
 
-use crate::arctangent;
 use crate::beam_column::{Column, TRUSTED_ARGUMENT};
 use crate::pose::{Coordinates, Pose, Span};
 use crate::precision::{Binary32, Binary64, Precision, Storage};
 use crate::response::{Answer, Demand, Law, Response};
 use crate::rigidity::Spring;
+use flotor_lanes::arctangent;
 use flotor_lanes::{Pair, Real, Vector};
 
 /// Which closed form.

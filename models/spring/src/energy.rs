@@ -30,11 +30,11 @@
 //! Derivation: the end stiffnesses are those of Haringx; the invariant form and the fourth order are this
 //! project's, in the book's chapter "The spring".
 
-use crate::angle::{TRUSTED_VERSINE, measures};
 use crate::bending::{Bending, BendingEnergy};
 use crate::pose::{Coordinates, Pose, Span};
 use crate::response::{Answer, Demand, Law, Response};
 use crate::rigidity::Spring;
+use flotor_lanes::angle::{TRUSTED_VERSINE, measures};
 use flotor_lanes::{Real, Vector};
 
 /// Smallest `1 + k.t`. The twist has no meaning for a plate turned upside down; this is 177.4 degrees.

@@ -3,14 +3,14 @@
 //! One idea a module, from the wire to the wrench:
 //! - [`rigidity`]: wire and coil become the rigidities of an equivalent rod; [`preset`]: springs with names.
 //! - [`pose`]: where the upper plate is; [`response`], [`validity`]: what a law answers.
-//! - [`flotor_lanes`]: formulas written once, for one pose and for several side by side; [`batch`] runs them over many.
+//! - [`flotor_lanes`]: formulas written once, for one pose and for several side by side, angles and saturation among them;
+//!   [`batch`] runs them over many.
 //! - [`entire`] and [`beam_column`]: the functions of the compressed rod, without branches or poles of their own.
 //! - [`thesis`]: the thesis's printed code with every branch, window and jump, for comparison.
-//! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`arctangent`] gives
-//!   it angles from sides, [`precision`] says in which format its numbers are stored.
+//! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`precision`]
+//!   says in which format its numbers are stored.
 //! - [`energy`]: the conservative law in three dimensions, the default. Its bending part is in [`bending`], to
-//!   fourth order in the angles by [`shape`] and [`quartic`]; [`angle`] gives angles without `acos`, and [`saturation`]
-//!   keeps the law smooth close to buckling.
+//!   fourth order in the angles by [`shape`] and [`quartic`].
 //! - [`rod`]: the exact rod, past buckling too, with a memory of where it was.
 //! - [`rod_blend`]: from the law `energy` to the rod where it is better, as one energy; `rod_share` says where.
 //! - [`held`]: a law with what a real coil adds to it: [`contact`] of its coils, and the twist and the off-axis ends of
@@ -20,8 +20,6 @@
 //!
 //! Derivations and sources are in the book, chapter "The spring".
 
-pub mod angle;
-pub mod arctangent;
 pub mod batch;
 pub mod beam_column;
 pub mod bending;
@@ -45,7 +43,6 @@ pub mod rigidity;
 pub mod rod;
 pub mod rod_blend;
 mod rod_share;
-pub mod saturation;
 pub mod seat;
 pub mod shape;
 pub mod thesis;

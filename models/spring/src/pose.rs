@@ -6,8 +6,8 @@
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::math;
 
-use crate::arctangent;
 use crate::validity::Validity;
+use flotor_lanes::arctangent;
 use flotor_lanes::{Real, Vector};
 
 /// Shortest distance of the plates, as a fraction of the free length, for which a direction between them makes

@@ -45,8 +45,8 @@ use crate::beam_column::Column;
 use crate::bending::{KNEE, REACH};
 use crate::entire::EntireFunctions;
 use crate::rigidity::{Rigidities, Spring};
-use crate::saturation::{Saturated, saturate_above, saturate_below};
 use crate::shape::Shape;
+use flotor_lanes::saturation::{Saturated, saturate_above, saturate_below};
 use flotor_lanes::{Real, polynomial};
 
 /// Length of the fit: relative error below 2e-4 of the coefficients of short springs, 1e-2 of the slender one.

@@ -1,11 +1,11 @@
 use flotor_hal::glam::{DMat3, DVec2, DVec3, DVec4};
 
 use super::{Quartic, coefficients, relative_length};
-use crate::angle::measures;
 use crate::bending::{Bending, saturated_argument};
 use crate::preset::Preset;
 use crate::rigidity::Spring;
 use crate::shape::Shape;
+use flotor_lanes::angle::measures;
 
 /// Normal of a section that leans from the chord (third axis) by the given vector.
 fn normal(lean: DVec2) -> DVec3 {

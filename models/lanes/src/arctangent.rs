@@ -12,7 +12,7 @@
 //! are positive, so nothing cancels. Found by weighted least squares on Chebyshev nodes with Lawson's iteration
 //! of the weights (Rice, *The Approximation of Functions*, volume 2, 1969), in 40 digits.
 
-use flotor_lanes::Real;
+use crate::Real;
 
 /// `P`, from the constant term.
 const NUMERATOR: [f64; 6] = [

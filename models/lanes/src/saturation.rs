@@ -3,22 +3,23 @@
 //! Near buckling, formulas run into poles. A hard limit would put a kink into the energy and a step into the
 //! stiffness; saturation keeps it twice differentiable, so force *and* stiffness stay continuous.
 
-use flotor_lanes::Real;
+use crate::Real;
 
 /// A quantity after saturation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Saturated<R: Real = f64> {
-    pub(crate) value: R,
+pub struct Saturated<R: Real = f64> {
+    /// After saturation.
+    pub value: R,
     /// Derivative by the quantity before saturation.
-    pub(crate) slope: R,
+    pub slope: R,
     /// Whether it was changed at all.
-    pub(crate) saturated: R::Mask,
+    pub saturated: R::Mask,
 }
 
 /// The quantity itself up to `knee`; with the excess `d` beyond it, `knee + d / sqrt(1 + (d / reach)²)`, which
 /// stays below `knee + reach`. Real-time: bounded, no allocation.
 #[inline(always)]
-pub(crate) fn saturate_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<R> {
+pub fn saturate_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<R> {
     let saturated = quantity.above(knee);
     let unit = quantity.like(1.0);
     if !R::any(saturated) {
@@ -38,7 +39,7 @@ pub(crate) fn saturate_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Sat
 
 /// The mirror image of [`saturate_above`]: never below `knee - reach`.
 #[inline(always)]
-pub(crate) fn saturate_below<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<R> {
+pub fn saturate_below<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<R> {
     let saturated = quantity.below(knee);
     if !R::any(saturated) {
         return Saturated { value: quantity, slope: quantity.like(1.0), saturated };

@@ -9,7 +9,7 @@
 //!
 //! Source: series of `asin² s` and `asin s / sqrt(1 - s²)` at `s = sin(angle / 2)`, NIST DLMF 4.24.
 
-use flotor_lanes::{Real, polynomial};
+use crate::{Real, polynomial};
 
 /// `1 - cos` of 60 degrees: beyond it the measures are a continuation.
 pub const TRUSTED_VERSINE: f64 = 0.5;
