@@ -107,6 +107,7 @@ impl<'a> RealTimeRig<'a> {
 
     /// From now on keeps every tick of every trial, in a file for each.
     pub fn record_into(&mut self, files: TrialFiles) {
+        self.shared.expect_recordings();
         self.files = Some(files);
     }
 

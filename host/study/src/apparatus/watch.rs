@@ -14,6 +14,8 @@ pub struct Watch {
     pub meter: Option<KinematicsMeter>,
     /// Of the trial under way.
     pub recording: RunRecording,
+    /// Outputs of the models that recordings of later trials store: the loop takes up a request some ticks later.
+    pub ahead: Option<Demand>,
     /// Ticks missed since somebody asked.
     pub missed_ticks: u64,
     /// Whether the handle was out of its range in the last tick.
@@ -33,7 +35,7 @@ impl Observer for Watch {
     }
 
     fn demand(&self) -> Demand {
-        self.recording.demand()
+        self.ahead.unwrap_or(Demand::FORCE).with(self.recording.demand())
     }
 
     fn change(&mut self, change: &Change) {
@@ -52,6 +54,11 @@ impl Shared {
     /// What was taken down so far. Not real-time: waits for the observers.
     pub fn lock(&self) -> MutexGuard<'_, Watch> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Requests all that a recording stores, from now on. Not real-time.
+    pub fn expect_recordings(&self) {
+        self.lock().ahead = Some(Demand::ALL);
     }
 }
 
@@ -78,5 +85,20 @@ fn sample(record: &TickRecord) -> Sample {
         force_z_n: record.commanded.force().z,
         force_n: record.commanded.force().length(),
         out_of_range: record.events.intersects(Events::BOUNDARY),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first ticks of a recording lacked torque and energy where its own request was the first.
+    #[test]
+    fn what_recordings_store_is_requested_before_the_first_of_them_begins() {
+        let shared = Shared::default();
+        assert_eq!(shared.demand(), Demand::FORCE);
+        shared.expect_recordings();
+        assert!(!shared.lock().recording.is_on());
+        assert_eq!(shared.demand(), Demand::ALL);
     }
 }
