@@ -3,7 +3,7 @@
 //! - [`trace`]: what a tick leaves behind; [`demand`]: the outputs of models that a run needs.
 //! - [`mapping`]: between the device frame and a model's frame.
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
-//!   a device, in a loop.
+//!   a device, in a loop; [`region`]: the vectors that limits allow.
 //! - [`plausibility`]: whether a sample can be true.
 //! - [`coupling`]: two devices held together; [`peer`]: what the two ends tell each other.
 //! - [`terminal`]: text without control characters.
@@ -23,6 +23,7 @@ mod outputs;
 pub mod peer;
 pub mod plausibility;
 mod random;
+pub mod region;
 pub mod rendered_boundary;
 pub mod terminal;
 pub mod trace;

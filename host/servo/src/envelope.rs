@@ -7,9 +7,8 @@
 //!
 //! The [slew limit](slew) is last, so that no fault upstream, not even a model that vanishes, makes the force jump, unless the part
 //! that accelerates the handle falls. The limits hold after it too: where the slew limit changes the wrench, the limited
-//! [regions](region) do once more.
+//! [regions](flotor_core::region) do once more.
 
-mod region;
 mod slew;
 
 use super::boundary::BoundaryWall;
@@ -17,11 +16,11 @@ use super::passivity::Passivity;
 use super::state::Gate;
 use flotor_core::limits::{Bound, Boundary, Limits};
 use flotor_core::oscillation::Oscillation;
+use flotor_core::region::Region;
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::Events;
 use flotor_coupling::port_energy::{Controller, PortObserver};
 use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench};
-use region::Region;
 use slew::SlewLimit;
 
 /// Effect of a stage of the envelope over a run.

@@ -6,8 +6,8 @@
 //! force took. Until the difference is paid back, a force along the motion is scaled by the ratio of what was taken to what would
 //! have been, so that a spring returns exactly what it received.
 
-use super::region::Region;
 use flotor_core::limits::Limits;
+use flotor_core::region::Region;
 use flotor_coupling::port_energy::Displacement;
 use flotor_hal::{Capabilities, DVec3, Twist, Wrench};
 
