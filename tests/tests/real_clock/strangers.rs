@@ -15,7 +15,7 @@ use rustix::process::Signal;
 use std::collections::VecDeque;
 use std::io::Read;
 use std::net::TcpListener;
-use std::os::unix::net::UnixListener;
+use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -39,7 +39,8 @@ fn directory(scratch: &Scratch) -> Directory {
 
 fn socket(directory: &Directory) -> PathBuf {
     let first = || directory.runs().into_iter().next();
-    wait_until("the run has a socket", || first().is_some());
+    // The file is there before somebody listens.
+    wait_until("the run has a socket", || first().is_some_and(|run| UnixStream::connect(run.path).is_ok()));
     first().expect("it is there").path
 }
 

@@ -362,7 +362,8 @@ fn an_expectation_asks_for_the_outputs_that_its_number_needs() {
     let passed = test("\"energy.loop_generated_j\" = { min = 0, max = 1 }");
     assert_eq!(passed.code, Some(exit_code::OK), "{passed:?}");
     let failed = test("\"energy.loop_generated_j\" = { min = 1, max = 2 }");
-    assert!(failed.code != Some(exit_code::OK) && failed.stdout.contains("--compute energy"), "{failed:?}");
+    assert_eq!(failed.code, Some(exit_code::OTHER), "{failed:?}");
+    assert!(failed.stdout.contains("energy.loop_generated_j: expected 1 to 2, got "), "{failed:?}");
 }
 
 /// A request is of no use to a run that is over, and does no harm.
