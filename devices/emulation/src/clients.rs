@@ -35,8 +35,7 @@ impl Clients {
         Ok(Self { port, silent: Vec::new() })
     }
 
-    /// Waits for the next client that sends something. Those that connected earlier and are silent stay for
-    /// [`FIRST_MESSAGE`].
+    /// Waits for the next client that sends something. Silent clients stay connected for [`FIRST_MESSAGE`].
     ///
     /// # Errors
     /// The system's error.

@@ -48,7 +48,7 @@ pub enum LinkError {
         reason: String,
     },
     /// Whoever has read a key is a member for as long as its certificate is valid.
-    #[error("other users may read the key in {}; `chmod 600 {}`, and if one may have read it, make new keys", file.display(), file.display())]
+    #[error("other users may read the key in {}; `chmod 600 {}`, and if another user may have read the file, make new keys", file.display(), file.display())]
     ExposedKey {
         /// The file with the key.
         file: PathBuf,

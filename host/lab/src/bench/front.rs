@@ -27,7 +27,8 @@ pub struct FrontRow {
     pub times: Times,
     /// Distance from the reference.
     pub distance: Distance,
-    /// The most accurate case that takes no more time for no larger error; `None` on the Pareto front.
+    /// The most accurate case that takes no more time for no larger error; `None` on the Pareto front, and for a case that is
+    /// not judged.
     pub dominated_by: Option<String>,
 }
 
@@ -50,7 +51,10 @@ impl Front {
         let points: Vec<Point> = times
             .iter()
             .zip(&distances)
-            .map(|(times, distance)| Point { time_ns: times.mean_ns, error_n: distance.force_max_n })
+            .map(|(times, distance)| Point {
+                time_ns: times.mean_ns,
+                error_n: if is_judged(distance, &distances) { distance.force_max_n } else { f64::NAN },
+            })
             .collect();
         let dominated_by = |point: &Point| Some((*named.get(dominator(*point, &points)?)?).to_owned());
         let rows = named.iter().zip(times).zip(distances).zip(&points);
@@ -63,6 +67,11 @@ impl Front {
         let Workspace { radius_m, rotation_rad } = workspace;
         Self { radius_m, rotation_rad, rows: rows.collect() }
     }
+}
+
+/// Whether a case has answered all poses that any case has: an error over the others alone is no measure of it.
+pub(super) fn is_judged<'d>(distance: &Distance, all: impl IntoIterator<Item = &'d Distance>) -> bool {
+    all.into_iter().all(|other| distance.unanswered <= other.unanswered) && !distance.force_max_n.is_nan()
 }
 
 /// Cost and error of a case.
@@ -88,6 +97,13 @@ fn dominator(point: Point, points: &[Point]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_case_that_leaves_out_poses_or_answers_none_is_not_judged() {
+        let distance = |unanswered, force_max_n| Distance { unanswered, force_max_n, ..Distance::default() };
+        let all = [distance(2, 0.1), distance(2, f64::NAN), distance(3, 0.0)];
+        assert_eq!(all.each_ref().map(|one| is_judged(one, &all)), [true, false, false]);
+    }
 
     #[test]
     fn the_most_accurate_of_the_better_cases_dominates() {

@@ -1,5 +1,6 @@
 //! The measurements as a table, as CSV, as a picture.
 
+use super::front::is_judged;
 use super::{DEMANDS, Distance, Front, FrontRow, Losses, Sampling, Speed, SplitTimes, Times};
 use flotor_command::tables::{table, to_csv};
 use flotor_plot::{Axis, Bin, Figure, Mark, Panel, Series};
@@ -146,8 +147,11 @@ impl BenchReport {
             let Distance { force_max_n, force_rms_n, torque_max_nm, .. } = *distance;
             let [mean, p999] = [times.mean_ns, times.warm_p999_ns].map(|ns| format!("{ns:.0}"));
             let [max, rms, torque] = [force_max_n, force_rms_n, torque_max_nm].map(|n| format!("{n:.1e}"));
-            let place =
-                dominated_by.as_ref().map_or_else(|| "yes".to_owned(), |by| format!("dominated by {by}"));
+            let place = match dominated_by {
+                Some(by) => format!("dominated by {by}"),
+                None if is_judged(distance, rows.iter().map(|row| &row.distance)) => "yes".to_owned(),
+                None => "not judged".to_owned(),
+            };
             [name.clone(), mean, p999, max, rms, torque, place]
         });
         let head = ["case", "mean ns", "p99.9", "force max N", "rms N", "torque max N m", "Pareto front"];

@@ -1,4 +1,4 @@
-//! What differs between systems: how a process keeps others from writing to its file.
+//! Exclusive writing to a file, by the means of each system.
 
 #[cfg(not(windows))]
 mod unix;

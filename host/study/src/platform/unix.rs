@@ -1,4 +1,4 @@
-//! The same for Linux: a lock that ends with the file's last descriptor, so with the process, however it ends.
+//! Linux: a lock on the file. The kernel releases it with the last descriptor, so after every end of the process.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Error, ErrorKind};

@@ -1,4 +1,4 @@
-//! The same for Windows: a share mode, which keeps writers out and lets readers in.
+//! Windows: a share mode, which refuses other writers and admits readers.
 
 use std::fs::{File, OpenOptions};
 use std::io::Error;

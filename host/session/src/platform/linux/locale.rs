@@ -6,8 +6,8 @@ use std::ptr::null;
 
 /// Returns the locale of the process, for all categories. Not real-time.
 pub(super) fn now() -> Option<CString> {
-    // SAFETY: asked with no name, `setlocale` changes nothing and returns a text that is valid until the next call; only plugins and
-    // this module call it, and the plugin whose code has just run has returned.
+    // SAFETY: asked with no name, `setlocale` changes nothing and returns a text that is valid until the next call. The host makes no
+    // other call meanwhile, and the contract forbids plugins to change the process.
     let text = unsafe { libc::setlocale(libc::LC_ALL, null()) };
     // SAFETY: null, or a text that ends in a zero.
     (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_owned())
@@ -15,7 +15,7 @@ pub(super) fn now() -> Option<CString> {
 
 /// Sets the locale that [`now`] returned. Not real-time.
 pub(super) fn set(locale: &CStr) {
-    // SAFETY: a text that ends in a zero and is there for the call. The host's own code formats nothing by the locale; the plugin
-    // that has changed it was as concurrent with other plugins.
+    // SAFETY: a text that ends in a zero and is there for the call. The host's own code reads no locale; the contract forbids plugins
+    // to call `setlocale`, so that none runs at the same time.
     unsafe { libc::setlocale(libc::LC_ALL, locale.as_ptr()) };
 }
