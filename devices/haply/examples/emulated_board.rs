@@ -3,7 +3,7 @@
 //! ```text
 //! $ cargo run -p flotor-haply --example emulated_board
 //! port /dev/pts/3
-//! $ flotor run host/scenes/haply.toml --set device.port=/dev/pts/3
+//! $ flotor run haply --set device.port=/dev/pts/3
 //! ```
 
 use flotor_hal::glam::DVec2;

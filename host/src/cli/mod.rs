@@ -10,6 +10,7 @@ mod plugins;
 mod record;
 mod release;
 mod run;
+mod scenes;
 mod swap;
 mod view;
 mod watchdog;
@@ -37,6 +38,7 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 #[command(after_help = "Examples:\n  \
     flotor                                            the built-in demo: simulate a spring for 10 s\n  \
     flotor run --clock virtual --seed 1 --plot run.svg    the same, repeatable, as a picture\n  \
+    flotor run wall                                   another of Flotor's own scenes (`flotor scenes`)\n  \
     flotor run scene.toml --set spring.variant=closed-form --record run.mcap\n  \
     flotor eval --model spring --set preset=thesis-2 --poses poses.csv --out -\n\n\
     Exit codes: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 anything else.")]
@@ -85,6 +87,8 @@ enum Command {
     View(Box<view::ViewArguments>),
     /// Evaluate a force model at poses from a CSV file
     Eval(Separate),
+    /// List Flotor's own scenes, or print one to begin from
+    Scenes(scenes::ScenesArguments),
     /// List the installed plugins, without running any of them
     Plugins(plugins::PluginsArguments),
     /// Check a plugin file against the rules of the contract
@@ -174,6 +178,7 @@ fn carry_out(command: Command) -> Result<(), CommandError> {
         Command::Replay(separate) => LAB.carry_out("replay", &separate.arguments),
         Command::View(arguments) => view::run(&arguments),
         Command::Eval(separate) => LAB.carry_out("eval", &separate.arguments),
+        Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Plugins(arguments) => plugins::run(&arguments),
         Command::Validate(separate) => LAB.carry_out("validate", &separate.arguments),
         Command::New(arguments) => new::run(&arguments),

@@ -34,11 +34,12 @@ use std::path::{Path, PathBuf};
 #[derive(Args, Default)]
 #[command(after_help = "Examples:\n  \
     flotor run --duration 5s --plot run.svg\n  \
+    flotor run wall                                       a scene of Flotor's own (`flotor scenes` lists them)\n  \
     flotor run scene.toml --clock virtual --seed 7 --record run.mcap --json run.json\n  \
     flotor run --set spring.variant=closed-form --set device.hand=press\n  \
     flotor run maglev.toml --allow-strong                 more than 20 N and 1 N·m, where scene and device allow it")]
 pub(crate) struct RunArguments {
-    /// Scene file (TOML); without it, the built-in demo
+    /// Scene file (TOML), or the name of one of Flotor's own scenes (default: demo)
     scene: Option<PathBuf>,
     /// Duration of the run: 10s, 500ms, 2min; a number alone is in seconds (default: that of the scene)
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]

@@ -120,7 +120,7 @@ fn the_gallery_has_every_scene_and_its_picture() {
     let scenes = files_under("host/scenes", "toml").expect("there are scenes");
     let names = scenes.iter().filter_map(|file| file.file_name()?.to_str()?.strip_suffix(".toml"));
     for name in names.filter(|name| !name.ends_with(".test")) {
-        let command = format!("$ flotor run host/scenes/{name}.toml --clock virtual ");
+        let command = format!("$ flotor run {name} --clock virtual ");
         let needs_more = gallery.contains(&format!("\n- `{name}.toml`: "));
         assert_ne!(gallery.contains(&command), needs_more, "{name} is shown, or the reason why not is told");
         if needs_more {
@@ -135,15 +135,21 @@ fn the_gallery_has_every_scene_and_its_picture() {
 }
 
 #[test]
-fn the_pictures_of_the_gallery_are_what_its_commands_draw() {
+fn the_pictures_of_the_readme_and_the_gallery_are_what_their_commands_draw() {
     if TestSize::of_this_run().leaves_out_long_tests() {
         return;
     }
-    let gallery = text("docs/src/gallery.md");
-    let commands: Vec<&str> = gallery.lines().filter_map(|line| line.strip_prefix("$ flotor ")).collect();
-    assert!(commands.len() >= 8, "{commands:?}");
+    let (readme, gallery) = (text("README.md"), text("docs/src/gallery.md"));
+    let of_readme = readme.split('`').filter_map(|quoted| quoted.strip_prefix("cargo run --release -- "));
+    let of_readme: Vec<(&str, &str)> = of_readme.map(|command| (command, "docs/src/images")).collect();
+    assert_eq!(of_readme.len(), 1, "{of_readme:?}");
+    let of_gallery = gallery.lines().filter_map(|line| line.strip_prefix("$ flotor "));
+    let of_gallery: Vec<(&str, &str)> =
+        of_gallery.map(|command| (command, "docs/src/images/scenes")).collect();
+    assert!(of_gallery.len() >= 8, "{of_gallery:?}");
     let scratch = Scratch::default();
-    let another = commands.into_par_iter().filter_map(|command| {
+    let commands = [of_readme, of_gallery].concat();
+    let another = commands.into_par_iter().filter_map(|(command, pictures)| {
         let words = command.split(' ').map(|word| match word.strip_suffix(".svg") {
             Some(_) => scratch.path().join(word).display().to_string(),
             None => word.to_owned(),
@@ -153,7 +159,7 @@ fn the_pictures_of_the_gallery_are_what_its_commands_draw() {
         assert_eq!(ran.code, Some(0), "{command}: {ran:#?}");
         let drawn = Path::new(words.last().expect("it has words"));
         let name = drawn.file_name()?.to_str()?;
-        let kept = text(&format!("docs/src/images/scenes/{name}"));
+        let kept = text(&format!("{pictures}/{name}"));
         (std::fs::read_to_string(drawn).ok() != Some(kept)).then_some(command)
     });
     assert_eq!(another.collect::<Vec<_>>(), Vec::<&str>::new(), "they draw another picture");

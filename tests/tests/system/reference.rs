@@ -69,6 +69,7 @@ fn an_option_of_many_commands_is_the_same_in_each() {
             &[
                 "run",
                 "replay",
+                "scenes",
                 "plugins",
                 "validate",
                 "test",

@@ -3,6 +3,7 @@
 mod change;
 mod coupling;
 mod devices;
+mod own;
 mod placement;
 mod reader;
 mod reference;
@@ -15,6 +16,7 @@ use flotor_core::coupling::{CouplingDescription, PassivityMode};
 use flotor_core::limits::{Boundary, Limits};
 use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
 use flotor_core::plausibility::is_rotation;
+pub use own::{OWN_SCENES, OwnScene};
 pub use reader::{Location, SceneError};
 pub use reference::{KeyReference, SectionReference, reference};
 pub use setting::{KeyValue, PluginKeyValue};
@@ -182,13 +184,18 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Reads a scene file. Not real-time.
+    /// Reads a scene file, or one of Flotor's own scenes by its name. Not real-time.
     ///
     /// # Errors
     /// [`SceneError`] with file, line, key and remedy.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let text = read_text(path, "the scene")
-            .map_err(|TextProblem { line, problem }| Location { file: path.into(), line }.problem(problem))?;
+        if let Some(own) = OwnScene::named(path) {
+            return own.read();
+        }
+        let text = read_text(path, "the scene").map_err(|TextProblem { line, problem }| {
+            let advice = if path.is_file() { String::new() } else { own::advice(path) };
+            Location { file: path.into(), line }.problem(problem + &advice)
+        })?;
         let mut scene = Self::parse(path, &text)?;
         let base = path.parent().unwrap_or(Path::new(""));
         for folder in &mut scene.plugin_folders {
