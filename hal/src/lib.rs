@@ -73,4 +73,4 @@ pub use model::{Demand, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output
 pub use parameter::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Settings};
 pub use refusal::{Refusal, RefusalKind};
 pub use sampled_loop::{Damper, SampledLoop};
-pub use text_file::{TextProblem, read_file, read_text};
+pub use text_file::{TextProblem, open_file, read_file, read_text};

@@ -40,12 +40,12 @@ impl TextProblem {
     }
 }
 
-/// Reads a whole regular file of at most so many bytes. A pipe, whose writer may never come, and a device file, which may have
-/// no end, are not opened. Not real-time.
+/// Opens a regular file for reading. A pipe, whose writer may never come, and a device file, which may have no end, are not
+/// opened. Not real-time.
 ///
 /// # Errors
-/// The system's; of kind `InvalidInput` for a pipe or a device file, `FileTooLarge` for a longer file.
-pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+/// The system's; of kind `IsADirectory` for a folder, `InvalidInput` for a pipe or a device file.
+pub fn open_file(path: &Path) -> io::Result<File> {
     let attributes = std::fs::metadata(path)?;
     if attributes.is_dir() {
         return Err(io::ErrorKind::IsADirectory.into());
@@ -54,8 +54,16 @@ pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
         let problem = "it is a pipe or a device; write its contents to a file and name that";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     }
+    File::open(path)
+}
+
+/// Reads a whole regular file of at most so many bytes. Not real-time.
+///
+/// # Errors
+/// Those of [`open_file`]; of kind `FileTooLarge` for a longer file.
+pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    open_file(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most_bytes {
         let problem = format!("it has more than {} MiB", most_bytes >> 20);
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));

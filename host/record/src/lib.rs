@@ -33,7 +33,6 @@
 //! Not real-time: records reach the recorder through the queue of the trace.
 
 mod chunked;
-mod container;
 mod coupling;
 mod digest;
 mod file;
@@ -47,12 +46,12 @@ mod writer;
 #[cfg(test)]
 mod tests;
 
-pub use container::Damage;
 pub use digest::{Coverage, TraceDigest};
 pub use file::FileError;
 pub use files::NamedFile;
+pub use flotor_mcap::Ending;
 pub use messages::{NoMessage, TickMessages, change_from_bytes, change_to_bytes, tick_from_messages};
-pub use reader::{Ending, ReadError, Recording};
+pub use reader::{Damage, ReadError, Recording};
 pub use run::{NoRun, PluginDescription, Role, RunDescription};
 pub use writer::{RecordError, Recorder};
 

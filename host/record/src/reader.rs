@@ -1,16 +1,51 @@
 //! Reads a recording back: how the run was set up, then tick by tick, bit for bit.
 
-use crate::container::{Damage, Messages, TopicMessage};
-use crate::schema::{Change as ChangeMessage, FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic};
+use crate::schema::{
+    Change as ChangeMessage, ENCODING, FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic,
+};
 use crate::{Note, RunDescription};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_hal::Pose;
-use mcap::{MAGIC, McapError};
-use prost::Message;
+use flotor_mcap::{ChannelInfo, Ending, Message, MessageReader, OpenError};
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io;
 use std::path::{Path, PathBuf};
+
+/// What keeps a recording from being read on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Damage {
+    /// The file is damaged below its messages.
+    #[error("{0}")]
+    File(#[from] flotor_mcap::Damage),
+    /// A message is not well-formed.
+    #[error("a message on `{topic}` cannot be decoded: {cause}")]
+    Message {
+        /// Topic of the message.
+        topic: &'static str,
+        /// What is wrong with it.
+        #[source]
+        cause: prost::DecodeError,
+    },
+    /// A message lacks a part that every recording has.
+    #[error("a message on `{topic}` lacks `{field}`")]
+    Missing {
+        /// Topic of the message.
+        topic: &'static str,
+        /// What it lacks.
+        field: &'static str,
+    },
+    /// A tick has no pose.
+    #[error("a tick has no pose of the same time on `/tf`")]
+    NoPose,
+    /// Ticks are missing.
+    #[error("{missing} ticks are missing")]
+    Gap {
+        /// How many.
+        missing: u32,
+    },
+}
 
 /// Why a recording cannot be read, or not any further.
 #[derive(Debug, thiserror::Error)]
@@ -86,22 +121,11 @@ pub enum ReadError {
     },
 }
 
-/// How a file ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
-    /// The recorder finished it: the whole run is there.
-    Finished,
-    /// It breaks off (a killed process, a full disk): the last ticks of the run are missing, up to 250 ms before
-    /// the process died.
-    CutOff,
-}
-
 /// A recording being read: an iterator over its ticks.
 pub struct Recording {
     path: PathBuf,
-    messages: Messages<File>,
+    messages: MessageReader<File, Topic>,
     run: RunDescription,
-    ending: Ending,
     notes: Vec<Note>,
     /// Changes before the tick read last, not taken yet.
     changes: Vec<Change>,
@@ -119,19 +143,18 @@ impl Recording {
     /// # Errors
     /// [`ReadError`]: not a recording, or nothing of it can be read.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let unreadable = |cause| ReadError::Open { path: path.into(), cause };
-        // A pipe would wait for a writer.
-        if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-            return Err(ReadError::NotMcap { path: path.into() });
-        }
-        let mut file = File::open(path).map_err(unreadable)?;
-        if !begins_as_mcap(&mut file).map_err(unreadable)? {
-            return Err(ReadError::NotMcap { path: path.into() });
-        }
-        let ending = ending(&mut file).map_err(unreadable)?;
-        file.rewind().map_err(unreadable)?;
-        let mut messages = Messages::new(file, ending == Ending::CutOff);
-        let run = match messages.next().map_err(|cause| damaged(path, None, cause))? {
+        let unreadable = |cause: io::Error| match cause.kind() {
+            io::ErrorKind::InvalidInput => ReadError::NotMcap { path: path.into() },
+            _ => ReadError::Open { path: path.into(), cause },
+        };
+        let file = flotor_hal::open_file(path).map_err(unreadable)?;
+        let mut messages = MessageReader::open(file, known_topic).map_err(|error| match error {
+            OpenError::Io(cause) => unreadable(cause),
+            _ => ReadError::NotMcap { path: path.into() },
+        })?;
+        let ending = messages.ending();
+        let first = messages.next_message().map_err(|cause| damaged(path, None, cause.into()))?;
+        let run = match first {
             Some(first) if first.topic == Topic::Run => read_run(path, &first)?,
             None if ending == Ending::CutOff => return Err(ReadError::CutOffAtStart { path: path.into() }),
             _ => return Err(ReadError::NotARecording { path: path.into() }),
@@ -140,7 +163,6 @@ impl Recording {
             path: path.into(),
             messages,
             run,
-            ending,
             notes: Vec::new(),
             changes: Vec::new(),
             pose: None,
@@ -159,7 +181,7 @@ impl Recording {
     /// Whether the end of the run is there; known from the start.
     #[must_use]
     pub fn ending(&self) -> Ending {
-        self.ending
+        self.messages.ending()
     }
 
     /// What happened, in words, up to the tick read last.
@@ -174,7 +196,7 @@ impl Recording {
     }
 
     fn next_tick(&mut self) -> Result<Option<TickRecord>, Damage> {
-        while let Some(message) = self.messages.next()? {
+        while let Some(message) = self.messages.next_message()? {
             match message.topic {
                 Topic::Run => {} // another recording appended to this one; its first tick is a gap
                 Topic::Pose => {
@@ -192,7 +214,7 @@ impl Recording {
         Ok(None)
     }
 
-    fn tick(&mut self, message: &TopicMessage) -> Result<TickRecord, Damage> {
+    fn tick(&mut self, message: &Message<Topic>) -> Result<TickRecord, Damage> {
         match message.sequence.wrapping_sub(self.sequence) {
             0 => self.sequence = self.sequence.wrapping_add(1),
             missing => return Err(Damage::Gap { missing }),
@@ -229,27 +251,13 @@ impl Iterator for Recording {
 
 impl std::iter::FusedIterator for Recording {}
 
-/// True if the file begins as MCAP does, as far as it goes.
-fn begins_as_mcap(file: &mut File) -> io::Result<bool> {
-    let mut head = Vec::with_capacity(MAGIC.len());
-    file.take(MAGIC.len() as u64).read_to_end(&mut head)?;
-    Ok(MAGIC.starts_with(&head))
+/// Returns the topic of a channel that is one of a recording's in name and kind.
+fn known_topic(channel: ChannelInfo<'_>) -> Option<Topic> {
+    let matches = |topic: &Topic| channel.topic == topic.name() && channel.schema == topic.schema();
+    Topic::ALL.into_iter().find(matches).filter(|_| channel.encoding == ENCODING)
 }
 
-/// A finished file ends with the magic bytes it begins with.
-fn ending(file: &mut File) -> io::Result<Ending> {
-    let length = file.seek(SeekFrom::End(0))?;
-    let magic_length = MAGIC.len() as u64;
-    if length < 2 * magic_length {
-        return Ok(Ending::CutOff);
-    }
-    file.seek(SeekFrom::Start(length - magic_length))?;
-    let mut tail = Vec::with_capacity(MAGIC.len());
-    file.take(magic_length).read_to_end(&mut tail)?;
-    Ok(if tail == MAGIC { Ending::Finished } else { Ending::CutOff })
-}
-
-fn read_run(path: &Path, message: &TopicMessage) -> Result<RunDescription, ReadError> {
+fn read_run(path: &Path, message: &Message<Topic>) -> Result<RunDescription, ReadError> {
     let run = decode::<Run>(message).map_err(|cause| damaged(path, None, cause))?;
     if run.format > FORMAT {
         let Run { format, flotor_version, .. } = run;
@@ -258,18 +266,18 @@ fn read_run(path: &Path, message: &TopicMessage) -> Result<RunDescription, ReadE
     RunDescription::from_message(run).map_err(|part| damaged(path, None, lacks(message, part)))
 }
 
-fn decode<M: Message + Default>(message: &TopicMessage) -> Result<M, Damage> {
+fn decode<M: prost::Message + Default>(message: &Message<Topic>) -> Result<M, Damage> {
     let topic = message.topic.name();
     M::decode(message.data.as_slice()).map_err(|cause| Damage::Message { topic, cause })
 }
 
-fn lacks(message: &TopicMessage, Missing(field): Missing) -> Damage {
+fn lacks(message: &Message<Topic>, Missing(field): Missing) -> Damage {
     Damage::Missing { topic: message.topic.name(), field }
 }
 
 fn damaged(path: &Path, after_tick: Option<u64>, cause: Damage) -> ReadError {
     match cause {
-        Damage::Container(McapError::UnsupportedCompression(compression)) => {
+        Damage::File(flotor_mcap::Damage::Compressed(compression)) => {
             ReadError::Compressed { path: path.into(), compression }
         }
         cause => ReadError::Damaged { path: path.into(), after_tick, cause },

@@ -362,7 +362,10 @@ fn a_record_longer_than_its_chunk_is_damage() {
     bytes[chunk + 9 + 40 + 1..][..8].copy_from_slice(&100_000_u64.to_le_bytes());
     fs::write(&file.0, &bytes).unwrap();
     let end = read(&file.0).1;
-    assert!(matches!(end, Err(ReadError::Damaged { cause: Damage::Chunk, .. })), "{end:?}");
+    assert!(
+        matches!(end, Err(ReadError::Damaged { cause: Damage::File(flotor_mcap::Damage::Chunk), .. })),
+        "{end:?}"
+    );
 }
 
 #[test]

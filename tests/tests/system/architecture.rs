@@ -32,6 +32,8 @@ enum Role {
     Coupling,
     /// The real-time core.
     Servo,
+    /// Reads MCAP files.
+    Container,
     Record,
     /// What host and observers say to each other.
     Live,
@@ -69,9 +71,9 @@ enum Role {
 }
 
 use Role::{
-    Calibration, Command, Compat, Contract, Core, Coupling, Drawing, DropIn, Emulator, Fixture, Guard, Host,
-    Judge, Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record, SceneTest, Service, Servo,
-    Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
+    Calibration, Command, Compat, Container, Contract, Core, Coupling, Drawing, DropIn, Emulator, Fixture,
+    Guard, Host, Judge, Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record, SceneTest,
+    Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -87,7 +89,8 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/core", Core, &[Contract, Sync]),
     ("host/coupling", Coupling, &[Contract, Sync, Core]),
     ("host/servo", Servo, &[Contract, Sync, Core, Coupling]),
-    ("host/record", Record, &[Contract, Sync, Core]),
+    ("host/mcap", Container, &[]),
+    ("host/record", Record, &[Contract, Sync, Core, Container]),
     ("host/live", Live, &[Contract, Sync, Core, Record]),
     ("host/session", Session, &[Contract, Sync, Core, Coupling, Servo, Record, Live]),
     ("host/compat/common", Compat, &[Contract, Sync, Core, Servo, Record, Live, Session]),
@@ -163,7 +166,7 @@ impl Role {
     /// The roles a crate of this role may depend on.
     fn may_use(self) -> &'static [Role] {
         match self {
-            Plugin => &[Contract, OfDevices, OfModels],
+            Plugin => &[Contract, OfDevices, OfModels, Container],
             Fixture => &[Contract],
             Emulator => &[Contract, Plugin, OfEmulators],
             _ => CRATES.iter().find(|(_, role, _)| *role == self).map_or(&[], |(.., used)| used),

@@ -24,6 +24,7 @@ mod examples;
 mod falcon;
 mod force_sensor;
 mod golden;
+mod hand_recording;
 mod haply;
 mod inputs;
 mod installation;

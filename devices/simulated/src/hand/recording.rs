@@ -19,8 +19,10 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Largest file read, bytes: hours of a run.
-const MAX_BYTES: u64 = 1 << 30;
+/// Size of the largest table read, bytes: hours of a run.
+const MAX_TABLE_BYTES: u64 = 256 << 20;
+/// Largest number of samples: hours of a run.
+const MAX_SAMPLES: usize = 1 << 24;
 /// Farthest position a handle can have had, m: ten times the range of the device.
 const FARTHEST_M: f64 = 0.12;
 
@@ -60,13 +62,13 @@ impl Recording {
     /// [`RecordingError`] if it cannot be read or is no trajectory.
     pub fn load(path: &Path) -> Result<Self, RecordingError> {
         let wrong = |problem: String| RecordingError { file: path.display().to_string(), problem };
-        let size = std::fs::metadata(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
-        if !size.is_file() || size.len() > MAX_BYTES {
-            return Err(wrong(format!("is not a recording: it is larger than {MAX_BYTES} bytes")));
-        }
-        let bytes = std::fs::read(path).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+        let unreadable = |error| wrong(format!("cannot be read: {error}"));
         let is_recording = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
-        let samples = if is_recording { mcap_file::read(&bytes) } else { table::read(&bytes) };
+        let samples = if is_recording {
+            mcap_file::read(flotor_hal::open_file(path).map_err(unreadable)?)
+        } else {
+            table::read(&flotor_hal::read_file(path, MAX_TABLE_BYTES).map_err(unreadable)?)
+        };
         samples.and_then(Self::new).map_err(wrong)
     }
 
@@ -118,6 +120,7 @@ impl Sample {
             Some(last) if self.time_ns <= last.time_ns => {
                 Err(format!("time {} ns is not after {} ns", self.time_ns, last.time_ns))
             }
+            _ if samples.len() >= MAX_SAMPLES => Err(format!("has more than {MAX_SAMPLES} poses")),
             _ => {
                 samples.push(self);
                 Ok(())

@@ -2,13 +2,19 @@
 
 use super::Sample;
 use flotor_hal::glam::{DQuat, DVec3};
+use flotor_mcap::{ChannelInfo, Ending, MessageReader, OpenError};
 use prost::Message;
+use std::io::{Read, Seek};
 
 /// Schema of a pose in a recording.
 const POSE_SCHEMA: &str = "foxglove.FrameTransform";
 
 /// Remedy for a file that is something else.
 const HOW_TO_MAKE_ONE: &str = "`flotor run --record FILE.mcap` makes one";
+
+/// Problem and remedy of a recording without its end.
+const TRUNCATED: &str = "is truncated: the end of the run is missing; record again, or name the copy that `mcap recover` \
+                         makes of what is there";
 
 /// What of `foxglove.FrameTransform` is read (<https://docs.foxglove.dev/docs/sdk/schemas/frame-transform>).
 #[derive(Clone, PartialEq, Message)]
@@ -41,29 +47,72 @@ struct Quaternion {
     w: f64,
 }
 
-/// Reads the poses of a recording.
-pub(super) fn read(bytes: &[u8]) -> Result<Vec<Sample>, String> {
-    if !bytes.starts_with(mcap::MAGIC) {
-        return Err(format!("is no MCAP file; {HOW_TO_MAKE_ONE}"));
+/// Topic of the ticks of a run.
+const TICK_TOPIC: &str = "/flotor/tick";
+/// Encoding of the messages.
+const ENCODING: &str = "protobuf";
+
+/// Channel of interest.
+#[derive(Clone, Copy)]
+enum Topic {
+    Pose,
+    /// Of these only the numbers count: a gap between them is a gap of the trajectory.
+    Tick,
+}
+
+/// Reads the poses of a recording, of which not one may be missing.
+pub(super) fn read(file: impl Read + Seek) -> Result<Vec<Sample>, String> {
+    let mut messages = MessageReader::open(file, topic_of).map_err(|error| match error {
+        OpenError::Io(cause) => format!("cannot be read: {cause}"),
+        _ => format!("is no MCAP file; {HOW_TO_MAKE_ONE}"),
+    })?;
+    if messages.ending() == Ending::CutOff {
+        return Err(TRUNCATED.to_owned());
     }
-    let options = mcap::read::Options::IgnoreEndMagic; // a killed recorder leaves none
-    let messages = mcap::MessageStream::new_with_options(bytes, options.into())
-        .map_err(|error| format!("is no MCAP file ({error}); {HOW_TO_MAKE_ONE}"))?;
     let mut samples = Vec::new();
     let mut start_ns = None;
-    for message in messages {
-        let Ok(message) = message else { break }; // cut off: what came before is good
-        if message.channel.schema.as_ref().is_none_or(|schema| schema.name != POSE_SCHEMA) {
-            continue;
+    let mut tick = 0_u32;
+    let damaged = |cause: String, samples: &[Sample]| {
+        let good_ns = samples.last().map_or(0, |sample| sample.time_ns);
+        format!("is damaged {good_ns} ns after the first pose: {cause}; record again")
+    };
+    while let Some(message) =
+        messages.next_message().map_err(|damage| damaged(damage.to_string(), &samples))?
+    {
+        match message.topic {
+            Topic::Pose => {
+                let (position_m, orientation) =
+                    pose(&message.data).map_err(|problem| damaged(problem, &samples))?;
+                let since_start_ns = message.time_ns.saturating_sub(*start_ns.get_or_insert(message.time_ns));
+                let sample = Sample::new(since_start_ns as f64 * 1.0e-9, position_m, orientation);
+                let place = |problem| format!("{since_start_ns} ns after the first pose: {problem}");
+                sample.and_then(|sample| sample.append_to(&mut samples)).map_err(place)?;
+            }
+            Topic::Tick => {
+                let missing = message.sequence.wrapping_sub(tick);
+                if missing != 0 {
+                    return Err(damaged(format!("{missing} ticks are missing"), &samples));
+                }
+                tick = tick.wrapping_add(1);
+            }
         }
-        let pose =
-            FrameTransform::decode(&*message.data).map_err(|error| format!("a pose is damaged: {error}"))?;
-        let (Some(at), Some(turn)) = (pose.translation, pose.rotation) else { continue };
-        let since_start_ns = message.log_time.saturating_sub(*start_ns.get_or_insert(message.log_time));
-        let orientation = DQuat::from_xyzw(turn.x, turn.y, turn.z, turn.w);
-        let sample = Sample::new(since_start_ns as f64 * 1.0e-9, DVec3::new(at.x, at.y, at.z), orientation);
-        let time = |problem| format!("{since_start_ns} ns after the first pose: {problem}");
-        sample.and_then(|sample| sample.append_to(&mut samples)).map_err(time)?;
     }
     Ok(samples)
+}
+
+fn topic_of(channel: ChannelInfo<'_>) -> Option<Topic> {
+    match channel {
+        ChannelInfo { encoding: ENCODING, schema: POSE_SCHEMA, .. } => Some(Topic::Pose),
+        ChannelInfo { encoding: ENCODING, topic: TICK_TOPIC, .. } => Some(Topic::Tick),
+        _ => None,
+    }
+}
+
+fn pose(message: &[u8]) -> Result<(DVec3, DQuat), String> {
+    let transform =
+        FrameTransform::decode(message).map_err(|error| format!("a pose cannot be decoded: {error}"))?;
+    let (Some(at), Some(turn)) = (transform.translation, transform.rotation) else {
+        return Err("a pose lacks its translation or its rotation".to_owned());
+    };
+    Ok((DVec3::new(at.x, at.y, at.z), DQuat::from_xyzw(turn.x, turn.y, turn.z, turn.w)))
 }

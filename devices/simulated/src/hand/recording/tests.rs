@@ -2,6 +2,7 @@
 
 use super::*;
 use proptest::prelude::*;
+use std::io::Cursor;
 
 fn table(text: &str) -> Result<Recording, String> {
     table::read(text.as_bytes()).and_then(Recording::new)
@@ -42,7 +43,7 @@ fn complaints_name_the_line_and_the_column() {
         let problem = table(text).expect_err("refused");
         assert!(problem.starts_with(expected), "{problem}, not {expected}");
     }
-    assert!(mcap_file::read(b"no such thing").is_err());
+    assert!(mcap_file::read(Cursor::new(b"no such thing")).is_err());
     assert!(Recording::load(Path::new("/no/such/file.csv")).is_err());
 }
 
@@ -59,7 +60,7 @@ proptest! {
         if as_mcap {
             bytes.splice(0..0, mcap::MAGIC.iter().copied());
         }
-        let read = if as_mcap { mcap_file::read(&bytes) } else { table::read(&bytes) };
+        let read = if as_mcap { mcap_file::read(Cursor::new(&bytes)) } else { table::read(&bytes) };
         if let Ok(recording) = read.and_then(Recording::new) {
             for time_ns in [0, recording.end_ns() / 3, recording.end_ns(), u64::MAX] {
                 let pose = recording.aim(time_ns).pose;
