@@ -11,6 +11,7 @@
 //! be right about one; here they are the large model with a history the contract has to carry.
 //!
 //! - [`mesh`]: what is linked to what: a stretched sheet, a hanging chain, the edges of a mesh file.
+//! - `obj`, `topology`: the text of a mesh file, and its connections by position.
 //! - [`network`]: the state, as one array per coordinate, and its step in time.
 //! - `links`: springs in runs of equal distance between their ends, so that a run is a loop over slices.
 //! - `regions`: blocks of masses that rest are left out until something moves beside them.
@@ -20,8 +21,10 @@
 mod links;
 pub mod mesh;
 pub mod network;
+mod obj;
 mod plugin;
 mod regions;
+mod topology;
 pub mod touch;
 
 pub use plugin::{FLOTOR_ENTRY, Membrane};

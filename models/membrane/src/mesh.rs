@@ -1,7 +1,8 @@
 //! What is linked to what: sheets, chains, and the edges of a mesh file. Not real-time.
 
+use crate::obj::Obj;
+use crate::topology::{Topology, in_mm};
 use flotor_hal::{DVec3, TextProblem};
-use std::collections::BTreeSet;
 
 /// A spring between two masses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,65 +99,44 @@ impl Mesh {
         mesh
     }
 
-    /// The edges of a Wavefront OBJ file (`v`, `f`, `l` lines; metres, z up) as springs at `stretch` times their length
-    /// without force. Edges of one face only are the border; their ends are held. The mass is shared out evenly.
+    /// Makes a network from the edges of a Wavefront OBJ file (`v`, `f`, `l` lines; metres, z up): springs at `stretch` times
+    /// their length without force. Edges of one face only are the border; their ends are held. The mass is shared out evenly.
     ///
     /// # Errors
-    /// The line that is wrong.
+    /// The line or the place that is wrong.
     pub fn from_obj(
         text: &str,
         mass_kg: f64,
         stiffness_n_per_m: f64,
         stretch: f64,
     ) -> Result<Self, TextProblem> {
-        let mut mesh = Self::default();
-        let mut edges: Vec<[usize; 2]> = Vec::new();
-        for (line, text) in text.lines().enumerate().map(|(index, text)| (index + 1, text)) {
-            let mut words = text.split_whitespace();
-            match words.next() {
-                Some("v") => {
-                    // `nan` and `inf` are numbers to the parser, but no places.
-                    let finite = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
-                    let numbers: Vec<f64> = words.take(3).filter_map(finite).collect();
-                    let [x, y, z] = numbers[..] else {
-                        return Err(TextProblem::at(line, "a vertex is `v X Y Z`, three finite numbers"));
-                    };
-                    mesh.positions_m.push(DVec3::new(x, y, z));
-                }
-                Some(kind @ ("f" | "l")) => {
-                    let corners = words.map(|word| corner(word, mesh.positions_m.len()));
-                    let corners = corners.collect::<Option<Vec<usize>>>();
-                    let corners = corners.filter(|corners| corners.len() >= 2).ok_or_else(|| {
-                        let problem =
-                            format!("`{kind}` takes two and more numbers of vertices that stand above it");
-                        TextProblem::at(line, problem)
-                    })?;
-                    edges.extend(corners.windows(2).map(|pair| [pair[0], pair[1]]));
-                    if let (true, [first, .., last]) = (kind == "f", &corners[..]) {
-                        edges.push([*last, *first]);
-                        mesh.face(&corners);
-                    }
-                }
-                _ => {} // normals, texture, groups, comments: not ours
-            }
+        let topology = Topology::of(&Obj::read(text)?)?;
+        let border = topology.border();
+        if let Some(at_m) = topology.part_without(&border) {
+            let problem = format!(
+                "nothing holds the part at {}: each of its edges has two faces or none; leave a border open",
+                in_mm(at_m)
+            );
+            return Err(TextProblem::of_file(problem));
         }
-        let mut edges: Vec<[usize; 2]> = edges.into_iter().map(|[a, b]| [a.min(b), a.max(b)]).collect();
-        edges.sort_unstable();
-        let border: BTreeSet<usize> =
-            edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).flat_map(|same| same[0]).collect();
-        edges.dedup();
-        if edges.is_empty() || border.len() == mesh.positions_m.len() {
+        let Topology { places_m: positions_m, faces, edges } = topology;
+        if border.len() == positions_m.len() {
             let problem = "there is nothing in it that could move: no mass inside a border of edges";
             return Err(TextProblem::of_file(problem));
         }
-        let node_kg = mass_kg / (mesh.positions_m.len() - border.len()) as f64;
-        mesh.masses_kg = (0..mesh.positions_m.len())
-            .map(|node| if border.contains(&node) { 0.0 } else { node_kg })
-            .collect();
-        for [a, b] in edges {
-            let rest_m = mesh.positions_m[a].distance(mesh.positions_m[b]) / stretch;
-            mesh.links.push(Link { ends: [a, b], rest_m, stiffness_n_per_m });
-        }
+        let node_kg = mass_kg / (positions_m.len() - border.len()) as f64;
+        let mass_kg = |node| if border.contains(&node) { 0.0 } else { node_kg };
+        let links = edges.into_keys().map(|[a, b]| {
+            let rest_m = positions_m[a].distance(positions_m[b]) / stretch;
+            Link { ends: [a, b], rest_m, stiffness_n_per_m }
+        });
+        let mut mesh = Self {
+            links: links.collect(),
+            masses_kg: (0..positions_m.len()).map(mass_kg).collect(),
+            positions_m,
+            triangles: Vec::new(),
+        };
+        faces.iter().for_each(|corners| mesh.face(corners));
         Ok(mesh)
     }
 
@@ -176,17 +156,13 @@ impl Mesh {
     }
 }
 
-/// `7`, `7/1/3` or `-1`: the number of a vertex, from 1 on or from the last one back.
-fn corner(word: &str, vertices: usize) -> Option<usize> {
-    let number: i64 = word.split('/').next()?.parse().ok()?;
-    let count = i64::try_from(vertices).ok()?;
-    let index = if number < 0 { count + number } else { number - 1 };
-    usize::try_from(index).ok().filter(|index| *index < vertices)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A square of four triangles around a vertex in the middle.
+    const SQUARE: &str = "# a comment\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nv 0 0 0\nvn 0 0 1\n\
+                          f 1/1 2/2 5/3\nf 2 3 5\nf 3 4 -1\nf 4 1 5\n";
 
     #[test]
     fn a_sheet_has_its_border_held_and_the_right_mass() {
@@ -201,25 +177,21 @@ mod tests {
 
     #[test]
     fn a_mesh_file_gives_each_edge_once_and_holds_its_border() {
-        // A square of four triangles around a vertex in the middle.
-        let text = "# a comment\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nv 0 0 0\nvn 0 0 1\n\
-                    f 1/1 2/2 5/3\nf 2 3 5\nf 3 4 -1\nf 4 1 5\n";
-        let mesh = Mesh::from_obj(text, 0.1, 10.0, 1.0).unwrap();
+        let mesh = Mesh::from_obj(SQUARE, 0.1, 10.0, 1.0).unwrap();
         assert_eq!((mesh.positions_m.len(), mesh.links.len()), (5, 8));
-        assert_eq!(mesh.masses_kg, [0.0, 0.0, 0.0, 0.0, 0.1]);
+        assert_eq!(mesh.masses_kg, [0.0, 0.0, 0.1, 0.0, 0.0]);
         assert!((mesh.coarseness_m() - 2.0).abs() < 1.0e-15);
     }
 
     #[test]
-    fn a_broken_mesh_file_names_the_line() {
+    fn a_mesh_that_nothing_holds_is_refused_with_the_place() {
         let error = |text: &str| Mesh::from_obj(text, 1.0, 1.0, 1.0).unwrap_err().in_file("m");
-        assert!(error("v 0 0\n").starts_with("m:1: a vertex"));
-        for vertex in ["v nan 0 0", "v 0 inf 0", "v 0 0 -inf", "v 1e999 0 0"] {
-            let text = format!("v 0 0 0\n{vertex}\nv 0 1 0\n");
-            assert!(error(&text).starts_with("m:2: a vertex"), "{vertex}");
-        }
-        assert!(error("v 0 0 0\nf 1 2 3\n").starts_with("m:2: `f`"));
         assert!(error("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").starts_with("m: there is nothing"));
-        assert!(error("").starts_with("m: there is nothing"));
+        let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n";
+        assert!(error(tetrahedron).starts_with("m: nothing holds the part at (0.000, 0.000, 0.000) mm"));
+        let beside = format!(
+            "{SQUARE}v 9 0 0\nv 10 0 0\nv 9 1 0\nv 9 0 1\nf -4 -3 -2\nf -4 -3 -1\nf -4 -2 -1\nf -3 -2 -1\n"
+        );
+        assert!(error(&beside).starts_with("m: nothing holds the part at (9000.000, 0.000, 0.000) mm"));
     }
 }

@@ -1,5 +1,6 @@
 //! The membrane as a library: at rest and in motion.
 
+mod exporters;
 mod motion;
 #[allow(unreachable_pub)] // shared with the other tests
 #[path = "../../../tests/src/printed.rs"]
