@@ -31,6 +31,7 @@
 //! ```
 
 mod axis;
+mod clip;
 mod decimate;
 mod labels;
 mod layout;

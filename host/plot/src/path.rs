@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::axis::Domain;
+use super::clip::clipped;
 use super::decimate::{Point, decimate};
 use super::series::{Bin, Series, Shape};
 use super::text;
@@ -20,6 +21,9 @@ const MARKER_CELL_PX: f64 = 1.0;
 /// Coordinates are held within this many sizes of the plotting area around it. Far outside, a point only
 /// gives the direction of the line that leaves.
 const FARTHEST_FRACTION: f64 = 1000.0;
+
+/// A point this near to the frame lies on its edge: half of what coordinates are rounded to.
+const EDGE_PX: f64 = 0.05;
 
 /// An axis-aligned rectangle in pixels, y down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +51,27 @@ impl Rect {
     /// The y at a fraction of the height, from the bottom.
     pub(super) fn y_at(&self, fraction: f64) -> f64 {
         self.bottom() - self.height * fraction
+    }
+
+    /// The rectangle, larger on all sides.
+    fn grown(&self, by_px: f64) -> Self {
+        let Self { left, top, width, height } = self;
+        Self {
+            left: left - by_px,
+            top: top - by_px,
+            width: width + 2.0 * by_px,
+            height: height + 2.0 * by_px,
+        }
+    }
+
+    /// True if the point lies in the rectangle or on its edge.
+    pub(super) fn contains(&self, point: Point) -> bool {
+        self.nearest(point) == point
+    }
+
+    /// The point of the rectangle nearest to `point`.
+    pub(super) fn nearest(&self, (x, y): Point) -> Point {
+        (x.clamp(self.left, self.right()), y.clamp(self.top, self.bottom()))
     }
 
     /// A line from bottom to top at `x`.
@@ -237,6 +262,7 @@ fn line(samples: impl Iterator<Item = Option<Point>>, slot: Slot, projection: &P
     let runs: Vec<Vec<Point>> = decimate(samples, projection.column())
         .into_iter()
         .map(|run| run.into_iter().map(|point| projection.point_px(point)).collect())
+        .flat_map(|run: Vec<Point>| clipped(&run, &projection.frame.grown(EDGE_PX)))
         .collect();
     let (mut path, mut dots) = (Path::default(), Path::default());
     if let [only_run] = runs.as_slice()
@@ -275,8 +301,12 @@ fn corners(samples: impl Iterator<Item = Option<Point>>) -> impl Iterator<Item =
 fn markers(samples: &[(f64, f64)], slot: Slot, projection: &Projection) -> Drawing {
     let mut path = Path::default();
     let mut taken = BTreeSet::new();
+    let frame = projection.frame.grown(EDGE_PX);
     for (x, y) in samples.iter().filter_map(|&sample| projection.point(sample)) {
         let (x_px, y_px) = projection.point_px((x, y));
+        if !frame.contains((x_px, y_px)) {
+            continue;
+        }
         let cell = |px: f64| ((px / MARKER_CELL_PX).round() + 0.0).to_bits();
         if taken.insert((cell(x_px), cell(y_px))) {
             slot.add_marker(&mut path, x_px, y_px);
@@ -290,7 +320,7 @@ fn bars(bins: &[Bin], projection: &Projection) -> Drawing {
     let floor = projection.y.scale.forward(0.0).unwrap_or(projection.y.low);
     let mut path = Path::default();
     for run in decimate(bar_outline(bins, projection, floor), projection.column()) {
-        path.polyline(run.into_iter().map(|point| projection.point_px(point)));
+        path.polyline(run.into_iter().map(|point| projection.frame.nearest(projection.point_px(point))));
         path.close();
     }
     Drawing::Bars(path)

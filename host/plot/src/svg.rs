@@ -1,7 +1,8 @@
 //! The document: an arranged figure written as SVG.
 //!
-//! Within a panel, from back to front: grid, reference lines, data (clipped to the frame), axis. The
-//! document has no ids and its style is confined to `.plot`, so that several pictures fit in one page.
+//! Within a panel, from back to front: grid, reference lines, data, axis. The document has no ids and its style is confined
+//! to `.plot`, so that several pictures fit in one page. It has one `<svg>` and no `<clipPath>`: programs that make PDF of a
+//! picture draw neither well, and data are cut at the frame before they are written (`clip`).
 
 use super::Figure;
 use super::axis::{Domain, Scale};
@@ -17,10 +18,6 @@ use super::path::{Drawing, Path, Projection, draw};
 use super::series::Shape;
 use super::text::{self, escape, px};
 use super::theme::{Slot, font_px, style_sheet};
-
-/// Lines may pass the frame by half their width before they are cut, markers by half their size.
-const LINE_SLACK_PX: f64 = 0.8;
-const MARKER_SLACK_PX: f64 = 5.0;
 
 const MAJOR_TICK_PX: f64 = 5.0;
 const MINOR_TICK_PX: f64 = 3.0;
@@ -201,37 +198,26 @@ impl Writer {
             self.text("label muted middle", frame.x_at(0.5), y, "no data");
             return;
         }
-        let has_markers =
-            cell.draft.panel.series.iter().any(|series| matches!(series.shape, Shape::Points(_)));
-        let slack = if has_markers { MARKER_SLACK_PX } else { LINE_SLACK_PX };
-        // A nested document clips without an id, unlike <clipPath>.
-        let (x, y) = (px(frame.left - slack), px(frame.top - slack));
-        let (width, height) = (px(frame.width + 2.0 * slack), px(frame.height + 2.0 * slack));
-        self.raw(&format!(
-            "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
-             viewBox=\"{x} {y} {width} {height}\" overflow=\"hidden\">\n"
-        ));
         for (index, (series, drawing)) in cell.draft.panel.series.iter().zip(drawings).enumerate() {
             if let Some(drawing) = drawing {
                 self.drawing(drawing, series.look(index));
             }
         }
-        self.raw("</svg>\n");
     }
 
     fn drawing(&mut self, drawing: &Drawing, slot: Slot) {
-        let color = slot.class();
+        let (stroke, fill) = (slot.stroke_class(), slot.fill_class());
         match drawing {
             Drawing::Line { path, dots, busy } => {
                 match (busy, slot.dash()) {
-                    (true, _) => self.path(&format!("line busy round {color}"), path),
-                    (false, "") => self.path(&format!("line round {color}"), path),
-                    (false, dash) => self.dashed_path(&format!("line {color}"), dash, path),
+                    (true, _) => self.path(&format!("line busy round {stroke}"), path),
+                    (false, "") => self.path(&format!("line round {stroke}"), path),
+                    (false, dash) => self.dashed_path(&format!("line {stroke}"), dash, path),
                 }
-                self.path(&format!("line round {color}"), dots);
+                self.path(&format!("line round {stroke}"), dots);
             }
-            Drawing::Markers(path) => self.path(&format!("points {color}"), path),
-            Drawing::Bars(path) => self.path(&format!("bars {color}"), path),
+            Drawing::Markers(path) => self.path(&format!("points {fill}"), path),
+            Drawing::Bars(path) => self.path(&format!("bars {fill} {stroke}"), path),
         }
     }
 
@@ -306,7 +292,7 @@ impl Writer {
             Some(Drawing::Line { busy, .. }) => {
                 path.polyline([(left, middle), (right, middle)]);
                 let dash = if *busy { "" } else { slot.dash() };
-                self.dashed_path(&format!("line {}", slot.class()), dash, &path);
+                self.dashed_path(&format!("line {}", slot.stroke_class()), dash, &path);
             }
             // Nothing is drawn, so there is nothing to show a sample of.
             None => {}

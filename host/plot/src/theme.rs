@@ -48,9 +48,14 @@ impl Slot {
         Self { color: PALETTE.len() + component, cue: component }
     }
 
-    /// The style class that sets the colour.
-    pub(super) fn class(self) -> String {
-        format!("c{}", self.color)
+    /// The style class for a stroke in the colour.
+    pub(super) fn stroke_class(self) -> String {
+        format!("s{}", self.color)
+    }
+
+    /// The style class for an area in the colour.
+    pub(super) fn fill_class(self) -> String {
+        format!("f{}", self.color)
     }
 
     /// The dash pattern; empty for a solid line.
@@ -96,13 +101,17 @@ pub(super) mod font_px {
 
 /// The style sheet: everything under `.plot`, so that a picture placed inside a page leaves the page alone.
 /// Colours are given twice, the second time for pages in dark mode.
+///
+/// It holds only what CairoSVG, svglib, Inkscape, librsvg and browsers all apply: plain colours for `fill` and `stroke`, no inherited
+/// size of type, and no size of the picture, which is in the root's attributes.
 pub(super) fn style_sheet(paper: Paper) -> String {
     let light = Page { paper: "#ffffff", ink: "#1f2328", muted: "#59636e", axis: "#8c959f", grid: "#e7eaee" };
     let dark = Page { paper: "#0d1117", ink: "#e6edf3", muted: "#9198a1", axis: "#656c76", grid: "#232a33" };
     let (light, dark) = (light.rules(|(light, _)| light), dark.rules(|(_, dark)| dark));
     format!(
-        ".plot{{max-width:100%;height:auto;font-family:system-ui,-apple-system,'Segoe UI',Roboto,\
-         'Helvetica Neue',sans-serif;font-size:{tick}px;font-variant-numeric:tabular-nums}}\n\
+        ".plot{{font-family:system-ui,-apple-system,'Segoe UI',Roboto,\
+         'Helvetica Neue',sans-serif;font-variant-numeric:tabular-nums}}\n\
+         .plot text{{font-size:{tick}px}}\n\
          .plot .title{{font-size:{title}px;font-weight:600}}\n\
          .plot .subtitle{{font-size:{subtitle}px}}\n\
          .plot .heading{{font-size:{heading}px;font-weight:600}}\n\
@@ -113,11 +122,11 @@ pub(super) fn style_sheet(paper: Paper) -> String {
          .plot .hair{{fill:none;stroke-width:1}}\n\
          .plot .minor{{stroke-opacity:.5}}\n\
          .plot .reference{{fill:none;stroke-width:1;stroke-dasharray:5 3}}\n\
-         .plot .line{{fill:none;stroke:currentColor;stroke-width:1.6;stroke-linejoin:round}}\n\
+         .plot .line{{fill:none;stroke-width:1.6;stroke-linejoin:round}}\n\
          .plot .busy{{stroke-width:1}}\n\
          .plot .round{{stroke-linecap:round}}\n\
-         .plot .points{{fill:currentColor;fill-opacity:.85}}\n\
-         .plot .bars{{fill:currentColor;fill-opacity:.16;stroke:currentColor;stroke-width:1.2}}\n\
+         .plot .points{{fill-opacity:.85}}\n\
+         .plot .bars{{fill-opacity:.16;stroke-width:1.2}}\n\
          {}",
         match paper {
             Paper::Light => light,
@@ -142,6 +151,7 @@ struct Page {
 }
 
 impl Page {
+    /// The rules for text, grid and axes, then two for each series: `s0` for strokes, `f0` for areas.
     fn rules(&self, series_color: impl Fn((&'static str, &'static str)) -> &'static str) -> String {
         let Self { paper, ink, muted, axis, grid } = self;
         let mut rules = format!(
@@ -153,7 +163,8 @@ impl Page {
              .plot .reference{{stroke:{muted}}}\n"
         );
         for (index, colors) in PALETTE.into_iter().chain(AXIS_COLORS).enumerate() {
-            rules.push_str(&format!(".plot .c{index}{{color:{}}}\n", series_color(colors)));
+            let color = series_color(colors);
+            rules.push_str(&format!(".plot .s{index}{{stroke:{color}}}\n.plot .f{index}{{fill:{color}}}\n"));
         }
         rules
     }

@@ -41,6 +41,7 @@ mod oracle;
 mod parsers;
 mod passivity;
 mod physics;
+mod pictures;
 mod planted;
 mod plugins;
 mod printed;

@@ -272,6 +272,79 @@ fn any_input_makes_a_well_formed_document() {
     }
 }
 
+/// The elements that CairoSVG, svglib, Inkscape, librsvg and browsers all draw as they are meant.
+const DRAWN_EVERYWHERE: [&str; 9] = ["svg", "title", "desc", "style", "rect", "g", "path", "text", "tspan"];
+
+#[test]
+fn a_picture_uses_only_what_every_program_draws() {
+    let samples = || (0..100).map(|index| (f64::from(index), f64::from(index % 7)));
+    let bins = [Bin { from: 0.0, to: 50.0, height: 3.0 }, Bin { from: 50.0, to: 90.0, height: 9.0 }];
+    let panel = Panel::new(Axis::linear("Force", "N").range(1.0, 5.0))
+        .series(Series::line("x", samples()).axis(0))
+        .series(Series::steps("held", samples()))
+        .series(Series::points("seen", samples()))
+        .series(Series::histogram("counts", bins))
+        .mark(Mark::at_x(30.0, "fault"))
+        .mark(Mark::at_y(4.0, "limit"));
+    for paper in [crate::Paper::OfReader, crate::Paper::Light, crate::Paper::Dark] {
+        let figure = Figure::new("Run", Axis::linear("Time", "s")).paper(paper).panel(panel.clone());
+        let svg = figure.to_svg();
+        let names = well_formed(&svg);
+        assert!(names.iter().all(|name| DRAWN_EVERYWHERE.contains(&name.as_str())), "{names:?}");
+        assert_eq!(names.iter().filter(|name| *name == "svg").count(), 1, "no nested document");
+        for missing_somewhere in
+            ["currentColor", "var(", "height:auto", "max-width", "color:#", "url(", " id="]
+        {
+            let found = svg.replace("currentcolor", "currentColor");
+            assert!(!found.contains(missing_somewhere), "{missing_somewhere}");
+        }
+        // Each class of a shape has a rule outside the media query, which some programs skip.
+        let (style, body) = svg.split_once("</style>").expect("a style sheet");
+        let rules = style.split("@media").next().expect("the rules of all pages");
+        for class in body.split("<path class=\"").skip(1).filter_map(|rest| rest.split('"').next()) {
+            assert!(class.split(' ').all(|class| rules.contains(&format!(".plot .{class}{{"))), "{class}");
+        }
+    }
+}
+
+/// Corners of every line and marker in a document of one panel.
+fn drawn(svg: &str, class: &str) -> Vec<Point> {
+    let start = format!("<path class=\"{class}");
+    let paths = svg.split(&start).skip(1);
+    let data = paths.filter_map(|rest| rest.split(" d=\"").nth(1)?.split('"').next());
+    data.flat_map(subpaths).flatten().collect()
+}
+
+#[test]
+fn data_outside_a_fixed_range_stay_within_the_frame() {
+    let samples = [(0.0, 0.5), (1.0, 40.0), (2.0, 0.5), (30.0, 0.2), (3.0, -5.0)];
+    let axis = || Axis::linear("", "").range(0.0, 1.0);
+    let shown = |series: Series| {
+        let x = Axis::linear("", "").range(0.0, 10.0);
+        Figure::new("", x).panel(Panel::new(axis()).series(series)).to_svg()
+    };
+    let ground = shown(Series::line("", [(0.0, 0.0), (0.0, 1.0), (10.0, 1.0), (10.0, 0.0)]));
+    let corners = drawn(&ground, "line");
+    let (least, most) =
+        corners.iter().fold(((f64::MAX, f64::MAX), (f64::MIN, f64::MIN)), |(low, high), at| {
+            ((low.0.min(at.0), low.1.min(at.1)), (high.0.max(at.0), high.1.max(at.1)))
+        });
+    for (class, series) in [
+        ("line", Series::line("", samples)),
+        ("line", Series::steps("", samples)),
+        ("bars", Series::histogram("", [Bin { from: -5.0, to: 4.0, height: 9.0 }])),
+    ] {
+        let points = drawn(&shown(series), class);
+        assert!(points.len() >= 3, "{class}: {points:?}");
+        for (x, y) in points {
+            let is_within =
+                (least.0 - 0.1..=most.0 + 0.1).contains(&x) && (least.1 - 0.1..=most.1 + 0.1).contains(&y);
+            assert!(is_within, "{class}: {x} {y} outside {least:?} {most:?}");
+        }
+    }
+    assert_eq!(shown(Series::points("", samples)).matches("<path class=\"points").count(), 1);
+}
+
 #[test]
 fn empty_figures_and_panels_say_so() {
     let axis = || Axis::linear("Time", "s");
@@ -316,5 +389,5 @@ fn a_picture_has_the_size_and_the_paper_it_was_given() {
     assert!(!svg.contains("prefers-color-scheme") && svg.contains("#144a9b") && !svg.contains("#96d0ff"));
     let dark = figure.clone().paper(crate::Paper::Dark).to_svg();
     assert!(dark.contains("#96d0ff") && !dark.contains("#144a9b"));
-    assert_eq!(figure.to_svg().matches("class=\"line c10").count(), 4, "z is z in both panels and legends");
+    assert_eq!(figure.to_svg().matches("class=\"line s10").count(), 4, "z is z in both panels and legends");
 }
