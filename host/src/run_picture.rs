@@ -3,89 +3,54 @@
 use crate::timing_picture::panels;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Demand, rotation_vector};
-use flotor_plot::{Axis, Figure, Mark, Panel, Series};
+use flotor_plot::{Axis, Figure, Mark, Panel, Series, Trace};
 use flotor_servo::Timing;
 use flotor_session::Observer;
 
-/// Collects the samples of a run; drawing happens at the end.
+/// The traces of a run, reduced while the run lasts; drawn at its end.
 pub struct RunPicture {
     title: String,
-    devices: Vec<String>,
-    records: Vec<TickRecord>,
+    devices: Vec<DeviceTraces>,
+    lateness_us: Trace,
+    is_real_time: bool,
+}
+
+/// The traces of one device.
+struct DeviceTraces {
+    name: String,
+    position_mm: [Trace; 3],
+    rotation_deg: [Trace; 3],
+    force_n: [Trace; 3],
+    torque_mnm: [Trace; 3],
+    energy_mj: Trace,
+    /// Time of the first contact with the boundary, s.
+    boundary_s: Option<f64>,
 }
 
 impl RunPicture {
     /// An empty picture of a run with these devices.
     #[must_use]
     pub fn new(title: &str, devices: Vec<String>) -> Self {
-        Self { title: title.to_owned(), devices, records: Vec::new() }
+        let devices = devices.into_iter().map(DeviceTraces::new).collect();
+        Self { title: title.to_owned(), devices, lateness_us: Trace::default(), is_real_time: false }
     }
 
-    /// Draws what was collected. Not real-time.
+    /// Draws the traces. Not real-time.
     #[must_use]
-    pub fn to_svg(&self, subtitle: &str, timing: &Timing) -> String {
-        let mut figure = Figure::new(self.title.clone(), Axis::linear("Time", "s")).subtitle(subtitle);
-        for (device, name) in (0..).zip(&self.devices) {
-            // With several devices where they were and what was felt there; the rest is in the recording.
-            let is_one_of_several = self.devices.len() > 1;
-            let label =
-                |what: &str| if is_one_of_several { format!("{what}, {name}") } else { what.to_owned() };
-            let axes = |what: &str, unit: &str, scale: f64, vector: fn(&TickRecord) -> DVec3| {
-                self.axes(device, &label(what), unit, scale, vector)
-            };
-            figure = figure.panel(axes("Position", "mm", 1.0e3, |record| record.pose.position()));
-            if !is_one_of_several {
-                let rotation = |record: &TickRecord| rotation_vector(record.pose.orientation());
-                figure = figure.panel(axes("Rotation", "°", 1.0_f64.to_degrees(), rotation));
-            }
-            figure = figure.panel(axes("Force", "N", 1.0, |record| record.commanded.force()));
-            if !is_one_of_several {
-                figure = figure.panel(axes("Torque", "mN·m", 1.0e3, |record| record.commanded.torque()));
-            }
-            let energy_mj =
-                |record: &TickRecord| record.model.energy_j().map_or(f64::NAN, |joule| joule * 1.0e3);
-            let energy = self.single(device, &label("Stored energy"), "mJ", energy_mj);
-            figure = figure.panel(energy);
-        }
-        if self.records.iter().any(|record| record.lateness_ns > 0) {
-            let lateness = self.single(0, "Lateness", "µs", |record| record.lateness_ns as f64 * 1.0e-3);
-            figure = panels(timing).into_iter().fold(figure.panel(lateness), Figure::panel);
+    pub fn into_svg(self, subtitle: &str, timing: &Timing) -> String {
+        let figure = Figure::new(self.title, Axis::linear("Time", "s")).subtitle(subtitle);
+        let is_only_one = self.devices.len() == 1;
+        let panels_of_devices = self.devices.into_iter().flat_map(|device| match is_only_one {
+            true => device.all_panels(),
+            false => device.main_panels(),
+        });
+        let mut figure = panels_of_devices.fold(figure, Figure::panel);
+        if self.is_real_time {
+            let lateness = Panel::new(Axis::linear("Lateness", "µs"));
+            figure = figure.panel(lateness.series(Series::trace("", self.lateness_us)));
+            figure = panels(timing).into_iter().fold(figure, Figure::panel);
         }
         figure.to_svg()
-    }
-
-    fn of(&self, device: u16) -> impl Iterator<Item = &TickRecord> {
-        self.records.iter().filter(move |record| record.device == device)
-    }
-
-    /// Three components over time; a boundary contact is marked where it begins.
-    fn axes(
-        &self,
-        device: u16,
-        label: &str,
-        unit: &str,
-        scale: f64,
-        vector: impl Fn(&TickRecord) -> DVec3,
-    ) -> Panel {
-        let component = |name: &str, pick: fn(DVec3) -> f64| {
-            let samples: Vec<(f64, f64)> =
-                self.of(device).map(|record| (seconds(record), pick(vector(record)) * scale)).collect();
-            Series::line(name, samples)
-        };
-        let panel = Panel::new(Axis::linear(label, unit))
-            .series(component("x", |v| v.x).axis(0))
-            .series(component("y", |v| v.y).axis(1))
-            .series(component("z", |v| v.z).axis(2));
-        match self.of(device).find(|record| record.events.intersects(Events::BOUNDARY)) {
-            Some(record) => panel.mark(Mark::at_x(seconds(record), "boundary")),
-            None => panel,
-        }
-    }
-
-    fn single(&self, device: u16, label: &str, unit: &str, value: impl Fn(&TickRecord) -> f64) -> Panel {
-        let samples: Vec<(f64, f64)> =
-            self.of(device).map(|record| (seconds(record), value(record))).collect();
-        Panel::new(Axis::linear(label, unit)).series(Series::line("", samples))
     }
 }
 
@@ -96,8 +61,85 @@ impl Observer for RunPicture {
     }
 
     fn observe(&mut self, record: &TickRecord) {
-        self.records.push(*record);
+        if record.device == 0 {
+            self.lateness_us.add(seconds(record), record.lateness_ns as f64 * 1.0e-3);
+        }
+        self.is_real_time |= record.lateness_ns > 0;
+        if let Some(device) = self.devices.get_mut(usize::from(record.device)) {
+            device.add(record);
+        }
     }
+}
+
+impl DeviceTraces {
+    fn new(name: String) -> Self {
+        Self {
+            name,
+            position_mm: Default::default(),
+            rotation_deg: Default::default(),
+            force_n: Default::default(),
+            torque_mnm: Default::default(),
+            energy_mj: Trace::default(),
+            boundary_s: None,
+        }
+    }
+
+    fn add(&mut self, record: &TickRecord) {
+        let time_s = seconds(record);
+        let rotation_deg = rotation_vector(record.pose.orientation()) * 1.0_f64.to_degrees();
+        add_components(&mut self.position_mm, time_s, record.pose.position() * 1.0e3);
+        add_components(&mut self.rotation_deg, time_s, rotation_deg);
+        add_components(&mut self.force_n, time_s, record.commanded.force());
+        add_components(&mut self.torque_mnm, time_s, record.commanded.torque() * 1.0e3);
+        self.energy_mj.add(time_s, record.model.energy_j().map_or(f64::NAN, |joule| joule * 1.0e3));
+        if self.boundary_s.is_none() && record.events.intersects(Events::BOUNDARY) {
+            self.boundary_s = Some(time_s);
+        }
+    }
+
+    /// The panels of the only device of a run.
+    fn all_panels(self) -> Vec<Panel> {
+        let boundary_s = self.boundary_s;
+        let vector =
+            |label: &str, unit: &str, traces: [Trace; 3]| vector_panel(label, unit, traces, boundary_s);
+        let vectors = [
+            vector("Position", "mm", self.position_mm),
+            vector("Rotation", "°", self.rotation_deg),
+            vector("Force", "N", self.force_n),
+            vector("Torque", "mN·m", self.torque_mnm),
+        ];
+        vectors.into_iter().chain(energy_panel("Stored energy", self.energy_mj)).collect()
+    }
+
+    /// The panels of one device of several: motion, force and energy. The recording has the rest.
+    fn main_panels(self) -> Vec<Panel> {
+        let label = |quantity: &str| format!("{quantity}, {}", self.name);
+        let vectors = [
+            vector_panel(&label("Position"), "mm", self.position_mm, self.boundary_s),
+            vector_panel(&label("Force"), "N", self.force_n, self.boundary_s),
+        ];
+        vectors.into_iter().chain(energy_panel(&label("Stored energy"), self.energy_mj)).collect()
+    }
+}
+
+fn add_components(traces: &mut [Trace; 3], time_s: f64, vector: DVec3) {
+    for (trace, component) in traces.iter_mut().zip(vector.to_array()) {
+        trace.add(time_s, component);
+    }
+}
+
+/// Three components over time; the first contact with the boundary is marked.
+fn vector_panel(label: &str, unit: &str, traces: [Trace; 3], boundary_s: Option<f64>) -> Panel {
+    let named = ["x", "y", "z"].into_iter().zip(traces).enumerate();
+    let panel = named.fold(Panel::new(Axis::linear(label, unit)), |panel, (axis, (name, trace))| {
+        panel.series(Series::trace(name, trace).axis(axis))
+    });
+    boundary_s.into_iter().fold(panel, |panel, time_s| panel.mark(Mark::at_x(time_s, "boundary")))
+}
+
+/// The stored energy over time; none if no model gives it.
+fn energy_panel(label: &str, trace: Trace) -> Option<Panel> {
+    trace.has_data().then(|| Panel::new(Axis::linear(label, "mJ")).series(Series::trace("", trace)))
 }
 
 fn seconds(record: &TickRecord) -> f64 {

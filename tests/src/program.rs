@@ -9,7 +9,7 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 /// Exit codes of the command line, a contract with scripts.
 pub mod exit_code {
@@ -155,6 +155,23 @@ impl Deref for Running {
 }
 
 impl Running {
+    /// Waits for its end; returns the largest resident memory of the process that carries out the command as well, KiB.
+    /// For programs that write less than a pipe holds.
+    ///
+    /// # Panics
+    /// As [`Self::wait`].
+    #[must_use]
+    pub fn wait_with_peak_kib(self) -> (Ran, u64) {
+        let status = format!("/proc/{}/status", self.host().as_raw_nonzero());
+        let mut peak_kib = 0;
+        while let Ok(text) = std::fs::read_to_string(&status) {
+            let Some(line) = text.lines().find_map(|line| line.strip_prefix("VmHWM:")) else { break };
+            peak_kib = peak_kib.max(line.trim().trim_end_matches("kB").trim().parse().unwrap_or(0));
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        (self.wait(), peak_kib)
+    }
+
     /// Waits for its end.
     ///
     /// # Panics

@@ -6,7 +6,7 @@
 use super::{text, ticks};
 
 /// Larger magnitudes are treated like infinity, so that the difference of two values never overflows.
-const LARGEST_DRAWABLE: f64 = 1e300;
+pub(super) const LARGEST_DRAWABLE: f64 = 1e300;
 
 /// A range narrower than this fraction of its values is a constant plus rounding: it is widened as one.
 const NARROWEST_RELATIVE_SPAN: f64 = 1e-9;

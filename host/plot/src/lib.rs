@@ -6,7 +6,8 @@
 //!
 //! Three promises shape the code:
 //! - **No peak is lost, no file is large.** Lines are reduced to at most four samples per pixel column
-//!   (`decimate`, after Jugel et al., "M4", VLDB 2014), so ten minutes at 1 kHz cost what a second costs.
+//!   (`decimate`, after Jugel et al., "M4", VLDB 2014), so ten minutes at 1 kHz cost what a second costs. A [`Trace`]
+//!   reduces them while they arrive: its memory does not grow with the run.
 //! - **Bad samples stay local.** NaN, infinity, and anything not positive on a log axis break the line there
 //!   and touch neither the axis range nor the rest of the curve.
 //! - **Same input, same bytes.** Coordinates are rounded to a tenth of a pixel; nothing depends on time,
@@ -42,6 +43,7 @@ mod svg;
 mod text;
 mod theme;
 mod ticks;
+mod trace;
 
 #[cfg(test)]
 mod tests;
@@ -50,6 +52,7 @@ pub use axis::Axis;
 pub use mark::Mark;
 pub use series::{Bin, Series};
 pub use theme::AXIS_COLORS;
+pub use trace::Trace;
 
 /// Width of a figure: fits the text column of the book and a laptop screen at full size.
 const WIDTH_PX: f64 = 960.0;

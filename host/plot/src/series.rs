@@ -2,6 +2,7 @@
 
 use super::axis::{Domain, Extent, Scale};
 use super::theme::Slot;
+use super::trace::Trace;
 
 /// A bin that starts at zero has no left edge on a log axis; it is drawn this wide.
 const OPEN_BIN_DECADES: f64 = 0.5;
@@ -13,6 +14,8 @@ pub struct Series {
     pub(super) label: String,
     slot: Option<Look>,
     pub(super) shape: Shape,
+    /// Number of samples or bins given, drawable or not.
+    pub(super) given: usize,
 }
 
 /// Where colour and dash come from.
@@ -87,6 +90,12 @@ impl Series {
         Self::new(label, Shape::Line(samples.into_iter().collect()))
     }
 
+    /// The samples of `trace`, joined as those of [`Series::line`].
+    pub fn trace(label: impl Into<String>, trace: Trace) -> Self {
+        let (samples, given) = trace.into_parts();
+        Self { given, ..Self::new(label, Shape::Line(samples)) }
+    }
+
     /// Samples `(x, y)` whose y holds until the next x (zero-order hold).
     pub fn steps(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(label, Shape::Steps(samples.into_iter().collect()))
@@ -103,7 +112,11 @@ impl Series {
     }
 
     fn new(label: impl Into<String>, shape: Shape) -> Self {
-        Self { label: label.into(), slot: None, shape }
+        let given = match &shape {
+            Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => samples.len(),
+            Shape::Histogram(bins) => bins.len(),
+        };
+        Self { label: label.into(), slot: None, shape, given }
     }
 
     /// Draws with the palette entry `slot` (counted from 0), so that the same thing looks the same in every
@@ -177,14 +190,6 @@ impl Series {
             }
         }
         extent
-    }
-
-    /// Number of samples or bins given, drawable or not.
-    pub(super) fn len(&self) -> usize {
-        match &self.shape {
-            Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => samples.len(),
-            Shape::Histogram(bins) => bins.len(),
-        }
     }
 }
 

@@ -81,7 +81,7 @@ fn description(figure: &Figure, layout: &Layout<'_>) -> String {
                         format!("{} to {}", value(extent.low), value(extent.high))
                     }
                 };
-                format!(" {label}{} {kind}, {range}", series.len())
+                format!(" {label}{} {kind}, {range}", series.given)
             })
             .collect();
         description.push_str(if clauses.is_empty() { " no data" } else { "" });

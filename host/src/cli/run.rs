@@ -213,7 +213,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     // Before anything else that can fail: the recording cannot be repeated.
     let recorded = recording.finish(&notes(&outcome, &summary)).map_err(Into::into);
     let drawn = match (&arguments.plot, plot) {
-        (Some(path), Some(plot)) => std::fs::write(path, plot.to_svg(&summary.one_line(), &outcome.timing))
+        (Some(path), Some(plot)) => std::fs::write(path, plot.into_svg(&summary.one_line(), &outcome.timing))
             .map_err(|cause| CommandError::file(path, "cannot write the plot", cause)),
         _ => Ok(()),
     };

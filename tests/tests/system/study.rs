@@ -817,21 +817,13 @@ fn nothing_is_kept_of_the_movements_if_so_asked() {
     }
 }
 
-/// Largest memory a study ever had, kB: from `/proc` while it runs.
-fn peak_kb(subjects: &str, out: &Path) -> f64 {
+/// Largest memory of a study, KiB.
+fn peak_kib(subjects: &str, out: &Path) -> u64 {
     let together = ["--subjects", subjects, "--jobs", "2"]; // else as many as there are cores have a seat in memory
     let arguments: Vec<&str> = SMALL.into_iter().chain(together).collect();
-    let running = study(&arguments, out).start();
-    let status = PathBuf::from(format!("/proc/{}/status", running.host().as_raw_nonzero()));
-    let mut peak = 0.0_f64;
-    while let Ok(text) = std::fs::read_to_string(&status) {
-        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-        let Some(line) = line else { break };
-        peak = peak.max(line.trim().trim_end_matches("kB").trim().parse().unwrap_or(0.0));
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    assert_eq!(running.wait().code, Some(exit_code::OK));
-    peak
+    let (ran, peak_kib) = study(&arguments, out).start().wait_with_peak_kib();
+    assert_eq!(ran.code, Some(exit_code::OK));
+    peak_kib
 }
 
 /// Eight times the subjects need no more memory: nothing is kept of what is on disk.
@@ -842,9 +834,9 @@ fn memory_does_not_grow_with_the_subjects() {
     }
     let scratch = Scratch::default();
     let (few, many) = (scratch.path().join("few"), scratch.path().join("many"));
-    let (few, many) = (peak_kb("2", &few), peak_kb("16", &many));
-    println!("peak memory of 2 subjects {few} kB, of 16 subjects {many} kB");
-    assert!(few > 1000.0 && many < 1.15 * few, "{few} kB for 2 subjects, {many} kB for 16");
+    let (few, many) = (peak_kib("2", &few), peak_kib("16", &many));
+    println!("peak memory of 2 subjects {few} KiB, of 16 subjects {many} KiB");
+    assert!(few > 1000 && 100 * many < 115 * few, "{few} KiB for 2 subjects, {many} KiB for 16");
 }
 
 /// Any protocol: thresholds of a default study exist for each base and modality.

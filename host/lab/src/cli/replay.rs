@@ -5,8 +5,9 @@ use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, PluginKeyValue, PluginPathOption, svg_file};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
 use flotor_core::ModelOutputs;
+use flotor_core::trace::TickRecord;
 use flotor_hal::DVec3;
-use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_plot::{Axis, Figure, Panel, Series, Trace};
 use flotor_record::Ending;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -73,14 +74,14 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let progress = progress_bar((replay.run().duration_s * 1.0e3) as u64, "{percent:>3} %  replaying");
     let started = Instant::now();
-    let mut samples = Vec::new();
+    let mut picture = arguments.plot.as_ref().map(|_| Picture::default());
     let mut end_ns = 0;
     let Compared { difference, coverage, why, ending, implausible, health } =
         replay.compare(|record, outputs| {
             end_ns = record.time_ns;
             progress.set_position(record.time_ns / 1_000_000);
-            if arguments.plot.is_some() {
-                samples.push(Sample { time_ns: record.time_ns, recorded: record.model, replayed: *outputs });
+            if let Some(picture) = &mut picture {
+                picture.add(record, outputs);
             }
         })?;
     progress.finish_and_clear();
@@ -99,7 +100,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
         wall_s: started.elapsed().as_secs_f64(),
     };
     print_result(arguments.json.file(), &report, || to_text(arguments, &report))?;
-    write_text(arguments.plot.as_deref(), || picture(&samples))?;
+    write_text(arguments.plot.as_deref(), || picture.map_or_else(String::new, Picture::into_svg))?;
     if let Some((_, words)) = health.iter().find(|(health, _)| health.panicked_at.is_some()) {
         return Err(CommandError::PluginRefused(format!("a model of the recording failed: {words}")));
     }
@@ -173,38 +174,45 @@ fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
     lines.join("\n")
 }
 
-/// A tick of the recording and the outputs of the models now.
-struct Sample {
-    time_ns: u64,
-    recorded: ModelOutputs,
-    replayed: ModelOutputs,
+/// Recorded and replayed force, and the differences along every axis, as they arrive.
+#[derive(Default)]
+struct Picture {
+    recorded: Trace,
+    replayed: Trace,
+    force: [Trace; 3],
+    torque: [Trace; 3],
 }
 
-/// N·m; NaN, which leaves a gap, where the recording holds no torque.
-fn difference_of_torque(sample: &Sample) -> DVec3 {
-    let torques = sample.replayed.torque().zip(sample.recorded.torque());
-    torques.map_or(DVec3::NAN, |(now, then)| now - then)
-}
+impl Picture {
+    fn add(&mut self, record: &TickRecord, now: &ModelOutputs) {
+        let (then, time_s) = (&record.model, record.time_ns as f64 * 1.0e-9);
+        self.recorded.add(time_s, then.force().z);
+        self.replayed.add(time_s, now.force().z);
+        // NaN, which leaves a gap, where the recording holds no torque.
+        let torque = now.torque().zip(then.torque()).map_or(DVec3::NAN, |(now, then)| now - then);
+        let force = now.force() - then.force();
+        for axis in 0..3 {
+            self.force[axis].add(time_s, force[axis]);
+            self.torque[axis].add(time_s, torque[axis] * 1.0e3);
+        }
+    }
 
-/// Recorded and replayed force, and their difference along every axis.
-fn picture(samples: &[Sample]) -> String {
-    let line = |value: &dyn Fn(&Sample) -> f64| -> Vec<(f64, f64)> {
-        samples.iter().map(|sample| (sample.time_ns as f64 * 1.0e-9, value(sample))).collect()
-    };
-    let axes = |label: &str, unit: &str, scale: f64, difference: fn(&Sample) -> DVec3| {
-        let panel = Panel::new(Axis::linear(label, unit));
-        ["x", "y", "z"].into_iter().enumerate().fold(panel, |panel, (axis, name)| {
-            panel.series(Series::line(name, line(&|sample| difference(sample)[axis] * scale)).slot(axis))
-        })
-    };
-    Figure::new("Recorded and replayed", Axis::linear("Time", "s"))
-        .panel(
-            Panel::new(Axis::linear("Force, z", "N"))
-                .series(Series::line("recorded", line(&|sample| sample.recorded.force().z)))
-                .series(Series::line("replayed", line(&|sample| sample.replayed.force().z))),
-        )
-        .panel(axes("Difference of force", "N", 1.0, |s| s.replayed.force() - s.recorded.force()))
-        .panel(axes("Difference of torque", "mN·m", 1.0e3, difference_of_torque))
-        .panel_height_px(180.0)
-        .to_svg()
+    fn into_svg(self) -> String {
+        let axes = |label: &str, unit: &str, traces: [Trace; 3]| {
+            let named = ["x", "y", "z"].into_iter().zip(traces).enumerate();
+            named.fold(Panel::new(Axis::linear(label, unit)), |panel, (axis, (name, trace))| {
+                panel.series(Series::trace(name, trace).slot(axis))
+            })
+        };
+        Figure::new("Recorded and replayed", Axis::linear("Time", "s"))
+            .panel(
+                Panel::new(Axis::linear("Force, z", "N"))
+                    .series(Series::trace("recorded", self.recorded))
+                    .series(Series::trace("replayed", self.replayed)),
+            )
+            .panel(axes("Difference of force", "N", self.force))
+            .panel(axes("Difference of torque", "mN·m", self.torque))
+            .panel_height_px(180.0)
+            .to_svg()
+    }
 }
