@@ -9,7 +9,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 /// Id of the plugin that stands in for the flotor.
-const SIMULATED: &str = "simulated";
+pub(crate) const SIMULATED: &str = "simulated";
 /// Time between two cycles unless a command says otherwise, ns.
 const PERIOD_NS: u64 = 1_000_000;
 

@@ -1,6 +1,7 @@
 //! A device of Flotor for programs written for the Maglev 200: a scene with that device and the controller as its model, run by
 //! the host. What stands between program and hand is what stands there in every run.
 
+use super::plant::SIMULATED;
 use super::{Arguments, ProtocolOption, plant};
 use flotor_emulation::port::Reach;
 use flotor_hal::abi::loader::Setting;
@@ -14,6 +15,11 @@ use std::io::Write as _;
 use std::os::fd::AsRawFd;
 use std::os::unix::process::CommandExt;
 use std::process::Command;
+
+/// The flotor of a Maglev 200, whose weight nothing but the controller carries, in a hand that rests at home: a hand that moves
+/// would keep the controller from finding the gravity.
+const RESTING: &[(&str, &str)] =
+    &[("flotor", "utah"), ("feedforward_n", "0"), ("hand", "hold"), ("hand_depth_mm", "0")];
 
 /// Becomes `flotor run`; comes back only if that cannot be.
 pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -47,6 +53,7 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
             .ok_or_else(|| Refusal::parameter(format!("--set {text}: write KEY=VALUE")))?;
         sets.push((key.trim(), value.trim()));
     }
+    sets.splice(0..0, resting(device, &sets));
     for (key, value) in &sets {
         // Numbers as they are, everything else as text.
         match value.parse::<f64>() {
@@ -73,6 +80,15 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
         "[[model]]\nplugin = \"ml-api\"\n[model.parameters]\nlisten = {listen:?}\nreach = \"{reach}\"\n{parameters}"
     )?;
     Ok(scene)
+}
+
+/// Settings of the simulated flotor that come before those of the command line, unless these describe a hand.
+fn resting(device: &str, sets: &[(&str, &str)]) -> Vec<(&'static str, &'static str)> {
+    if device != SIMULATED || sets.iter().any(|(key, _)| key.starts_with("hand")) {
+        return Vec::new();
+    }
+    let is_free = |(key, _): &&(&str, &str)| sets.iter().all(|(set, _)| set != key);
+    RESTING.iter().filter(is_free).copied().collect()
 }
 
 /// What a device can do; nothing if it cannot be opened: the host says why.
