@@ -29,6 +29,9 @@ pub static ENTRY: Entry = model_entry::<ProgramModel>();
 /// The model of a scene without one.
 const MODEL: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"program\"\n";
 
+/// Time in which force fades in unless a scene sets `ramp_ms`.
+const RAMP_MS: f64 = 200.0;
+
 /// What a program orders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Order {
@@ -198,6 +201,8 @@ pub struct Connected {
     pub device: u16,
     /// Between the frame of the device and that of the program.
     pub mapping: Mapping,
+    /// Time in which force fades in once the program enables it, ns.
+    pub ramp_ns: u64,
 }
 
 /// Gives each device of a scene a port: the first model `program` on it takes it; a device without one gets one that adds to its
@@ -220,15 +225,27 @@ pub fn connect(scene: &mut Scene) -> Vec<Connected> {
         }
         let port = Port::new();
         let model = scene.models.iter_mut().find(is_ours);
-        let mapping = model.map(|model| {
+        let (mapping, ramp_ns) = model.map_or((Mapping::new(&Default::default()), 0), |model| {
             *model = model.replaced_by(None, &[("port", &port.number().to_string())]);
             let place = model.places_m.first().copied().unwrap_or_default();
-            Mapping::new(&model.mapping).at(place)
+            (Mapping::new(&model.mapping).at(place), ramp_ns(model))
         });
-        Connected { port, device, mapping: mapping.unwrap_or_else(|| Mapping::new(&Default::default())) }
+        Connected { port, device, mapping, ramp_ns }
     };
     let devices = u16::try_from(scene.devices.len()).unwrap_or(u16::MAX);
     (0..devices).map(connect).collect()
+}
+
+/// Time in which the force of a model `program` fades in, ns, as its scene sets it. What is no number is refused with the scene.
+fn ramp_ns(model: &ModelUse) -> u64 {
+    let set = model.plugin.parameters.iter().rev().find(|parameter| parameter.key == "ramp_ms");
+    set.and_then(|parameter| parameter.value.parse().ok()).map_or(nanoseconds(RAMP_MS), nanoseconds)
+}
+
+/// Converts ms of a parameter, at most a minute.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn nanoseconds(time_ms: f64) -> u64 {
+    (time_ms * 1.0e6).round() as u64
 }
 
 /// The force model. Times are those of ticks, so that a run on the virtual clock can be repeated.
@@ -286,7 +303,7 @@ impl ForceModel for ProgramModel {
             "ms",
             0.0,
             60_000.0,
-            200.0,
+            RAMP_MS,
             "Time in which force fades in once it is enabled",
         ),
     ];
@@ -300,8 +317,7 @@ impl ForceModel for ProgramModel {
                 "no program commands this model; `flotor lend SCENE -- PROGRAM` starts one, and it has one place only",
             ));
         };
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
-        let ns = |id| (settings.number_or_default(id) * 1.0e6).round() as u64;
+        let ns = |id| nanoseconds(settings.number_or_default(id));
         Ok(Self {
             end,
             valid_ns: ns("valid_ms"),

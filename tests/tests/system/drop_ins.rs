@@ -102,6 +102,65 @@ fn numbers_and_errors_are_those_of_each_interface() {
     }
 }
 
+/// A motion that a program has printed: result, number of the error, distance from the place in m, whether it goes on.
+fn motion(ran: &Ran, name: &str) -> (i32, i32, f64, bool) {
+    let line = ran.stdout.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    let words: Vec<&str> = line.unwrap_or_else(|| panic!("no {name}: {ran:?}")).split(' ').collect();
+    let number = |index: usize| words[index].parse().expect("a number");
+    (number(0), number(1), words[2].parse().expect("a distance"), words[3] == "1")
+}
+
+#[test]
+fn a_motion_ends_where_the_handle_has_arrived_and_one_that_a_hand_prevents_is_an_error() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    /// Largest distance of a handle that has arrived, m.
+    const ARRIVED_M: f64 = 1.0e-3;
+    /// Number of the interface's timeout.
+    const TIMEOUT: i32 = 7;
+    let scratch = Scratch::default();
+    let program = compiled(&scratch, "move");
+    let free =
+        scratch.file("free.toml", "[device]\nplugin = \"simulated\"\n[device.parameters]\nhand = \"open\"\n");
+    let free = free.display().to_string();
+    for pace in ["lockstep", "real"] {
+        let ran = lent(&program, &["--api", "dhd", "--pace", pace, &free], "", 0);
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        for name in ["right", "left", "turned", "home"] {
+            let (result, _, away_m, is_moving) = motion(&ran, name);
+            assert!(result == 0 && away_m < ARRIVED_M && !is_moving, "{pace}, {name}: {ran:?}");
+        }
+        assert_eq!(fact(&ran, "moving"), 1.0, "{ran:?}");
+    }
+    // A hand of 2000 N/m against the spring of 400 N/m: the handle goes a sixth of the way, and home is where the hand is.
+    let ran = lent(&program, &["--api", "dhd", "--pace", "lockstep"], "", 0);
+    for name in ["right", "left", "turned"] {
+        let (result, error, away_m, is_moving) = motion(&ran, name);
+        assert!(result == -1 && error == TIMEOUT && away_m > ARRIVED_M && !is_moving, "{name}: {ran:?}");
+    }
+    assert!(motion(&ran, "home").2 < ARRIVED_M, "{ran:?}");
+}
+
+#[test]
+fn a_program_that_only_reads_goes_on_in_lockstep_and_is_told_why() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let program = compiled(&scratch, "wait");
+    for (api, way) in [("dhd", "dhd"), ("chai3d", "phantom")] {
+        // The hand needs a few hundred ticks for 2 mm, at 0.7 Hz and 5 mm; a tick takes a hundred reads.
+        let runs = [(); 2].map(|()| lent(&program, &["--api", api, "--pace", "lockstep"], way, 1_000_000));
+        for ran in &runs {
+            assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+            assert_eq!(ran.stderr.matches("this program only reads").count(), 1, "{ran:?}");
+        }
+        let [first, second] = runs.each_ref().map(|ran| fact(ran, "reads"));
+        assert!(first > 1_000.0 && first == second, "{first} and {second} reads");
+    }
+}
+
 /// Lends it the built-in device.
 fn lent(program: &Path, options: &[&str], way: &str, calls: usize) -> Ran {
     let (program, calls) = (program.display().to_string(), calls.to_string());

@@ -356,6 +356,18 @@ fn messages_that_are_wrong_get_a_state_and_an_event_and_never_more_force_than_th
 }
 
 #[test]
+fn in_lockstep_messages_that_only_read_make_a_tick_now_and_then() {
+    let service = Service::start(&["--pace", "lockstep"]);
+    let (mut client, _) = service.session();
+    let places: Vec<DVec3> =
+        (0..1000).map(|_| vector(&state(&client.ask("{}"))["cursor_position"])).collect();
+    let ticks = places.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    assert!((9..=10).contains(&ticks), "a hundred reads for a tick, not {ticks} in 1000");
+    let summary = service.end();
+    assert!(summary.contains("this program only reads"), "{summary}");
+}
+
+#[test]
 fn in_lockstep_the_same_messages_give_the_same_digest() {
     let scratch = Scratch::default();
     let summary = scratch.path().join("summary.json");

@@ -47,6 +47,13 @@ fn open(id: c_int) -> Option<(&'static Host, &'static Station, usize)> {
     station(id).filter(|(_, station, _)| station.is_open())
 }
 
+/// The station for a read of its sample, if it is open.
+fn sampled(id: c_int) -> Option<&'static Station> {
+    let (host, station, _) = open(id)?;
+    host.note_read(|| ());
+    Some(station)
+}
+
 /// How CHAI3D's `getPosition` and `close` want to hear of success: it takes 0 for failure there, while the original says 0.
 fn done_for_chai3d() -> c_int {
     c_int::from(said("FLOTOR_PHANTOM_SUCCESS").is_some_and(|value| value == "1"))
@@ -90,7 +97,7 @@ fn set_held(number: usize, change: impl FnOnce(&mut Wrench)) -> Wrench {
 /// # Safety
 /// Each place is null or may be written.
 unsafe fn vector(id: c_int, places: [*mut f64; 3], of: impl FnOnce(&Station) -> DVec3) -> Option<()> {
-    let (_, station, _) = open(id)?;
+    let station = sampled(id)?;
     let values = FRAME.of_flotor(of(station)).to_array();
     for (place, value) in places.into_iter().zip(values) {
         // SAFETY: by the contract of this function.
@@ -149,7 +156,7 @@ pub unsafe extern "C" fn hdPhantomGetRotation(
     r22: *mut f64,
 ) -> c_int {
     guarded(FAILED, || {
-        let Some((_, station, _)) = open(id) else { return FAILED };
+        let Some(station) = sampled(id) else { return FAILED };
         let rows = FRAME.rotation(station.state().orientation);
         let places = [r00, r01, r02, r10, r11, r12, r20, r21, r22];
         for (place, value) in places.into_iter().zip(rows.into_iter().flatten()) {
@@ -163,7 +170,7 @@ pub unsafe extern "C" fn hdPhantomGetRotation(
 /// Buttons, one bit each; 0 if it is not open.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdPhantomGetButtons(id: c_int) -> c_int {
-    guarded(0, || open(id).map_or(0, |(_, station, _)| station.state().buttons.cast_signed()))
+    guarded(0, || sampled(id).map_or(0, |station| station.state().buttons.cast_signed()))
 }
 
 /// Sends what is held now and, if it `waits`, waits for the tick that sees it.

@@ -9,8 +9,8 @@ use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
 use flotor_session::{RunOptions, Session, program};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, Once, OnceLock, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -24,6 +24,8 @@ const BEGIN: Duration = Duration::from_secs(10);
 const END: Duration = Duration::from_secs(20);
 /// Pause between two looks at either.
 const LOOK: Duration = Duration::from_millis(1);
+/// Reads without a command that make a tick in lockstep: far more than the loop of a program has between two commands.
+const READS_OF_A_TICK: u64 = 100;
 
 static HOST: OnceLock<Option<Host>> = OnceLock::new();
 /// Whether somebody pressed the emergency stop.
@@ -76,6 +78,8 @@ pub struct Host {
     period_ns: u64,
     stop: StopSwitch,
     stage: Mutex<Stage>,
+    /// Reads of the program since the last tick that it made.
+    reads: AtomicU64,
 }
 
 /// How far the run has come.
@@ -124,7 +128,14 @@ impl Host {
         let stations = stations.collect();
         notice_copies();
         let stage = Stage::Prepared(Box::new(Prepared { session, scene, options, settings }));
-        Ok(Self { stations, pace, period_ns, stop: stop.clone(), stage: Mutex::new(stage) })
+        Ok(Self {
+            stations,
+            pace,
+            period_ns,
+            stop: stop.clone(),
+            stage: Mutex::new(stage),
+            reads: AtomicU64::new(0),
+        })
     }
 
     /// The devices of the scene, in its order.
@@ -249,8 +260,26 @@ impl Host {
         IS_STOPPED.load(Ordering::Acquire)
     }
 
+    /// Counts a read of the program. In lockstep the hundredth without a command makes a tick, after `before_tick`: a program that
+    /// waits until the handle moves or a button is pressed would wait for ever. Not real-time.
+    pub fn note_read(&self, before_tick: impl FnOnce()) {
+        static WARNING: Once = Once::new();
+        let reads = self.reads.fetch_add(1, Ordering::Relaxed) + 1;
+        if self.pace == Pace::Lockstep && reads >= READS_OF_A_TICK {
+            WARNING.call_once(|| {
+                tell(&format!(
+                    "in lockstep the commands of the program make the ticks; this program only reads, so each \
+                     {READS_OF_A_TICK}th read makes a tick"
+                ));
+            });
+            before_tick();
+            self.advance();
+        }
+    }
+
     /// In lockstep, one tick; whether there was one. Not real-time.
     pub fn advance(&self) -> bool {
+        self.reads.store(0, Ordering::Relaxed);
         match &mut *self.stage() {
             Stage::Lockstep(run) => run.advance(),
             Stage::Prepared(_) | Stage::Beside(_) | Stage::Over => false,

@@ -42,6 +42,7 @@ pub struct Station {
     most: [f64; 2],
     tap: Tap,
     period_ns: u64,
+    ramp_ns: u64,
     opened: AtomicU64,
     is_open: AtomicBool,
     turn: Turn,
@@ -95,7 +96,7 @@ impl Station {
         tap: Tap,
         period_ns: u64,
     ) -> Self {
-        let Connected { port, mapping, .. } = connected;
+        let Connected { port, mapping, ramp_ns, .. } = connected;
         let largest = |axes: [f64; 3], told: &[Option<f64>; 3], norm: Option<f64>| {
             let axis = |(most, told): (f64, &Option<f64>)| told.map_or(most, |told| told.min(most));
             let axes = axes.into_iter().zip(told).map(axis);
@@ -115,6 +116,7 @@ impl Station {
             most,
             tap,
             period_ns,
+            ramp_ns,
             opened: AtomicU64::new(0),
             is_open: AtomicBool::new(false),
             turn: Turn::default(),
@@ -208,6 +210,12 @@ impl Station {
     /// No force from the next tick on.
     pub fn disable(&self) {
         self.port.disable();
+    }
+
+    /// Time in which force fades in once it is enabled, ns.
+    #[must_use]
+    pub fn ramp_ns(&self) -> u64 {
+        self.ramp_ns
     }
 
     /// Whether force is let through.

@@ -1,7 +1,8 @@
 //! Opening, identity, pose, velocity, buttons: what is read of a device.
 
 use crate::device::{
-    FRAME, Open, any, close, count, default, expert, kind, live, open, open_first, open_number, set_default,
+    FRAME, Open, any, close, count, default, expert, kind, open, open_first, open_number, sampled,
+    set_default,
 };
 use crate::error::{Code, DONE, failed, result};
 use crate::force;
@@ -166,10 +167,10 @@ export! {
     /// 1 if a button is pressed.
     fn dhdGetButton(index: c_int, id: i8) -> c_int [-1] {
         let bit = u32::try_from(index).ok().filter(|index| *index < 32).ok_or(Code::InvalidIndex);
-        result(bit.and_then(|bit| live(id).map(|open| c_int::from(open.station.state().buttons >> bit & 1 == 1))))
+        result(bit.and_then(|bit| sampled(id).map(|open| c_int::from(open.station.state().buttons >> bit & 1 == 1))))
     }
     /// Buttons, one bit each; 0 on error.
-    fn dhdGetButtonMask(id: i8) -> c_uint [0] { live(id).map_or(0, |open| open.station.state().buttons) }
+    fn dhdGetButtonMask(id: i8) -> c_uint [0] { sampled(id).map_or(0, |open| open.station.state().buttons) }
 
     /// There is no gripper.
     fn dhdGetGripperAngleRad(angle: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([angle]) }
@@ -218,9 +219,9 @@ pub(crate) fn read(id: i8, body: impl FnOnce(&Open)) -> c_int {
     }))
 }
 
-/// Reads something of a device that is not lost.
+/// Reads the sample of a device that is not lost.
 pub(crate) fn read_live(id: i8, body: impl FnOnce(&Open)) -> c_int {
-    result(live(id).map(|open| {
+    result(sampled(id).map(|open| {
         body(&open);
         DONE
     }))

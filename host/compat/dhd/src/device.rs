@@ -42,6 +42,8 @@ pub(crate) struct Device {
     /// Wrenches that had expired when force was enabled last.
     pub(crate) lapses: u64,
     pub(crate) has_been_stopped: bool,
+    /// Time at which force is fully on, ns.
+    pub(crate) faded_in_ns: u64,
     pub(crate) velocity_threshold: u32,
     /// About x, about z, of the device, rad.
     pub(crate) angles_rad: [f64; 3],
@@ -65,6 +67,7 @@ impl Device {
         watchdog: 0,
         lapses: 0,
         has_been_stopped: false,
+        faded_in_ns: 0,
         velocity_threshold: 0,
         angles_rad: [0.0; 3],
         parameters: [[1.0, 0.2, 10.0]; 8],
@@ -112,6 +115,11 @@ pub(crate) fn open(id: i8) -> Result<Open, Code> {
 /// The same, if it is not lost.
 pub(crate) fn live(id: i8) -> Result<Open, Code> {
     open(id).and_then(|open| if open.host.is_running() { Ok(open) } else { Err(Code::Com) })
+}
+
+/// The device of an id for a read of its sample, unless the device is lost.
+pub(crate) fn sampled(id: i8) -> Result<Open, Code> {
+    live(id).inspect(|open| open.host.note_read(crate::force::follow_all))
 }
 
 /// The same, in expert mode.
@@ -204,15 +212,24 @@ impl Open {
 
     /// Lets force through or not.
     pub(crate) fn set_switch(&self, device: &mut Device, switch: Switch) {
-        device.switch = switch;
         if switch == Switch::On {
-            device.lapses = self.station.counts().lapses;
+            self.enable(device);
             device.has_been_stopped = false;
-            self.station.enable();
         } else {
+            device.switch = switch;
             (device.force_n, device.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
             device.regulation = Regulation::OFF;
             self.station.disable();
+        }
+    }
+
+    /// Lets force through, which fades in unless it is on already.
+    fn enable(&self, device: &mut Device) {
+        device.switch = Switch::On;
+        device.lapses = self.station.counts().lapses;
+        if !self.station.is_enabled() {
+            device.faded_in_ns = self.host.now_ns() + self.station.ramp_ns();
+            self.station.enable();
         }
     }
 
@@ -226,7 +243,7 @@ impl Open {
         let [most_n, most_nm, _] = device.most;
         (device.force_n, device.torque_nm) = (own(force_n, most_n), own(torque_nm, most_nm));
         if device.switch == Switch::Unsaid {
-            self.set_on_by_command(device);
+            self.enable(device);
         }
         self.send_again(device);
         let [limit_n, limit_nm] = self.station.most();
@@ -234,12 +251,6 @@ impl Open {
         let is_cut = (device.force_n, device.torque_nm) != (force_n, torque_nm);
         let is_limited = is_long(force_n, limit_n) || self.has_active_wrist() && is_long(torque_nm, limit_nm);
         Ok(is_cut || is_limited)
-    }
-
-    fn set_on_by_command(&self, device: &mut Device) {
-        device.switch = Switch::On;
-        device.lapses = self.station.counts().lapses;
-        self.station.enable();
     }
 
     /// Sends what the program commanded last, with what the regulation and a vibration add now.

@@ -10,6 +10,7 @@ pub(crate) enum Code {
     Com = 2,
     NoDevice = 5,
     NotAvailable = 6,
+    Timeout = 7,
     ExpertModeDisabled = 9,
     NotImplemented = 10,
     InvalidIndex = 15,

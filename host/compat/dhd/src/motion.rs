@@ -1,17 +1,14 @@
 //! Regulation and motion: holding the handle, moving it, following the program.
 
 use crate::basic::{angles, put3, read, read_live, turning};
-use crate::device::{FRAME, Open, Switch, live, open};
+use crate::device::{FRAME, Open, Switch, live, open, sampled};
 use crate::error::{Code, DONE, failed, result};
 use crate::kept::{POSITION_MOVE, ROTATION_MOVE};
-use crate::regulation::{self, Regulation};
+use crate::regulation::{self, Progress, Regulation};
 use flotor_compat::pointer::{In, Out};
 use flotor_hal::{DQuat, DVec3, rotation_vector};
 use std::ffi::c_int;
 use std::time::Duration;
-
-/// Longest motion that a call waits for, in periods of the loop.
-const LONGEST_WAIT_TICKS: u64 = 120_000;
 
 fn begin(id: i8) -> c_int {
     result(live(id).map(|open| {
@@ -37,7 +34,7 @@ struct Goal {
 /// How a program wants to get there.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Way {
-    /// Along a line, and the call returns when it is there.
+    /// Along a line, and the call waits until the handle has arrived.
     Blocking,
     /// Along a line.
     Line,
@@ -63,35 +60,54 @@ fn go(id: i8, goal: Goal, way: Way) -> c_int {
         if !device.regulation.is_running {
             return failed(Code::NoRegulation);
         }
-        let now_ns = open.host.now_ns();
-        let fastest = |index: usize| {
-            let speed = device.parameters.get(index).map_or(0.1, |[_, speed, _]| *speed);
-            (way != Way::Follow).then_some(speed)
-        };
-        let (fastest_m, fastest_rad) = (fastest(POSITION_MOVE), fastest(ROTATION_MOVE));
-        if let Some(position_m) = goal.position_m {
-            device.regulation.move_to(FRAME.to_flotor(position_m), fastest_m, now_ns);
+        // A plan that runs while force fades in would be over before the handle moves.
+        let since_ns = open.host.now_ns().max(device.faded_in_ns);
+        let fastest = [POSITION_MOVE, ROTATION_MOVE]
+            .map(|index| device.parameters.get(index).map_or(0.1, |[_, speed, _]| *speed));
+        let regulation = &mut device.regulation;
+        if let Some(position_m) = goal.position_m.map(|position_m| FRAME.to_flotor(position_m)) {
+            match way {
+                Way::Follow => regulation.follow_place(position_m),
+                Way::Blocking | Way::Line => regulation.move_to(position_m, fastest[0], since_ns),
+            }
         }
-        if let Some(angles_rad) = goal.angles_rad {
-            device.regulation.turn_to(turned(angles_rad), fastest_rad, now_ns);
+        if let Some(turned_rad) = goal.angles_rad.map(turned) {
+            match way {
+                Way::Follow => regulation.follow_turn(turned_rad),
+                Way::Blocking | Way::Line => regulation.turn_to(turned_rad, fastest[1], since_ns),
+            }
         }
         open.send_again(&mut device);
     }
-    if way == Way::Blocking {
-        wait_for_end(&open);
+    match way {
+        Way::Blocking => result(wait_for_arrival(&open, goal)),
+        Way::Line | Way::Follow => DONE,
     }
-    DONE
 }
 
-fn wait_for_end(open: &Open) {
-    for _ in 0..LONGEST_WAIT_TICKS {
-        let is_moving = open.device().regulation.is_moving(open.host.now_ns());
-        if !is_moving || !open.host.is_running() {
-            return;
+/// Waits until the handle has arrived at a goal.
+///
+/// # Errors
+/// [`Code::Timeout`] of a handle that does not arrive, [`Code::Com`] when the run ends before.
+fn wait_for_arrival(open: &Open, goal: Goal) -> Result<c_int, Code> {
+    let is_awaited = [goal.position_m.is_some(), goal.angles_rad.is_some()];
+    loop {
+        let awaited = progress(open).into_iter().zip(is_awaited).filter(|(_, is_awaited)| *is_awaited);
+        match awaited.map(|(progress, _)| progress).max() {
+            None | Some(Progress::Arrived) => return Ok(DONE),
+            Some(Progress::TimedOut) => return Err(Code::Timeout),
+            Some(Progress::Moving) if !open.host.is_running() => return Err(Code::Com),
+            Some(Progress::Moving) => {}
         }
         regulation::follow(open);
         open.host.sleep(Duration::from_nanos(open.host.period_ns()));
     }
+}
+
+/// Returns the progress of the position and of the rotation of a device.
+fn progress(open: &Open) -> [Progress; 2] {
+    let (state, now_ns) = (open.station.state(), open.host.now_ns());
+    open.device().regulation.update(&state, open.station.axes(), now_ns)
 }
 
 fn regulate(id: i8, axis: usize, on: bool) -> c_int {
@@ -124,9 +140,9 @@ export! {
     fn drdIsSupported(id: i8) -> bool [false] { open(id).is_ok() }
     /// Whether it is regulated.
     fn drdIsRunning(id: i8) -> bool [false] { open(id).is_ok_and(|open| open.device().regulation.is_running) }
-    /// Whether a motion is under way.
+    /// Whether a motion goes on: until the handle has arrived, or 2 s after the plan.
     fn drdIsMoving(id: i8) -> bool [false] {
-        open(id).is_ok_and(|open| open.device().regulation.is_moving(open.host.now_ns()))
+        sampled(id).is_ok_and(|open| progress(&open).contains(&Progress::Moving))
     }
     /// Nothing is to be found out: holds the device.
     fn drdAutoInit(id: i8) -> c_int [-1] { begin(id) }

@@ -4,7 +4,7 @@
 //! soft enough for any device, so a hand that holds against it wins.
 
 use crate::device::{self, Open};
-use flotor_compat::{Pace, State, quietly};
+use flotor_compat::{Axes, Pace, State, quietly};
 use flotor_hal::{DQuat, DVec3, orientation_from_rotation_vector, rotation_vector};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,6 +16,24 @@ const TURNING: [f64; 2] = [0.5, 0.005];
 const SHORTEST_S: f64 = 0.1;
 /// Peak over mean speed of a motion with a smooth start and end.
 const PEAK: f64 = 1.875;
+/// Distance from its place and speed below which a handle has arrived, m and m/s: a handle of half a kilogram overshoots on the spring
+/// by v sqrt(m / k), 1 mm.
+const ARRIVED: [f64; 2] = [1.0e-3, 25.0e-3];
+/// Angle and angular velocity below which a handle has turned, rad and rad/s.
+const TURNED: [f64; 2] = [0.02, 0.5];
+/// Time for which a handle may be away from its place after the plan of a motion, ns: a hand may hold it.
+const PATIENCE_NS: u64 = 2_000_000_000;
+
+/// Progress of a motion; of several, the last one in this order is that of all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Progress {
+    /// The handle has arrived.
+    Arrived,
+    /// The handle did not arrive in time.
+    TimedOut,
+    /// The plan goes on, or the handle is on its way.
+    Moving,
+}
 
 /// Whether the handle is regulated, and where to.
 #[derive(Clone, Copy, Debug)]
@@ -34,20 +52,34 @@ struct Motion {
     to: DVec3,
     since_ns: u64,
     until_ns: u64,
+    progress: Progress,
 }
 
 impl Motion {
-    const NONE: Self = Self { from: DVec3::ZERO, to: DVec3::ZERO, since_ns: 0, until_ns: 0 };
+    const NONE: Self =
+        Self { from: DVec3::ZERO, to: DVec3::ZERO, since_ns: 0, until_ns: 0, progress: Progress::Arrived };
 
     fn at(place: DVec3) -> Self {
         Self { from: place, to: place, ..Self::NONE }
     }
 
-    fn new(from: DVec3, to: DVec3, fastest: f64, now_ns: u64) -> Self {
+    fn new(from: DVec3, to: DVec3, fastest: f64, since_ns: u64) -> Self {
         let time_s = (PEAK * (to - from).length() / fastest.max(1.0e-3)).clamp(SHORTEST_S, 60.0);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
         let time_ns = (time_s * 1.0e9) as u64;
-        Self { from, to, since_ns: now_ns, until_ns: now_ns + time_ns }
+        Self { from, to, since_ns, until_ns: since_ns + time_ns, progress: Progress::Moving }
+    }
+
+    /// Updates the progress, given whether the handle is where the motion ends.
+    fn update(&mut self, is_at_end: bool, now_ns: u64) -> Progress {
+        if self.progress == Progress::Moving && now_ns >= self.until_ns {
+            if is_at_end {
+                self.progress = Progress::Arrived;
+            } else if now_ns >= self.until_ns + PATIENCE_NS {
+                self.progress = Progress::TimedOut;
+            }
+        }
+        self.progress
     }
 
     fn place(&self, now_ns: u64) -> DVec3 {
@@ -72,22 +104,38 @@ impl Regulation {
         self.rotation = Motion::at(rotation_vector(state.orientation));
     }
 
-    /// Moves it to a place, or lets it follow one; in Flotor's axes, with so much speed at most.
-    pub(crate) fn move_to(&mut self, place_m: DVec3, fastest: Option<f64>, now_ns: u64) {
-        let from = self.position.place(now_ns);
-        self.position =
-            fastest.map_or(Motion::at(place_m), |fastest| Motion::new(from, place_m, fastest, now_ns));
+    /// Moves the handle along a line to a place in Flotor's axes, from a time on and with a speed, m/s, at most.
+    pub(crate) fn move_to(&mut self, place_m: DVec3, fastest: f64, since_ns: u64) {
+        self.position = Motion::new(self.position.place(since_ns), place_m, fastest, since_ns);
     }
 
-    /// The same for the orientation, a rotation vector.
-    pub(crate) fn turn_to(&mut self, turned_rad: DVec3, fastest: Option<f64>, now_ns: u64) {
-        let from = self.rotation.place(now_ns);
-        self.rotation =
-            fastest.map_or(Motion::at(turned_rad), |fastest| Motion::new(from, turned_rad, fastest, now_ns));
+    /// Turns the handle to a rotation vector in Flotor's axes, from a time on and with a speed, rad/s, at most.
+    pub(crate) fn turn_to(&mut self, turned_rad: DVec3, fastest: f64, since_ns: u64) {
+        self.rotation = Motion::new(self.rotation.place(since_ns), turned_rad, fastest, since_ns);
     }
 
-    pub(crate) fn is_moving(&self, now_ns: u64) -> bool {
-        self.is_running && now_ns < self.position.until_ns.max(self.rotation.until_ns)
+    /// Holds the handle at a place from now on.
+    pub(crate) fn follow_place(&mut self, place_m: DVec3) {
+        self.position = Motion::at(place_m);
+    }
+
+    /// Holds the handle at a rotation vector from now on.
+    pub(crate) fn follow_turn(&mut self, turned_rad: DVec3) {
+        self.rotation = Motion::at(turned_rad);
+    }
+
+    /// Updates the progress of the position and of the rotation from the state of a handle with these axes.
+    pub(crate) fn update(&mut self, state: &State, axes: Axes, now_ns: u64) -> [Progress; 2] {
+        let [position, rotation, _] = self.axes;
+        let is_below = |[most, fastest]: [f64; 2], away: DVec3, speed: DVec3| {
+            away.length() < most && speed.length() < fastest
+        };
+        let has_arrived =
+            !position || is_below(ARRIVED, self.position.to - state.position_m, state.velocity_m_per_s);
+        let has_turned = !rotation
+            || axes != Axes::Six
+            || is_below(TURNED, turn_from(state, self.rotation.to), state.angular_velocity_rad_per_s);
+        [self.position.update(has_arrived, now_ns), self.rotation.update(has_turned, now_ns)]
     }
 
     /// Force and torque that hold the handle, Flotor's axes, N and N·m.
@@ -101,12 +149,17 @@ impl Regulation {
         }
         if rotation {
             let [stiffness, damping] = TURNING;
-            let target: DQuat = orientation_from_rotation_vector(self.rotation.place(now_ns));
-            let away = rotation_vector(target * state.orientation.conjugate());
+            let away = turn_from(state, self.rotation.place(now_ns));
             wrench.1 = away * stiffness - state.angular_velocity_rad_per_s * damping;
         }
         wrench
     }
+}
+
+/// Rotation from the orientation of the handle to a rotation vector, itself a rotation vector.
+fn turn_from(state: &State, to_rad: DVec3) -> DVec3 {
+    let target: DQuat = orientation_from_rotation_vector(to_rad);
+    rotation_vector(target * state.orientation.conjugate())
 }
 
 /// Whether there is a thread that regulates.

@@ -94,10 +94,12 @@ fn answer(service: &Service, session: u64, socket: &mut WebSocket<Link>) -> Resu
             },
             _ => continue,
         };
-        if let Some(station) = carried.commanded.and_then(|device| service.host.station(device)) {
-            if service.host.pace() == Pace::Lockstep {
+        match carried.commanded.and_then(|device| service.host.station(device)) {
+            None => service.host.note_read(|| ()),
+            Some(_) if service.host.pace() == Pace::Lockstep => {
                 service.host.advance();
-            } else {
+            }
+            Some(station) => {
                 next = waiting(socket)?;
                 if next.is_none() {
                     service.host.wait_in(station, &turn);
