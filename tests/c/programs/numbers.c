@@ -2,6 +2,7 @@
  * and makes each error happen that a program can. Says what is otherwise than in these tables; ends with the number of such lines. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
@@ -189,6 +190,9 @@ static int (*dhdGetSystemType)(signed char), (*dhdGetStatus)(int *, signed char)
 static int (*dhdGetPosition)(double *, double *, double *, signed char), (*dhdEnableForce)(unsigned char, signed char);
 static int (*dhdSetBrakes)(int, signed char), (*dhdGetDeltaEncoders)(int *, int *, int *, signed char);
 static int (*dhdSetDeltaMotor)(unsigned short, unsigned short, unsigned short, signed char);
+static int (*dhdDeltaEncoderToPosition)(int, int, int, double *, double *, double *, signed char);
+static int (*dhdDeltaEncodersToJointAngles)(int, int, int, double *, double *, double *, signed char);
+static int (*dhdDeltaJointAnglesToJacobian)(double, double, double, double *, signed char);
 static int (*dhdEnableExpertMode)(void), (*dhdDisableExpertMode)(void), (*dhdGetVelocityThreshold)(unsigned *, signed char);
 static int (*drdMoveTo)(const double *, int, signed char);
 static const char *(*dhdErrorGetStr)(int);
@@ -197,7 +201,8 @@ static void dhd(void)
 {
     FIND(dhdGetDeviceCount); FIND(dhdOpen); FIND(dhdClose); FIND(dhdErrorGetLast); FIND(dhdGetSystemType); FIND(dhdGetStatus);
     FIND(dhdGetComMode); FIND(dhdGetPosition); FIND(dhdEnableForce); FIND(dhdSetBrakes); FIND(dhdGetDeltaEncoders);
-    FIND(dhdSetDeltaMotor); FIND(dhdEnableExpertMode); FIND(dhdDisableExpertMode); FIND(dhdGetVelocityThreshold);
+    FIND(dhdSetDeltaMotor); FIND(dhdDeltaEncoderToPosition); FIND(dhdDeltaEncodersToJointAngles);
+    FIND(dhdDeltaJointAnglesToJacobian); FIND(dhdEnableExpertMode); FIND(dhdDisableExpertMode); FIND(dhdGetVelocityThreshold);
     FIND(dhdErrorGetStr); FIND(drdMoveTo);
     if (wrong)
         return;
@@ -239,6 +244,23 @@ static void dhd(void)
     expect("its error", dhdErrorGetLast(), 9);
     expect("an expert", dhdEnableExpertMode(), 0);
     expect("an expert's function", dhdGetVelocityThreshold(&threshold, -1) >= 0, 1);
+    /* The Jacobian is constant: position = Jacobian * joints, to a count of 0.1 um. */
+    int counts[3];
+    double from[3], joints[3], jacobian[9];
+    expect("encoders", dhdGetDeltaEncoders(&counts[0], &counts[1], &counts[2], -1), 0);
+    dhdGetPosition(&x, &y, &z, -1);
+    dhdDeltaEncoderToPosition(counts[0], counts[1], counts[2], &from[0], &from[1], &from[2], -1);
+    expect("the position of the encoders", fabs(from[0] - x) + fabs(from[1] - y) + fabs(from[2] - z) < 3e-7, 1);
+    dhdDeltaEncodersToJointAngles(counts[0], counts[1], counts[2], &joints[0], &joints[1], &joints[2], -1);
+    dhdDeltaJointAnglesToJacobian(joints[0], joints[1], joints[2], jacobian, -1);
+    for (int row = 0; row < 3; row++) {
+        double sum = 0.0;
+        for (int column = 0; column < 3; column++)
+            sum += jacobian[3 * row + column] * joints[column];
+        expect("the position of the joints", fabs(sum - from[row]) < 1e-12, 1);
+    }
+    expect("no motors", dhdSetDeltaMotor(0, 0, 0, -1), -1);
+    expect("no motors, error", dhdErrorGetLast(), 10);
     expect("not an expert", dhdDisableExpertMode(), 0);
     for (int code = 0; code <= 22; code++)
         expect("a text of an error", strcmp(dhdErrorGetStr(code), dhdErrorGetStr(777)) != 0, 1);

@@ -22,7 +22,7 @@ mod station;
 
 pub use frame::Frame;
 pub use host::{Host, host, prepare};
-pub use process::{guarded, library, quietly};
+pub use process::{Language, guarded, language, library, quietly};
 pub use settings::{Pace, Settings, said};
 pub use station::{Axes, State, Station, Turn};
 

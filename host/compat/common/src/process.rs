@@ -78,6 +78,23 @@ pub fn guarded<T>(fallback: T, body: impl FnOnce() -> T) -> T {
     catch_unwind(AssertUnwindSafe(body)).unwrap_or(fallback)
 }
 
+/// Language of the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// Python: its interpreter is in the process.
+    Python,
+    /// Any other.
+    Other,
+}
+
+/// Returns the language of the program of this process. Not real-time.
+#[must_use]
+pub fn language() -> Language {
+    // SAFETY: a terminated name; the address is compared and not called.
+    let interpreter = unsafe { libc::dlsym(libc::RTLD_DEFAULT, c"Py_IsInitialized".as_ptr()) };
+    if interpreter.is_null() { Language::Other } else { Language::Python }
+}
+
 /// The file this library was loaded from, links followed. Not real-time.
 #[must_use]
 pub fn library() -> Option<PathBuf> {

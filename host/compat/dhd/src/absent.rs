@@ -1,4 +1,4 @@
-//! What a Flotor device does not have: raw encoders and motors, joints, the memory of a controller. Each answers that it is not
+//! What a Flotor device does not have: motors, encoders beyond those of the base, joints of a wrist, the memory of a controller. Each answers that it is not
 //! implemented, whatever it is asked.
 
 use crate::error::{Code, failed};
@@ -18,15 +18,15 @@ macro_rules! absent {
 }
 
 absent! {
-    dhdPreset dhdCalibrateWrist dhdResetWrist dhdUpdateEncoders dhdGetDeltaEncoders dhdGetWristEncoders
+    dhdPreset dhdCalibrateWrist dhdResetWrist dhdUpdateEncoders dhdGetWristEncoders
     dhdGetGripperEncoder dhdGetEncoder dhdGetEnc dhdGetEncRange dhdGetEncVelocities dhdSetMotor
     dhdSetDeltaMotor dhdSetWristMotor dhdSetGripperMotor dhdSetMot dhdPreloadMot dhdSetBrk
-    dhdDeltaEncoderToPosition dhdDeltaPositionToEncoder dhdDeltaMotorToForce dhdDeltaForceToMotor
+    dhdDeltaMotorToForce dhdDeltaForceToMotor
     dhdWristEncoderToOrientation dhdWristOrientationToEncoder dhdWristMotorToTorque dhdWristTorqueToMotor
     dhdGripperEncoderToAngleRad dhdGripperEncoderToGap dhdGripperAngleRadToEncoder dhdGripperGapToEncoder
-    dhdGripperMotorToForce dhdGripperForceToMotor dhdGetDeltaJointAngles dhdDeltaJointAnglesToJacobian
-    dhdDeltaJointTorquesExtrema dhdSetDeltaJointTorques dhdDeltaEncodersToJointAngles
-    dhdDeltaJointAnglesToEncoders dhdGetWristJointAngles dhdWristJointAnglesToJacobian
+    dhdGripperMotorToForce dhdGripperForceToMotor
+    dhdDeltaJointTorquesExtrema dhdSetDeltaJointTorques
+    dhdGetWristJointAngles dhdWristJointAnglesToJacobian
     dhdWristJointTorquesExtrema dhdSetWristJointTorques dhdSetForceAndWristJointTorques
     dhdSetForceAndWristJointTorquesAndGripperForce dhdWristEncodersToJointAngles
     dhdWristJointAnglesToEncoders dhdDeltaGravityJointTorques dhdWristGravityJointTorques dhdSetComMode

@@ -2,7 +2,7 @@
 
 use crate::error::Code;
 use crate::regulation::Regulation;
-use flotor_compat::{Axes, Frame, Host, Station, host, said};
+use flotor_compat::{Axes, Frame, Host, Language, Station, host, language, said};
 use flotor_hal::{DVec3, Wrench, math};
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -185,13 +185,15 @@ pub(crate) fn set_default(id: i8) -> Result<i32, Code> {
     Ok(0)
 }
 
-/// Which device of the maker it stands for: `FLOTOR_DHD_TYPE` says another number. An unknown one would stop a program.
+/// Returns the type of device that a program sees, unless `FLOTOR_DHD_TYPE` sets one. Of the types with six driven axes, bindings of
+/// Python know 104, and an unknown one stops them; CHAI3D, in C++, shifts the position of a 104 by a centimetre.
 pub(crate) fn kind(station: &Station) -> i32 {
-    let told = said("FLOTOR_DHD_TYPE").and_then(|text| text.parse().ok());
-    told.unwrap_or(match station.axes() {
-        Axes::Three => 33,
-        Axes::ThreeAndWrist => 34,
-        Axes::Six => 108,
+    let set = said("FLOTOR_DHD_TYPE").and_then(|text| text.parse().ok());
+    set.unwrap_or_else(|| match (station.axes(), language()) {
+        (Axes::Three, _) => 33,
+        (Axes::ThreeAndWrist, _) => 34,
+        (Axes::Six, Language::Python) => 104,
+        (Axes::Six, Language::Other) => 108,
     })
 }
 

@@ -11,6 +11,7 @@ pub(crate) enum Code {
     NoDevice = 5,
     NotAvailable = 6,
     Timeout = 7,
+    Geometry = 8,
     ExpertModeDisabled = 9,
     NotImplemented = 10,
     InvalidIndex = 15,

@@ -3,8 +3,8 @@
 //!
 //! Lengths in m, forces in N, torques in N·m, angles in rad; x towards the user, y right, z up. A result of 0 is success, 2 a
 //! command that was scaled down, -1 an error, whose number the calling thread may ask for. What sets a force waits for the
-//! next tick, and so paces the program. What a Flotor device does not have (encoders, motors, joints, a gripper) is answered
-//! as the SDK answers for a device without it.
+//! next tick, and so paces the program. Encoders and joints are those of a nominal base. What a Flotor device does not have (motors, a
+//! gripper) is answered as the SDK answers for a device without it.
 //!
 //! Source: the public header of the interface, version 3.17, and how a dozen open programs use it: names, numbers and behaviour
 //! only.
@@ -32,6 +32,7 @@ mod device;
 mod error;
 mod expert;
 mod force;
+mod joints;
 mod kept;
 mod keyboard;
 mod motion;
