@@ -6,6 +6,7 @@ use crate::scratch::Scratch;
 use std::ffi::OsStr;
 use std::io::Write;
 use std::ops::Deref;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
@@ -105,6 +106,13 @@ impl Flotor {
             };
         }
         self.command = shell;
+        self
+    }
+
+    /// Runs it as the leader of a process group, as a shell does: what its terminal sends reaches the group.
+    #[must_use]
+    pub fn leading_a_group(mut self) -> Self {
+        self.command.process_group(0);
         self
     }
 

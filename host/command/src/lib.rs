@@ -5,6 +5,7 @@
 //! - [`say!`], [`print_result`], [`write_json`], [`write_text`]: results for people and for machines.
 //! - [`tables`]: results as tables.
 //! - [`supervised`]: a command in a process of its own, whose end never passes for success.
+//! - [`PluginProcess`]: a process for the code of plugins, which ends with the command.
 //! - [`stopping`]: signals and keys that end a run.
 //! - [`separate`]: programs beside this one that carry out a command.
 //! - [`reference()`]: every command with its arguments, for the book.
@@ -22,6 +23,8 @@ pub mod stopping;
 pub mod style;
 mod supervision;
 pub mod tables;
+
+pub use flotor_session::PluginProcess;
 
 pub use error::{CommandError, before_advice};
 pub use output::{

@@ -6,10 +6,10 @@
 //! A thread of its own waits for what asks. On Linux these are signals, blocked in every other thread: a plugin that installs
 //! handlers or blocks signals takes none of them away. On Windows they are events of the console, and Ctrl-Break ends a run at once.
 
-use super::{CommandError, note};
+use super::{CommandError, note, print_error_line};
 use crate::platform::{INTERRUPTED, KeyTerminal, Request, Requests, is_orphaned, outlive_requests};
-use flotor_servo::last_stop::{leave_process, stop_all, was_armed};
-use flotor_servo::{EmergencySource, StopSwitch, THREAD_ADVICE, enter_guard_priority};
+use flotor_servo::last_stop::{calls, leave_process, stop_all, was_armed};
+use flotor_servo::{EmergencySource, StopSwitch, Stuck, THREAD_ADVICE, enter_guard_priority};
 use std::io::{self, Read, stdin};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -21,6 +21,10 @@ const ONE_REQUEST: Duration = Duration::from_millis(100);
 
 /// How long a run may take to end after an emergency stop: what holds it up then is left behind.
 const LAST_PATIENCE: Duration = Duration::from_secs(5);
+/// How long a call of the loop may last once an end was requested, and the interval between two looks at it. A run that names the call
+/// itself waits for one second.
+const CALL_PATIENCE: Duration = Duration::from_millis(1500);
+const LOOK: Duration = Duration::from_millis(100);
 /// How long devices may take to be told to stop when a process is left.
 const STOP_PATIENCE: Duration = Duration::from_millis(50);
 
@@ -79,11 +83,23 @@ fn register(first: First, stop: &StopSwitch) -> io::Result<()> {
 fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
     // Above a loop that hogs its core.
     enter_guard_priority();
-    let mut insistence = Insistence::default();
+    let (mut insistence, mut hang) = (Insistence::default(), Hang::default());
     loop {
-        let Some(request) = requests.next(LAST_PATIENCE) else {
+        let patience = if insistence.last.is_some() { LOOK } else { LAST_PATIENCE };
+        let Some(request) = requests.next(patience) else {
+            let now = Instant::now();
+            if let Some((who, at)) = insistence.last.and_then(|_| hang.look(calls(), now)) {
+                let call = at.place.call();
+                print_error_line(format_args!(
+                    "error: `{who}` did not return from {call} in tick {} after the request to stop",
+                    at.tick
+                ));
+                exit.take();
+            }
             // An orphan was asked to end when its supervisor ended.
-            if insistence.is_out_of_patience(Instant::now()) || is_orphaned() {
+            if insistence.is_out_of_patience(now)
+                || is_orphaned() && !insistence.is_younger_than_patience(now)
+            {
                 exit.take();
             }
             continue;
@@ -152,6 +168,11 @@ impl Insistence {
         })
     }
 
+    /// An end was requested a short time ago.
+    fn is_younger_than_patience(&self, now: Instant) -> bool {
+        self.last.is_some_and(|(since, _)| now.duration_since(since) < LAST_PATIENCE)
+    }
+
     fn answer(&mut self, now: Instant) -> Answer {
         let answer = match self.last {
             Some((since, answer)) if now.duration_since(since) < ONE_REQUEST => return answer,
@@ -161,6 +182,30 @@ impl Insistence {
         };
         self.last = Some((now, answer));
         answer
+    }
+}
+
+/// Calls that the loops were in at the last look, and the time when they were seen there first.
+#[derive(Default)]
+struct Hang {
+    seen: Vec<(String, Stuck)>,
+    since: Option<Instant>,
+}
+
+impl Hang {
+    /// Returns a call that has lasted too long.
+    fn look(&mut self, calls: Vec<(String, Stuck)>, now: Instant) -> Option<(String, Stuck)> {
+        let lasting = calls.iter().find(|call| self.seen.contains(call)).cloned();
+        let since = *self.since.get_or_insert(now);
+        self.seen = calls;
+        match lasting {
+            Some(call) if now.duration_since(since) >= CALL_PATIENCE => Some(call),
+            Some(_) => None,
+            None => {
+                self.since = Some(now);
+                None
+            }
+        }
     }
 }
 
@@ -212,6 +257,7 @@ impl KeyRequest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flotor_servo::Place;
 
     #[test]
     fn a_repeated_request_is_more_urgent() {
@@ -225,6 +271,20 @@ mod tests {
         assert!(!insistence.is_out_of_patience(later), "an orderly end may take its time");
         assert_eq!(insistence.answer(start), Answer::AtOnce);
         assert!(!insistence.is_out_of_patience(start) && insistence.is_out_of_patience(later));
+    }
+
+    #[test]
+    fn a_call_that_lasts_is_found_and_those_that_return_are_not() {
+        let (mut hang, start) = (Hang::default(), Instant::now());
+        let at = |tick| ("jelly".to_owned(), Stuck { tick, place: Place::Model(0) });
+        let mut look = |ms, calls: &[u64]| {
+            hang.look(calls.iter().map(|tick| at(*tick)).collect(), start + Duration::from_millis(ms))
+        };
+        assert_eq!(look(0, &[1]), None);
+        assert_eq!(look(2000, &[2]), None, "another tick");
+        assert_eq!(look(4000, &[]), None, "the host's own code");
+        assert_eq!([look(6000, &[3]), look(6100, &[3]), look(7499, &[3])], [None, None, None]);
+        assert_eq!(look(7500, &[3]), Some(at(3)));
     }
 
     #[test]

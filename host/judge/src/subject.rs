@@ -46,7 +46,7 @@ pub fn input_of(tick: u64, pose: Pose) -> Input {
 /// What the model returned in the place of an answer.
 pub fn call(model: &mut Model, input: &Input) -> Result<Output, CallStatus> {
     let mut output = Output::default();
-    let _call = calling(input.pose);
+    let _call = calling(std::slice::from_ref(input));
     match model.step(input, &mut output) {
         CallStatus::Ok => Ok(output),
         other => Err(other),

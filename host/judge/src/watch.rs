@@ -1,38 +1,41 @@
-//! Finds the call of a model that does not return: every call says where it is while it lasts, and one thread looks.
+//! Finds the step of a model that does not return: every call says where it is while it lasts, and one thread looks.
 //!
-//! Nothing can end such a call but the end of its process. So the thread that finds one reports the pose, and whoever
+//! Nothing can end such a call but the end of its process. So the thread that finds one reports it, and whoever
 //! measures runs in a process of its own.
 
-use flotor_hal::Pose;
+use flotor_hal::{Input, Pose};
+use flotor_session::{Exceeded, LongCall, ThreadClock};
 use std::collections::BTreeMap;
+use std::fmt;
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread;
 use std::time::Duration;
 
-/// How often a watch looks while its patience lasts. Looks are counted, not time: a thread that had to wait for a processor
-/// has been waited for by this one.
-const LOOKS: u32 = 10;
+/// Interval between two looks.
+const LOOK: Duration = Duration::from_millis(20);
 
-/// Where the calls of one thread are.
-#[derive(Default)]
-struct Place(Mutex<Doing>);
+/// A thread that makes calls, and the call that it is in.
+struct Caller {
+    clock: ThreadClock,
+    doing: Mutex<Doing>,
+}
 
 #[derive(Clone, Copy, Default)]
 struct Doing {
     /// Calls that have begun.
     calls: u64,
-    /// The pose of the one that lasts.
-    at: Option<Pose>,
+    /// Steps of the one that lasts, and the tick and the pose of the first.
+    at: Option<(u32, u64, Pose)>,
 }
 
 /// The threads that have made calls.
-static THREADS: Mutex<Vec<Weak<Place>>> = Mutex::new(Vec::new());
+static CALLERS: Mutex<Vec<Weak<Caller>>> = Mutex::new(Vec::new());
 
 thread_local! {
-    static OWN: Arc<Place> = {
-        let own = Arc::new(Place::default());
-        locked(&THREADS).push(Arc::downgrade(&own));
+    static OWN: Arc<Caller> = {
+        let own = Arc::new(Caller { clock: ThreadClock::of_this_thread(), doing: Mutex::default() });
+        locked(&CALLERS).push(Arc::downgrade(&own));
         own
     };
 }
@@ -45,59 +48,76 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// While it lives, this thread is in a call.
 pub struct Calling(());
 
-/// This thread calls a model at a pose, until the result is dropped. Takes some tens of nanoseconds.
+/// Marks this thread as being in `step` with these inputs, until the result is dropped. Takes some tens of nanoseconds.
 #[must_use]
-pub fn calling(pose: Pose) -> Calling {
+pub fn calling(inputs: &[Input]) -> Calling {
+    let steps = u32::try_from(inputs.len()).unwrap_or(u32::MAX);
+    let at = inputs.first().map(|first| (steps, first.tick, first.pose));
     OWN.with(|own| {
-        let mut doing = locked(&own.0);
-        *doing = Doing { calls: doing.calls + 1, at: Some(pose) };
+        let mut doing = locked(&own.doing);
+        *doing = Doing { calls: doing.calls + 1, at };
     });
     Calling(())
 }
 
 impl Drop for Calling {
     fn drop(&mut self) {
-        OWN.with(|own| locked(&own.0).at = None);
+        OWN.with(|own| locked(&own.doing).at = None);
     }
 }
 
-/// Watches all threads of this process, until one is in the same call for longer than `patience`: then it reports the
-/// pose, once, from a thread of its own.
+/// A step that does not return.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StuckStep {
+    /// Tick of its input.
+    pub tick: u64,
+    /// Pose of its input.
+    pub pose: Pose,
+    /// The limit that it has exceeded.
+    pub limit: Exceeded,
+}
+
+impl fmt::Display for StuckStep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "`step` did not return in tick {}{}", self.tick, self.limit)
+    }
+}
+
+/// Watches all threads of this process, until one is in a step for longer than `limit` of processor time, or waits there ten
+/// times as long: then it reports the step, once, from a thread of its own.
 ///
 /// # Errors
 /// The system's, if there can be no thread.
-pub fn start(patience: Duration, on_stuck: impl FnOnce(Pose) + Send + 'static) -> io::Result<()> {
+pub fn start(limit: Duration, on_stuck: impl FnOnce(StuckStep) + Send + 'static) -> io::Result<()> {
     thread::Builder::new().spawn(move || {
         let mut seen = BTreeMap::new();
         loop {
-            thread::sleep(patience / LOOKS);
-            if let Some(pose) = stuck(&mut seen) {
-                return on_stuck(pose);
+            thread::sleep(LOOK.min(limit));
+            if let Some(stuck) = stuck(&mut seen, limit) {
+                return on_stuck(stuck);
             }
         }
     })?;
     Ok(())
 }
 
-/// The pose of a call that has been seen [`LOOKS`] times. `seen`: by thread, in which call, and how often.
-fn stuck(seen: &mut BTreeMap<usize, (u64, u32)>) -> Option<Pose> {
-    let threads: Vec<Arc<Place>> = {
-        let mut all = locked(&THREADS);
-        all.retain(|thread| thread.strong_count() > 0);
+/// Returns a step that has exceeded its limit. `seen`: the call of each thread.
+fn stuck(seen: &mut BTreeMap<usize, LongCall<u64>>, limit: Duration) -> Option<StuckStep> {
+    let callers: Vec<Arc<Caller>> = {
+        let mut all = locked(&CALLERS);
+        all.retain(|caller| caller.strong_count() > 0);
         all.iter().filter_map(Weak::upgrade).collect()
     };
-    for thread in threads {
-        let id = Arc::as_ptr(&thread).addr();
-        let Doing { calls, at } = *locked(&thread.0);
-        match (at, seen.get_mut(&id)) {
-            (None, _) => drop(seen.remove(&id)),
-            (Some(pose), Some((same, looks))) if *same == calls => {
-                *looks += 1;
-                if *looks > LOOKS {
-                    return Some(pose);
-                }
-            }
-            (Some(_), _) => drop(seen.insert(id, (calls, 1))),
+    for caller in callers {
+        let id = Arc::as_ptr(&caller).addr();
+        let Doing { calls, at } = *locked(&caller.doing);
+        let Some((steps, tick, pose)) = at else {
+            seen.remove(&id);
+            continue;
+        };
+        let call = seen.entry(id).or_insert_with(|| LongCall::new(calls));
+        if let Some(limit) = call.look(calls, &caller.clock, limit.saturating_mul(steps), None) {
+            return Some(StuckStep { tick, pose, limit });
         }
     }
     None
@@ -106,27 +126,30 @@ fn stuck(seen: &mut BTreeMap<usize, (u64, u32)>) -> Option<Pose> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::subject::input_of;
     use flotor_hal::DVec3;
     use std::sync::mpsc;
     use std::time::Instant;
 
     #[test]
-    fn the_call_that_does_not_return_is_named_and_no_other() {
+    fn the_step_that_does_not_return_is_named_and_no_other() {
         let far = Pose { position_m: DVec3::new(1.0, 2.0, 3.0).to_array(), ..Pose::HOME };
         let (tell, told) = mpsc::channel();
-        let patience = Duration::from_millis(100);
-        start(patience, move |pose| tell.send(pose).expect("the test waits")).expect("a thread");
+        let limit = Duration::from_millis(20);
+        start(limit, move |stuck| tell.send(stuck).expect("the test waits")).expect("a thread");
         let (end, ended) = mpsc::channel::<()>();
-        // One that makes many short calls for longer than the patience lasts, then one long call.
+        // One that makes many short calls for longer than the limit, then one long call.
         let worker = thread::spawn(move || {
             let begin = Instant::now();
-            while begin.elapsed() < 3 * patience {
-                let _call = calling(Pose::HOME);
+            while begin.elapsed() < 20 * limit {
+                let _call = calling(&[input_of(1, Pose::HOME)]);
             }
-            let _call = calling(far);
+            let _call = calling(&[input_of(700, far)]);
             ended.recv().ok();
         });
-        assert_eq!(told.recv().expect("it is found"), far);
+        let stuck = told.recv().expect("it is found");
+        assert_eq!((stuck.tick, stuck.pose, stuck.limit), (700, far, Exceeded::Waiting(10 * limit)));
+        assert!(stuck.to_string().starts_with("`step` did not return in tick 700 within 0.2 s"), "{stuck}");
         end.send(()).expect("the worker waits");
         worker.join().expect("the worker ends");
     }

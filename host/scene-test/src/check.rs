@@ -248,7 +248,8 @@ fn judge(case: &Case<'_>, ran: &Ran, json: &Value) -> Vec<Failure> {
     let Case { file, label, .. } = case;
     let mut failures = Vec::new();
     if !file.expect.iter().any(|expectation| expectation.path == "end") {
-        failures.extend(missed("end", &Bound::Word("finished".to_owned()), at(json, "end")));
+        let early = missed("end", &Bound::Word("finished".to_owned()), at(json, "end"));
+        failures.extend(early.map(|early| Failure { got: format!("{}: {}", early.got, ran.error), ..early }));
         let ended = failures.is_empty() && ran.code != Some(0);
         failures.extend(ended.then(|| Failure::new("the run", "exit code 0", &ran.error)));
     }

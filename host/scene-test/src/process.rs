@@ -1,7 +1,7 @@
 //! `flotor` as a process of its own.
 
-use flotor_command::CommandError;
 use flotor_command::separate::{Built, SeparateProgram};
+use flotor_command::{CommandError, PluginProcess};
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -80,7 +80,7 @@ impl Flotor {
     }
 
     fn wait(&self, command: &mut Command) -> Result<Option<i32>, Trouble> {
-        let mut process = command.spawn()?;
+        let mut process = PluginProcess::start(command)?;
         let started = Instant::now();
         loop {
             if let Some(status) = process.try_wait()? {
@@ -88,7 +88,6 @@ impl Flotor {
             }
             if started.elapsed() > self.limit {
                 process.kill()?;
-                process.wait()?;
                 return Err(Trouble::Late);
             }
             std::thread::sleep(Duration::from_millis(2));

@@ -150,7 +150,8 @@ impl Heartbeat {
     }
 
     /// Where the loop is. Real-time: bounded, no allocation.
-    pub(crate) fn now(&self) -> Stuck {
+    #[must_use]
+    pub fn now(&self) -> Stuck {
         Stuck::at(self.beat())
     }
 

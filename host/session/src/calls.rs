@@ -23,6 +23,9 @@ use std::time::{Duration, Instant};
 /// Environment variable with the longest time a call may take before a run, in seconds.
 pub const LIMIT_VARIABLE: &str = "FLOTOR_CALL_LIMIT_S";
 
+/// Environment variable with the longest processor time of a step without a clock (virtual clock, `validate`, `stress`), in seconds.
+pub const STEP_LIMIT_VARIABLE: &str = "FLOTOR_STEP_LIMIT_S";
+
 /// Time after which somebody who waits is told for whom, or half of a shorter limit.
 const TELL_AFTER: Duration = Duration::from_secs(5);
 /// The longest time a call may take before a run, or for a replacement during one, unless the user says so: large models
@@ -209,11 +212,15 @@ pub(crate) fn leave_behind() {
     LEFT_BEHIND.store(true, Ordering::Relaxed);
 }
 
-/// The longest time a call may take before a run.
+/// Returns the longest time a call may take before a run.
 pub(crate) fn limit() -> Duration {
-    let told = std::env::var(LIMIT_VARIABLE).ok().and_then(|text| text.parse::<f64>().ok());
-    let told = told.filter(|seconds| *seconds > 0.0).and_then(|s| Duration::try_from_secs_f64(s).ok());
-    told.unwrap_or(DEFAULT_LIMIT)
+    limit_of(LIMIT_VARIABLE).unwrap_or(DEFAULT_LIMIT)
+}
+
+/// Reads a limit from the environment.
+pub(crate) fn limit_of(variable: &str) -> Option<Duration> {
+    let seconds = std::env::var(variable).ok()?.parse::<f64>().ok().filter(|seconds| *seconds > 0.0)?;
+    Duration::try_from_secs_f64(seconds).ok()
 }
 
 /// The longest time a call may take after a run: no longer than before one.

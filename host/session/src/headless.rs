@@ -43,11 +43,14 @@ pub fn run(
         recording.map(|path| Recorder::create(path, &describe(scene, &options, &plugins))).transpose()?;
     let recording = RunRecording::new(recorder);
     let mut watchers = Watchers { tally: Tally::default(), digest: TraceDigest::new(), recording, demand };
-    let mut outcome = session.run(&mut watchers, &StopSwitch::default())?;
+    let ran = session.run(&mut watchers, &StopSwitch::default());
+    let Watchers { tally, digest, mut recording, .. } = watchers;
+    // Also that of a run which did not end well.
+    let recorded = recording.finish(&[]);
+    let mut outcome = ran?;
+    recorded?;
     // Nobody was there to be told before.
     outcome.warnings.splice(0..0, notices);
-    let Watchers { tally, digest, mut recording, .. } = watchers;
-    recording.finish(&[])?;
     let facts = RunFacts {
         title: &scene.title,
         clock: "virtual",

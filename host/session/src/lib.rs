@@ -11,6 +11,7 @@
 //! - [`headless`]: a whole run in virtual time, recorded and reported.
 //! - [`summary`]: what a run came to; [`run_description`]: all it takes to repeat it.
 //! - [`telemetry`]: a running session, for other programs to watch and change.
+//! - [`PluginProcess`]: a process for the code of plugins, which ends with its host.
 //! - [`calibration_file`]: the correction of a device's vertical force, as measured and kept.
 
 pub mod calibration_file;
@@ -18,7 +19,9 @@ mod calls;
 mod estimates;
 mod feel;
 pub mod headless;
+mod long_call;
 mod platform;
+mod plugin_process;
 pub mod program;
 pub mod registry;
 pub mod run_description;
@@ -29,10 +32,14 @@ pub mod summary;
 pub mod telemetry;
 
 pub use calls::{
-    Call, CallError, LIMIT_VARIABLE, Notice, Unresponsive, is_left_behind, stop_waits_with, tell_notices,
+    Call, CallError, LIMIT_VARIABLE, Notice, STEP_LIMIT_VARIABLE, Unresponsive, is_left_behind,
+    stop_waits_with, tell_notices,
 };
 pub use estimates::estimates;
 pub use flotor_servo::THREAD_ADVICE;
+pub use long_call::{Exceeded, LongCall, step_limit};
+pub use platform::ThreadClock;
+pub use plugin_process::PluginProcess;
 pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue, Observer,

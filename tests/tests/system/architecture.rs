@@ -374,6 +374,10 @@ const UNSAFE: &[(&str, &str)] = &[
         "the one place of the host that loads a plugin file, which the user guarantees",
     ),
     (
+        "host/session/src/platform/linux/process_group.rs",
+        "what a child does between `fork` and `exec`: it asks for its end with its parent",
+    ),
+    (
         "host/compat/",
         "entry points in C for programs of other makers' interfaces, and what a library in another program hooks: `fork`, `exit`",
     ),

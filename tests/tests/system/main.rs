@@ -33,6 +33,7 @@ mod inverse3;
 mod isolation;
 mod judges;
 mod latch;
+mod left_running;
 mod limits;
 mod live;
 mod maglev;

@@ -117,7 +117,7 @@ impl Stopwatch {
         }
         let input = subject.at_rest(pose);
         let mut output = Output::default();
-        let _call = calling(pose);
+        let _call = calling(&[input]);
         let begin = Instant::now();
         let call = subject.model().step(std::hint::black_box(&input), std::hint::black_box(&mut output));
         let call_ns = net_ns(begin);

@@ -88,7 +88,7 @@ fn singly(model: &mut Model, inputs: &[Input]) -> Vec<Bits> {
 
 fn batch(model: &mut Model, inputs: &[Input]) -> Vec<Bits> {
     let mut outputs = vec![Output::default(); inputs.len()];
-    let _calls = inputs.first().map(|first| calling(first.pose));
+    let _calls = calling(inputs);
     match model.step_batch(inputs, &mut outputs) {
         CallStatus::Ok => outputs.iter().map(bits).collect(),
         _ => vec![UNANSWERED; inputs.len()],

@@ -13,6 +13,7 @@ use super::{
 use crate::platform::{anonymous_file, end_at_once, ending_signal, standard_input};
 use crate::{Progress, watch};
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
+use flotor_session::PluginProcess;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Seek, Write};
 use std::process::{Command, Stdio};
@@ -150,8 +151,8 @@ pub(super) fn measure(setup: &Setup<'_>, part: Part) -> Result<Found, LoadError>
 #[derive(Serialize, Deserialize)]
 enum Delivery {
     Found(Found),
-    /// A call did not return, at this pose.
-    Stuck(PoseRecord),
+    /// A step did not return, at this pose; and which.
+    Stuck(PoseRecord, String),
     Refused(String),
 }
 
@@ -162,7 +163,8 @@ impl Delivery {
 }
 
 /// Measures one part in this process, which is there for that alone, and writes what it found into the file that is standard
-/// input. A call that takes longer than `patience` ends the process. Not real-time.
+/// input. A step that takes longer than `limit` of
+/// processor time, or waits ten times as long, ends the process. Not real-time.
 ///
 /// # Errors
 /// Standard input is no such file, or the system has no thread.
@@ -171,12 +173,12 @@ pub fn deliver(
     settings: &[Setting],
     options: &StressOptions,
     part: Part,
-    patience: Duration,
+    limit: Duration,
     progress: &dyn Progress,
 ) -> io::Result<()> {
-    watch::start(patience, |pose| {
+    watch::start(limit, |stuck| {
         // Whether or not that can be told: nothing else ends a call that does not return.
-        Delivery::Stuck(PoseRecord::from(pose)).write().ok();
+        Delivery::Stuck(PoseRecord::from(stuck.pose), stuck.to_string()).write().ok();
         end_at_once();
     })?;
     let measured = plugin.create_model(settings).and_then(|model| {
@@ -201,17 +203,18 @@ pub fn score_in_processes(
     settings: &[Setting],
     options: &StressOptions,
     only: &[Part],
-    patience: Duration,
     program: impl Fn(Part) -> Command,
 ) -> Result<StressReport, LoadError> {
     let memory = plugin.create_model(settings)?.memory();
-    let mut found = Found::default();
+    let (mut found, mut stuck) = (Found::default(), None);
     for part in Part::all(options).filter(|part| only.is_empty() || only.contains(part)) {
         let delivered = in_own_process(program(part));
         found.add(match delivered {
             Ok(Ok(Delivery::Found(found))) => found,
-            Ok(Ok(Delivery::Stuck(pose))) => {
-                part.broken(Some(pose), &format!("a call did not return within {patience:?}"))
+            Ok(Ok(Delivery::Stuck(pose, step))) => {
+                let found = part.broken(Some(pose), &step);
+                stuck.get_or_insert(step);
+                found
             }
             Ok(Ok(Delivery::Refused(why)) | Err(why)) => part.broken(None, &why),
             Err(error) => part.broken(None, &format!("cannot be measured: {error}")),
@@ -219,13 +222,13 @@ pub fn score_in_processes(
     }
     let setup =
         Setup { plugin, settings, options: *options, part: part_of(options.size, memory), progress: &() };
-    Ok(StressReport::new(&setup, found.measures, found.spread))
+    Ok(StressReport { stuck, ..StressReport::new(&setup, found.measures, found.spread) })
 }
 
 /// What the process of a part says, or how it ended without a word.
 fn in_own_process(mut command: Command) -> io::Result<Result<Delivery, String>> {
     let mut told = anonymous_file("flotor-stress")?;
-    let end = command.stdin(told.try_clone()?).stdout(Stdio::null()).status()?;
+    let end = PluginProcess::start(command.stdin(told.try_clone()?).stdout(Stdio::null()))?.wait()?;
     let mut text = Vec::new();
     told.rewind()?;
     told.read_to_end(&mut text)?;

@@ -28,6 +28,9 @@ pub struct StressReport {
     pub measures: Vec<Measure>,
     /// How quantities are spread, for pictures.
     pub distributions: Distributions,
+    /// The first step that did not return, which a measure names.
+    #[serde(skip)]
+    pub stuck: Option<String>,
 }
 
 /// How quantities are spread.
@@ -64,6 +67,7 @@ impl StressReport {
             score: passed as f64 / measures.len().max(1) as f64,
             measures,
             distributions,
+            stuck: None,
         }
     }
 

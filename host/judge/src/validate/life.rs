@@ -5,6 +5,7 @@ use super::Seen;
 use super::checks::Subject;
 use super::device::Running;
 use super::path::{CONFIG, finite, walk};
+use crate::watch::calling;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Model, OpenedDevice};
 use flotor_hal::extension::linear_field::LinearField;
@@ -49,7 +50,11 @@ pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Seen> {
 fn steps(model: &mut Model) -> Result<(), String> {
     for sent in walk(STEPS) {
         let (input, mut output) = (Box::new(sent), Box::<Output>::default());
-        if model.step(&input, &mut output) != CallStatus::Ok {
+        let status = {
+            let _call = calling(std::slice::from_ref(&*input));
+            model.step(&input, &mut output)
+        };
+        if status != CallStatus::Ok {
             return Err(format!("step {} failed: it {}", sent.tick, model.last_message()));
         }
         if *input != sent {
@@ -58,6 +63,7 @@ fn steps(model: &mut Model) -> Result<(), String> {
     }
     let inputs: Vec<Input> = walk(STEPS).collect();
     let mut outputs = vec![Output::default(); inputs.len()];
+    let _calls = calling(&inputs);
     match model.step_batch(&inputs, &mut outputs) {
         CallStatus::Ok => Ok(()),
         other => Err(format!("step_batch returned {other:?}")),

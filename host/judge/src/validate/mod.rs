@@ -21,9 +21,12 @@ pub(crate) mod untouched;
 pub use checks::check;
 pub use rule::Check;
 
-use crate::platform::{anonymous_file, ending_signal, locked, standard_input};
+use crate::platform::{anonymous_file, end_at_once, ending_signal, locked, standard_input};
+use crate::watch;
 use flotor_hal::abi::loader::read_metadata;
 use flotor_hal::conformance::Rule;
+use flotor_session::PluginProcess;
+use flotor_session::scene::KeyValue;
 use patience::Ended;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Seek, Write};
@@ -81,7 +84,7 @@ impl Finding {
         let Verdict { seen, figures } = verdict;
         let (violation, unchecked, obstacle) = match seen {
             None => (None, None, None),
-            Some(Seen::Violation(seen)) => (Some(seen), None, None),
+            Some(Seen::Violation(seen) | Seen::Stuck(seen)) => (Some(seen), None, None),
             Some(Seen::Missing(what)) => (None, Some(what), Some(Obstacle::Requirement)),
             Some(Seen::NotOnThisSystem(why)) => (None, Some(why), Some(Obstacle::System)),
             Some(Seen::NothingToJudge(why)) => (None, Some(why), Some(Obstacle::Subject)),
@@ -96,6 +99,8 @@ impl Finding {
 pub enum Seen {
     /// It does not.
     Violation(String),
+    /// Nor will it ever be known: a step did not return.
+    Stuck(String),
     /// The plugin needs something that is not there (a device, a permission): neither its fault nor a proof.
     Missing(String),
     /// This system cannot tell, whatever the plugin does.
@@ -127,19 +132,31 @@ impl Verdict {
         Self { seen: Some(Seen::Violation(seen)), figures: None }
     }
 
-    /// Writes it where the process that started this one looks for it: into the file that is standard input. What the
-    /// plugin prints, and however much, goes elsewhere.
-    ///
-    /// # Errors
-    /// Standard input is no such file.
-    pub fn deliver(&self) -> io::Result<()> {
+    /// Writes it into the file that is standard input, where the process that started this one reads it: a plugin prints
+    /// elsewhere.
+    fn deliver(&self) -> io::Result<()> {
         standard_input()?.write_all(&serde_json::to_vec(self)?)
     }
 }
 
+/// Checks one rule, of instances with these settings, in this process, which is there for that alone, and writes the verdict into the
+/// file that is standard input. A step that takes longer than `limit` of processor time, or waits ten times as long, ends the
+/// process. Not real-time.
+///
+/// # Errors
+/// Standard input is no such file, or the system has no thread.
+pub fn deliver(path: &Path, settings: &[KeyValue], wanted: Check, limit: Duration) -> io::Result<()> {
+    watch::start(limit, |stuck| {
+        // Whether or not that can be told: nothing else ends a call that does not return.
+        let _ = Verdict::of(Err(Seen::Stuck(stuck.to_string()))).deliver();
+        end_at_once();
+    })?;
+    Verdict::of(check(path, settings, wanted)).deliver()
+}
+
 /// Checks a plugin file against every rule that applies; stops at the first that makes the rest pointless. Not
 /// real-time. A rule may take `patience` of a processor, and wait as long; `program` starts this program once more, to check one rule of the file and
-/// to [deliver](Verdict::deliver) the verdict. `only` names the rules to check; empty: all.
+/// to [deliver](deliver()) the verdict. `only` names the rules to check; empty: all.
 #[must_use]
 pub fn validate(
     path: &Path,
@@ -149,7 +166,7 @@ pub fn validate(
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut note = |check: Check, verdict: Verdict| {
-        let is_violated = matches!(verdict.seen, Some(Seen::Violation(_)));
+        let is_violated = matches!(verdict.seen, Some(Seen::Violation(_) | Seen::Stuck(_)));
         findings.push(Finding::new(check, verdict));
         is_violated
     };
@@ -177,8 +194,12 @@ pub fn validate(
         }
         let outcome = outcome.map(|ended| ended.map(|(verdict, _)| verdict));
         let is_fatal = matches!(check, Check::Contract(Rule::Loads | Rule::Defaults));
-        let stops = is_fatal || matches!(outcome, Ok(None));
+        let is_stuck = matches!(outcome, Ok(None | Some(Verdict { seen: Some(Seen::Stuck(_)), .. })));
+        let stops = is_fatal || is_stuck;
         let verdict = match outcome {
+            Ok(Some(Verdict { seen: Some(Seen::Stuck(step)), .. })) => {
+                Verdict::violated(format!("{step}; the rules after it were not checked"))
+            }
             Ok(Some(verdict)) => verdict,
             // Its allocator is slow, and whether a call ends is seen without it.
             Ok(None) if check == Check::Contract(Rule::InsideMemory) => {
@@ -235,12 +256,14 @@ fn in_own_process(
 ) -> io::Result<Option<(Verdict, Duration)>> {
     // A file, not a pipe: nobody has to empty it. What a plugin prints is its own business.
     let mut told = anonymous_file("flotor-verdict")?;
-    let mut child = command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
+    command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = PluginProcess::start(&mut command)?;
     let Some(Ended { status: end, ran }) = patience::wait(&mut child, patience)? else { return Ok(None) };
     let mut text = Vec::new();
     told.rewind()?;
     told.read_to_end(&mut text)?;
     let verdict = match serde_json::from_slice(&text) {
+        Ok(verdict @ Verdict { seen: Some(Seen::Stuck(_)), .. }) => verdict,
         Ok(verdict) if end.success() => verdict,
         _ => Verdict::violated(died(check, end)),
     };

@@ -2,8 +2,9 @@
 //! did not want to. Time in which others have the processor is nobody's violation.
 
 use crate::platform::used;
+use flotor_session::PluginProcess;
 use std::io;
-use std::process::{Child, ExitStatus};
+use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
 /// How often a process is looked at.
@@ -20,7 +21,7 @@ pub(crate) struct Ended {
 }
 
 /// Waits for the end of a process; `None` if it took too long and was ended.
-pub(crate) fn wait(child: &mut Child, patience: Duration) -> io::Result<Option<Ended>> {
+pub(crate) fn wait(child: &mut PluginProcess, patience: Duration) -> io::Result<Option<Ended>> {
     let (mut idle, mut looked) = (Duration::ZERO, Instant::now());
     let mut ran = Duration::ZERO;
     loop {
@@ -31,7 +32,6 @@ pub(crate) fn wait(child: &mut Child, patience: Duration) -> io::Result<Option<E
         ran = ran.max(used.ran);
         if used.ran > patience || idle > patience {
             child.kill()?;
-            child.wait()?;
             return Ok(None);
         }
         std::thread::sleep(LOOK);

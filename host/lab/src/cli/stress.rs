@@ -9,6 +9,7 @@ use flotor_command::options::{
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::abi::PluginKind;
 use flotor_judge::stress::{Part, Reach, StressOptions, Symmetry, deliver, score_in_processes};
+use flotor_session::step_limit;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -42,9 +43,9 @@ pub(crate) struct StressArguments {
     /// Compute only this measure (repeatable)
     #[arg(long, value_parser = measure, value_name = "M0")]
     only: Vec<Part>,
-    /// Time limit of one call: 10s, 500ms
-    #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME", default_value = "10s")]
-    timeout: f64,
+    /// Limit of the processor time of one step, ten times as long for one that waits: 5s, 500ms (default: 1s)
+    #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
+    timeout: Option<f64>,
     /// Make one measure in this process, and write the result into the file that is standard input
     #[arg(long, hide = true, value_parser = part)]
     deliver: Option<Part>,
@@ -70,10 +71,10 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
     let settings = settings(&plugin, "--set", &arguments.sets)?;
     let StressArguments { size, seed, symmetry, .. } = *arguments;
     let options = StressOptions { size, seed, reach: Reach::default(), symmetry };
-    let patience = Duration::from_secs_f64(arguments.timeout);
+    let limit = arguments.timeout.map_or_else(step_limit, Duration::from_secs_f64);
     if let Some(part) = arguments.deliver {
         let line = ProgressLine::new();
-        let delivered = deliver(&plugin, &settings, &options, part, patience, &line);
+        let delivered = deliver(&plugin, &settings, &options, part, limit, &line);
         line.0.finish_and_clear();
         return delivered.map_err(|error| CommandError::Failed(error.to_string()));
     }
@@ -82,7 +83,7 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
     let one_part = |part: Part| {
         let mut command = Command::new(&program);
         command.args(["stress", "--deliver", part.word(), "--size", size.word()]);
-        command.arg(format!("--seed={seed}")).arg(format!("--timeout={}", arguments.timeout));
+        command.arg(format!("--seed={seed}")).arg(format!("--timeout={}", limit.as_secs_f64()));
         command.arg("--model").arg(&arguments.model).args(arguments.plugin_path.arguments());
         for (key, value) in arguments.sets.iter().map(KeyValue::pair) {
             command.arg("--set").arg(format!("{key}={value}"));
@@ -92,8 +93,10 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
         }
         command
     };
-    let report = score_in_processes(&plugin, &settings, &options, &arguments.only, patience, one_part)?;
+    let report = score_in_processes(&plugin, &settings, &options, &arguments.only, one_part)?;
     let text = || format!("{}\n{}", style::title(&report.subject()), report.to_text());
     print_result(arguments.json.file(), &report, text)?;
-    write_text(arguments.plot.as_deref(), || report.to_svg())
+    write_text(arguments.plot.as_deref(), || report.to_svg())?;
+    let stuck = |step: &String| CommandError::PluginRefused(format!("{}: {step}", report.model));
+    report.stuck.as_ref().map_or(Ok(()), |step| Err(stuck(step)))
 }

@@ -4,8 +4,9 @@ use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, duration_s};
 use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
-use flotor_judge::validate::{Check, Figures, Finding, Verdict, check, validate};
+use flotor_judge::validate::{Check, Figures, Finding, Verdict, check, deliver, validate};
 use flotor_servo::last_stop::ignore_no_signal;
+use flotor_session::step_limit;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -45,10 +46,11 @@ fn rule(id: &str) -> Result<Check, String> {
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if let Some(rule) = arguments.rule {
         ignore_no_signal(); // a plugin that sends one is found, also in the background of a shell
-        let verdict = Verdict::of(check(&arguments.plugin, &arguments.sets, rule));
         if arguments.deliver {
-            return verdict.deliver().map_err(|error| CommandError::Failed(error.to_string()));
+            let delivered = deliver(&arguments.plugin, &arguments.sets, rule, step_limit());
+            return delivered.map_err(|error| CommandError::Failed(error.to_string()));
         }
+        let verdict = Verdict::of(check(&arguments.plugin, &arguments.sets, rule));
         // On a line of its own, whatever the plugin has printed before.
         say!(
             "\n{}",

@@ -86,6 +86,14 @@ pub fn stop_all() {
     }
 }
 
+/// Returns the plugin that each loop of this process is executing, and where. Not real-time.
+#[must_use]
+pub fn calls() -> Vec<(String, Stuck)> {
+    let runs = RUNS.iter().filter_map(|run| lock(run).clone()).filter(|run| !run.is_over());
+    let calls = runs.map(|run| (run.name(run.heart.now().place).to_owned(), run.heart.now()));
+    calls.filter(|(_, at)| at.place.is_a_plugins()).collect()
+}
+
 /// The runs there are, for one who dies: they are never let go again, because what closes a device allocates, and the
 /// allocator may be what died.
 fn runs() -> impl Iterator<Item = ManuallyDrop<Arc<Armed>>> {

@@ -68,3 +68,46 @@ pub(crate) fn user_folder() -> Option<PathBuf> {
 pub(crate) fn distrust(_: &Path, _: &Metadata) -> Option<String> {
     None
 }
+
+/// Use of the processors by a thread, which nobody reads yet.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Used {
+    pub(crate) ran: std::time::Duration,
+    pub(crate) wants: bool,
+}
+
+/// Reads the use of the processors by one thread: not yet.
+pub struct ThreadClock;
+
+impl ThreadClock {
+    /// That of the calling thread.
+    #[must_use]
+    pub fn of_this_thread() -> Self {
+        Self
+    }
+
+    /// Reads it: the system is not asked yet.
+    #[allow(clippy::unused_self)] // as on other systems
+    pub(crate) fn used(&self) -> Option<Used> {
+        None
+    }
+}
+
+/// A process that ends with its parent: here its group is the process itself, and nothing ends it with a parent that is killed.
+pub(crate) mod process_group {
+    use std::io;
+    use std::process::{Child, Command};
+
+    /// Changes nothing.
+    pub(crate) fn lead_until_parent_ends(_: &mut Command) {}
+
+    /// Whether a child has ended.
+    pub(crate) fn has_ended(child: &mut Child) -> io::Result<bool> {
+        Ok(child.try_wait()?.is_some())
+    }
+
+    /// Kills a child.
+    pub(crate) fn kill(child: &mut Child) {
+        let _ = child.kill();
+    }
+}

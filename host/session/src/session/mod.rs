@@ -10,6 +10,7 @@ mod prepare;
 mod remains;
 mod steps;
 mod unguarded;
+mod virtual_loop;
 
 pub use ceiling::{Strength, StrongDevice};
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
@@ -20,18 +21,19 @@ pub use remains::Remains;
 pub use steps::Steps;
 
 use crate::calls::{Call, CallError, EndReserve, Progress, Unresponsive, end_limit, leave_behind, limit};
+use crate::long_call::Exceeded;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{Pacing, Scene, SceneError};
 use ceiling::{norm_notice, under_ceiling};
 use controls::{ChangeLog, Parts};
 use epilogue::Epilogue;
 use flotor_core::Change;
+use flotor_core::ModelOutputs;
 use flotor_core::demand::{ObserverDemand, felt_within};
 use flotor_core::limits::{Bound, Limits};
 use flotor_core::plausibility::ImplausibleSamples;
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
-use flotor_core::{MOST_DEVICES, ModelOutputs};
 use flotor_coupling::{Line, Patience, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
@@ -113,18 +115,15 @@ pub enum RunError {
     /// The emergency stop of the machine is pressed, or was while the run started; nothing was energised.
     #[error("{}", latch::latched_words(.0.as_ref()))]
     Latched(Option<Pressed>),
-    /// A call of the loop did not return; the watchdog has stopped the device.
-    #[error(
-        "`{who}` did not return from {} in tick {}; the watchdog stopped the device after {} ms",
-        stuck.place.call(), stuck.tick, limit_ns / 1_000_000
-    )]
+    /// A call of the loop did not return; the devices are stopped.
+    #[error("`{who}` did not return from {} in tick {}{limit}", stuck.place.call(), stuck.tick)]
     Hung {
         /// Name in the scene, or "device" or "host".
         who: String,
         /// Where it is.
         stuck: Stuck,
-        /// How long the watchdog waits, ns.
-        limit_ns: u64,
+        /// The limit that the call has exceeded.
+        limit: Exceeded,
     },
 }
 
@@ -351,8 +350,6 @@ pub struct DeviceOutcome {
 
 /// Records that fit between loop and observers: four seconds at 1 kHz.
 const RING_RECORDS: usize = 4096;
-/// Ticks run between two looks of the observers on the virtual clock.
-const VIRTUAL_BATCH: usize = 1024;
 /// How long a watchdog that is not needed any more may take to end.
 const WATCHDOG_END: Duration = Duration::from_millis(50);
 /// How often observers look at a loop in real time.
@@ -652,36 +649,6 @@ impl Session {
         }
     }
 
-    /// Same tick, no waiting: observers look between batches, so that a slow one slows the run and loses nothing.
-    fn run_virtual(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
-        let Session { standby, controls, mut changes, mut taps, period_ns, duration_ns, plugins, .. } = self;
-        let stoppers = standby.stoppers();
-        let mut asked = standby.observers().request(observer.demand());
-        let mut runner =
-            Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
-        // A tick may end a batch with a record for each device.
-        let mut batch = Vec::with_capacity(VIRTUAL_BATCH + usize::from(MOST_DEVICES));
-        while runner.end().is_none() {
-            asked.change_to(observer.demand());
-            while batch.len() < VIRTUAL_BATCH && runner.end().is_none() {
-                runner.advance(stop, |record| {
-                    publish_to(&mut taps, record);
-                    batch.push(*record);
-                });
-            }
-            if runner.end().is_some() {
-                stoppers.iter().for_each(Stopper::safe_stop);
-                runner.servo().heart().finish();
-            }
-            for record in batch.drain(..) {
-                changes.up_to(record.tick, |change| observer.change(change));
-                observer.observe(&record);
-            }
-            controls.sweep();
-        }
-        Ok(Finished::of(runner, 0, RealTimeReport::not_asked()))
-    }
-
     /// The loop on a thread of its own; this one lets the observers look.
     fn run_real(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
         let (mut sender, mut receiver) = queue(RING_RECORDS);
@@ -801,7 +768,7 @@ impl Session {
                 && since.elapsed() > COME_BACK
             {
                 leave_behind();
-                return Err(hung(stuck, &plugins, watchdog_ns));
+                return Err(hung(stuck, &plugins, Exceeded::Watchdog(Duration::from_nanos(watchdog_ns))));
             }
             std::thread::sleep(OBSERVER_PERIOD);
         }
@@ -821,7 +788,7 @@ fn wait_for_end_of(watchdog: &JoinHandle<()>) {
 }
 
 /// Whose fault a stuck loop is, by name.
-fn hung(stuck: Stuck, plugins: &[PluginReport], limit_ns: u64) -> RunError {
+fn hung(stuck: Stuck, plugins: &[PluginReport], limit: Exceeded) -> RunError {
     let name = |index: usize| plugins.get(index).map_or_else(String::new, |plugin| plugin.name.clone());
     let devices = plugins.iter().filter(|plugin| plugin.metadata.kind == PluginKind::Device).count();
     let who = match stuck.place {
@@ -831,7 +798,7 @@ fn hung(stuck: Stuck, plugins: &[PluginReport], limit_ns: u64) -> RunError {
         }
         Place::Host | Place::Waiting => "host".to_owned(),
     };
-    RunError::Hung { who, stuck, limit_ns }
+    RunError::Hung { who, stuck, limit }
 }
 
 struct Finished {

@@ -65,10 +65,11 @@ pub(crate) fn used(process: u32) -> Used {
 mod tests {
     use super::*;
     use crate::validate::patience::wait;
-    use std::process::{Child, Command};
+    use flotor_session::PluginProcess;
+    use std::process::Command;
 
-    fn shell(script: &str) -> Child {
-        Command::new("sh").args(["-c", script]).spawn().expect("there is a shell")
+    fn shell(script: &str) -> PluginProcess {
+        PluginProcess::start(Command::new("sh").args(["-c", script])).expect("there is a shell")
     }
 
     #[test]

@@ -2,8 +2,11 @@
 
 mod locale;
 mod machine;
+pub(crate) mod process_group;
+mod thread_clock;
 
 pub(crate) use machine::MachineState;
+pub use thread_clock::ThreadClock;
 
 use rustix::process::geteuid;
 use std::fs::Metadata;

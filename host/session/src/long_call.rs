@@ -1,0 +1,114 @@
+//! A call of a plugin that may not return: how long it lasts, and the limit that it exceeds.
+//!
+//! Time in which others have the processor is no fault of the call. So the limit is one of processor time, and, ten times as long,
+//! one of time in which its thread needs no processor.
+
+use crate::calls::STEP_LIMIT_VARIABLE;
+use crate::platform::ThreadClock;
+use flotor_servo::StopSwitch;
+use std::fmt;
+use std::time::{Duration, Instant};
+
+/// The longest processor time of a call, unless the user says so.
+const DEFAULT_LIMIT: Duration = Duration::from_secs(1);
+/// How many times longer than the limit of its processor time a call may wait for something.
+const WAITS: u32 = 10;
+/// How long a call may last once the run is to stop.
+const STOP_PATIENCE: Duration = Duration::from_secs(1);
+/// The longest interval between two looks that counts: a longer one shows that the watching thread had no processor either.
+const LONGEST_LOOK: Duration = Duration::from_millis(100);
+
+/// Returns the longest processor time of a call in a loop without a clock. Not real-time.
+#[must_use]
+pub fn step_limit() -> Duration {
+    crate::calls::limit_of(STEP_LIMIT_VARIABLE).unwrap_or(DEFAULT_LIMIT)
+}
+
+const REMEDY: &str = "`FLOTOR_STEP_LIMIT_S` allows more";
+
+/// Limit that a call has exceeded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Exceeded {
+    /// That of the watchdog, which has stopped the devices.
+    Watchdog(Duration),
+    /// Of processor time.
+    Processor(Duration),
+    /// Of time in which its thread needed no processor.
+    Waiting(Duration),
+    /// Of time after a request to stop.
+    Stop(Duration),
+}
+
+impl fmt::Display for Exceeded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Watchdog(limit) => {
+                write!(f, "; the watchdog stopped the device after {} ms", limit.as_millis())
+            }
+            Self::Processor(limit) => {
+                write!(f, " within {} s of processor time ({REMEDY})", limit.as_secs_f64())
+            }
+            Self::Waiting(limit) => {
+                write!(f, " within {} s, in which it needed no processor ({REMEDY})", limit.as_secs_f64())
+            }
+            Self::Stop(limit) => write!(f, " within {} s after the request to stop", limit.as_secs_f64()),
+        }
+    }
+}
+
+/// A call at a place, as another thread sees it at each look.
+pub struct LongCall<P> {
+    place: P,
+    ran_before: Option<Duration>,
+    waited: Duration,
+    lasted: Duration,
+    looked: Instant,
+}
+
+impl<P: PartialEq> LongCall<P> {
+    /// A call that has just begun.
+    pub fn new(place: P) -> Self {
+        let (waited, lasted) = (Duration::ZERO, Duration::ZERO);
+        Self { place, ran_before: None, waited, lasted, looked: Instant::now() }
+    }
+
+    /// Returns the place of the call.
+    pub fn place(&self) -> &P {
+        &self.place
+    }
+
+    /// Looks at the thread of `clock`, which is at `place` now; returns the limit that the call has exceeded. Call it every few
+    /// hundredths of a second. Not real-time.
+    pub fn look(
+        &mut self,
+        place: P,
+        clock: &ThreadClock,
+        limit: Duration,
+        stop: Option<&StopSwitch>,
+    ) -> Option<Exceeded> {
+        let used = clock.used();
+        let ran = used.map_or(Duration::ZERO, |used| used.ran);
+        if place != self.place {
+            *self = Self { ran_before: Some(ran), ..Self::new(place) };
+            return None;
+        }
+        let since = self.looked.elapsed().min(LONGEST_LOOK);
+        self.looked = Instant::now();
+        self.lasted += since;
+        if !used.is_some_and(|used| used.wants) {
+            self.waited += since;
+        }
+        let before = *self.ran_before.get_or_insert(ran);
+        let is_to_stop = stop.is_some_and(|stop| stop.is_stop_asked() || stop.emergency().is_some());
+        if ran.saturating_sub(before) >= limit {
+            Some(Exceeded::Processor(limit))
+        } else if self.waited >= WAITS * limit {
+            Some(Exceeded::Waiting(WAITS * limit))
+        } else if is_to_stop && self.lasted >= STOP_PATIENCE {
+            Some(Exceeded::Stop(STOP_PATIENCE))
+        } else {
+            None
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! A process of its own for the code of plugins: it ends with the thread that started it, however that ends, and takes all
+//! processes of its process group with it.
+//!
+//! A plugin may hang, ignore signals or start processes. Nothing of it outlives whoever waits for its answer. On Windows only the
+//! process itself is killed, and it outlives a host that is killed: this needs a job object, which Flotor does not use yet.
+
+use crate::platform::process_group;
+use std::io;
+use std::process::{Child, Command, ExitStatus};
+use std::thread::sleep;
+use std::time::Duration;
+
+/// Poll interval of [`PluginProcess::wait`].
+const POLL: Duration = Duration::from_millis(2);
+
+/// A running process for the code of plugins. Dropping it kills the whole process group.
+pub struct PluginProcess {
+    pub(crate) child: Child,
+    status: Option<ExitStatus>,
+}
+
+impl PluginProcess {
+    /// Starts a command in a process group of its own; the system kills it when the calling thread ends. Not real-time.
+    ///
+    /// # Errors
+    /// The error of the system.
+    pub fn start(command: &mut Command) -> io::Result<Self> {
+        process_group::lead_until_parent_ends(command);
+        Ok(Self { child: command.spawn()?, status: None })
+    }
+
+    /// Returns the number of the process.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Returns the status of a process that has ended, and kills the rest of its group. Does not wait. Not real-time.
+    ///
+    /// # Errors
+    /// The error of the system.
+    pub fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
+        // The number of the group is free once its leader is waited for.
+        if self.status.is_none() && process_group::has_ended(&mut self.child)? {
+            process_group::kill(&mut self.child);
+            self.status = Some(self.child.wait()?);
+        }
+        Ok(self.status)
+    }
+
+    /// Waits for the end of the process, and kills the rest of its group. Not real-time.
+    ///
+    /// # Errors
+    /// The error of the system.
+    pub fn wait(&mut self) -> io::Result<ExitStatus> {
+        loop {
+            if let Some(status) = self.try_wait()? {
+                return Ok(status);
+            }
+            sleep(POLL);
+        }
+    }
+
+    /// Kills the process group and waits for its end. Not real-time.
+    ///
+    /// # Errors
+    /// The error of the system.
+    pub fn kill(&mut self) -> io::Result<()> {
+        if self.status.is_none() {
+            process_group::kill(&mut self.child);
+            self.status = Some(self.child.wait()?);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for PluginProcess {
+    fn drop(&mut self) {
+        let _ = self.kill();
+    }
+}

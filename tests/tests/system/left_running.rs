@@ -1,0 +1,221 @@
+//! What a command leaves running when it is killed while a plugin hangs: nothing. And a step that does not return has a name.
+
+use flotor_record::{Ending, Recording};
+use flotor_tests::library::compile_c_file;
+use flotor_tests::program::{Flotor, Ran, Running, exit_code};
+use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::{Tool, required};
+use flotor_tests::{TestSize, workspace_root};
+use rustix::process::{Signal, kill_process_group};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// A folder with a scene of a model that hangs in tick 70, and a test of it.
+struct Hanging {
+    folder: Scratch,
+    model: PathBuf,
+}
+
+impl Hanging {
+    /// `how` is a statement that does not return.
+    fn by(how: &str) -> Self {
+        let folder = Scratch::default();
+        let model = folder.path().join("libhangs.so");
+        let habit = format!("IN_STEP=if (input->tick == 70) {how}");
+        compile_c_file(&workspace_root().join("tests/c/model_that.c"), &[&habit], &model);
+        let scene = format!(
+            "duration_s = 0.2\n[device]\nplugin = \"simulated\"\n[[model]]\nname = \"jelly\"\nplugin = {model:?}\n"
+        );
+        let _ = folder.file("scene.toml", scene);
+        let _ = folder.file(
+            "hangs.test.toml",
+            "scene = \"scene.toml\"\nvalidate = true\nstress = \"short\"\n[expect]\npeak_force_n = { min = 0 }\n",
+        );
+        Self { folder, model }
+    }
+
+    fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    fn flotor(&self, arguments: &[&str]) -> Flotor {
+        let model = self.model.display().to_string();
+        let arguments = arguments.iter().map(|word| if *word == "MODEL" { model.as_str() } else { word });
+        Flotor::with(arguments).inside(self.path())
+    }
+
+    /// The processes whose folder this is: commands of a test and all that they have started.
+    fn processes(&self) -> Vec<String> {
+        let own = self.path().canonicalize().expect("it is there");
+        let entries = std::fs::read_dir("/proc").expect("/proc is there").flatten();
+        let inside = entries.filter(|process| {
+            std::fs::read_link(process.path().join("cwd")).is_ok_and(|folder| folder == own)
+        });
+        // The command line of a process that has ended is empty.
+        let words = inside.filter_map(|process| std::fs::read_to_string(process.path().join("cmdline")).ok());
+        words.map(|words| words.replace('\0', " ")).filter(|words| !words.is_empty()).collect()
+    }
+
+    /// Waits until no process is left; the time it took.
+    fn is_left(&self, what: &str) -> Duration {
+        let since = Instant::now();
+        loop {
+            let left = self.processes();
+            if left.is_empty() {
+                return since.elapsed();
+            }
+            assert!(since.elapsed() < FOR_EVER, "{what} left running: {left:#?}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+/// Time after which a process is taken for one that never ends.
+const FOR_EVER: Duration = Duration::from_secs(30);
+
+/// How a command ends.
+#[derive(Clone, Copy, Debug)]
+enum End {
+    /// SIGKILL to the process that was started.
+    Kill,
+    /// SIGTERM to it.
+    Term,
+    /// Ctrl-C: SIGINT to its process group.
+    Interrupt,
+}
+
+impl End {
+    fn bring_about(self, command: &Running) {
+        match self {
+            Self::Kill => command.signal(Signal::KILL),
+            Self::Term => command.signal(Signal::TERM),
+            Self::Interrupt => kill_process_group(command.pid(), Signal::INT).expect("it is ours"),
+        }
+    }
+}
+
+/// Each would go on for minutes.
+const COMMANDS: [&[&str]; 4] = [
+    &["run", "scene.toml", "--clock", "virtual"],
+    &["test", "hangs.test.toml"],
+    &["validate", "MODEL", "--timeout", "600s"],
+    &["stress", "--model", "MODEL", "--timeout", "600s"],
+];
+
+/// A spin, and a wait.
+const HANGS: [&str; 2] = ["{ for (;;) {} }", "hang();"];
+
+#[test]
+fn nothing_is_left_of_a_command_that_is_killed_while_a_model_hangs() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    let kills = TestSize::of_this_run().pick(6, 200);
+    let hanging = HANGS.map(Hanging::by);
+    let mut slowest = Duration::ZERO;
+    for command in COMMANDS {
+        for number in 0..kills {
+            let end = [End::Kill, End::Term, End::Interrupt][number % 3];
+            let scene = &hanging[number / 3 % 2];
+            let started = scene.flotor(command).env("FLOTOR_STEP_LIMIT_S", "600").leading_a_group().start();
+            // Spread evenly, without a period of its own: the golden section.
+            let share = (number as f64 * 0.618_034).fract();
+            std::thread::sleep(Duration::from_secs_f64(1.5 * share));
+            end.bring_about(&started);
+            slowest = slowest.max(scene.is_left(&format!("{command:?} {end:?} after {share}")));
+            let _ = started.wait();
+        }
+    }
+    println!("{kills} kills of each command: the last process ended after {slowest:.2?} at most");
+}
+
+#[test]
+fn a_test_of_a_model_that_hangs_leaves_nothing_when_it_ends() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    let hanging = Hanging::by(HANGS[0]);
+    let test = ["test", "hangs.test.toml", "--timeout", "1s"];
+    let ran = hanging.flotor(&test).env("FLOTOR_STEP_LIMIT_S", "600").run();
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+    assert!(ran.stdout.contains("it had not ended after 1 s, and was killed"), "{}", ran.stdout);
+    hanging.is_left("flotor test");
+}
+
+// ---------------------------------------------------------------- a name
+
+/// The line that names the step.
+fn named(ran: &Ran, limit: &str) -> bool {
+    ran.stderr.contains(&format!("`jelly` did not return from `step` in tick 70 within {limit}"))
+}
+
+#[test]
+fn a_step_that_does_not_return_on_the_virtual_clock_is_named_and_costs_neither_recording_nor_summary() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    for (how, limit) in
+        HANGS.into_iter().zip(["0.1 s of processor time", "1 s, in which it needed no processor"])
+    {
+        let hanging = Hanging::by(how);
+        let run = ["run", "scene.toml", "--clock", "virtual", "--record", "run.mcap", "--json", "run.json"];
+        let ran = hanging.flotor(&run).env("FLOTOR_STEP_LIMIT_S", "0.1").run();
+        assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+        assert!(named(&ran, limit), "{ran:#?}");
+        let summary = std::fs::read_to_string(hanging.path().join("run.json")).expect("it is written");
+        let summary: Value = serde_json::from_str(&summary).expect("it is JSON");
+        assert_eq!(summary["end"], "watchdog", "{summary:#}");
+        let mut recording = Recording::open(&hanging.path().join("run.mcap")).expect("a recording");
+        let ticks: Vec<u64> = recording.by_ref().map(|record| record.expect("it is whole").tick).collect();
+        assert_eq!(ticks, (0..70).collect::<Vec<_>>(), "every tick before that one");
+        assert_eq!(recording.ending(), Ending::Finished);
+    }
+}
+
+#[test]
+fn a_test_and_the_judges_name_a_step_that_does_not_return() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    let hanging = Hanging::by(HANGS[0]);
+    let ran = |arguments: &[&str]| hanging.flotor(arguments).env("FLOTOR_STEP_LIMIT_S", "0.1").run();
+    let tested = ran(&["test", "hangs.test.toml"]);
+    assert_eq!(tested.code, Some(exit_code::OTHER), "{tested:#?}");
+    for line in [
+        "end: expected finished, got watchdog: `jelly` did not return from `step` in tick 70 within 0.1 s of processor time",
+        // The shortest run that has the fault.
+        "flotor run scene.toml --clock virtual --seed 1 --duration 0.07s",
+        "rule reset-repeats: ",
+    ] {
+        assert!(tested.stdout.contains(line), "{line}: {}", tested.stdout);
+    }
+    let step = "`step` did not return in tick 70 within 0.1 s of processor time";
+    let validated = ran(&["validate", "MODEL"]);
+    assert_eq!(validated.code, Some(exit_code::PLUGIN_REFUSED), "{validated:#?}");
+    assert!(validated.stdout.contains(step), "{}", validated.stdout);
+    let stressed = ran(&["stress", "--model", "MODEL"]);
+    assert_eq!(stressed.code, Some(exit_code::PLUGIN_REFUSED), "{stressed:#?}");
+    assert!(stressed.stdout.contains("`step` did not return in tick"), "{}", stressed.stdout);
+}
+
+/// As Python runs a scene.
+#[test]
+fn a_run_inside_another_program_ends_with_the_name_of_the_step() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    let hanging = Hanging::by(HANGS[0]);
+    let scene = flotor_session::scene::Scene::load(&hanging.path().join("scene.toml")).expect("a scene");
+    let recording = hanging.path().join("run.mcap");
+    let registry =
+        flotor_session::registry::Registry::search(&[flotor_tests::library::build_folder().join("deps")]);
+    let ran =
+        flotor_session::headless::run(&scene, &registry, 1, Some(&recording), flotor_hal::Demand::FORCE);
+    let Err(error) = ran else { panic!("a model hangs, and the run ends well") };
+    assert_eq!(
+        error.to_string(),
+        "`jelly` did not return from `step` in tick 70 within 1 s of processor time (`FLOTOR_STEP_LIMIT_S` allows more)"
+    );
+    assert!(Recording::open(&recording).expect("a recording").all(|record| record.is_ok()));
+}
