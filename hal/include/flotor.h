@@ -974,7 +974,8 @@ typedef struct FlotorConnectionTable {
 
 // How a device is stopped without its host. 88 bytes.
 typedef struct FlotorIndependentStop {
-    // Time from the end of the host's commands, or from the message, until the device is in its safe state, ns.
+    // Time from the end of the host's commands, or from the message, until the device is in its safe state, ns; with descriptor -1
+    // the largest number for a device that nothing stops.
     uint64_t within_ns;
     // A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. On Windows
     // the lower 32 bits of a handle. -1: the device stops by itself when no command comes.

@@ -1,5 +1,6 @@
 //! The FTDI chip between USB and the device's serial line, as the host sees it (FT232B, FTDI's requests).
 
+use flotor_hal::IndependentStop;
 use std::time::Duration;
 
 /// Vendor and product of a Falcon.
@@ -58,6 +59,12 @@ pub trait Chip: Send + Sync + 'static {
     /// # Errors
     /// [`ChipLost`].
     fn read(&self, packets: &mut [u8], patience: Duration) -> Result<usize, ChipLost>;
+
+    /// Returns the stop of a device that a process without this plugin stops with these bytes for the line. A chip on USB has none:
+    /// it takes bytes by calls that such a process does not make.
+    fn independent_stop(&self, _rest: &[u8]) -> IndependentStop {
+        IndependentStop::none()
+    }
 }
 
 /// Passes what came down the line on, without the bytes of the chip itself. Real-time: bounded, no allocation.

@@ -11,8 +11,9 @@ use crate::trouble::Trouble;
 use crate::usb;
 use flotor_hal::{
     ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, ConnectionDevice, Cycle, DQuat, DVec3,
-    Device, DeviceInfo, DeviceState, LoopConfig, Parameter, Pose, Refusal, Settings, Tick, Twist, UsbAccess,
-    UsbKind, VerticalCalibration, Wrench, choices, export_device, math,
+    Device, DeviceInfo, DeviceState, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose,
+    Refusal, Settings, Tick, Twist, UsbAccess, UsbKind, VerticalCalibration, Wrench, choices, export_device,
+    math,
 };
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -397,4 +398,12 @@ impl ConnectionDevice for FalconDevice {
     const USB: &'static [UsbKind] = &[UsbKind::new(VENDOR, PRODUCT, UsbAccess::Raw)];
 }
 
-export_device!(FalconDevice, calibration, connection);
+impl IndependentStopDevice for FalconDevice {
+    /// Of the connection that was opened first; a device on USB has none.
+    fn independent_stop(&self) -> IndependentStop {
+        let rest = Command::REST.bytes();
+        self.chip.as_ref().map_or(IndependentStop::none(), |chip| chip.independent_stop(&rest))
+    }
+}
+
+export_device!(FalconDevice, calibration, connection, independent_stop);

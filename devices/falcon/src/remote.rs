@@ -6,6 +6,8 @@
 //! ```
 
 use crate::chip::{Chip, ChipLost, PACKET_BYTES, Request};
+use crate::platform::descriptor;
+use flotor_hal::{IndependentStop, StoppedState};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::sync::{Mutex, PoisonError};
@@ -15,6 +17,8 @@ use std::time::Duration;
 pub const REQUEST: u8 = b'R';
 /// First byte of bytes for the line.
 pub const WRITE: u8 = b'W';
+/// Time in which an emulator has set its motors to rest, ns.
+const STOP_NS: u64 = 5_000_000;
 /// Bytes that are sent at once at most.
 const PIECE_BYTES: usize = 255;
 
@@ -65,6 +69,13 @@ impl Chip for RemoteChip {
             let length = u8::try_from(piece.len()).unwrap_or(u8::MAX);
             self.send(&[WRITE, length], piece)
         })
+    }
+
+    fn independent_stop(&self, rest: &[u8]) -> IndependentStop {
+        let stream = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+        let length = u8::try_from(rest.len()).unwrap_or(u8::MAX);
+        let message = [&[WRITE, length], rest].concat();
+        IndependentStop::by_message(descriptor(&stream), &message, StoppedState::Zero, STOP_NS)
     }
 
     fn read(&self, packets: &mut [u8], patience: Duration) -> Result<usize, ChipLost> {

@@ -17,6 +17,8 @@ use crate::{Refusal, extension::independent_stop::means::Independence};
 pub const STOP_MESSAGE_BYTES: usize = 64;
 /// The descriptor of a device that stops by itself.
 const BY_ITSELF: i32 = -1;
+/// The time of a device that nothing stops, ns.
+const NEVER_NS: u64 = u64::MAX;
 
 /// What a device exerts once it is stopped. In C as a number of this value.
 #[repr(u32)]
@@ -33,7 +35,8 @@ pub enum StoppedState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct IndependentStop {
-    /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns.
+    /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns; with descriptor -1
+    /// the largest number for a device that nothing stops.
     pub(crate) within_ns: u64,
     /// A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. On Windows
     /// the lower 32 bits of a handle. -1: the device stops by itself when no command comes.
@@ -64,6 +67,12 @@ impl IndependentStop {
     pub const fn by_itself(state: StoppedState, within_ns: u64) -> Self {
         let message = [0; STOP_MESSAGE_BYTES];
         Self { within_ns, descriptor: BY_ITSELF, length: 0, message, state: state as u32, reserved: 0 }
+    }
+
+    /// A device that nothing stops, as one without this extension: for plugins whose devices differ in that.
+    #[must_use]
+    pub const fn none() -> Self {
+        Self::by_itself(StoppedState::Zero, NEVER_NS)
     }
 }
 
@@ -134,7 +143,7 @@ table!(IndependentStopTable: "flotor.independent-stop/1", D: [IndependentStopDev
 /// The host's side.
 #[cfg(feature = "loader")]
 pub mod means {
-    use super::{BY_ITSELF, IndependentStop, STOP_MESSAGE_BYTES, StoppedState};
+    use super::{BY_ITSELF, IndependentStop, NEVER_NS, STOP_MESSAGE_BYTES, StoppedState};
     use crate::Refusal;
     use crate::abi::loader::platform::{Handle, writable_duplicate};
 
@@ -160,8 +169,8 @@ pub mod means {
     }
 
     impl Independence {
-        /// What a plugin said, with a duplicate of its descriptor.
-        pub(crate) fn of(told: &IndependentStop) -> Result<Self, Refusal> {
+        /// Reads what a plugin declares, with a duplicate of its descriptor; nothing of a device that nothing stops.
+        pub(crate) fn of(told: &IndependentStop) -> Result<Option<Self>, Refusal> {
             let wrong = |what: String| Refusal::broken(format!("its independent stop {what}"));
             let state = match told.state {
                 0 => StoppedState::Zero,
@@ -170,8 +179,9 @@ pub mod means {
             };
             let length = told.length as usize;
             if told.descriptor == BY_ITSELF {
-                return match length {
-                    0 => Ok(Self::Itself { within_ns: told.within_ns, state }),
+                return match (length, told.within_ns) {
+                    (0, NEVER_NS) => Ok(None),
+                    (0, within_ns) => Ok(Some(Self::Itself { within_ns, state })),
                     _ => Err(wrong("has a message and no descriptor".to_owned())),
                 };
             }
@@ -181,7 +191,7 @@ pub mod means {
             };
             // SAFETY: the plugin keeps it open until the device is closed (contract), and the device is open.
             let handle = unsafe { writable_duplicate(told.descriptor) }.map_err(wrong)?;
-            Ok(Self::Message { handle, message, state })
+            Ok(Some(Self::Message { handle, message, state }))
         }
     }
 }
@@ -202,6 +212,6 @@ impl OpenedDevice {
         let Some(told) = self.asked(ask, unfilled) else {
             return Err(Refusal::broken("it does not say how it is stopped without its host"));
         };
-        Independence::of(&told).map(Some)
+        Independence::of(&told)
     }
 }

@@ -1,5 +1,8 @@
 //! Linux: udev says who may use a device.
 
+use std::net::TcpStream;
+use std::os::fd::AsRawFd;
+
 /// What helps where no other advice does.
 pub(crate) const OTHER_REMEDY: &str = "connect it without a hub, and try again";
 
@@ -10,6 +13,11 @@ pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
          SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{vendor:04x}\", ATTR{{idProduct}}==\"{product:04x}\", TAG+=\"uaccess\", \
          ENV{{ID_MM_DEVICE_IGNORE}}=\"1\""
     )
+}
+
+/// The descriptor of a connection.
+pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
+    stream.as_raw_fd()
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What differs between systems for a device on USB: what its user has to do.
+//! What differs between systems: what the user of a device on USB has to do, and the number of a connection.
 
 #[cfg(not(windows))]
 mod linux;
@@ -6,6 +6,6 @@ mod linux;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use linux::{OTHER_REMEDY, access_remedy};
+pub(crate) use linux::{OTHER_REMEDY, access_remedy, descriptor};
 #[cfg(windows)]
-pub(crate) use windows::{OTHER_REMEDY, access_remedy};
+pub(crate) use windows::{OTHER_REMEDY, access_remedy, descriptor};

@@ -1,5 +1,8 @@
 //! Windows: a driver says who may use a device; libusb needs WinUSB.
 
+use std::net::TcpStream;
+use std::os::windows::io::AsRawSocket;
+
 /// What helps where no other advice does.
 pub(crate) const OTHER_REMEDY: &str =
     "give it the driver WinUSB with the program Zadig, connect it without a hub, and try again";
@@ -9,4 +12,10 @@ pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     format!(
         "close the program that uses {vendor:04x}:{product:04x}, or give it the driver WinUSB with the program Zadig"
     )
+}
+
+/// The number of a connection's handle, of which the system uses 32 bits.
+#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // as the contract says
+pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
+    stream.as_raw_socket() as i32
 }

@@ -140,7 +140,7 @@ mod tests {
         let told = IndependentStop::by_message(writer.as_raw_fd(), b"stop", StoppedState::Zero, 0);
         let means = Independence::of(&told).expect("it is right");
         drop(writer);
-        let Independence::Message { handle, message, state } = means else { panic!("{means:?}") };
+        let Some(Independence::Message { handle, message, state }) = means else { panic!("{means:?}") };
         assert_eq!((message.as_slice(), state), (&b"stop"[..], StoppedState::Zero));
         drop(handle);
         assert_eq!(reader.read(&mut [0; 4]).expect("it ends"), 0, "nobody holds the other end any more");
@@ -164,6 +164,7 @@ mod tests {
         }
         let own = IndependentStop::by_itself(StoppedState::Landed, 5);
         let own = Independence::of(&own).expect("it is right");
-        assert!(matches!(own, Independence::Itself { within_ns: 5, state: StoppedState::Landed }));
+        assert!(matches!(own, Some(Independence::Itself { within_ns: 5, state: StoppedState::Landed })));
+        assert!(Independence::of(&IndependentStop::none()).expect("it is right").is_none());
     }
 }
