@@ -25,7 +25,7 @@ const NEEDED_THREADS: u64 = 32;
 
 /// Returns the findings beside cores and privileges; those of control groups from the files below `root`.
 pub(crate) fn of_the_system(root: &Path) -> Vec<Diagnosis> {
-    let own = [isolated_cores(), kernel(), throttling(), governor(), killed_together()];
+    let own = [isolated_cores(), kernel(), throttling(), governor(), killed_together(), supervision()];
     own.into_iter().chain(group_limits(root).iter().filter_map(of_limit)).collect()
 }
 
@@ -135,6 +135,20 @@ fn killed_together() -> Diagnosis {
         ),
         Err(error) => Diagnosis::bad("watchdog process", error.to_string(), "run the `flotor` of one build"),
     }
+}
+
+/// Whether a supervisor waits for the process that runs plugins.
+fn supervision() -> Diagnosis {
+    if std::process::id() != 1 {
+        return Diagnosis::good("supervisor", "an end without a report fails");
+    }
+    Diagnosis::note(
+        "supervisor",
+        "none: process 1 of a container runs the plugins itself, because a kill of the container closes the device of process 1 alone \
+         before it kills the watchdog process",
+        "`flotor validate` finds a plugin that ends the process; `docker run --init` gives a supervisor, and a kill of the container may \
+         then leave the force on",
+    )
 }
 
 fn isolated_cores() -> Diagnosis {

@@ -26,7 +26,8 @@ const SUSPENDING: [c_int; 3] = [libc::SIGTSTP, libc::SIGTTIN, libc::SIGTTOU];
 static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
 
 /// Divides this process, which has one thread. The parent returns once the child has ended. Process 1 stays whole: in a container
-/// its end kills all processes at once, the watchdog process too, and only the descriptors of process 1 are closed before.
+/// its end kills all processes at once, the watchdog process too, and only the descriptors of process 1 are closed before. As process
+/// 1 the host is seen to end by the watchdog process, as its child it would be killed together with it. `flotor doctor` says so.
 ///
 /// # Errors
 /// No room for a process, or what the system says.
