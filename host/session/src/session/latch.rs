@@ -3,7 +3,7 @@
 
 use super::RunError;
 use flotor_live::{Directory, Latch, LatchState, Pressed, process_number};
-use flotor_servo::{EmergencySource, StopSwitch};
+use flotor_servo::{EmergencySource, StopSwitch, enter_guard_priority};
 use std::fmt::{self, Display, Formatter};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -120,6 +120,8 @@ impl LatchGuard {
     }
 
     fn attend(&self, stop: &StopSwitch, is_over: &AtomicBool) {
+        // A stop of another run waits for this thread.
+        enter_guard_priority();
         loop {
             let is_last = is_over.load(Ordering::Relaxed);
             match stop.emergency() {
