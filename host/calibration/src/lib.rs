@@ -33,6 +33,7 @@ mod tests;
 
 use flotor_hal::abi::loader::{LoadError, SettingError};
 use flotor_hal::{Fault, InvalidCalibration, Refusal};
+use flotor_session::RunError;
 
 /// Why a calibration did not come about.
 #[derive(Debug, thiserror::Error)]
@@ -97,6 +98,9 @@ pub enum CalibrationError {
     /// There is no thread to hold the handle.
     #[error("cannot start the holding controller thread: {0}")]
     NoThread(std::io::Error),
+    /// A rule that holds for every program that drives a device.
+    #[error(transparent)]
+    Run(#[from] RunError),
     /// The device refuses to run or to be calibrated.
     #[error("device refused: {0}")]
     Refused(Refusal),

@@ -2,6 +2,7 @@
 
 use crate::CommandError;
 use clap::{Args, Command, Parser, ValueEnum};
+use flotor_core::limits::Limits;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_servo::Core;
 use flotor_session::Strength;
@@ -55,7 +56,7 @@ impl StrengthOption {
     }
 }
 
-/// `--accept-shared-control-group`, of each command that runs a scene on a device.
+/// `--accept-shared-control-group`, of each command that drives a device.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct ControlGroupOption {
     /// Run although a kill of this program's control group ends the watchdog process with it, which alone stops a device then
@@ -64,9 +65,20 @@ pub struct ControlGroupOption {
 }
 
 impl ControlGroupOption {
-    /// Adds the consent to that of the scene.
-    pub fn apply(self, scene: &mut Scene) {
-        scene.limits.accept_shared_control_group |= self.accept_shared_control_group;
+    /// Adds the consent to that of a scene.
+    pub fn apply(self, limits: &mut Limits) {
+        limits.accept_shared_control_group |= self.accept_shared_control_group;
+    }
+
+    /// Whether the consent was given.
+    #[must_use]
+    pub fn is_accepted(self) -> bool {
+        self.accept_shared_control_group
+    }
+
+    /// The option, if it was given, for another process of Flotor.
+    pub fn arguments(self) -> impl Iterator<Item = &'static str> {
+        self.accept_shared_control_group.then_some("--accept-shared-control-group").into_iter()
     }
 }
 

@@ -42,7 +42,7 @@ pub use platform::ThreadClock;
 pub use plugin_process::PluginProcess;
 pub use run_recording::RunRecording;
 pub use session::{
-    ControlError, Controls, DeviceOutcome, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue, Observer,
-    Outcome, PluginReport, Remains, RunError, RunOptions, Session, Steps, StopReach, Strength, StrongDevice,
-    Tap, prepare_model,
+    ControlError, Controls, DeviceOutcome, Guardian, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue,
+    Observer, Outcome, PluginReport, Remains, RunError, RunOptions, Session, Steps, StopReach,
+    StopWithoutHost, Strength, StrongDevice, Tap, WatchdogStart, prepare_model, start_watchdog_process,
 };

@@ -311,7 +311,7 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
         let added = Scene::parse(Path::new("--ml-api"), ML_API).map_err(RunError::Scene)?.models;
         scene.models.extend(added.iter().map(|model| model.replaced_by(None, &[("listen", listen)])));
     }
-    arguments.control_group.apply(&mut scene);
+    arguments.control_group.apply(&mut scene.limits);
     arguments.plugin_path.put_before_those_of(&mut scene);
     for set in &arguments.sets {
         set.apply(&mut scene).map_err(CommandError::Usage)?;

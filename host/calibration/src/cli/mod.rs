@@ -37,6 +37,7 @@ pub fn command() -> clap::Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let Command::Calibrate(arguments) = options::arguments::<Arguments>().command;
+    flotor_session::tell_notices(|notice| flotor_command::note(notice));
     supervised(|| run(&arguments))
 }
 
@@ -81,6 +82,7 @@ fn write_calibration(path: &Path, file: &CalibrationFile) -> Result<(), CommandE
 fn refused(error: CalibrationError) -> CommandError {
     match error {
         CalibrationError::Plugin(error) => error.into(),
+        CalibrationError::Run(error) => error.into(),
         CalibrationError::Fault(fault) => CommandError::DeviceFault(fault),
         CalibrationError::Setting(_) | CalibrationError::Refused(_) => {
             CommandError::PluginRefused(error.to_string())

@@ -1,12 +1,15 @@
 //! Selection of the rig: the simulated one, or a device with a force sensor on a serial port.
 
 use super::refused;
-use crate::rig::{DeviceRig, SimulatedRig, Waiting};
+use crate::rig::{DeviceRig, RigOptions, SimulatedRig, Waiting};
 use crate::sensor::{ForceSensor, SERIAL_SENSOR};
 use clap::{ArgGroup, Args};
-use flotor_command::options::{KeyValue, PluginPathOption, duration_s, number, settings, whole};
+use flotor_command::options::{
+    ControlGroupOption, KeyValue, PluginPathOption, duration_s, number, settings, whole,
+};
 use flotor_command::stopping::stop_on_signals;
-use flotor_command::{CommandError, Redrawn, progress_bar};
+use flotor_command::{CommandError, Redrawn, note, progress_bar};
+use flotor_core::limits::Limits;
 use flotor_hal::abi::PluginKind;
 use flotor_servo::StopSwitch;
 use flotor_session::{LatchGuard, LatchWatch};
@@ -53,6 +56,8 @@ pub(super) struct RigArguments {
     pub(super) seed: u64,
     #[command(flatten)]
     plugin_path: PluginPathOption,
+    #[command(flatten)]
+    control_group: ControlGroupOption,
 }
 
 /// Shows the next height of the sensor; breaks if the user stops the procedure.
@@ -85,12 +90,21 @@ impl RigArguments {
         let sensor_settings = settings(&sensor_plugin, "--sensor-set", &self.sensor_sets)?;
         let port = self.sensor.as_deref().unwrap_or_default();
         let sensor = ForceSensor::open(&sensor_plugin, port, sensor_settings).map_err(refused)?;
-        let (close_m, patience) = (self.tolerance_mm * 1.0e-3, Duration::from_secs_f64(self.patience));
+        let mut limits = Limits::default();
+        self.control_group.apply(&mut limits);
+        let options = RigOptions {
+            close_m: self.tolerance_mm * 1.0e-3,
+            patience: Duration::from_secs_f64(self.patience),
+            limits,
+        };
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
-        let watch = LatchGuard::of_this_user().obey(&stop)?;
-        let guide = guide(&progress, &stop, watch);
-        let rig = DeviceRig::open(&plugin, &device_settings, sensor, close_m, patience, stop, guide);
-        Ok((rig.map_err(refused)?, progress))
+        let latch = LatchGuard::of_this_user();
+        latch.warning().iter().for_each(note);
+        let guide = guide(&progress, &stop, latch.obey(&stop)?);
+        let rig =
+            DeviceRig::open(&plugin, &device_settings, sensor, options, stop, guide).map_err(refused)?;
+        rig.warnings().iter().for_each(note);
+        Ok((rig, progress))
     }
 }
 

@@ -8,9 +8,12 @@ use crate::sensor::ForceSensor;
 use flotor_core::limits::{Boundary, CEILING, Limits};
 use flotor_core::plausibility::PlausibilityCheck;
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
-use flotor_hal::{Fault, LoopConfig, Refusal, VerticalCalibration};
+use flotor_hal::{Embodiment, Fault, LoopConfig, Refusal, VerticalCalibration};
+use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{Envelope, StopSwitch};
+use flotor_session::{Guardian, StopWithoutHost, WatchdogStart, start_watchdog_process};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How often it is looked whether the handle rests where it should.
@@ -27,6 +30,17 @@ pub struct Waiting {
     pub command_n: f64,
 }
 
+/// Conditions of a procedure.
+#[derive(Clone, Copy, Debug)]
+pub struct RigOptions {
+    /// Largest distance of the handle at rest from its target, m.
+    pub close_m: f64,
+    /// Longest time until the handle rests there.
+    pub patience: Duration,
+    /// Limits of the device, under the host's ceiling, and the consents of the user.
+    pub limits: Limits,
+}
+
 /// A device in the rig.
 pub struct DeviceRig<W> {
     /// Nothing while it is held, and after it was lost.
@@ -39,31 +53,38 @@ pub struct DeviceRig<W> {
     /// How often the handle was found restless before it came to the rest that is being measured.
     restless: u64,
     serial: String,
-    /// How far from its target a stop may be, m.
-    close_m: f64,
-    patience: Duration,
+    options: RigOptions,
     waiting: W,
+    /// Stops the device if this process is gone; dropped after the device.
+    watchdog_process: Option<Arc<WatchdogProcess>>,
+    guardian: Guardian,
+    warnings: Vec<String>,
 }
 
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
-    /// Opens the device. A stop counts if the handle rests within `close_m` of where it should, within `patience`;
-    /// until then `waiting` is told where it is, and then told nothing, once. When it breaks off, the handle is let down;
-    /// at the emergency stop of `stop` the device is stopped.
+    /// Opens the device and starts its watchdog process. Until the handle rests at its target `waiting` gets its place, then nothing,
+    /// once. When `waiting` breaks off, the handle is let down; at the emergency stop of `stop` the device is stopped.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the device refuses.
+    /// [`CalibrationError`] if the device refuses, or if it must not be driven without the user's consent.
     pub fn open(
         plugin: &Plugin,
         settings: &[Setting],
         sensor: ForceSensor,
-        close_m: f64,
-        patience: Duration,
+        options: RigOptions,
         stop: StopSwitch,
         waiting: W,
     ) -> Result<Self, CalibrationError> {
         let mut opened = plugin.open_device(settings)?;
         let serial = opened.serial();
-        let [_, _, most_n] = opened.capabilities().map_err(CalibrationError::Refused)?.max_force_n;
+        let capabilities = opened.capabilities().map_err(CalibrationError::Refused)?;
+        let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
+        let independent = StopWithoutHost::of(&plugin.metadata().id, embodiment, &capabilities, &mut opened);
+        let independent = independent.map_err(CalibrationError::Refused)?;
+        let WatchdogStart { process, warnings } = start_watchdog_process(&[&independent], &options.limits)?;
+        let watchdog_process = process.map(Arc::new);
+        let guardian = Guardian::of(watchdog_process.as_ref(), options.limits.require_independent_stop);
+        let [_, _, most_n] = capabilities.max_force_n;
         Ok(Self {
             opened: Some(opened),
             holder: None,
@@ -72,10 +93,18 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
             sensor,
             restless: 0,
             serial,
-            close_m,
-            patience,
+            options,
             waiting,
+            watchdog_process,
+            guardian,
+            warnings,
         })
+    }
+
+    /// Warnings about the device before it is energised, a sentence each.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Serial number of the device.
@@ -108,6 +137,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     }
 
     fn tell(&mut self, waiting: Option<Waiting>) -> Result<(), CalibrationError> {
+        self.guardian.look(&self.stop);
         match (self.waiting)(waiting) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(CalibrationError::BrokenOff),
@@ -118,11 +148,12 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         if let (None, Some(mut opened)) = (&self.holder, self.opened.take()) {
             let config = LoopConfig { period_ns: PERIOD_NS, seed: 0 };
             let capabilities = opened.capabilities().map_err(CalibrationError::Refused)?;
-            let limits = Limits::default().under(CEILING);
+            let limits = self.options.limits.under(CEILING);
             let envelope = Envelope::new(&limits, &without_wall(), &capabilities, PERIOD_NS);
             let plausibility = PlausibilityCheck::new(&capabilities, PERIOD_NS);
             let (stopper, stop) = (opened.stopper(), self.stop.clone());
-            let guard = Guard { envelope, plausibility, stopper, stop };
+            let watchdog_process = self.watchdog_process.clone();
+            let guard = Guard { envelope, plausibility, stopper, stop, watchdog_process };
             let active = opened.activate(&config).map_err(|(opened, refusal)| {
                 self.opened = Some(opened);
                 CalibrationError::Refused(refusal)
@@ -150,7 +181,8 @@ fn lost() -> CalibrationError {
 
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
     fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
-        let (close_m, until, command_n) = (self.close_m, Instant::now() + self.patience, command_n(target_m));
+        let RigOptions { close_m, patience, .. } = self.options;
+        let (until, command_n) = (Instant::now() + patience, command_n(target_m));
         if command_n > self.most_n {
             return Err(CalibrationError::TooStrong { command_n, most_n: self.most_n });
         }
@@ -179,7 +211,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
 
     fn still_rests(&mut self, rest: &Rest) -> Result<bool, CalibrationError> {
         // What the handle did while the last reading was taken is in the mean that has begun, or in the next.
-        let (from, until) = (self.holder()?.look()?.means, Instant::now() + self.patience);
+        let (from, until) = (self.holder()?.look()?.means, Instant::now() + self.options.patience);
         loop {
             let report = self.holder()?.look()?;
             if report.means >= from + 2 {

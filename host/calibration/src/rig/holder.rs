@@ -10,10 +10,12 @@ use flotor_core::plausibility::{PlausibilityCheck, Trust};
 use flotor_core::trace::Events;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Conditions, Cycle, DeviceState, Fault, Tick};
+use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
     EmergencySource, Envelope, Gate, Heartbeat, LastStop, Place, StopSwitch, enter_real_time, start_watchdog,
 };
 use flotor_sync::{Observer, Publisher, Words, latest};
+use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -132,6 +134,7 @@ pub(super) struct Guard {
     pub(super) plausibility: PlausibilityCheck,
     pub(super) stopper: Stopper,
     pub(super) stop: StopSwitch,
+    pub(super) watchdog_process: Option<Arc<WatchdogProcess>>,
 }
 
 /// The handle in the hands of the thread.
@@ -150,15 +153,19 @@ impl Holder {
     pub(super) fn start(device: ActiveDevice, guard: Guard) -> std::io::Result<Self> {
         let (orders, ordered) = latest(Order::Push(0.0));
         let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
-        let Guard { envelope, plausibility, stopper, stop } = guard;
+        let Guard { envelope, plausibility, stopper, stop, watchdog_process } = guard;
         let heart = Heartbeat::default();
-        start_watchdog(heart.clone(), vec![stopper.clone()], stop.clone(), WATCHDOG_NS, None)?;
+        let signs = watchdog_process.as_ref().and_then(|process| process.sign_of_life().ok());
+        start_watchdog(heart.clone(), vec![stopper.clone()], stop.clone(), WATCHDOG_NS, signs)?;
         let thread_heart = heart.clone();
         let hold = move || {
+            // The rig notices that the process is gone.
+            let _ = watchdog_process.as_ref().map(|process| process.follow_this_thread());
             let name = "the device of the rig".to_owned();
             let _last_stop = LastStop::arm(vec![stopper], vec![name], thread_heart.clone());
             let device = hold(device, envelope, plausibility, &thread_heart, &stop, &ordered, publisher);
             thread_heart.finish();
+            let _ = watchdog_process.as_ref().map(|process| process.follow_no_thread());
             device
         };
         let thread = std::thread::Builder::new().name("flotor-rig".to_owned()).spawn(hold)?;

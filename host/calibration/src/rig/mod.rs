@@ -8,7 +8,7 @@ mod device;
 mod holder;
 mod simulated;
 
-pub use device::{DeviceRig, Waiting};
+pub use device::{DeviceRig, RigOptions, Waiting};
 pub use simulated::{RIG_WEIGHT_N, SENSOR_NOISE_N, SimulatedRig};
 
 use super::CalibrationError;

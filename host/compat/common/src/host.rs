@@ -2,7 +2,7 @@
 
 use crate::process::{at_end, guarded, is_copy, is_first, library, notice_copies, quietly};
 use crate::run::{LockstepRun, Prepared, tell};
-use crate::settings::{Pace, Settings, said};
+use crate::settings::{Pace, Settings, SharedControlGroup, said};
 use crate::station::{Station, Turn};
 use flotor_servo::{Clock, StopSwitch, guest, monotonic_ns};
 use flotor_session::registry::Registry;
@@ -105,6 +105,9 @@ impl Host {
         scene.plugin_folders.splice(0..0, settings.plugin_folders.iter().cloned());
         scene.plugin_folders.extend(plugin_folders(&folder));
         scene.duration_s = NO_END_S;
+        if settings.shared_control_group == SharedControlGroup::Accepted {
+            scene.limits.accept_shared_control_group = true;
+        }
         let connected = program::connect(&mut scene);
         let (clock, pace) = match settings.pace {
             Pace::Real => (Clock::Real, Pace::Real),

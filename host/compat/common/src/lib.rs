@@ -23,7 +23,7 @@ mod station;
 pub use frame::Frame;
 pub use host::{Host, host, prepare};
 pub use process::{Language, guarded, language, library, quietly};
-pub use settings::{Pace, Settings, said};
+pub use settings::{Pace, Settings, SharedControlGroup, said};
 pub use station::{Axes, State, Station, Turn};
 
 /// What a drop-in exports as `flotor_dropin`, so that a plugin that loads a maker's library can refuse one of these: it would

@@ -4,6 +4,9 @@ use flotor_servo::guest::Signals;
 use std::ffi::OsStr;
 use std::path::PathBuf;
 
+/// Variable of [`Settings::shared_control_group`].
+const CONSENT: &str = "FLOTOR_SHARED_CONTROL_GROUP";
+
 /// Who makes time go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
@@ -33,6 +36,17 @@ pub struct Settings {
     pub seed: u64,
     /// `FLOTOR_SIGNALS`: `stop` to stop the devices when the program dies of a signal.
     pub signals: Signals,
+    /// `FLOTOR_SHARED_CONTROL_GROUP`: `accept` adds the consent of `--accept-shared-control-group`.
+    pub shared_control_group: SharedControlGroup,
+}
+
+/// Consent to a watchdog process in the control group of the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SharedControlGroup {
+    /// As the scene says.
+    ByScene,
+    /// Accepted.
+    Accepted,
 }
 
 /// The value of a variable, if it is set and not empty. Not real-time.
@@ -87,6 +101,11 @@ impl Settings {
             Some("stop") => Signals::StopFirst,
             Some(other) => return wrong("FLOTOR_SIGNALS", other, "`leave` or `stop`"),
         };
+        let shared_control_group = match said(CONSENT).as_deref() {
+            None => SharedControlGroup::ByScene,
+            Some("accept") => SharedControlGroup::Accepted,
+            Some(other) => return wrong(CONSENT, other, "`accept`"),
+        };
         let seed = match said("FLOTOR_SEED").map(|text| (text.parse(), text)) {
             None => 0,
             Some((Ok(seed), _)) => seed,
@@ -101,6 +120,7 @@ impl Settings {
             pace,
             seed,
             signals,
+            shared_control_group,
         })
     }
 }
@@ -125,6 +145,10 @@ mod tests {
         let mut recorded = read("FLOTOR_RECORD", "/tmp/run.mcap").expect("it is a file");
         recorded.keep_apart("libHD".as_ref());
         assert_eq!(recorded.record, Some(PathBuf::from("/tmp/run-libHD.mcap")));
+        assert_eq!(plain.shared_control_group, SharedControlGroup::ByScene);
+        let accepted = read(CONSENT, "accept").map(|settings| settings.shared_control_group);
+        assert_eq!(accepted, Ok(SharedControlGroup::Accepted));
+        assert_eq!(read(CONSENT, "1"), Err(format!("{CONSENT}=1: must be `accept`")));
         assert!(read("FLOTOR_SEED", "-1").is_err_and(|said| said.contains("whole number")));
     }
 }

@@ -29,10 +29,10 @@ mod view;
 
 use access::Access;
 use clap::{Parser, ValueEnum};
-use flotor_command::options::{PluginPathOption, arguments, json_file, mcap_file, whole};
+use flotor_command::options::{ControlGroupOption, PluginPathOption, arguments, json_file, mcap_file, whole};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, say, supervised};
-use flotor_compat::{Pace, Settings, prepare};
+use flotor_compat::{Pace, Settings, SharedControlGroup, prepare};
 use flotor_emulation::port::{Port, Reach, ReachArguments};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use service::Service;
@@ -76,6 +76,8 @@ struct Arguments {
     json: Option<PathBuf>,
     #[command(flatten)]
     plugin_path: PluginPathOption,
+    #[command(flatten)]
+    control_group: ControlGroupOption,
     /// End with the process that started this one, however that ends
     #[arg(long, hide = true)]
     lent: bool,
@@ -116,6 +118,9 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
         Some(PaceOption::Lockstep) => Pace::Lockstep,
         None => settings.pace,
     };
+    if arguments.control_group.is_accepted() {
+        settings.shared_control_group = SharedControlGroup::Accepted;
+    }
     if settings.report.is_none() {
         settings.report = Some("-".into());
     }

@@ -9,6 +9,7 @@ mod lockstep;
 mod prepare;
 mod remains;
 mod steps;
+mod stop_without_host;
 mod unguarded;
 mod virtual_loop;
 
@@ -19,6 +20,8 @@ pub use lockstep::Lockstep;
 pub use prepare::prepare_model;
 pub use remains::Remains;
 pub use steps::Steps;
+pub use stop_without_host::{StopWithoutHost, WatchdogStart, start_watchdog_process};
+pub use unguarded::Guardian;
 
 use crate::calls::{Call, CallError, EndReserve, Progress, Unresponsive, end_limit, leave_behind, limit};
 use crate::long_call::Exceeded;
@@ -54,7 +57,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use unguarded::Guardian;
 
 /// How a scene is to be run.
 #[derive(Clone, Debug)]
@@ -104,7 +106,7 @@ pub enum RunError {
     #[error(
         "a kill of the control group `{group}`, as at the end of a service or a container or when memory runs out, leaves the force of \
          `{device}` on: the watchdog process cannot leave that group, and the device has no watchdog of its own; `flotor doctor` says how \
-         to start the run; `[limits] accept_shared_control_group = true` or `--accept-shared-control-group` accepts it"
+         to start the program; `[limits] accept_shared_control_group = true` in a scene or `--accept-shared-control-group` accepts it"
     )]
     SharedControlGroup {
         /// Name of the device in the scene.
@@ -397,8 +399,7 @@ impl Session {
         }
         for (number, (device, opened)) in (0..).zip(scene.devices.iter().zip(&opened)) {
             let mut mismatches = prepare::pair(scene, number, &opened.capabilities, opened.device.can_pace());
-            mismatches
-                .extend(opened.without_independent_stop().filter(|_| scene.limits.require_independent_stop));
+            mismatches.extend(opened.stop.missing().filter(|_| scene.limits.require_independent_stop));
             if !mismatches.is_empty() {
                 return Err(RunError::Mismatch { device: device.plugin.plugin.clone(), mismatches });
             }
@@ -410,10 +411,14 @@ impl Session {
         warnings.extend(torqueless);
         warnings.extend(prepare::amplifications(scene));
         warnings.extend(latch.as_ref().and_then(LatchGuard::warning));
-        let watchdog_process = match options.clock {
-            Clock::Real => prepare::watchdog_process(scene, &opened, &mut warnings)?,
-            Clock::Virtual => None,
+        let WatchdogStart { process: watchdog_process, warnings: stops_missing } = match options.clock {
+            Clock::Real => {
+                let stops: Vec<_> = opened.iter().map(|opened| &opened.stop).collect();
+                start_watchdog_process(&stops, &scene.limits)?
+            }
+            Clock::Virtual => WatchdogStart::default(),
         };
+        warnings.extend(stops_missing);
         let parts = Parts::new(&plugins);
         let Scheduled { changes, replacements } =
             prepare::schedule(scene, &parts, registry, &config, options.clock)?;

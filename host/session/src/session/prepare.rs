@@ -2,11 +2,11 @@
 
 use super::choice::chosen;
 use super::controls::{ChosenBy, ControlError, NewValue, Parts, understands};
+use super::stop_without_host::StopWithoutHost;
 use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::calls::{Call, Progress, attended_while, is_to_begin, keeping_machine, limit};
 use crate::estimates;
-use crate::platform::NOT_CAUGHT;
 use crate::registry::{Registry, is_installed};
 use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
@@ -17,13 +17,12 @@ use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting, Stopper};
 use flotor_hal::{
-    Axes, Capabilities, Demand, Embodiment, Independence, LoopConfig, Parameter, ParameterKind, Refusal,
-    SampledLoop, SoftRange,
+    Axes, Capabilities, Demand, Embodiment, LoopConfig, Parameter, ParameterKind, Refusal, SampledLoop,
+    SoftRange,
 };
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
 use flotor_servo::last_stop::{SignalGuard, TakenSignals};
-use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
     Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget, pushes_at_home,
 };
@@ -89,26 +88,8 @@ pub(super) struct Opened {
     pub(super) device: OpenedDevice,
     pub(super) capabilities: Capabilities,
     pub(super) embodiment: Embodiment,
-    /// What stops it when this process is gone.
-    independence: Option<Independence>,
-}
-
-impl Opened {
-    /// That nothing stops it when this process is gone, if so: what drives nothing needs no stop.
-    pub(super) fn without_independent_stop(&self) -> Option<String> {
-        (self.independence.is_none() && self.capabilities.actuated != Axes::NONE).then(|| {
-            "nothing stops it if this program is killed: its plugin lacks the extension `flotor.independent-stop/1`; remove \
-             `[limits] require_independent_stop`, and keep a hand at its power switch"
-                .to_owned()
-        })
-    }
-
-    /// Returns true for a physical device that only the watchdog process stops after the death of the host.
-    fn needs_watchdog_process(&self) -> bool {
-        self.embodiment == Embodiment::Physical
-            && self.capabilities.actuated != Axes::NONE
-            && matches!(self.independence, Some(Independence::Message { .. }))
-    }
+    /// Stop of the device after the end of this process.
+    pub(super) stop: StopWithoutHost,
 }
 
 /// That models may ask for torque and the device gives none, unless the scene says that none is wanted. A model says that it can
@@ -137,60 +118,6 @@ pub(super) fn amplifications(scene: &Scene) -> impl Iterator<Item = String> + '_
     })
 }
 
-/// Starts the process that stops devices when this one is gone, and says which devices nothing stops then. Not real-time.
-pub(super) fn watchdog_process(
-    scene: &Scene,
-    opened: &[Opened],
-    warnings: &mut Vec<String>,
-) -> Result<Option<WatchdogProcess>, RunError> {
-    for (device, opened) in scene.devices.iter().zip(opened) {
-        if opened.without_independent_stop().is_some() {
-            warnings.push(format!(
-                "nothing stops `{}` if this program is killed: its plugin lacks the extension \
-                 `flotor.independent-stop/1`; keep a hand at its power switch",
-                device.name
-            ));
-        }
-    }
-    let names = scene.devices.iter().map(|device| device.name.as_str());
-    let means = names.zip(opened).filter_map(|(name, opened)| Some((name, opened.independence.as_ref()?)));
-    let process = match WatchdogProcess::start(means) {
-        Ok(process) => Some(process),
-        Err(error) if scene.limits.require_independent_stop => return Err(RunError::WatchdogProcess(error)),
-        Err(error) => {
-            warnings.push(format!(
-                "no watchdog process ({error}): nothing stops the devices if this program is killed"
-            ));
-            None
-        }
-    };
-    let process_is_there = process.as_ref().and_then(Option::as_ref);
-    if let Some(group) = process_is_there.and_then(WatchdogProcess::shared_group) {
-        let mut devices =
-            scene.devices.iter().zip(opened).filter(|(_, opened)| opened.needs_watchdog_process());
-        match devices.next().filter(|_| !scene.limits.accept_shared_control_group) {
-            Some((device, _)) => {
-                let (device, group) = (device.name.clone(), group.to_owned());
-                return Err(RunError::SharedControlGroup { device, group });
-            }
-            None => warnings.push(shared_group_warning(group)),
-        }
-    }
-    // One that stops by itself needs nobody.
-    if process.is_none() || opened.iter().any(|opened| opened.without_independent_stop().is_some()) {
-        warnings.extend(NOT_CAUGHT.map(str::to_owned));
-    }
-    Ok(process.flatten())
-}
-
-/// Returns the warning that whoever kills a control group kills this program and the watchdog process.
-fn shared_group_warning(group: &str) -> String {
-    format!(
-        "the watchdog process is in the control group `{group}` of this program: nothing stops the devices if all processes of \
-         the group are killed, as at the end of a service or a container, or when memory runs out; `flotor doctor` says what to do"
-    )
-}
-
 /// Loads and opens one device of a scene. Not real-time.
 pub(super) fn open_device(
     registry: &Registry,
@@ -201,16 +128,17 @@ pub(super) fn open_device(
     let plugin = load(registry, used, PluginKind::Device)?;
     let settings = settings(&plugin, name, &used.parameters)?;
     let (who, opening, given) = (name.clone(), plugin.clone(), settings.clone());
+    let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
     let open = move |progress: &Progress| {
         progress.enter(&who, Call::Open);
         let refuse = |refusal| refused(opening.metadata(), refusal);
         let mut device = opening.open_device(&given)?;
         let capabilities = device.capabilities().map_err(refuse)?;
-        let independence = device.independent_stop().map_err(refuse)?;
+        let stop = StopWithoutHost::of(&who, embodiment, &capabilities, &mut device).map_err(refuse)?;
         let values: Vec<f64> = (0..opening.parameters().len()).map(|index| device.parameter(index)).collect();
-        Ok::<_, RunError>((device, capabilities, independence, values))
+        Ok::<_, RunError>((device, capabilities, stop, values))
     };
-    let (mut device, capabilities, independence, values) =
+    let (mut device, capabilities, stop, values) =
         keeping_machine(name, || attended_while(limit(), is_to_begin, open))??;
     let mut report = report(&plugin, name, used, &settings, |index| value_at(&values, index));
     if let Some(calibration) = calibration {
@@ -218,8 +146,7 @@ pub(super) fn open_device(
     }
     report.signals_taken = signals.put_back();
     report.latency_s = capabilities.latency_s;
-    let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
-    Ok((Opened { device, capabilities, embodiment, independence }, report))
+    Ok((Opened { device, capabilities, embodiment, stop }, report))
 }
 
 /// A number of a plugin's parameter; NaN if it has none.

@@ -1,25 +1,26 @@
-//! Whether the process that stops the devices when this one is gone is there itself.
+//! The end of the watchdog process itself.
 
 use crate::calls::{Notice, tell};
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{RunEnd, StopSwitch};
 use std::sync::{Arc, Weak};
 
-/// Watches over the watchdog process of a run.
-pub(super) struct Guardian {
+/// Watch over the watchdog process of a run.
+pub struct Guardian {
     process: Weak<WatchdogProcess>,
     is_required: bool,
     is_gone: bool,
 }
 
 impl Guardian {
-    /// Of a run that has such a process, or none; whether the scene requires one.
-    pub(super) fn of(process: Option<&Arc<WatchdogProcess>>, is_required: bool) -> Self {
+    /// Watches over this process, if there is one; `is_required` ends a run that loses it.
+    #[must_use]
+    pub fn of(process: Option<&Arc<WatchdogProcess>>, is_required: bool) -> Self {
         Self { process: process.map(Arc::downgrade).unwrap_or_default(), is_required, is_gone: false }
     }
 
-    /// Tells once that it is gone; a run that requires it ends in order then. Not real-time.
-    pub(super) fn look(&mut self, stop: &StopSwitch) {
+    /// Reports the end of the process once; a run that requires it ends in order then. Not real-time.
+    pub fn look(&mut self, stop: &StopSwitch) {
         if self.is_gone || !self.process.upgrade().is_some_and(|process| process.is_gone()) {
             return;
         }

@@ -5,7 +5,7 @@ mod program;
 mod service;
 
 use clap::{Args, ValueEnum};
-use flotor_command::options::{PluginPathOption, json_file, mcap_file, whole};
+use flotor_command::options::{ControlGroupOption, PluginPathOption, json_file, mcap_file, whole};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note, say};
 use flotor_servo::StopSwitch;
@@ -52,6 +52,8 @@ pub(crate) struct LendArguments {
     json: Option<PathBuf>,
     #[command(flatten)]
     plugin_path: PluginPathOption,
+    #[command(flatten)]
+    control_group: ControlGroupOption,
     /// Scene file (TOML); without it, a simulated flotor held by a hand
     scene: Option<PathBuf>,
     /// The program and its arguments
@@ -366,6 +368,9 @@ fn told(
     }
     command.env("FLOTOR_PACE", if arguments.pace == PaceOption::Real { "real" } else { "lockstep" });
     command.env("FLOTOR_SEED", arguments.seed.to_string());
+    if arguments.control_group.is_accepted() {
+        command.env("FLOTOR_SHARED_CONTROL_GROUP", "accept");
+    }
     command.env("FLOTOR_REPORT", report).env("FLOTOR_PROGRAM", own);
     Ok(())
 }

@@ -375,7 +375,7 @@ impl Common {
         };
         let mut scene = scene.map_err(RunError::Scene)?;
         self.plugin_path.put_before_those_of(&mut scene);
-        self.control_group.apply(&mut scene);
+        self.control_group.apply(&mut scene.limits);
         set(&mut scene, hand.unwrap_or_default())?;
         self.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
         set(&mut scene, way.map(ForceWay::load).unwrap_or_default())?;

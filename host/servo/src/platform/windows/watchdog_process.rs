@@ -56,6 +56,14 @@ impl WatchdogProcess {
         match *self {}
     }
 
+    /// Follows the process alone from now on.
+    ///
+    /// # Errors
+    /// None.
+    pub fn follow_no_thread(&self) -> io::Result<()> {
+        match *self {}
+    }
+
     /// Returns the control group that the process shares with the host: this system has none.
     #[must_use]
     pub fn shared_group(&self) -> Option<&str> {

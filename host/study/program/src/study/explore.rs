@@ -141,7 +141,7 @@ fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
     };
     let mut scene = scene.map_err(RunError::Scene)?;
     arguments.plugin_path.put_before_those_of(&mut scene);
-    arguments.control_group.apply(&mut scene);
+    arguments.control_group.apply(&mut scene.limits);
     arguments.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
     scene.duration_s = 86_400.0;
     Ok(scene)

@@ -65,6 +65,9 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
     if let Some(felt) = capabilities(device, &sets).as_ref().and_then(felt) {
         writeln!(scene, "force_n = {felt:?}")?;
     }
+    if arguments.ml_api.accept_shared_control_group {
+        scene.push_str("accept_shared_control_group = true\n");
+    }
     if let Some(most_ms) = arguments.ml_api.host_watchdog_ms {
         writeln!(scene, "watchdog_ms = {most_ms:?}")?;
     }

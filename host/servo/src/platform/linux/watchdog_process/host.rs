@@ -84,6 +84,14 @@ impl WatchdogProcess {
         self.say(Packet::Thread, &gettid().as_raw_nonzero().get().to_le_bytes())
     }
 
+    /// Follows the process alone from now on: the thread that was followed may end. Not real-time.
+    ///
+    /// # Errors
+    /// The process is gone.
+    pub fn follow_no_thread(&self) -> io::Result<()> {
+        self.say(Packet::Thread, &[])
+    }
+
     fn say(&self, packet: Packet, rest: &[u8]) -> io::Result<()> {
         send(&self.link, &bytes_of(packet, rest), SendFlags::NOSIGNAL)?;
         Ok(())

@@ -29,7 +29,7 @@ enum Packet {
     Name = b'n',
     /// To the process: these were all.
     Begin = b'b',
-    /// To the process: the number of the thread that runs the loop. A killed process ends with its last thread, which on a busy
+    /// To the process: the number of the thread that runs the loop, nothing where none does any more. A killed process ends with its last thread, which on a busy
     /// machine may wait for its turn; this one has priority.
     Thread = b't',
     /// To the process: the host runs, and says so again within this many ns. A process that is stopped does not.

@@ -1,0 +1,120 @@
+//! The stop of a device after the end of the host's process, and the watchdog process that sends it: one rule for runs and for
+//! commands that drive a device without a scene.
+
+use super::RunError;
+use crate::platform::NOT_CAUGHT;
+use flotor_core::limits::Limits;
+use flotor_hal::abi::loader::OpenedDevice;
+use flotor_hal::{Axes, Capabilities, Embodiment, Independence, Refusal};
+use flotor_servo::watchdog_process::WatchdogProcess;
+
+/// Stop of an open device after the end of the host's process.
+pub struct StopWithoutHost {
+    device: String,
+    embodiment: Embodiment,
+    actuated: Axes,
+    /// Nothing of a device that nothing stops.
+    means: Option<Independence>,
+}
+
+impl StopWithoutHost {
+    /// Reads the stop of a device, which messages call `name`. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] of a stop that cannot be used.
+    pub fn of(
+        name: &str,
+        embodiment: Embodiment,
+        capabilities: &Capabilities,
+        device: &mut OpenedDevice,
+    ) -> Result<Self, Refusal> {
+        let means = device.independent_stop()?;
+        Ok(Self { device: name.to_owned(), embodiment, actuated: capabilities.actuated, means })
+    }
+
+    /// Returns why the device is refused where a stop is required; nothing of a device with a stop or without force.
+    pub(super) fn missing(&self) -> Option<String> {
+        self.is_missing().then(|| {
+            "nothing stops it if this program is killed: its plugin lacks the extension `flotor.independent-stop/1`; remove \
+             `[limits] require_independent_stop`, and keep a hand at its power switch"
+                .to_owned()
+        })
+    }
+
+    fn is_missing(&self) -> bool {
+        self.means.is_none() && self.actuated != Axes::NONE
+    }
+
+    fn warning(&self) -> Option<String> {
+        self.is_missing().then(|| {
+            format!(
+                "nothing stops `{}` if this program is killed: its plugin lacks the extension `flotor.independent-stop/1`; keep a \
+                 hand at its power switch",
+                self.device
+            )
+        })
+    }
+
+    /// Returns true for a physical device that only the watchdog process stops after the death of the host.
+    fn needs_watchdog_process(&self) -> bool {
+        self.embodiment == Embodiment::Physical
+            && self.actuated != Axes::NONE
+            && matches!(self.means, Some(Independence::Message { .. }))
+    }
+}
+
+/// Start of a watchdog process.
+#[derive(Default)]
+pub struct WatchdogStart {
+    /// The process; none where no device is stopped by a message, or where none can be started and none is required.
+    pub process: Option<WatchdogProcess>,
+    /// Ways in which the devices stay unguarded, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Starts the watchdog process of open devices, before the first of them is energised. Not real-time.
+///
+/// # Errors
+/// [`RunError::WatchdogProcess`] where `limits` require one and there is none; [`RunError::SharedControlGroup`] where a kill of one
+/// control group leaves the force of a device on and `limits` do not accept that.
+pub fn start_watchdog_process(
+    stops: &[&StopWithoutHost],
+    limits: &Limits,
+) -> Result<WatchdogStart, RunError> {
+    let mut warnings: Vec<String> = stops.iter().filter_map(|stop| stop.warning()).collect();
+    let means = stops.iter().filter_map(|stop| Some((stop.device.as_str(), stop.means.as_ref()?)));
+    let started = WatchdogProcess::start(means);
+    let is_guarded = started.is_ok() && !stops.iter().any(|stop| stop.is_missing());
+    let process = match started {
+        Ok(process) => process,
+        Err(error) if limits.require_independent_stop => return Err(RunError::WatchdogProcess(error)),
+        Err(error) => {
+            warnings.push(format!(
+                "no watchdog process ({error}): nothing stops the devices if this program is killed"
+            ));
+            None
+        }
+    };
+    if let Some(group) = process.as_ref().and_then(WatchdogProcess::shared_group) {
+        let mut unconsented = stops.iter().filter(|stop| stop.needs_watchdog_process());
+        match unconsented.next().filter(|_| !limits.accept_shared_control_group) {
+            Some(stop) => {
+                let (device, group) = (stop.device.clone(), group.to_owned());
+                return Err(RunError::SharedControlGroup { device, group });
+            }
+            None => warnings.push(shared_group_warning(group)),
+        }
+    }
+    if !is_guarded {
+        warnings.extend(NOT_CAUGHT.map(str::to_owned));
+    }
+    Ok(WatchdogStart { process, warnings })
+}
+
+/// Returns the warning that a kill of a control group ends this program and the watchdog process.
+fn shared_group_warning(group: &str) -> String {
+    format!(
+        "the watchdog process is in the control group `{group}` of this program: nothing stops the devices if all processes of \
+         the group are killed, as at the end of a service or a container, or when memory runs out; `flotor doctor` says what to do"
+    )
+}
