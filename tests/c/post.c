@@ -1,10 +1,19 @@
 /* A device in C: a post that does not move, a millimetre below home. It delivers what it is told until it is
- * stopped, from whatever thread. */
+ * stopped, from whatever thread. With KEEPS_FORCE it keeps its last force without a host, as its own log at the terminal
+ * FIXTURE_FORCE_LOG says: a line for each command, with the vertical force in N; the message `0` and a line end stops it. */
+#ifdef KEEPS_FORCE
+#define _POSIX_C_SOURCE 200809L
+#endif
 #include "flotor.h"
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef KEEPS_FORCE
+#include <fcntl.h>
+#include <stdio.h>
+#include <unistd.h>
+#endif
 
 FLOTOR_METADATA("kind = \"device\"\nid = \"fixture-c-post\"\nname = \"Post\"\ndoc = \"A handle that does not move, in C\"\n"
                 "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_post\"\n");
@@ -17,12 +26,21 @@ typedef struct {
     FlotorWrench held;
     atomic_bool stopped;
     bool active;
+#ifdef KEEPS_FORCE
+    int log;
+#endif
 } Post;
 
 static uint32_t open_post(const FlotorParameterValue *values, uint32_t count, FlotorMessage *message, FlotorInstance *out) {
     (void)values, (void)count, (void)message;
     Post *post = calloc(1, sizeof *post);
     *out = post;
+#ifdef KEEPS_FORCE
+    const char *log = getenv("FIXTURE_FORCE_LOG");
+    if (post != NULL && log != NULL) {
+        post->log = open(log, O_WRONLY | O_NOCTTY | O_CLOEXEC);
+    }
+#endif
     return post == NULL ? FlotorRefusalKind_Resource : 0;
 }
 
@@ -81,6 +99,11 @@ static uint32_t write_post(FlotorInstance instance, const FlotorTick *tick, cons
     (void)tick;
     Post *post = instance;
     post->held = *wrench;
+#ifdef KEEPS_FORCE
+    if (dprintf(post->log, "%.6f\n", wrench->force_n[2]) < 0) {
+        return FLOTOR_CYCLE_STALE;
+    }
+#endif
     return FLOTOR_CYCLE_FRESH;
 }
 
@@ -103,7 +126,26 @@ static const FlotorDeviceTable table = {
     .safe_stop = safe_stop,
 };
 
+#ifdef KEEPS_FORCE
+static uint32_t independent_stop(FlotorInstance instance, FlotorIndependentStop *stop) {
+    const Post *post = instance;
+    *stop = (FlotorIndependentStop){.descriptor = post->log, .length = 2, .message = "0\n", .within_ns = 1000000};
+    return FlotorCallStatus_Ok;
+}
+
+static const FlotorIndependentStopTable stop_table = {
+    .size = sizeof(FlotorIndependentStopTable),
+    .independent_stop = independent_stop,
+};
+#endif
+
 static const void *get_interface(FlotorStr id) {
+#ifdef KEEPS_FORCE
+    static const char stop[] = FLOTOR_INTERFACE_INDEPENDENT_STOP;
+    if (id.len == sizeof stop - 1 && memcmp(id.ptr, stop, id.len) == 0) {
+        return &stop_table;
+    }
+#endif
     static const char device[] = FLOTOR_INTERFACE_DEVICE;
     return id.len == sizeof device - 1 && memcmp(id.ptr, device, id.len) == 0 ? &table : NULL;
 }

@@ -99,7 +99,8 @@ struct Ready {
     is_new: bool,
 }
 
-/// The time for which a client is served while others wait.
+/// The time for which a client is served while others wait. One that sends whole messages is a host, and keeps its turn: a program
+/// of the same user could end the emulator as well.
 pub struct Tenure<'c> {
     others: &'c mut Clients,
     /// The last whole message.

@@ -1,6 +1,8 @@
-//! A board that keeps its last torque for ever (the emulated Haply board), its own log, and runs on it with a model that dies
+//! A board that keeps its last torque for ever (the emulated Haply board), and runs on it with a model that dies
 //! or takes signals away (`tests/c/dies.c`).
 
+use crate::force_log::ForceLog;
+pub(crate) use crate::force_log::{FELT_N, wait_until};
 use flotor_hal::glam::DVec2;
 use flotor_haply::emulator::EmulatedBoard;
 use flotor_haply::pantograph::Pantograph;
@@ -13,28 +15,21 @@ use rustix::process::Pid;
 use serialport::{SerialPort, TTYPort};
 use std::ffi::OsStr;
 use std::io::{Read, Write};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 const LINKAGE: Pantograph = Pantograph { inner_m: 0.07, outer_m: 0.09, base_m: 0.038 };
 /// The hand holds the handle 5 mm and 4 mm from home: the spring of 200 N/m pulls with 1.28 N.
 const HELD_M: DVec2 = DVec2::new(0.014, 0.096);
-/// Less than a fifth of that: there was force.
-pub(crate) const FELT_N: f64 = 0.25;
 /// Requests of a host that is past the tick in which the fixture does what it does, and the next look of its watchdog.
 pub(crate) const PAST: usize = 600;
-/// How long anything here may take: a machine on which nothing moves for a while is no failure.
-const PATIENCE: Duration = Duration::from_secs(30);
-
-/// Force on the hand after each look at what the host has sent, N, and when.
-type Log = Arc<Mutex<Vec<(Instant, f64)>>>;
-
 /// A board on a thread of its own, until it is dropped. It outlives the host.
 pub(crate) struct Board {
     path: String,
-    log: Log,
+    log: ForceLog,
     is_over: Arc<AtomicBool>,
 }
 
@@ -43,8 +38,8 @@ impl Board {
         let (mut port, host_end) = TTYPort::pair().expect("the system has pseudo terminals");
         port.set_timeout(Duration::from_millis(5)).expect("it is ours");
         let path = host_end.name().expect("it has a path");
-        let (log, is_over) = (Log::default(), Arc::new(AtomicBool::new(false)));
-        let (entries, ended) = (Arc::clone(&log), Arc::clone(&is_over));
+        let (log, is_over) = (ForceLog::default(), Arc::new(AtomicBool::new(false)));
+        let (entries, ended) = (log.clone(), Arc::clone(&is_over));
         std::thread::spawn(move || {
             let _host_end = host_end; // open as long as the board is: a host that goes does not unplug it
             let mut board = EmulatedBoard::new(LINKAGE, HELD_M);
@@ -55,52 +50,25 @@ impl Board {
                     continue;
                 }
                 let answer = board.hear(&chunk[..length]);
-                let force_n = board.force_n().map_or(0.0, DVec2::length);
-                entries.lock().unwrap_or_else(PoisonError::into_inner).push((Instant::now(), force_n));
+                entries.push(board.force_n().map_or(0.0, DVec2::length));
                 let _ = port.write_all(&answer);
             }
         });
         Self { path, log, is_over }
     }
+}
 
-    pub(crate) fn log(&self) -> MutexGuard<'_, Vec<(Instant, f64)>> {
-        self.log.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+impl Deref for Board {
+    type Target = ForceLog;
 
-    pub(crate) fn force_n(&self) -> f64 {
-        self.log().last().map_or(0.0, |(_, force_n)| *force_n)
-    }
-
-    /// Waits until the host has sent so many requests, and there is force.
-    pub(crate) fn wait_for_force(&self, requests: usize) {
-        wait_until("there is force", || self.force_n() > FELT_N);
-        wait_until("the host sends requests", || self.log().len() > requests);
-    }
-
-    /// There was force, and there is none any more: time from the last request with force to the first without.
-    pub(crate) fn assert_stopped(&self, what: &str) -> Duration {
-        wait_until(&format!("{what}: the board is at rest"), || self.force_n() == 0.0);
-        let log = self.log();
-        let felt = log.iter().rposition(|(_, force_n)| *force_n > 0.0);
-        let most_n = log.iter().map(|(_, force_n)| *force_n).fold(0.0, f64::max);
-        assert!(most_n > FELT_N, "{what}: there was no force that could be taken away: {most_n} N");
-        let felt = felt.expect("there was some");
-        log[felt + 1].0.duration_since(log[felt].0)
+    fn deref(&self) -> &ForceLog {
+        &self.log
     }
 }
 
 impl Drop for Board {
     fn drop(&mut self) {
         self.is_over.store(true, Ordering::Release);
-    }
-}
-
-/// Looks until it is so.
-pub(crate) fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
-    let started = Instant::now();
-    while !is_so() {
-        assert!(started.elapsed() < PATIENCE, "{what}: not within {PATIENCE:?}");
-        std::thread::sleep(Duration::from_millis(2));
     }
 }
 

@@ -4,6 +4,7 @@ use crate::board::{
     Board, FELT_N, PAST, PATIENT, Where, children_of, dies, mark_in, recorded_ticks, run_on, run_with,
     wait_until,
 };
+use crate::post::Post;
 use flotor_tests::TestSize;
 use flotor_tests::program::{Ran, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -148,6 +149,20 @@ fn a_host_that_is_killed_from_outside_leaves_no_force_and_no_process_behind() {
             wait_until("its processes are gone", || test_kill_process(child).is_err());
         }
     });
+}
+
+#[test]
+fn a_calibration_that_is_killed_leaves_no_force() {
+    let _turn = crate::alone();
+    let post = Post::new();
+    let calibration = post.calibration();
+    let running = post.flotor(&calibration.iter().map(String::as_str).collect::<Vec<_>>()).start();
+    post.wait_for_force(0);
+    running.signal_host(Signal::KILL);
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:?}");
+    assert!(ran.stderr.contains("flotor watchdog: the host is gone; stopped `fixture-c-post`"), "{ran:?}");
+    let _ = post.assert_stopped("the calibration is killed");
 }
 
 #[test]

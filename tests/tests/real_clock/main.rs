@@ -2,13 +2,18 @@
 
 mod board;
 mod deaths;
+mod emulated;
 mod end_of_run;
 mod first_moment;
+mod force_log;
 mod groups;
 mod jitter;
+mod keyboard;
 mod lateness;
+mod post;
 mod scarcity;
 mod signals;
+mod stop_reach;
 mod strangers;
 
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};

@@ -4,16 +4,17 @@
 #[path = "../../src/attacks.rs"]
 mod attacks;
 
-use crate::board::{Board, PAST, Where, dies, run_on, wait_until};
+use crate::board::{Board, PAST, Where, children_of, dies, run_on, wait_until};
+use crate::keyboard::Keyboard;
 use attacks::{Attackers, Listening, Place, Target};
 use flotor_live::{Ask, Client, Directory, Event, Kind, Request, frame};
 use flotor_tests::TestSize;
 use flotor_tests::library::build_folder;
 use flotor_tests::program::{Flotor, Running, exit_code};
 use flotor_tests::scratch::Scratch;
-use rustix::process::Signal;
+use rustix::process::{Pid, Signal};
 use std::collections::VecDeque;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::PathBuf;
@@ -132,11 +133,54 @@ fn strangers_at_the_live_socket_cost_little() {
     assert_eq!(run.wait().code, Some(exit_code::OK));
 }
 
+/// Sends a request by HTTP; returns whether anything is answered in time.
+fn answers(place: &Place) -> bool {
+    let asked = place.connect().and_then(|mut stream| {
+        stream.set_read_timeout(Some(Duration::from_secs(1)))?;
+        stream.write_all(HTTP)?;
+        stream.read(&mut [0; 16])
+    });
+    asked.is_ok_and(|length| length > 0)
+}
+
+const HTTP: &[u8] = b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n";
+
+/// The newest process under one: each process here has one child at most.
+fn last_of(process: Pid) -> Pid {
+    children_of(process).first().map_or(process, |child| last_of(*child))
+}
+
+#[test]
+fn strangers_at_a_service_beside_a_program_cost_little() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let _turn = crate::among_idle_ones();
+    let port =
+        TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a free port");
+    let at = port.to_string();
+    let lend = ["lend", "--api", "haply", "--listen", &at, "--", "/bin/sleep", "600"];
+    let run = Flotor::with(lend).start();
+    let place = Place::Port(port);
+    wait_until("the service listens", || answers(&place));
+    let is_service = |process: &Pid| {
+        let name = std::fs::read_to_string(format!("/proc/{}/comm", process.as_raw_nonzero()));
+        name.is_ok_and(|name| name.starts_with("flotor-haply"))
+    };
+    let service = children_of(run.pid()).into_iter().find(is_service).expect("it listens");
+    let process = last_of(service).as_raw_nonzero().get().cast_unsigned();
+    Target { process, place }.withstand(HTTP, answers);
+    run.signal(Signal::TERM);
+    let _ = run.wait();
+}
+
 // ---------------------------------------------------------------- stops
 
 /// How a run is stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stop {
+    /// The space bar of the run's terminal.
+    Key,
     Signal,
     /// Over a connection that is made for it.
     Socket,
@@ -148,7 +192,9 @@ enum Stop {
 fn stop_time(stop: Stop, selected: usize) -> Duration {
     let (board, scratch) = (Board::start(), Scratch::default());
     let runtime = scratch.path().display().to_string();
-    let run = run_on(&board, &scratch, dies(), Where::InTheHost).env("XDG_RUNTIME_DIR", &runtime).start();
+    let mut keyboard = Keyboard::new();
+    let run = run_on(&board, &scratch, dies(), Where::InTheHost).env("XDG_RUNTIME_DIR", &runtime);
+    let run = run.through_shell(&keyboard.script()).start();
     let path = socket(&directory(&scratch));
     let watching = Client::connect(&path).expect("the run answers");
     let connected = watching.asker();
@@ -160,6 +206,7 @@ fn stop_time(stop: Stop, selected: usize) -> Duration {
         std::thread::sleep(Duration::from_millis(300));
         let since = Instant::now();
         match stop {
+            Stop::Key => keyboard.press(b' '),
             Stop::Signal => run.signal(Signal::USR1),
             Stop::Connected => drop(connected.ask(Ask::EmergencyStop).expect("the connection is there")),
             Stop::Socket => {
@@ -170,11 +217,8 @@ fn stop_time(stop: Stop, selected: usize) -> Duration {
         wait_until("there is no force", || board.force_n() == 0.0);
         since
     });
-    let _ = board.assert_stopped(&format!("{stop:?}"));
     assert_eq!(run.wait().code, Some(exit_code::DEVICE_FAULT), "{stop:?}");
-    let log = board.log();
-    let felt = log.iter().rposition(|(_, force_n)| *force_n > 0.0).expect("there was force");
-    log[felt + 1].0.duration_since(since)
+    board.assert_stopped_since(since, &format!("{stop:?}"))
 }
 
 /// The bound of a stop where a machine without strangers is faster.
@@ -187,7 +231,7 @@ fn strangers_at_the_live_socket_delay_no_stop() {
     }
     let _turn = crate::alone();
     let trials = TestSize::of_this_run().pick(3, 9);
-    for stop in [Stop::Signal, Stop::Socket, Stop::Connected] {
+    for stop in [Stop::Key, Stop::Signal, Stop::Socket, Stop::Connected] {
         let mut times = [Vec::new(), Vec::new()];
         for _ in 0..trials {
             for (selected, times) in times.iter_mut().enumerate() {
@@ -304,7 +348,6 @@ fn strangers_at_a_port_of_the_loops_process_do_not_make_it_later() {
     let runtime = format!("XDG_RUNTIME_DIR={}", scratch.path().display());
     let arguments = [&*runtime, &program, "--listen", "127.0.0.1:0", "--events", "127.0.0.1:0"];
     let service = Listening::start("env", &arguments, "listening ws://");
-    let request = b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n";
     let here = directory(&scratch);
-    judge("haply-service", &windows(&here, &service.target.place, &scratch, request, count));
+    judge("haply-service", &windows(&here, &service.target.place, &scratch, HTTP, count));
 }

@@ -110,6 +110,21 @@ fn an_option_of_many_commands_is_the_same_in_each() {
                 "doctor",
             ],
         ),
+        (
+            "--accept-shared-control-group",
+            "| `--accept-shared-control-group` |  | Run although a kill of this program's control group ends the watchdog process \
+             with it, which alone stops a device then |",
+            &[
+                "run",
+                "study jnd",
+                "study magnitude",
+                "study force",
+                "study explore",
+                "calibrate vertical",
+                "calibrate verify",
+                "lend",
+            ],
+        ),
     ] {
         // The standard output of `lend` belongs to the program that it runs.
         let found: Vec<_> = with_option(&reference, option)

@@ -66,3 +66,15 @@ fn who_pressed_an_emergency_stop_is_escaped() {
     assert_eq!(released.code, Some(exit_code::OK), "{released:?}");
     assert_escaped(&released);
 }
+
+/// Arguments of a user, and names of devices, reach the lines and errors of emulators.
+#[test]
+fn lines_of_emulators_are_escaped() {
+    let set = format!("{HOSTILE}=1");
+    let cases: [&[&str]; 2] = [&["maglev", "--listen", HOSTILE], &["maglev", "--set", &set]];
+    for arguments in cases {
+        let ran = Flotor::with([&["emulate"], arguments].concat()).run();
+        assert_ne!(ran.code, Some(exit_code::OK), "{arguments:?}: {ran:?}");
+        assert_escaped(&ran);
+    }
+}

@@ -18,3 +18,5 @@ pub mod in_process;
 pub mod machine;
 pub mod rig;
 pub mod server;
+
+pub use flotor_emulation::{clients, port};
