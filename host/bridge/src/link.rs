@@ -5,7 +5,7 @@ use crate::keys::Name;
 use crate::stop_channel::{StopChannel, StopKeys};
 use clap::Args;
 use flotor_live::Directory;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::net::IpAddr;
 use std::ops::Deref;
 use std::path::PathBuf;
@@ -92,9 +92,17 @@ pub struct Link {
     member: Name,
     expires_s: Option<u64>,
     stop_channel: Option<StopChannel>,
+    lacks_stop_keys: bool,
 }
 
 impl Link {
+    /// Whether the keys were made before there were stop keys: an emergency stop of a member goes by a session alone, which a flood of
+    /// connections delays.
+    #[must_use]
+    pub fn lacks_stop_keys(&self) -> bool {
+        self.lacks_stop_keys
+    }
+
     /// The second way of an emergency stop, where the keys have one.
     #[must_use]
     pub fn stop_channel(&self) -> Option<&StopChannel> {
@@ -195,9 +203,12 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
         }
     }
     let metadata = says(&config, "metadata").unwrap_or_default();
+    let has_members = end == End::Visiting || says(&config, "access_control/policies") != Some(json!([]));
+    let lacks_stop_keys =
+        has_members && metadata.get(access::EXPIRES).is_some() && metadata.get(access::STOP_KEYS).is_none();
     let session = zenoh::open(config).wait().map_err(|error| LinkError::Open(error.to_string()))?;
     let (member, expires_s) = (member_of(&metadata), metadata.get(access::EXPIRES).and_then(Value::as_u64));
-    Ok(Link { session, member, expires_s, stop_channel })
+    Ok(Link { session, member, expires_s, stop_channel, lacks_stop_keys })
 }
 
 /// The second way of an emergency stop of a visitor, without a session, whose opening may wait for others.

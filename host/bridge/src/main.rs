@@ -187,7 +187,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
     let directory = Directory::of_this_user();
     let visit = |link: LinkOptions| {
         let link = open(&link.or_this_user(&directory, None), End::Visiting)?;
-        tell_expiry(&link, &mut |line| eprintln!("{}", escaped(line)));
+        tell_of_keys(&link, &mut |line| eprintln!("{}", escaped(line)));
         Ok::<Link, LinkError>(link)
     };
     let mut tell = |line: &str| eprintln!("{}", escaped(line));
@@ -197,7 +197,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             directory.make()?;
             let link = link.or_this_user(&directory, Some(&service.name));
             let session = open(&link, End::Serving)?;
-            tell_expiry(&session, &mut tell);
+            tell_of_keys(&session, &mut tell);
             if let (None, Some(endpoint)) = (&link.config, link.open_to_others()) {
                 tell(&format!(
                     "without keys: whoever reaches {endpoint}, on this machine every user, has the rights of --allow"
@@ -273,8 +273,14 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Keys that are soon no longer good, in time to make new ones.
-fn tell_expiry(link: &Link, tell: &mut dyn FnMut(&str)) {
+/// Reports keys that expire soon, and keys without a second way of an emergency stop.
+fn tell_of_keys(link: &Link, tell: &mut dyn FnMut(&str)) {
+    if link.lacks_stop_keys() {
+        tell(
+            "the keys have no stop key: an emergency stop of a new member waits while others flood the bridge with connections; \
+             `flotor bridge keys` makes new ones, for the bridge and all members",
+        );
+    }
     const SOON_DAYS: u64 = 30;
     if let Some(days) = link.days_left().filter(|days| *days < SOON_DAYS) {
         tell(&format!("the keys are good for {days} more days; `flotor bridge keys` makes new ones"));

@@ -146,6 +146,24 @@ fn members_ask_under_their_own_names_only() {
 }
 
 #[test]
+fn keys_of_before_there_were_stop_keys_are_known() {
+    let folder = tempfile::tempdir().unwrap();
+    write_keys(folder.path(), &members()).unwrap();
+    let file = folder.path().join("bridge.json5");
+    let lacks = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        let listen = vec![format!("tls/localhost:{}", free_port())];
+        let link = LinkOptions { config: Some(file.clone()), listen, ..LinkOptions::default() };
+        open(&link, End::Serving).unwrap().lacks_stop_keys()
+    };
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(!lacks(&text));
+    let mut before: serde_json::Value = serde_json::from_str(&text).unwrap();
+    before["metadata"].as_object_mut().unwrap().remove("stop_keys").expect("it has some");
+    assert!(lacks(&before.to_string()));
+}
+
+#[test]
 fn keys_are_secret_and_never_replaced() {
     let folder = tempfile::tempdir().unwrap();
     write_keys(folder.path(), &members()).unwrap();
