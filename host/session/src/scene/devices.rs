@@ -3,6 +3,7 @@
 use super::reader::{Location, SceneError, Section, Value, did_you_mean};
 use super::{CalibrationUse, ModelUse, PluginUse, plugin_use};
 use flotor_core::MOST_DEVICES;
+use std::collections::BTreeSet;
 
 /// Stands between the name of a model and that of its device where a model is on several.
 const ON: char = '@';
@@ -118,9 +119,9 @@ pub fn without_device(name: &str) -> &str {
 
 /// Reports an error for two models, or a model and a device, of one name: `--set` and changes would reach only one.
 pub(super) fn tell_apart(models: &[ModelUse], devices: &[DeviceUse]) -> Result<(), SceneError> {
-    for (index, model) in models.iter().enumerate() {
-        let before = models.get(..index).unwrap_or_default();
-        let other = if before.iter().any(|other| other.name == model.name) {
+    let mut names = BTreeSet::new();
+    for model in models {
+        let other = if !names.insert(&model.name) {
             "two models are"
         } else if devices.iter().any(|device| device.name == model.name) {
             "a device and a model are"

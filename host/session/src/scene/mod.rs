@@ -234,6 +234,12 @@ impl Scene {
         let devices = devices::read(&mut root)?;
         let models = root.sections("model")?.into_iter().map(|section| model(section, &devices));
         let models = models.collect::<Result<Vec<_>, _>>()?.concat();
+        if let Some(model) = models.get(MOST_MODELS) {
+            let problem = format!(
+                "there are more than {MOST_MODELS} models; `grid` of `mapping` puts one model at many places"
+            );
+            return Err(model.plugin.location.problem(problem));
+        }
         devices::tell_apart(&models, &devices)?;
         let limits = root.section("limits")?.map(|section| limits(section, rate_hz)).transpose()?;
         let limits = limits.unwrap_or_default();
@@ -369,6 +375,9 @@ fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneErr
 
 /// A scale of zero would make a device move nothing or feel nothing; a million is a unit mistaken.
 const SCALE: std::ops::RangeInclusive<f64> = 1.0e-6..=1.0e6;
+
+/// Largest number of models, each on one device: their calls alone take a millisecond.
+const MOST_MODELS: usize = 4096;
 
 /// Longest time a watchdog may wait, ms.
 const LONGEST_WATCHDOG_MS: f64 = 60_000.0;

@@ -58,6 +58,8 @@ pub struct SceneError {
 pub(super) struct Source<'t> {
     file: &'t Path,
     text: &'t str,
+    /// Places of the line ends, so that the line of a place is found without counting through the text.
+    line_ends: Vec<usize>,
     /// The keys that were looked for in each table that was read to its end.
     seen: RefCell<Vec<(String, Vec<Known>)>>,
     /// The values that were looked for above all tables.
@@ -90,7 +92,8 @@ pub(super) enum Takes {
 
 impl<'t> Source<'t> {
     pub(super) fn new(file: &'t Path, text: &'t str) -> Self {
-        Self { file, text, seen: RefCell::default(), above: RefCell::default() }
+        let line_ends = text.match_indices('\n').map(|(at, _)| at).collect();
+        Self { file, text, line_ends, seen: RefCell::default(), above: RefCell::default() }
     }
 
     pub(super) fn text(&self) -> &'t str {
@@ -103,8 +106,8 @@ impl<'t> Source<'t> {
     }
 
     fn location(&self, span: &Range<usize>) -> Location {
-        let before = self.text.get(..span.start).unwrap_or(self.text);
-        Location { file: self.file.into(), line: before.matches('\n').count() + 1 }
+        let before = self.line_ends.partition_point(|end| *end < span.start);
+        Location { file: self.file.into(), line: before + 1 }
     }
 
     pub(super) fn parse(&'t self) -> Result<Section<'t>, SceneError> {
