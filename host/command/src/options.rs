@@ -15,9 +15,19 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+/// Size of the smallest stack that the description of all options fits on in every build, bytes.
+const LEAST_STACK_BYTES: u64 = 1 << 20;
+
 /// The arguments of this process. A negative number is the value of its option, whose parser says what is legal: without
-/// this, clap takes it for another option. Not real-time.
+/// this, clap takes it for another option. Ends the process where its stack is too small for them. Not real-time.
 pub fn arguments<T: Parser>() -> T {
+    if let Some(bytes) = crate::platform::stack_limit_bytes().filter(|bytes| *bytes < LEAST_STACK_BYTES) {
+        let (has, least) = (bytes >> 10, LEAST_STACK_BYTES >> 10);
+        crate::print_error_line(format_args!(
+            "error: a stack of {has} kB is too small: allow {least} kB and more, `ulimit -s 8192`"
+        ));
+        std::process::exit(2);
+    }
     let matches = with_negative_numbers(T::command()).get_matches();
     T::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }

@@ -8,7 +8,7 @@ use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Metadata, Plugin};
 use flotor_hal::{Input, Mutability, Output, Parameter, ParameterKind, Pose, Wrench};
 use flotor_session::estimates;
-use flotor_session::registry::{PATH_VARIABLE, Registry, SkippedFolder};
+use flotor_session::registry::{PATH_VARIABLE, Registry, SkippedFolder, installation_is_unknown};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -96,7 +96,11 @@ fn list(registry: &Registry, json: &JsonOption) -> Result<(), CommandError> {
     if listed.is_empty() {
         let folders: Vec<String> =
             registry.folders().iter().map(|folder| folder.display().to_string()).collect();
-        say!("no plugins found in {}; add folders with --plugin-path or {PATH_VARIABLE}", folders.join(", "));
+        let place = if folders.is_empty() { String::new() } else { format!(" in {}", folders.join(", ")) };
+        say!("no plugins found{place}; add folders with --plugin-path or {PATH_VARIABLE}");
+    }
+    if let Some(cause) = installation_is_unknown() {
+        say!("{note} {cause}");
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! A file without an end, or without an answer, in place of every input file: refused at once, in one line that names it.
 
-use flotor_tests::program::Flotor;
+use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use rayon::prelude::*;
 use std::process::Command;
@@ -67,4 +67,35 @@ fn a_pipe_or_a_device_file_is_refused_in_place_of_every_input() {
         })
         .collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_stack_that_is_too_small_is_refused_in_one_line() {
+    let ran = Flotor::with(["plugins"]).through_shell("ulimit -s 256; exec \"$@\"").run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.stderr.starts_with("error: a stack of 256 kB is too small"), "{}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+}
+
+#[test]
+fn without_proc_the_cause_is_named() {
+    let without = "exec unshare -m sh -c 'umount -l /proc && exec \"$@\"' sh \"$@\"";
+    let can = Command::new("unshare").args(["-m", "umount", "-l", "/proc"]).output();
+    if !can.is_ok_and(|output| output.status.success()) {
+        println!("skipped: only the superuser takes /proc away");
+        return;
+    }
+    let ran = Flotor::with(["plugins"]).through_shell(without).run();
+    assert!(ran.stdout.contains("because /proc is not mounted"), "{ran:?}");
+}
+
+#[test]
+fn a_scene_has_a_bounded_number_of_models() {
+    let scratch = Scratch::default();
+    let model = |number| format!("[[model]]\nplugin = \"wall\"\nname = \"w{number}\"\n");
+    let models: String = (0..20_000).map(model).collect();
+    let scene = scratch.file("many.toml", format!("[device]\nplugin = \"simulated\"\n{models}"));
+    let ran = Flotor::with(["run", &scene.display().to_string()]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.stderr.contains("many.toml:12292: there are more than 4096 models"), "{}", ran.stderr);
 }

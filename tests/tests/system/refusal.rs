@@ -79,7 +79,7 @@ const WRONG_FILES: &[WrongFile] = &[
             library
         },
         cause: "undefined symbol: not_to_be_found",
-        remedy: "install what is missing or rebuild the plugin",
+        remedy: "link the library that has the symbol, and rebuild the plugin",
     },
     WrongFile {
         name: "metadata that are no TOML",

@@ -1,5 +1,6 @@
 //! Why a plugin was refused: one readable line with file, cause and remedy.
 
+use super::platform::link_remedy;
 use crate::abi::{CONTRACT, PluginKind};
 use crate::{Refusal, RefusalKind};
 use std::path::PathBuf;
@@ -64,7 +65,7 @@ pub enum LoadError {
         theirs: String,
     },
     /// The dynamic linker refused.
-    #[error("{}: the system cannot link the library: {cause}; install what is missing or rebuild the plugin", path.display())]
+    #[error("{}: the system cannot link the library: {cause}; {}", path.display(), link_remedy(cause))]
     Link {
         /// The file.
         path: PathBuf,

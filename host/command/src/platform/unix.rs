@@ -5,7 +5,7 @@ mod supervision;
 use super::Request;
 use flotor_servo::StopSwitch;
 use flotor_servo::platform::{block_signals, leave_sent_signals_to_the_loop, wait_for_signal};
-use rustix::process::{Pid, Signal, getpgrp, kill_process};
+use rustix::process::{Pid, Resource, Signal, getpgrp, getrlimit, kill_process};
 use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
 use signal_hook::consts::{
     SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2,
@@ -79,6 +79,11 @@ impl Requests {
 pub(crate) fn outlive_requests() -> io::Result<()> {
     let signals = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGXFSZ];
     block_signals(&[&ENDING[..], &SUSPENDING, &signals].concat())
+}
+
+/// Returns the limit of the first thread's stack; none where it has none.
+pub(crate) fn stack_limit_bytes() -> Option<u64> {
+    getrlimit(Resource::Stack).current
 }
 
 /// Whether this process was started with a signal ignored.

@@ -17,6 +17,11 @@ use windows_sys::Win32::System::Console::{
     SetConsoleMode, SetStdHandle,
 };
 
+/// Returns the limit of the first thread's stack: none, the program's file has its size.
+pub(crate) fn stack_limit_bytes() -> Option<u64> {
+    None
+}
+
 /// Leaves this process undivided: Windows cannot copy a process.
 ///
 /// # Errors

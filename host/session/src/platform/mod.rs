@@ -12,10 +12,14 @@ mod linux;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use linux::{MachineState, NOT_CAUGHT, changed, distrust, identity, process_group, user_folder};
+pub(crate) use linux::{
+    MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, process_group, user_folder,
+};
 #[cfg(not(windows))]
 pub use linux::{ThreadClock, is_same_file};
 #[cfg(windows)]
-pub(crate) use windows::{MachineState, NOT_CAUGHT, changed, distrust, identity, process_group, user_folder};
+pub(crate) use windows::{
+    MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, process_group, user_folder,
+};
 #[cfg(windows)]
 pub use windows::{ThreadClock, is_same_file};

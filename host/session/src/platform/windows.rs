@@ -58,6 +58,9 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
     matches!((of(one), of(other)), (Ok(one), Ok(other)) if one == other)
 }
 
+/// Cause of a program whose place the system does not tell.
+pub(crate) const UNKNOWN_PROGRAM: &str = "the folder of this program is unknown; name folders of plugins";
+
 /// Where a user keeps plugins for all installations.
 pub(crate) fn user_folder() -> Option<PathBuf> {
     let local = std::env::var_os("LOCALAPPDATA").map(PathBuf::from).filter(|path| path.is_absolute());

@@ -7,7 +7,7 @@ mod stamp;
 use self::stamp::{FileStamp, hash_of};
 use crate::calls::{self, Call, CallError, attended_while};
 pub use crate::platform::is_same_file;
-use crate::platform::{distrust, user_folder};
+use crate::platform::{UNKNOWN_PROGRAM, distrust, user_folder};
 use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
@@ -228,6 +228,7 @@ impl Registry {
     /// That no plugin (of a kind) has an id, with the nearest that one has.
     fn unknown(&self, id: &str, kind: Option<PluginKind>) -> LookupError {
         let candidates = self.found.iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
+        let unknown_program = || installation_is_unknown().map(str::to_owned);
         let here = Path::new(id)
             .is_file()
             .then(|| format!("for the file of this name write `.{MAIN_SEPARATOR}{id}`"));
@@ -236,7 +237,7 @@ impl Registry {
             id: id.to_owned(),
             kind,
             nearest: nearest(id, candidates.map(|known| known.id.as_str())).map(str::to_owned),
-            hint: here.or_else(broken),
+            hint: here.or_else(broken).or_else(unknown_program),
         }
     }
 
@@ -259,6 +260,12 @@ impl Registry {
         loaded.push(Loaded { path: path.into(), stamp, hash, plugin: plugin.clone() });
         Ok(plugin)
     }
+}
+
+/// Returns the cause where the system does not tell the place of this program: plugins beside it are not found then.
+#[must_use]
+pub fn installation_is_unknown() -> Option<&'static str> {
+    own_folders().is_empty().then_some(UNKNOWN_PROGRAM)
 }
 
 /// Where the plugins of this installation are: beside the program, or where its archive puts them.

@@ -87,6 +87,28 @@ impl PrivateCopy {
     }
 }
 
+/// Returns what helps where the dynamic linker refuses a library for this cause.
+pub(crate) fn link_remedy(cause: &str) -> &'static str {
+    // Texts of the C library, and what helps against each.
+    const REMEDIES: [(&str, &str); 6] = [
+        (
+            "static TLS",
+            "the room for thread-local variables is used up, also by what was loaded before (a hot swap unloads nothing): start the \
+             host again, or with GLIBC_TUNABLES=glibc.rtld.optional_static_tls=16384",
+        ),
+        ("it: cannot open shared object file", "a plugin is opened through /proc/self/fd: mount /proc"),
+        (
+            "cannot open shared object file",
+            "install the library of this name, or set LD_LIBRARY_PATH to its folder",
+        ),
+        ("undefined symbol", "link the library that has the symbol, and rebuild the plugin"),
+        ("' not found", "rebuild the plugin on this system, or install a library of that version"),
+        ("cannot allocate memory", "allow more memory (`ulimit -v`, control group)"),
+    ];
+    let found = REMEDIES.iter().find(|(text, _)| cause.contains(text));
+    found.map_or("rebuild the plugin for this system", |(_, remedy)| remedy)
+}
+
 /// The bytes of the metadata section.
 ///
 /// # Errors
@@ -129,10 +151,28 @@ fn end_of_section_headers(header: &FileHeader64<Endianness>) -> object::Result<u
 
 #[cfg(test)]
 mod tests {
+    use super::link_remedy;
     use crate::extension::independent_stop::means::Independence;
     use crate::{IndependentStop, StoppedState};
     use std::io::Read;
     use std::os::fd::AsRawFd;
+
+    #[test]
+    fn a_remedy_names_its_cause() {
+        for (cause, remedy) in [
+            ("it: cannot allocate memory in static TLS block", "optional_static_tls=16384"),
+            ("it: cannot open shared object file: No such file or directory", "mount /proc"),
+            ("libfoo.so.2: cannot open shared object file: No such file or directory", "install the library"),
+            ("it: undefined symbol: bar", "link the library that has the symbol"),
+            (
+                "libc.so.6: version `GLIBC_2.99' not found (required by it)",
+                "rebuild the plugin on this system",
+            ),
+            ("it: cannot allocate memory", "allow more memory"),
+        ] {
+            assert!(link_remedy(cause).contains(remedy), "{cause}: {}", link_remedy(cause));
+        }
+    }
 
     #[test]
     fn a_message_and_a_handle_are_kept_beyond_the_plugins_own() {

@@ -23,6 +23,11 @@ const FOLDER: &str = "flotor-plugins";
 /// A copy that is younger may be one that another process has not opened yet.
 const OPENED_WITHIN: Duration = Duration::from_secs(60);
 
+/// Returns what helps where the system cannot link a library.
+pub(crate) fn link_remedy(_: &str) -> &'static str {
+    "install what is missing or rebuild the plugin"
+}
+
 /// What is kept of a plugin's descriptor: nothing, because no process beside the host uses it yet.
 pub(crate) type Handle = PhantomData<OwnedHandle>;
 

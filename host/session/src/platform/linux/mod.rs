@@ -33,6 +33,9 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
     matches!((of(one), of(other)), (Ok(one), Ok(other)) if one == other)
 }
 
+/// Cause of a program whose place the system does not tell.
+pub(crate) const UNKNOWN_PROGRAM: &str = "the folder of this program is unknown, because /proc is not mounted: mount it, or name folders of plugins";
+
 /// Where a user keeps plugins for all installations, by the XDG base directory specification. Root has none: a file of a home
 /// folder is no reason to run code with all rights.
 pub(crate) fn user_folder() -> Option<PathBuf> {
