@@ -2,6 +2,7 @@
 
 use crate::CommandError;
 use clap::{Args, Command, Parser, ValueEnum};
+pub use flotor_core::LARGEST_SEED;
 use flotor_core::limits::Limits;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_servo::Core;
@@ -277,12 +278,15 @@ pub fn real(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "write a number such as 0.75".to_owned())
 }
 
-/// A whole number from 0, such as a seed.
+/// Reads a seed, at most [`LARGEST_SEED`].
 ///
 /// # Errors
-/// If the text is none.
-pub fn whole(text: &str) -> Result<u64, String> {
-    text.trim().parse().map_err(|_| "write a whole number from 0 to 2^64 - 1".to_owned())
+/// If the text is no such number.
+pub fn seed(text: &str) -> Result<u64, String> {
+    let number = text.trim().parse().ok().filter(|seed| *seed <= LARGEST_SEED);
+    number.ok_or_else(|| {
+        format!("write a whole number from 0 to {LARGEST_SEED} (2^53, which every program reads alike)")
+    })
 }
 
 /// A core of the machine.
@@ -340,10 +344,20 @@ mod tests {
 
     #[test]
     fn a_negative_number_is_a_value_and_not_an_option() {
-        let seed = clap::Arg::new("seed").long("seed").value_parser(whole);
-        let command = with_negative_numbers(Command::new("test").arg(seed));
+        let argument = clap::Arg::new("seed").long("seed").value_parser(seed);
+        let command = with_negative_numbers(Command::new("test").arg(argument));
         let error = command.try_get_matches_from(["test", "--seed", "-1"]).unwrap_err().to_string();
-        assert!(error.contains("write a whole number from 0 to 2^64 - 1"), "{error}");
+        assert!(error.contains("write a whole number from 0 to 9007199254740992"), "{error}");
+    }
+
+    #[test]
+    fn a_seed_is_a_number_that_json_keeps() {
+        assert_eq!(seed("9007199254740992"), Ok(LARGEST_SEED));
+        for large in ["9007199254740993", "18446744073709551615", "99999999999999999999"] {
+            assert!(seed(large).is_err(), "{large}");
+        }
+        // What a program reads that keeps the numbers of JSON as f64.
+        assert_eq!(LARGEST_SEED as f64 as u64, LARGEST_SEED);
     }
 
     #[test]

@@ -33,5 +33,7 @@ pub use clock::Clock;
 pub use outputs::ModelOutputs;
 pub use random::Random;
 
+/// Largest seed that commands and files take: every program reads the whole numbers up to it as they stand in JSON.
+pub const LARGEST_SEED: u64 = 1 << 53;
 /// Devices of a run at most.
 pub const MOST_DEVICES: u16 = 8;

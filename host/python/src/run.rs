@@ -1,6 +1,7 @@
 //! Scenes in virtual time, and what plugins there are.
 
 use crate::error::refuse;
+use flotor_core::LARGEST_SEED;
 use flotor_hal::Demand;
 use flotor_session::registry::Registry;
 use flotor_session::scene::{PluginKeyValue, Scene};
@@ -50,6 +51,9 @@ pub(crate) fn run_scene(
     let mut folders = folders;
     folders.splice(0..0, scene.plugin_folders.iter().cloned());
     let registry = Registry::search(&folders);
+    if seed > LARGEST_SEED {
+        return Err(refuse(format!("seed {seed} is larger than {LARGEST_SEED} (2^53)")));
+    }
     let run = || flotor_session::headless::run(&scene, &registry, seed, recording.as_deref(), Demand::FORCE);
     let summary = py.detach(run);
     serde_json::to_string(&summary.map_err(refuse)?).map_err(refuse)

@@ -5,6 +5,7 @@ use crate::curve::Points;
 use crate::numbers::{did_you_mean, outputs_for};
 use flotor_command::CommandError;
 use flotor_command::options::{PluginPathOption, duration_s};
+use flotor_core::LARGEST_SEED;
 use flotor_hal::read_text;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -207,6 +208,10 @@ impl TestFile {
             }
             Some(seeds) => seeds.get_ref().clone(),
         };
+        if let Some(large) = seeds.iter().find(|seed| **seed > LARGEST_SEED) {
+            let start = written.seeds.as_ref().map_or(0, |seeds| seeds.span().start);
+            return Err((start, format!("the seed {large} is larger than {LARGEST_SEED} (2^53)")));
+        }
         let duration = written.duration.as_ref().map(|duration| {
             let text = scalar(duration.get_ref()).map_err(|wrong| (duration.span().start, wrong))?;
             duration_s(&text).map_err(|wrong| (duration.span().start, wrong)).map(|_| text)
@@ -424,6 +429,7 @@ mod tests {
             ("seedz = [1]", "F:2: unknown key `seedz`; did you mean `seeds`?"),
             ("\n[curve]\nfle = \"a\"\nwithin_n = 1", "did you mean `file`?"),
             ("seeds = []", "F:2: no seed"),
+            ("seeds = [1, 9007199254740993]", "F:2: the seed 9007199254740993 is larger than"),
             ("duration = \"5 parsec\"", "F:2: unknown unit of time `parsec`"),
             ("[set]\nspring = 3", "F:3: `spring` is not PLUGIN.PARAMETER"),
             ("[expect]\nlate_ticks = 0\npeak_force_n = { min = 2, max = 1 }", "F:4: `peak_force_n`: min = 2"),

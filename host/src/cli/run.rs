@@ -5,7 +5,7 @@ use crate::run_picture::RunPicture;
 use clap::{Args, ValueEnum};
 use flotor_command::options::{
     ClockOption, ControlGroupOption, JsonOption, PluginKeyValue, PluginPathOption, StrengthOption, core,
-    duration_s, mcap_file, rate_hz, svg_file, whole,
+    duration_s, mcap_file, rate_hz, seed, svg_file,
 };
 use flotor_command::stopping::{Keys, stop_on_signals, stop_run_on_signals};
 use flotor_command::{
@@ -51,7 +51,7 @@ pub(crate) struct RunArguments {
     #[arg(long, value_enum, default_value_t)]
     clock: ClockOption,
     /// Seed of all random numbers
-    #[arg(long, value_parser = whole, default_value_t = 0, value_name = "N")]
+    #[arg(long, value_parser = seed, default_value_t = 0, value_name = "N")]
     seed: u64,
     /// Pin the loop to this core of the machine (real clock)
     #[arg(long, value_parser = core, value_name = "N")]

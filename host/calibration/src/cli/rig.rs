@@ -5,7 +5,7 @@ use crate::rig::{DeviceRig, RigOptions, SimulatedRig, Waiting};
 use crate::sensor::{ForceSensor, SERIAL_SENSOR};
 use clap::{ArgGroup, Args};
 use flotor_command::options::{
-    ControlGroupOption, KeyValue, PluginPathOption, duration_s, number, settings, whole,
+    ControlGroupOption, KeyValue, PluginPathOption, duration_s, number, seed, settings,
 };
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, Redrawn, note, progress_bar};
@@ -52,7 +52,7 @@ pub(super) struct RigArguments {
     #[arg(long, value_name = "TIME", default_value = "10min", conflicts_with = "simulated", value_parser = duration_s, allow_hyphen_values = true)]
     patience: f64,
     /// Seed of the simulated sensor's noise
-    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N", conflicts_with = "device")]
+    #[arg(long, value_parser = seed, default_value_t = 1, value_name = "N", conflicts_with = "device")]
     pub(super) seed: u64,
     #[command(flatten)]
     plugin_path: PluginPathOption,

@@ -29,7 +29,7 @@ mod view;
 
 use access::Access;
 use clap::{Parser, ValueEnum};
-use flotor_command::options::{ControlGroupOption, PluginPathOption, arguments, json_file, mcap_file, whole};
+use flotor_command::options::{ControlGroupOption, PluginPathOption, arguments, json_file, mcap_file, seed};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, say, supervised};
 use flotor_compat::{Pace, Settings, SharedControlGroup, prepare};
@@ -66,7 +66,7 @@ struct Arguments {
     #[arg(long, value_enum, value_name = "WHO")]
     pace: Option<PaceOption>,
     /// Seed of all random numbers
-    #[arg(long, value_parser = whole, value_name = "N")]
+    #[arg(long, value_parser = seed, value_name = "N")]
     seed: Option<u64>,
     /// Record every tick to an MCAP file
     #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]

@@ -3,9 +3,7 @@
 use super::ProgressLine;
 use crate::Size;
 use clap::{Args, ValueEnum};
-use flotor_command::options::{
-    JsonOption, KeyValue, PluginPathOption, duration_s, settings, svg_file, whole,
-};
+use flotor_command::options::{JsonOption, KeyValue, PluginPathOption, duration_s, seed, settings, svg_file};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::abi::PluginKind;
 use flotor_judge::stress::{Part, Reach, StressOptions, Symmetry, deliver, score_in_processes};
@@ -35,7 +33,7 @@ pub(crate) struct StressArguments {
     #[arg(long, value_enum, default_value = "short")]
     size: Size,
     /// Seed of poses and motions
-    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
+    #[arg(long, value_parser = seed, default_value_t = 1, value_name = "N")]
     seed: u64,
     /// Symmetry that the model should have; M10 checks it
     #[arg(long, value_enum)]

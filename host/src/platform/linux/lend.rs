@@ -5,7 +5,7 @@ mod program;
 mod service;
 
 use clap::{Args, ValueEnum};
-use flotor_command::options::{ControlGroupOption, PluginPathOption, json_file, mcap_file, whole};
+use flotor_command::options::{ControlGroupOption, PluginPathOption, json_file, mcap_file, seed};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note, say};
 use flotor_servo::StopSwitch;
@@ -42,7 +42,7 @@ pub(crate) struct LendArguments {
     #[arg(long, value_enum, default_value_t = PaceOption::Real)]
     pace: PaceOption,
     /// Seed of all random numbers
-    #[arg(long, value_parser = whole, default_value_t = 0, value_name = "N")]
+    #[arg(long, value_parser = seed, default_value_t = 0, value_name = "N")]
     seed: u64,
     /// Record every tick to an MCAP file
     #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]

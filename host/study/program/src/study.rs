@@ -16,7 +16,7 @@ use choices::{
 };
 use clap::{Args, Subcommand, ValueEnum};
 use flotor_command::options::{
-    ControlGroupOption, PluginKeyValue, PluginPathOption, StrengthOption, count, duration_s, real, whole,
+    ControlGroupOption, PluginKeyValue, PluginPathOption, StrengthOption, count, duration_s, real, seed,
 };
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
@@ -106,7 +106,7 @@ struct Common {
     #[arg(long, value_parser = count(NonZeroUsize::MIN..=MOST_JOBS), value_name = "N")]
     jobs: Option<NonZeroUsize>,
     /// Seed of orders, presentations and simulated answers
-    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
+    #[arg(long, value_parser = seed, default_value_t = 1, value_name = "N")]
     seed: u64,
     /// Folder for the data
     #[arg(long, value_name = "DIR")]

@@ -1,7 +1,7 @@
 //! `flotor study bias`: bias and error of each threshold estimator.
 
 use clap::Args;
-use flotor_command::options::{JsonOption, count, whole};
+use flotor_command::options::{JsonOption, count, seed};
 use flotor_command::{CommandError, print_result, progress_bar, style};
 use flotor_study::bias::{BiasRow, observer_of, rows};
 use rayon::prelude::*;
@@ -28,7 +28,7 @@ pub(super) struct BiasArguments {
     #[arg(long, default_value_t = 2, value_parser = count(1..=100_u32), value_name = "N")]
     tracks: u32,
     /// Seed of the answers
-    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
+    #[arg(long, value_parser = seed, default_value_t = 1, value_name = "N")]
     seed: u64,
     #[command(flatten)]
     json: JsonOption,

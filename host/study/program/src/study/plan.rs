@@ -7,6 +7,7 @@
 use super::{StudyArguments, Task};
 use clap::{Args, FromArgMatches};
 use flotor_command::CommandError;
+use flotor_core::LARGEST_SEED;
 use flotor_hal::abi::loader::nearest;
 use flotor_hal::read_text;
 use flotor_study::exclusion::ExclusionRules;
@@ -142,6 +143,9 @@ fn words(
         let start = error.span().map_or(0, |span| span.start);
         let line = 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
         let message = error.message().replace('\n', " ");
+        let is_large = message.contains("too large");
+        let message =
+            if is_large { format!("{message}; the largest seed is {LARGEST_SEED}") } else { message };
         CommandError::Usage(format!("{}:{line}: {message}", file.display()))
     })?;
     let task = match study.task {

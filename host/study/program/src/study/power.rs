@@ -1,7 +1,7 @@
 //! `flotor study power`: how many subjects a difference experiment needs.
 
 use clap::Args;
-use flotor_command::options::{JsonOption, count, real, whole};
+use flotor_command::options::{JsonOption, count, real, seed};
 use flotor_command::{CommandError, print_result, progress_bar, style};
 use flotor_study::power::{Power, population, power, study};
 use flotor_study::protocol::{JndProtocol, Protocol, SubjectNumber};
@@ -35,7 +35,7 @@ pub(super) struct PowerArguments {
     #[arg(long, default_value_t = 4, value_parser = count(2..=1000_u32), value_name = "N")]
     replications: u32,
     /// Seed of the answers
-    #[arg(long, value_parser = whole, default_value_t = 1, value_name = "N")]
+    #[arg(long, value_parser = seed, default_value_t = 1, value_name = "N")]
     seed: u64,
     #[command(flatten)]
     json: JsonOption,
