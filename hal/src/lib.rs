@@ -38,6 +38,7 @@ mod model;
 mod parameter;
 mod refusal;
 mod sampled_loop;
+mod table;
 mod text_file;
 
 pub use abi::Choices;
@@ -73,4 +74,5 @@ pub use model::{Demand, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output
 pub use parameter::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Settings};
 pub use refusal::{Refusal, RefusalKind};
 pub use sampled_loop::{Damper, SampledLoop};
-pub use text_file::{TextProblem, open_file, read_file, read_text};
+pub use table::{HashLines, Row, Table};
+pub use text_file::{TextProblem, open_file, read_file, read_text, text_from_bytes};

@@ -71,15 +71,37 @@ pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text file of at most 256 MiB, without a byte order mark; `what` names it where it cannot be read. Not real-time.
+/// Reads a text file of at most 256 MiB, as [`text_from_bytes`] does; `what` names it where it cannot be read. Not real-time.
 ///
 /// # Errors
 /// What the system says, or the first line that is not UTF-8.
 pub fn read_text(path: &Path, what: &str) -> Result<String, TextProblem> {
-    let mut bytes = read_file(path, MOST_TEXT_BYTES)
+    let bytes = read_file(path, MOST_TEXT_BYTES)
         .map_err(|error| TextProblem::of_file(format!("cannot read {what}: {error}")))?;
+    text_from_bytes(bytes)
+}
+
+/// Makes a text of the bytes of a file: without a byte order mark, and with line feeds where every line ends in a carriage
+/// return alone. Not real-time.
+///
+/// # Errors
+/// The first line that is not UTF-8, or has a byte 0.
+pub fn text_from_bytes(mut bytes: Vec<u8>) -> Result<String, TextProblem> {
     if bytes.starts_with(BYTE_ORDER_MARK) {
         bytes.drain(..BYTE_ORDER_MARK.len());
+    }
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        return Err(TextProblem::at(1, "this is UTF-16; save the file as UTF-8"));
+    }
+    if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
+        bytes.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+    }
+    if let Some(at) = bytes.iter().position(|byte| *byte == 0) {
+        let line = 1 + bytes.iter().take(at).filter(|byte| **byte == b'\n').count();
+        return Err(TextProblem::at(
+            line,
+            "there is a byte 0: this is no text, or a part of it was never written",
+        ));
     }
     String::from_utf8(bytes).map_err(|error| {
         let before = error.as_bytes().iter().take(error.utf8_error().valid_up_to());
@@ -100,6 +122,11 @@ mod tests {
         assert_eq!(told.unwrap_err(), "it.txt:2: this is not UTF-8; save the file as UTF-8");
         std::fs::write(&path, b"\xef\xbb\xbfx,y\n").expect("the folder can be written to");
         assert_eq!(read_text(&path, "it"), Ok("x,y\n".to_owned()), "spreadsheets write a mark first");
+        assert_eq!(text_from_bytes(b"x,y\r1,2\r".to_vec()), Ok("x,y\n1,2\n".to_owned()));
+        let told = text_from_bytes(b"\xff\xfex\0".to_vec()).map_err(|wrong| wrong.in_file("it.txt"));
+        assert_eq!(told.unwrap_err(), "it.txt:1: this is UTF-16; save the file as UTF-8");
+        let told = text_from_bytes(b"x\n\0\0".to_vec()).map_err(|wrong| wrong.line);
+        assert_eq!(told, Err(2));
         assert_eq!(read_file(&path, 7).expect("seven bytes").len(), 7);
         assert_eq!(read_file(&path, 6).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         std::fs::remove_file(&path).expect("it is there");

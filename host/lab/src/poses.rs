@@ -1,7 +1,7 @@
 //! A table of poses: `[id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad`, one row a pose.
 
 use crate::evaluate::Handle;
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, HashLines, Table, TextProblem, text_from_bytes};
 use flotor_session::scene::did_you_mean;
 
 /// Columns of a pose, in order.
@@ -22,57 +22,35 @@ pub struct Poses {
 
 /// Why a table is none, with file and line; an empty file has no line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{place}: {problem}")]
-pub struct PosesError {
-    place: String,
-    problem: String,
-}
+#[error("{0}")]
+pub struct PosesError(String);
 
 impl Poses {
     /// Reads a table; `file` is its name in errors. Not real-time.
     ///
     /// # Errors
     /// [`PosesError`]: the line, and what is wrong with it.
-    pub fn parse(file: &str, bytes: &[u8]) -> Result<Self, PosesError> {
-        let wrong = |line: usize, problem: String| PosesError { place: format!("{file}:{line}"), problem };
-        let text = std::str::from_utf8(bytes).map_err(|error| {
-            let before = bytes.iter().take(error.valid_up_to());
-            wrong(
-                1 + before.filter(|byte| **byte == b'\n').count(),
-                "this is not UTF-8; save the poses as UTF-8".to_owned(),
-            )
-        })?;
+    pub fn parse(file: &str, bytes: Vec<u8>) -> Result<Self, PosesError> {
+        let wrong = |problem: &TextProblem| PosesError(problem.in_file(file));
+        let text = text_from_bytes(bytes).map_err(|problem| wrong(&problem))?;
         if text.trim().is_empty() {
-            let problem = format!("no poses; the header is {}", header_text());
-            return Err(PosesError { place: file.to_owned(), problem });
+            return Err(wrong(&TextProblem::of_file(format!("no poses; the header is {}", header_text()))));
         }
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-        let line = |at: Option<&csv::Position>| at.map_or(1, |at| line_of(text, at));
-        let malformed = |error: csv::Error| {
-            let problem = match error.kind() {
-                csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-                    format!("{len} columns, but the header has {expected_len}")
-                }
-                _ => error.to_string(),
-            };
-            wrong(line(error.position()), problem)
-        };
-        let header = reader.headers().map_err(malformed)?.clone();
-        let columns = columns(&header).map_err(|problem| wrong(1, problem))?;
-        let id_column = header.iter().position(|name| name == ID_COLUMN);
+        Self::of_table(&text).map_err(|problem| wrong(&problem))
+    }
 
+    fn of_table(text: &str) -> Result<Self, TextProblem> {
+        let table = Table::parse(text, HashLines::Rows)?;
+        let columns = columns(table.columns()).map_err(|problem| table.header_problem(problem))?;
+        let id_column = table.column(ID_COLUMN);
         let mut poses = Self { ids: Vec::new(), handles: Vec::new() };
-        for record in reader.into_records() {
-            let record = record.map_err(malformed)?;
+        for row in table.rows() {
+            let row = row?;
             let mut numbers = [0.0; 6];
-            for ((number, column), name) in numbers.iter_mut().zip(columns).zip(POSE_COLUMNS) {
-                let text = record.get(column).unwrap_or_default();
-                let problem = |_| {
-                    wrong(line(record.position()), format!("{name} must be a number, not `{}`", plain(text)))
-                };
-                *number = text.parse().map_err(problem)?;
+            for (number, column) in numbers.iter_mut().zip(columns) {
+                *number = row.number(column)?;
             }
-            let id = id_column.and_then(|column| record.get(column)).map(str::to_owned);
+            let id = id_column.map(|column| row.text(column).to_owned());
             poses.ids.push(id.unwrap_or_else(|| poses.handles.len().to_string()));
             let [x, y, z, rx, ry, rz] = numbers;
             let (position_m, rotation_rad) = (DVec3::new(x, y, z), DVec3::new(rx, ry, rz));
@@ -82,19 +60,10 @@ impl Poses {
     }
 }
 
-/// Line, from 1, on which a record stands. The reader's own count ends before blank lines it is about to skip.
-fn line_of(text: &str, at: &csv::Position) -> usize {
-    let start = usize::try_from(at.byte()).unwrap_or(usize::MAX).min(text.len());
-    let (before, from_here) = text.split_at_checked(start).unwrap_or((text, ""));
-    let blank = from_here.len() - from_here.trim_start_matches(['\n', '\r']).len();
-    let skipped = from_here.get(..blank).unwrap_or_default();
-    1 + before.matches('\n').count() + skipped.matches('\n').count()
-}
-
 /// Where each pose column is; the error of a missing or unknown one names the right columns.
-fn columns(header: &csv::StringRecord) -> Result<[usize; 6], String> {
+fn columns(header: &[String]) -> Result<[usize; 6], String> {
     let known = || POSE_COLUMNS.iter().copied().chain([ID_COLUMN]);
-    if let Some(unknown) = header.iter().find(|name| !known().any(|column| column == *name)) {
+    if let Some(unknown) = header.iter().find(|name| !known().any(|column| column == name.as_str())) {
         let hint = did_you_mean(unknown, known());
         return Err(format!("unknown column `{}`{hint} (the header is {})", plain(unknown), header_text()));
     }
@@ -122,10 +91,11 @@ mod tests {
 
     #[test]
     fn a_line_that_is_no_text_is_named() {
-        let told = |bytes: &[u8]| Poses::parse("poses.csv", bytes).expect_err("it is none").to_string();
+        let told =
+            |bytes: &[u8]| Poses::parse("poses.csv", bytes.to_vec()).expect_err("it is none").to_string();
         let mut bytes = b"x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,0,0,0,0\n0,0,".to_vec();
         bytes.extend([0xff, b',', b'0']);
-        assert_eq!(told(&bytes), "poses.csv:3: this is not UTF-8; save the poses as UTF-8");
+        assert_eq!(told(&bytes), "poses.csv:3: this is not UTF-8; save the file as UTF-8");
         assert_eq!(told(b"x_m\n"), "poses.csv:1: column `y_m` is missing");
     }
 }

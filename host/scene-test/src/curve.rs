@@ -1,6 +1,6 @@
 //! A force-position curve: a CSV with poses and the wrench expected at each.
 
-use flotor_hal::read_text;
+use flotor_hal::{HashLines, Table, TextProblem, read_text};
 use std::path::Path;
 
 /// Columns of a pose, as `flotor eval` reads them.
@@ -22,46 +22,42 @@ impl Points {
     /// # Errors
     /// In words, with the line.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
-        let text = read_text(path, "the curve").map_err(|wrong| wrong.in_file(path.display()))?;
-        Self::parse(&text).map_err(|wrong| format!("{}:{wrong}", path.display()))
+        let read = read_text(path, "the curve").and_then(|text| Self::parse(&text));
+        read.map_err(|wrong| wrong.in_file(path.display()))
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
-        let mut lines = (1..).zip(text.lines()).filter(|(_, line)| {
-            let line = line.trim();
-            !line.is_empty() && !line.starts_with('#')
-        });
-        let (_, head) = lines.next().ok_or("1: no columns")?;
-        let columns: Vec<&str> = head.split(',').map(str::trim).collect();
-        if let Some(unknown) = columns.iter().find(|name| !POSE.contains(name) && !WRENCH.contains(name)) {
-            return Err(format!(
-                "1: unknown column `{unknown}`; they are {}, {}",
-                POSE.join(", "),
-                WRENCH.join(", ")
-            ));
+    fn parse(text: &str) -> Result<Self, TextProblem> {
+        let table = Table::parse(text, HashLines::Comments)?;
+        let columns = table.columns();
+        let is_known = |name: &String| POSE.contains(&name.as_str()) || WRENCH.contains(&name.as_str());
+        if let Some(unknown) = columns.iter().find(|name| !is_known(name)) {
+            let problem =
+                format!("unknown column `{unknown}`; they are {}, {}", POSE.join(", "), WRENCH.join(", "));
+            return Err(table.header_problem(problem));
         }
-        let compared: Vec<usize> = (0..6).filter(|index| columns.contains(&WRENCH[*index])).collect();
+        let of_pose = POSE.map(|name| table.column(name));
+        let of_wrench = WRENCH.map(|name| table.column(name));
+        let compared: Vec<usize> = (0..6).filter(|index| of_wrench[*index].is_some()).collect();
         if compared.is_empty() {
-            return Err("1: no column to compare, such as fz_n".to_owned());
+            return Err(table.header_problem("no column to compare, such as fz_n"));
         }
         let mut rows = Vec::new();
-        for (line, text) in lines {
-            let cells: Vec<&str> = text.split(',').map(str::trim).collect();
-            if cells.len() != columns.len() {
-                return Err(format!("{line}: {} cells for {} columns", cells.len(), columns.len()));
-            }
+        for row in table.rows() {
+            let row = row?;
+            let number = |column: Option<usize>| column.map_or(Ok(0.0), |column| row.number(column));
             let (mut pose, mut wrench) = ([0.0; 6], [0.0; 6]);
-            for (name, cell) in columns.iter().zip(cells) {
-                let number = cell.parse().map_err(|_| format!("{line}: `{cell}` is no number"))?;
-                for (names, numbers) in [(POSE, &mut pose), (WRENCH, &mut wrench)] {
-                    if let Some(index) = names.iter().position(|known| known == name) {
-                        numbers[index] = number;
-                    }
+            for (numbers, columns) in [(&mut pose, of_pose), (&mut wrench, of_wrench)] {
+                for (value, column) in numbers.iter_mut().zip(columns) {
+                    *value = number(column)?;
                 }
             }
             rows.push((pose, wrench));
         }
-        if rows.is_empty() { Err("2: no point".to_owned()) } else { Ok(Self { compared, rows }) }
+        if rows.is_empty() {
+            Err(table.header_problem("no point follows"))
+        } else {
+            Ok(Self { compared, rows })
+        }
     }
 
     /// The poses, as `flotor eval` reads them.
@@ -145,14 +141,14 @@ mod tests {
     #[test]
     fn a_mistake_has_a_line() {
         for (text, says) in [
-            ("", "1: no columns"),
+            ("", "c:1: the table is empty"),
             ("z_m\n1", "no column to compare"),
             ("z_mm,fz_n\n1,1", "unknown column `z_mm`"),
-            ("z_m,fz_n\n1,1\n2", "3: 1 cells for 2"),
-            ("z_m,fz_n\n1,x", "2: `x` is no number"),
+            ("z_m,fz_n\n1,1\n2", "c:3: 1 cell for 2"),
+            ("z_m,fz_n\n1,x", "c:2: `fz_n` must be a number, not `x`"),
             ("z_m,fz_n\n", "no point"),
         ] {
-            let told = Points::parse(text).unwrap_err();
+            let told = Points::parse(text).unwrap_err().in_file("c");
             assert!(told.contains(says), "{told}");
         }
     }

@@ -8,6 +8,7 @@
 //! 20.0,3.41                         5.0,3.41
 //! ```
 
+use flotor_hal::{HashLines, Table, TextProblem};
 use flotor_statistics::StatisticsError;
 use flotor_statistics::describe::mean;
 use flotor_statistics::regression::{self, Line};
@@ -86,6 +87,12 @@ pub enum CurveError {
     Sparse(usize),
 }
 
+impl From<TextProblem> for CurveError {
+    fn from(TextProblem { line, problem }: TextProblem) -> Self {
+        Self::Line { line, problem }
+    }
+}
+
 /// What the first column is.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Abscissa {
@@ -99,26 +106,20 @@ impl MeasuredCurve {
     /// # Errors
     /// [`CurveError::Line`].
     pub fn parse(text: &str, free_length_m: Option<f64>) -> Result<Self, CurveError> {
-        let wrong = |line: usize, problem: &str| CurveError::Line { line, problem: problem.to_owned() };
-        let is_content = |line: &str| !(line.trim().is_empty() || line.starts_with('#'));
-        let mut lines = (1..).zip(text.lines()).filter(|(_, line)| is_content(line));
-        let (number, head) = lines.next().ok_or_else(|| wrong(1, "the table is empty"))?;
-        let abscissa = match head.split(',').map(str::trim).collect::<Vec<_>>().as_slice() {
-            ["length_mm", "force_n"] => Abscissa::Length,
-            ["compression_mm", "force_n"] => Abscissa::Compression,
-            _ => return Err(wrong(number, "the header is `length_mm,force_n` or `compression_mm,force_n`")),
+        let table = Table::parse(text, HashLines::Comments)?;
+        let abscissa = match table.columns().join(",").as_str() {
+            "length_mm,force_n" => Abscissa::Length,
+            "compression_mm,force_n" => Abscissa::Compression,
+            _ => {
+                let problem = "the header is `length_mm,force_n` or `compression_mm,force_n`";
+                return Err(table.header_problem(problem).into());
+            }
         };
-        let mut rows = Vec::new();
-        for (number, line) in lines {
-            let cells: Vec<Option<f64>> = line
-                .split(',')
-                .map(|cell| cell.trim().parse().ok().filter(|x: &f64| x.is_finite()))
-                .collect();
-            let &[Some(length_mm), Some(force_n)] = cells.as_slice() else {
-                return Err(wrong(number, "two finite numbers are expected, separated by a comma"));
-            };
-            rows.push((length_mm * 1.0e-3, force_n));
-        }
+        let rows = table.rows().map(|row| {
+            let row = row?;
+            Ok((row.finite(0)? * 1.0e-3, row.finite(1)?))
+        });
+        let rows: Vec<(f64, f64)> = rows.collect::<Result<_, TextProblem>>()?;
         let longest_m = rows.iter().map(|(length_m, _)| *length_m).fold(f64::NEG_INFINITY, f64::max);
         Ok(match abscissa {
             Abscissa::Compression => Self { points: rows, free_length_m },
@@ -291,7 +292,10 @@ mod tests {
     fn what_is_no_curve_is_refused_with_its_line() {
         let refused = |text: &str| MeasuredCurve::parse(text, None).unwrap_err().to_string();
         assert!(refused("x,y\n1,2\n").starts_with("line 1: the header"));
-        assert!(refused("length_mm,force_n\n1,2\n3;4\n").starts_with("line 3: two finite numbers"));
+        assert!(
+            refused("length_mm,force_n\n1,2\n3;4\n")
+                .starts_with("line 3: 1 cell for 2 columns; separate them with commas")
+        );
         assert!(refused("length_mm,force_n\n1,nan\n").starts_with("line 2"));
         let few = MeasuredCurve::parse("compression_mm,force_n\n0,0\n1,2\n", Some(0.02)).unwrap();
         assert!(matches!(few.fit(), Err(CurveError::Statistics(_))));

@@ -1,6 +1,7 @@
 //! What is asked: axes, seeds, and the model or scene to ask, read from TOML and checked before anything runs.
 
-use flotor_hal::read_file;
+use flotor_command::options::LARGEST_SEED;
+use flotor_hal::{TextProblem, read_file, text_from_bytes};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -178,9 +179,13 @@ impl Plan {
     /// # Errors
     /// [`PlanError`], with file and line or what would be right.
     pub fn load(path: &Path) -> Result<Self, PlanError> {
-        let text = read_file(path, MOST_BYTES)
-            .and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other))
+        let bytes = read_file(path, MOST_BYTES)
             .map_err(|cause| PlanError::Unreadable { path: path.into(), cause })?;
+        let text = text_from_bytes(bytes).map_err(|TextProblem { line, problem }| PlanError::Malformed {
+            path: path.into(),
+            line,
+            problem,
+        })?;
         Self::parse(&text, path)
     }
 
@@ -234,6 +239,9 @@ impl Plan {
             self.axes.iter().enumerate().find(|(at, axis)| self.axes[..*at].iter().any(|a| a.key == axis.key))
         {
             return Err(format!("`{}` is an axis twice", repeated.1.key));
+        }
+        if let Some(large) = self.seeds.iter().find(|seed| **seed > LARGEST_SEED) {
+            return Err(format!("the seed {large} is larger than {LARGEST_SEED} (2^53)"));
         }
         if self.seeds.is_empty() || self.block == 0 {
             return Err("`seeds` needs one at least, and `block` is at least 1".into());

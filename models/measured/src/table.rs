@@ -11,7 +11,7 @@
 //! falling.
 
 use crate::curve::{Curve, CurveError};
-use flotor_hal::TextProblem;
+use flotor_hal::{HashLines, Table, TextProblem};
 
 /// The header a table begins with.
 pub const HEADER: &str = "compression_mm,force_n";
@@ -21,25 +21,15 @@ pub const HEADER: &str = "compression_mm,force_n";
 /// # Errors
 /// The line that is wrong.
 pub fn parse(text: &str) -> Result<Curve, TextProblem> {
-    let is_content = |line: &str| !(line.trim().is_empty() || line.trim_start().starts_with('#'));
-    let mut lines = (1_usize..).zip(text.lines()).filter(|(_, line)| is_content(line));
-    let header = lines.next().map(|(number, line)| (number, line.replace(' ', "")));
-    match &header {
-        Some((_, line)) if line == HEADER => {}
-        Some((number, _)) => return Err(TextProblem::at(*number, format!("the header is `{HEADER}`"))),
-        None => return Err(TextProblem::at(1, format!("the table is empty; its header is `{HEADER}`"))),
+    let table = Table::parse(text, HashLines::Comments)?;
+    if table.columns().join(",") != HEADER {
+        return Err(table.header_problem(format!("the header is `{HEADER}`")));
     }
-    let mut numbers = Vec::new();
-    let mut knots = Vec::new();
-    for (number, line) in lines {
-        let mut cells = line.split(',').map(|cell| cell.trim().parse().ok().filter(|x: &f64| x.is_finite()));
-        let (Some(Some(compression_mm)), Some(Some(force_n)), None) =
-            (cells.next(), cells.next(), cells.next())
-        else {
-            return Err(TextProblem::at(number, "two finite numbers are expected, separated by a comma"));
-        };
-        knots.push((compression_mm * 1.0e-3, force_n));
-        numbers.push(number);
+    let (mut numbers, mut knots) = (Vec::new(), Vec::new());
+    for row in table.rows() {
+        let row = row?;
+        knots.push((row.finite(0)? * 1.0e-3, row.finite(1)?));
+        numbers.push(row.line());
     }
     Curve::new(&knots).map_err(|error| match error {
         CurveError::Count(count) => {

@@ -5,6 +5,12 @@ use flotor_hal::{DVec3, TextProblem};
 /// Largest number of vertices read: 40 000 masses, each written once for each of its six triangles.
 const MOST_VERTICES: usize = 240_000;
 
+/// Statements without an effect on the mesh: normals, texture, points, groups, materials, display.
+const UNUSED: [&str; 15] = [
+    "vn", "vt", "vp", "p", "o", "g", "s", "mg", "mtllib", "usemtl", "usemap", "bevel", "lod", "c_interp",
+    "d_interp",
+];
+
 /// Content of an OBJ file (`v`, `f` and `l`; metres, z up).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Obj {
@@ -22,6 +28,10 @@ impl Obj {
     /// # Errors
     /// The line that is wrong, or the format that the file has instead.
     pub(crate) fn read(text: &str) -> Result<Self, TextProblem> {
+        let head = text.trim_start();
+        if head.starts_with("solid") && head.contains("facet") {
+            return Err(TextProblem::at(1, "this is an STL file; export the mesh as Wavefront OBJ"));
+        }
         let mut obj = Self::default();
         let mut lines = text.lines().enumerate().map(|(index, text)| (index + 1, text));
         while let Some((line, first)) = lines.next() {
@@ -34,15 +44,11 @@ impl Obj {
             }
             obj.read_line(&text).map_err(|problem| TextProblem::at(line, problem))?;
         }
-        match text.trim_start() {
-            _ if !obj.faces.is_empty() => Ok(obj),
-            text if text.starts_with("solid") && text.contains("facet") => {
-                Err(TextProblem::at(1, "this is an STL file; export the mesh as Wavefront OBJ"))
-            }
-            _ => Err(TextProblem::of_file(
-                "there is no face (`f`) in it; export the mesh as Wavefront OBJ, with faces",
-            )),
+        if obj.faces.is_empty() {
+            let problem = "there is no face (`f`) in it; export the mesh as Wavefront OBJ, with faces";
+            return Err(TextProblem::of_file(problem));
         }
+        Ok(obj)
     }
 
     fn read_line(&mut self, text: &str) -> Result<(), String> {
@@ -63,15 +69,20 @@ impl Obj {
             Some(kind @ ("f" | "l")) => {
                 let corners = words.map(|word| corner(word, self.vertices_m.len()));
                 let corners = corners.collect::<Option<Vec<usize>>>();
-                let corners = corners.filter(|corners| corners.len() >= 2).ok_or_else(|| {
-                    format!("`{kind}` takes two and more numbers of vertices that stand above it")
+                let (least, word) = if kind == "f" { (3, "three") } else { (2, "two") };
+                let corners = corners.filter(|corners| corners.len() >= least).ok_or_else(|| {
+                    format!("`{kind}` takes {word} and more numbers of vertices that stand above it")
                 })?;
                 match kind {
                     "f" => self.faces.push(corners),
                     _ => self.segments.extend(corners.windows(2).map(|pair| [pair[0], pair[1]])),
                 }
             }
-            _ => {} // normals, texture, groups, comments
+            Some(other) if !other.starts_with('#') && !UNUSED.contains(&other) => {
+                let other: String = other.chars().take(20).flat_map(char::escape_debug).collect();
+                return Err(format!("`{other}` is no statement of a mesh in Wavefront OBJ"));
+            }
+            _ => {}
         }
         Ok(())
     }
@@ -108,6 +119,8 @@ mod tests {
         }
         assert!(error("v 0 0 0\nf 1 2 3\n").starts_with("m:2: `f`"));
         assert!(error("").starts_with("m: there is no face"));
+        assert!(error("v 0 0 0\nv 1 0 0\nf 1 2\n").starts_with("m:3: `f` takes three"));
+        assert!(error("v 0 0 0\n0 0 0\n").starts_with("m:2: `0` is no statement"));
         let stl = "solid sheet\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n";
         assert_eq!(error(stl), "m:1: this is an STL file; export the mesh as Wavefront OBJ");
     }

@@ -9,7 +9,7 @@ use crate::{cache, gmsh};
 use flotor_hal::{
     Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output,
     Parameter, Pose, Refusal, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel, Wrench,
-    choices, read_file,
+    choices, read_file, text_from_bytes,
 };
 use std::path::Path;
 
@@ -160,8 +160,10 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
         .map_err(|error| Refusal::resource(format!("{path}: cannot read the mesh: {error}")))?;
     let [fixed, touched] = [faces[0].unwrap_or("fixed"), faces[1].unwrap_or("touched")];
     let wrong = |problem: &dyn std::fmt::Display| Refusal::resource(format!("{path}: {problem}"));
-    let parts = gmsh::read(String::from_utf8_lossy(&bytes).trim_start_matches('\u{feff}'))
-        .map_err(|problem| wrong(&problem))?;
+    // A binary file has another problem than its encoding, which its second line names.
+    let text =
+        text_from_bytes(bytes.clone()).unwrap_or_else(|_| String::from_utf8_lossy(&bytes).into_owned());
+    let parts = gmsh::read(&text).map_err(|problem| wrong(&problem))?;
     let mesh = Mesh::new(parts, fixed, touched).map_err(|problem| wrong(&problem))?;
     let named = [&bytes[..], b"\0", fixed.as_bytes(), b"\0", touched.as_bytes()].concat();
     Ok(Some((mesh, cache::digest(&named))))

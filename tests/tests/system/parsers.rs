@@ -114,6 +114,29 @@ fn scenes() {
     assert!(read > 0 && refused > 0, "{read} read, {refused} refused");
 }
 
+/// Processor time of this thread.
+fn processor_time_s() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1.0e-9
+}
+
+/// Four times the changes take four times as long, not sixteen.
+#[test]
+fn a_scene_is_read_in_time_proportional_to_its_length() {
+    let change = "[[change]]\nat_s = 1\nset = \"spring.gamma_n=20\"\n";
+    let scene = |changes| format!("{DEMO}\n{}", change.repeat(changes));
+    let took = |text: &str| {
+        let shortest = (0..5).map(|_| {
+            let started = processor_time_s();
+            Scene::parse(Path::new("scene.toml"), text).expect("a scene");
+            processor_time_s() - started
+        });
+        shortest.fold(f64::INFINITY, f64::min)
+    };
+    let ratio = took(&scene(8000)) / took(&scene(2000));
+    assert!(ratio < 8.0, "{ratio}");
+}
+
 #[test]
 fn recordings() {
     let scratch = Scratch::default();
@@ -230,7 +253,7 @@ fn poses() {
     let whole =
         "id,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\na,0,0,-0.005,0,0,0\nb,0.001,nan,0,0.1,0,0\nc,0,0,inf,0,0,0\n";
     let (refused, placed) = mutated(7, whole.as_bytes(), |bytes| {
-        let poses = Poses::parse("poses.csv", bytes).map_err(|error| error.to_string())?;
+        let poses = Poses::parse("poses.csv", bytes.to_vec()).map_err(|error| error.to_string())?;
         assert_eq!(poses.ids.len(), poses.handles.len());
         Ok(())
     });

@@ -15,12 +15,11 @@ mod table;
 
 use super::{Aim, Pose};
 use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::{TextProblem, read_text};
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Size of the largest table read, bytes: hours of a run.
-const MAX_TABLE_BYTES: u64 = 256 << 20;
 /// Largest number of samples: hours of a run.
 const MAX_SAMPLES: usize = 1 << 24;
 /// Farthest position a handle can have had, m: ten times the range of the device.
@@ -67,7 +66,11 @@ impl Recording {
         let samples = if is_recording {
             mcap_file::read(flotor_hal::open_file(path).map_err(unreadable)?)
         } else {
-            table::read(&flotor_hal::read_file(path, MAX_TABLE_BYTES).map_err(unreadable)?)
+            let read = read_text(path, "the table").and_then(|text| table::read(&text));
+            read.map_err(|TextProblem { line, problem }| match line {
+                0 => problem,
+                line => format!("line {line}: {problem}"),
+            })
         };
         samples.and_then(Self::new).map_err(wrong)
     }

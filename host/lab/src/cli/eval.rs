@@ -88,7 +88,7 @@ fn read_poses(path: &Path) -> Result<Poses, CommandError> {
         CommandError::Usage(format!("{}: {}", path.display(), format_args!("cannot read the poses: {cause}")))
     };
     let bytes = read(path).map_err(problem)?;
-    Poses::parse(&path.display().to_string(), &bytes).map_err(|error| CommandError::Usage(error.to_string()))
+    Poses::parse(&path.display().to_string(), bytes).map_err(|error| CommandError::Usage(error.to_string()))
 }
 
 /// Longest file of poses, bytes: twenty million poses.

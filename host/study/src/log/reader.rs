@@ -4,8 +4,11 @@ use super::{Begin, CHAIN_START, Event, FORMAT, Incident, LogWriter, TrialEvent, 
 use crate::sitting::{AnswerError, Sitting, TrackResult};
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Response, Trial};
-use std::io;
+use flotor_hal::read_file;
 use std::path::{Path, PathBuf};
+
+/// Size of the longest log, bytes: hundreds of hours of a sitting.
+const MOST_BYTES: u64 = 256 << 20;
 
 /// Why a log cannot be used: the file, the line (counted from 1; 0 for the file as a whole) and the reason.
 #[derive(Debug, thiserror::Error)]
@@ -125,14 +128,6 @@ pub struct SittingLog {
     chain: String,
 }
 
-/// Reads a log; a pipe or a device file is none.
-fn read(path: &Path) -> io::Result<Vec<u8>> {
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file"));
-    }
-    std::fs::read(path)
-}
-
 impl SittingLog {
     /// Reads a log, checks its chain, and goes through the experiment with its answers: every trial must be the one
     /// the state machine asks for, every verdict the one it gives.
@@ -140,7 +135,8 @@ impl SittingLog {
     /// # Errors
     /// [`LogError`] with line and reason.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let bytes = read(path).map_err(|cause| LogError::file(path, "cannot read the log", cause))?;
+        let bytes = read_file(path, MOST_BYTES)
+            .map_err(|cause| LogError::file(path, "cannot read the log", cause))?;
         let at = |line: usize, problem: LogProblem| LogError { path: path.into(), line, problem };
         let complete = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
         let whole = bytes.get(..complete).unwrap_or_default();

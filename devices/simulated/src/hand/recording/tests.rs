@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use std::io::Cursor;
 
 fn table(text: &str) -> Result<Recording, String> {
-    table::read(text.as_bytes()).and_then(Recording::new)
+    table::read(text).map_err(|wrong| wrong.in_file("t")).and_then(Recording::new)
 }
 
 #[test]
@@ -31,14 +31,14 @@ fn rotations_are_followed_too() {
 #[test]
 fn complaints_name_the_line_and_the_column() {
     for (text, expected) in [
-        ("", "line 1: the columns are time_s,x_m,y_m,z_m or time_s,"),
-        ("t,x,y,z\n0,0,0,0\n", "line 1: the columns are"),
+        ("", "t:1: the table is empty"),
+        ("t,x,y,z\n0,0,0,0\n", "t:1: the columns are time_s,x_m,y_m,z_m or time_s,"),
         ("time_s,x_m,y_m,z_m\n", "holds no pose"),
-        ("time_s,x_m,y_m,z_m\n0,0,0,0\n1,0,up,0\n", "line 3: `y_m` must be a number, not `up`"),
-        ("time_s,x_m,y_m,z_m\n0,0,0,0\n0,0,0,0\n", "line 3: time 0 ns is not after 0 ns"),
-        ("time_s,x_m,y_m,z_m\n0,0,0,nan\n", "line 2: position_m is not a finite number"),
-        ("time_s,x_m,y_m,z_m\n0,0,0,4\n", "line 2: ([0, 0, 4]) m is outside the workspace of"),
-        ("time_s,x_m,y_m,z_m\n0,0,0\n", "CSV error: record 1 (line: 2"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,0\n1,0,up,0\n", "t:3: `y_m` must be a number, not `up`"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,0\n0,0,0,0\n", "t:3: time 0 ns is not after 0 ns"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,nan\n", "t:2: `z_m` must be finite"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,4\n", "t:2: ([0, 0, 4]) m is outside the workspace of"),
+        ("time_s,x_m,y_m,z_m\n0,0,0\n", "t:2: 3 cells for 4 columns"),
     ] {
         let problem = table(text).expect_err("refused");
         assert!(problem.starts_with(expected), "{problem}, not {expected}");
@@ -60,7 +60,12 @@ proptest! {
         if as_mcap {
             bytes.splice(0..0, mcap::MAGIC.iter().copied());
         }
-        let read = if as_mcap { mcap_file::read(Cursor::new(&bytes)) } else { table::read(&bytes) };
+        let text = String::from_utf8_lossy(&bytes);
+        let read = if as_mcap {
+            mcap_file::read(Cursor::new(&bytes))
+        } else {
+            table::read(&text).map_err(|wrong| wrong.problem)
+        };
         if let Ok(recording) = read.and_then(Recording::new) {
             for time_ns in [0, recording.end_ns() / 3, recording.end_ns(), u64::MAX] {
                 let pose = recording.aim(time_ns).pose;
