@@ -26,6 +26,48 @@ def test_a_pressed_spring_pushes_back_along_its_axis():
     assert up.status == ["ok"]
 
 
+def columns(rows):
+    return {name: rows[:, index] for index, name in enumerate(["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"])}
+
+
+def test_columns_with_names_go_by_name():
+    rows = poses(20)
+    expected = flotor.Model("spring").evaluate(rows).force_n
+    other_order = dict(reversed(columns(rows).items()))
+    records = np.rec.fromarrays(list(other_order.values()), names=list(other_order))
+    tables = [other_order, other_order | {"id": np.arange(20)}, records]
+    for module in ["pandas", "polars"]:
+        try:
+            tables.append(__import__(module).DataFrame(other_order))
+        except ImportError:
+            print(f"skipped: {module}")
+    for table in tables:
+        assert flotor.Model("spring").evaluate(table).force_n.tolist() == expected.tolist()
+
+
+def test_other_column_names_are_refused():
+    rows = poses(20)
+    millimetres = {name.replace("z_m", "z_mm"): column for name, column in columns(rows).items()}
+    for table in [millimetres, columns(rows) | {"w": rows[:, 0]}, {"x_m": rows[:, 0]}]:
+        with pytest.raises(flotor.FlotorError, match="they must be x_m, y_m, z_m, rx_rad, ry_rad, rz_rad"):
+            flotor.Model("spring").evaluate(table)
+
+
+def test_a_masked_number_is_no_number():
+    rows = poses(4)
+    masked = np.ma.array(rows, mask=np.zeros_like(rows, bool))
+    masked[1] = np.ma.masked
+    masked[2, 3] = np.ma.masked
+    expected = np.where(masked.mask, np.nan, rows)
+    result = flotor.Model("spring").evaluate(masked)
+    assert result.status[1] == result.status[2] == "invalid_input"
+    assert result.force_n.tolist() == flotor.Model("spring").evaluate(expected).force_n.tolist()
+    assert flotor.Model("spring").evaluate(list(masked)).status == result.status
+    inputs = np.ma.array(flotor.Model("spring").inputs(rows), mask=False)
+    with pytest.raises(flotor.FlotorError, match="no masks"):
+        flotor.Model("spring").step_batch(inputs)
+
+
 @pytest.mark.parametrize("variant", ["thesis", "closed-form", "current-length", "energy"])
 def test_same_bits_as_the_command(variant, tmp_path):
     command = os.environ.get("FLOTOR") or shutil.which("flotor")

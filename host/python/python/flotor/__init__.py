@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -150,6 +151,8 @@ class Model:
         memory, and nobody may move them meanwhile: ``ndarray.resize(..., refcheck=False)`` in another thread frees what
         is being written to. A child of ``os.fork()`` makes models of its own.
         """
+        if isinstance(inputs, np.ma.MaskedArray) or isinstance(outputs, np.ma.MaskedArray):
+            raise FlotorError("inputs and outputs have no masks; pass rows that are not masked (`inputs.compressed()`)")
         if outputs is None:
             outputs = np.empty(len(inputs), OUTPUT)
         self._model.step_batch(inputs, outputs)
@@ -158,7 +161,8 @@ class Model:
     def evaluate(self, poses: np.ndarray, *, path: bool = False) -> Evaluation:
         """Answers at poses (n, 6) in m and rad (rotation vector), bit for bit what ``flotor eval`` prints.
 
-        Each pose is reached from home and held until converged; with ``path`` the rows are successive poses of one
+        A data frame, a table of Arrow, a record array or a mapping goes by its column names, which have to be those of
+        ``flotor eval``; a masked number is NaN. Each pose is reached from home and held until converged; with ``path`` the rows are successive poses of one
         handle. NaN and infinity are legal and answered with zero force and a status.
         """
         force_n, torque_nm, energy_j, status = self._model.evaluate(_poses(poses), path)
@@ -168,8 +172,40 @@ class Model:
         return repr(self._model)
 
 
+#: Columns of a pose, in order.
+_POSE = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
+
+
+def _column_names(table: object) -> list | None:
+    """Names of the columns of a data frame, a table of Arrow, a record array or a mapping; None for what has no names."""
+    if isinstance(table, Mapping):
+        return list(table)
+    names = getattr(table, "column_names", None)
+    if names is None:
+        names = getattr(getattr(table, "dtype", None), "names", None)
+    if names is None:
+        names = getattr(table, "columns", None)
+    names = None if names is None else list(names)
+    # pandas numbers the columns of an array that had no names.
+    return None if names == list(range(len(names or ()))) else names
+
+
+def _numbers(values: object) -> np.ndarray:
+    """Values as numbers: NaN where they are masked."""
+    if isinstance(values, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in values):
+        values = np.ma.array(values)
+    if isinstance(values, np.ma.MaskedArray):
+        values = values.astype(np.float64).filled(np.nan)
+    return np.asarray(values, np.float64)
+
+
 def _poses(poses: object) -> np.ndarray:
-    poses = np.require(poses, np.float64, ["C_CONTIGUOUS", "ALIGNED"])
+    names = _column_names(poses)
+    if names is not None:
+        if sorted(map(str, names)) not in (sorted(_POSE), sorted([*_POSE, "id"])):
+            raise FlotorError(f"the columns are {', '.join(map(str, names))}; they must be {', '.join(_POSE)}, and may have an id")
+        poses = np.column_stack([_numbers(poses[name]) for name in _POSE])
+    poses = np.require(_numbers(poses), np.float64, ["C_CONTIGUOUS", "ALIGNED"])
     if poses.ndim != 2 or poses.shape[1] != 6:
         raise FlotorError(f"poses have shape {poses.shape}; it is (n, 6): x_m, y_m, z_m, rx_rad, ry_rad, rz_rad")
     return poses
