@@ -94,7 +94,7 @@ static uint32_t deactivate(FlotorInstance instance) {
     return FlotorCallStatus_Ok;
 }
 
-static uint32_t read_state(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
+static FlotorCycleCode read_state(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
     MakerKnob *device = instance;
     double position_mm = 0.0;
     if (kk_get_position_mm(device->knob, &position_mm) != 0) {
@@ -114,7 +114,7 @@ static uint32_t read_state(FlotorInstance instance, const FlotorTick *tick, Flot
     return FLOTOR_CYCLE_FRESH;
 }
 
-static uint32_t write_wrench(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
+static FlotorCycleCode write_wrench(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
     (void)tick;
     MakerKnob *device = instance;
     device->force_n = atomic_load(&device->stopped) ? 0.0 : wrench->force_n[2];

@@ -615,6 +615,13 @@ typedef struct FlotorCapabilities {
     double latency_s;
 } FlotorCapabilities;
 
+// Result of `read` and `write` as it crosses the boundary: a type of its own, so that no other code of the contract is taken for
+// one. 4 bytes.
+typedef struct FlotorCycleCode {
+    // 0 fresh, 1 stale, 256 + a fault.
+    uint32_t code;
+} FlotorCycleCode;
+
 // One tick as a device and a host see it. 24 bytes.
 typedef struct FlotorTick {
     // Number of the tick, from 0.
@@ -647,7 +654,7 @@ typedef struct FlotorDeviceState {
 } FlotorDeviceState;
 
 // `flotor.device/1`. `open` and `activate` return 0 or a [`crate::RefusalKind`] and say why in the message;
-// `read` and `write` return the code of a [`crate::Cycle`]; the others a [`super::CallStatus`] code.
+// `read` and `write` return a [`CycleCode`]; the others a [`super::CallStatus`] code.
 typedef struct FlotorDeviceTable {
     // Bytes of this table as the plugin knows it.
     uint32_t size;
@@ -673,11 +680,13 @@ typedef struct FlotorDeviceTable {
     // Zero wrench, then opened again. Not real-time.
     uint32_t (*deactivate)(FlotorInstance instance);
     // Newest sample. Real-time.
-    uint32_t (*read)(FlotorInstance instance, const struct FlotorTick *tick, struct FlotorDeviceState *state);
+    struct FlotorCycleCode (*read)(FlotorInstance instance,
+                                   const struct FlotorTick *tick,
+                                   struct FlotorDeviceState *state);
     // Wrench on the hand until the next write. Real-time.
-    uint32_t (*write)(FlotorInstance instance,
-                      const struct FlotorTick *tick,
-                      const struct FlotorWrench *wrench);
+    struct FlotorCycleCode (*write)(FlotorInstance instance,
+                                    const struct FlotorTick *tick,
+                                    const struct FlotorWrench *wrench);
     // Actuators safe, now. Any thread, any time, also during `read` and `write`.
     void (*safe_stop)(FlotorInstance instance);
     // Changes a live parameter at a tick boundary. Real-time. May be null.
@@ -1062,7 +1071,13 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_DEMAND_FORCE 1u
 #define FLOTOR_DEMAND_TORQUE 2u
 #define FLOTOR_DEMAND_ENERGY 4u
-/* Sets of axes: `{FLOTOR_AXES_ALL}` makes a FlotorAxes. */
+/* Sets of axes: `{FLOTOR_AXES_X | FLOTOR_AXES_RZ}` makes a FlotorAxes. */
+#define FLOTOR_AXES_X 1u
+#define FLOTOR_AXES_Y 2u
+#define FLOTOR_AXES_Z 4u
+#define FLOTOR_AXES_RX 8u
+#define FLOTOR_AXES_RY 16u
+#define FLOTOR_AXES_RZ 32u
 #define FLOTOR_AXES_PLANE 3u
 #define FLOTOR_AXES_TRANSLATION 7u
 #define FLOTOR_AXES_ROTATION 56u
@@ -1075,10 +1090,15 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_REGION_EVERYWHERE 0u
 #define FLOTOR_REGION_SPHERE 1u
 #define FLOTOR_REGION_BOX 2u
-/* What `read` and `write` of a device return; a fault is one of FlotorFault. */
-#define FLOTOR_CYCLE_FRESH 0u
-#define FLOTOR_CYCLE_STALE 1u
-#define FLOTOR_CYCLE_FAULT(fault) (0x100u | (uint32_t)(fault))
+/* Results of `read` and `write` of a device; a fault is one of FlotorFault. */
+static inline FlotorCycleCode flotor_cycle(uint32_t code) {
+    FlotorCycleCode cycle;
+    cycle.code = code;
+    return cycle;
+}
+#define FLOTOR_CYCLE_FRESH flotor_cycle(0u)
+#define FLOTOR_CYCLE_STALE flotor_cycle(1u)
+#define FLOTOR_CYCLE_FAULT(fault) flotor_cycle(0x100u | (uint32_t)(fault))
 
 /* First eight bytes of an entry. */
 #define FLOTOR_MAGIC_BYTES { 'F', 'L', 'O', 'T', 'O', 'R', '\r', '\n' }
@@ -1211,6 +1231,8 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(ForceTable, parameter),
     FLOTOR_FIELD(ForceTable, reset),
     FLOTOR_FIELD(ForceTable, last_message),
+    FLOTOR_STRUCT(CycleCode),
+    FLOTOR_FIELD(CycleCode, code),
     FLOTOR_STRUCT(DeviceTable),
     FLOTOR_FIELD(DeviceTable, size),
     FLOTOR_FIELD(DeviceTable, parameter_count),

@@ -104,32 +104,6 @@ pub enum Cycle {
     Fault(Fault),
 }
 
-impl Cycle {
-    /// Bit that marks a fault in the code that crosses the boundary.
-    const FAULT_BIT: u32 = 0x100;
-
-    pub(crate) const fn code(self) -> u32 {
-        match self {
-            Self::Fresh => 0,
-            Self::Stale => 1,
-            Self::Fault(fault) => Self::FAULT_BIT | fault as u32,
-        }
-    }
-
-    /// Reads a verdict from the boundary; anything unknown means the plugin broke the contract.
-    #[inline]
-    pub const fn from_code(code: u32) -> Self {
-        match code {
-            0 => Self::Fresh,
-            1 => Self::Stale,
-            _ => Self::Fault(match Fault::from_code(code & !Self::FAULT_BIT) {
-                Some(fault) if code & Self::FAULT_BIT != 0 => fault,
-                _ => Fault::Broken,
-            }),
-        }
-    }
-}
-
 /// What a device reports each tick. 168 bytes, in the device frame.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -219,6 +193,12 @@ impl Axes {
     pub const Y: Axes = Axes { bits: 0b00_0010 };
     /// Translation along z.
     pub const Z: Axes = Axes { bits: 0b00_0100 };
+    /// Rotation about x.
+    pub const RX: Axes = Axes { bits: 0b00_1000 };
+    /// Rotation about y.
+    pub const RY: Axes = Axes { bits: 0b01_0000 };
+    /// Rotation about z.
+    pub const RZ: Axes = Axes { bits: 0b10_0000 };
     /// Translations along x and y: a planar device.
     pub const PLANE: Axes = Axes { bits: 0b00_0011 };
     /// The three translations.
@@ -228,10 +208,24 @@ impl Axes {
     /// All six.
     pub const ALL: Axes = Axes { bits: 0b11_1111 };
 
+    /// Joins two sets: `Axes::X.with(Axes::Z)` in constants, `Axes::X | Axes::Z` elsewhere.
+    #[must_use]
+    pub const fn with(self, other: Axes) -> Axes {
+        Axes { bits: self.bits | other.bits }
+    }
+
     /// True if all of `other` is among them.
     #[must_use]
     pub const fn contains(self, other: Axes) -> bool {
         self.bits & other.bits == other.bits
+    }
+}
+
+impl std::ops::BitOr for Axes {
+    type Output = Axes;
+
+    fn bitor(self, other: Axes) -> Axes {
+        self.with(other)
     }
 }
 

@@ -91,7 +91,7 @@ static uint32_t deactivate(FlotorInstance instance) {
     return FlotorCallStatus_Ok;
 }
 
-static uint32_t read_handle(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
+static FlotorCycleCode read_handle(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
     const Handle *handle = instance;
     IN_READ
     memset(state, 0, sizeof *state);
@@ -104,7 +104,7 @@ static uint32_t read_handle(FlotorInstance instance, const FlotorTick *tick, Flo
     return FLOTOR_CYCLE_FRESH;
 }
 
-static uint32_t write_handle(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
+static FlotorCycleCode write_handle(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
     (void)tick;
     Handle *handle = instance;
     handle->held = *wrench;

@@ -83,7 +83,11 @@ static uint32_t deactivate(FlotorInstance instance) {
     return FlotorCallStatus_Ok;
 }
 
-static uint32_t read_post(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
+#ifndef RESULT
+#define RESULT FLOTOR_CYCLE_FRESH
+#endif
+
+static FlotorCycleCode read_post(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
     const Post *post = instance;
     memset(state, 0, sizeof *state);
     state->pose.position_m[2] = -0.001;
@@ -92,10 +96,10 @@ static uint32_t read_post(FlotorInstance instance, const FlotorTick *tick, Floto
     if (!atomic_load(&post->stopped)) {
         state->delivered = post->held;
     }
-    return FLOTOR_CYCLE_FRESH;
+    return RESULT;
 }
 
-static uint32_t write_post(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
+static FlotorCycleCode write_post(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
     (void)tick;
     Post *post = instance;
     post->held = *wrench;

@@ -12,8 +12,49 @@ use crate::{
 use std::ffi::c_void;
 use std::marker::PhantomData;
 
+/// Result of `read` and `write` as it crosses the boundary: a type of its own, so that no other code of the contract is taken for
+/// one. 4 bytes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+pub struct CycleCode {
+    /// 0 fresh, 1 stale, 256 + a fault.
+    pub(super) code: u32,
+}
+
+/// Bit of a code that marks a fault.
+const FAULT_BIT: u32 = 0x100;
+
+impl From<Cycle> for CycleCode {
+    fn from(cycle: Cycle) -> Self {
+        let code = match cycle {
+            Cycle::Fresh => 0,
+            Cycle::Stale => 1,
+            Cycle::Fault(fault) => FAULT_BIT | fault as u32,
+        };
+        Self { code }
+    }
+}
+
+#[cfg(feature = "loader")]
+impl CycleCode {
+    /// Returns the result that the code stands for, if any.
+    #[inline]
+    pub(super) const fn cycle(self) -> Option<Cycle> {
+        match self.code {
+            0 => Some(Cycle::Fresh),
+            1 => Some(Cycle::Stale),
+            code if code & FAULT_BIT == 0 => None,
+            code => match Fault::from_code(code & !FAULT_BIT) {
+                Some(fault) => Some(Cycle::Fault(fault)),
+                None => None,
+            },
+        }
+    }
+}
+
 /// `flotor.device/1`. `open` and `activate` return 0 or a [`crate::RefusalKind`] and say why in the message;
-/// `read` and `write` return the code of a [`crate::Cycle`]; the others a [`super::CallStatus`] code.
+/// `read` and `write` return a [`CycleCode`]; the others a [`super::CallStatus`] code.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -46,11 +87,13 @@ pub struct DeviceTable {
     /// Zero wrench, then opened again. Not real-time.
     pub deactivate: Option<unsafe extern "C" fn(instance: Instance) -> u32>,
     /// Newest sample. Real-time.
-    pub read:
-        Option<unsafe extern "C" fn(instance: Instance, tick: *const Tick, state: *mut DeviceState) -> u32>,
+    pub read: Option<
+        unsafe extern "C" fn(instance: Instance, tick: *const Tick, state: *mut DeviceState) -> CycleCode,
+    >,
     /// Wrench on the hand until the next write. Real-time.
-    pub write:
-        Option<unsafe extern "C" fn(instance: Instance, tick: *const Tick, wrench: *const Wrench) -> u32>,
+    pub write: Option<
+        unsafe extern "C" fn(instance: Instance, tick: *const Tick, wrench: *const Wrench) -> CycleCode,
+    >,
     /// Actuators safe, now. Any thread, any time, also during `read` and `write`.
     pub safe_stop: Option<unsafe extern "C" fn(instance: Instance)>,
     /// Changes a live parameter at a tick boundary. Real-time. May be null.
@@ -62,6 +105,7 @@ pub struct DeviceTable {
 }
 
 layout! {
+    CycleCode { code }
     DeviceTable {
         size, parameter_count, parameters, info, open, close, capabilities, activate, deactivate, read, write,
         safe_stop, set_parameter, parameter, last_message,
@@ -153,12 +197,12 @@ unsafe extern "C" fn deactivate<D: Device>(instance: Instance) -> u32 {
     unsafe { call::<DevicePlug<D>>(instance, Phase::deactivate) }
 }
 
-/// Runs one cycle of an active device; the code of its [`Cycle`].
+/// Runs one cycle of an active device.
 ///
 /// # Safety
 /// As for every table call.
 #[inline]
-unsafe fn cycle<D: Device>(instance: Instance, body: impl FnOnce(&mut D::Active) -> Cycle) -> u32 {
+unsafe fn cycle<D: Device>(instance: Instance, body: impl FnOnce(&mut D::Active) -> Cycle) -> CycleCode {
     let mut cycle = Cycle::Fault(Fault::Broken);
     // SAFETY: by the contract of this function.
     let _ = unsafe {
@@ -167,15 +211,23 @@ unsafe fn cycle<D: Device>(instance: Instance, body: impl FnOnce(&mut D::Active)
             Ok(())
         })
     };
-    cycle.code()
+    cycle.into()
 }
 
-unsafe extern "C" fn read<D: Device>(instance: Instance, tick: *const Tick, state: *mut DeviceState) -> u32 {
+unsafe extern "C" fn read<D: Device>(
+    instance: Instance,
+    tick: *const Tick,
+    state: *mut DeviceState,
+) -> CycleCode {
     // SAFETY: as in `capabilities`.
     unsafe { cycle::<D>(instance, |device| device.read(&*tick, &mut *state)) }
 }
 
-unsafe extern "C" fn write<D: Device>(instance: Instance, tick: *const Tick, wrench: *const Wrench) -> u32 {
+unsafe extern "C" fn write<D: Device>(
+    instance: Instance,
+    tick: *const Tick,
+    wrench: *const Wrench,
+) -> CycleCode {
     // SAFETY: as in `capabilities`.
     unsafe { cycle::<D>(instance, |device| device.write(&*tick, &*wrench)) }
 }

@@ -29,8 +29,8 @@ mod text;
 #[cfg(feature = "loader")]
 pub mod loader;
 
+pub use device::{CycleCode, DeviceTable, device_entry, device_entry_with};
 pub(crate) use device::{DevicePlug, not_opened};
-pub use device::{DeviceTable, device_entry, device_entry_with};
 pub use entry::{
     ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, CallStatus, Entry, HOST_QUIET_PANICS, Host, Instance,
     LayoutProof, MAGIC, PluginKind,

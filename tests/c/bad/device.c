@@ -123,7 +123,7 @@ static uint32_t deactivate(FlotorInstance instance) {
     return FlotorCallStatus_Ok;
 }
 
-static uint32_t read_post(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
+static FlotorCycleCode read_post(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
     const Post *post = instance;
     bool stopped = atomic_load(&post->stopped);
 #ifdef STALE
@@ -169,7 +169,7 @@ static uint32_t read_post(FlotorInstance instance, const FlotorTick *tick, Floto
 #endif
 }
 
-static uint32_t write_post(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
+static FlotorCycleCode write_post(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
     (void)tick;
     Post *post = instance;
     post->held = *wrench;

@@ -174,7 +174,7 @@ static void spoil(Handle *handle, FlotorDeviceState *state) {
     }
 }
 
-static uint32_t read_handle(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
+static FlotorCycleCode read_handle(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
     Handle *handle = instance;
     if (handle->number[FAULT_AT] > 0.0 && tick->index >= (uint64_t)handle->number[FAULT_AT]) {
         return FLOTOR_CYCLE_FAULT(FlotorFault_OverTemperature);
@@ -204,7 +204,7 @@ static uint32_t read_handle(FlotorInstance instance, const FlotorTick *tick, Flo
     return FLOTOR_CYCLE_FRESH;
 }
 
-static uint32_t write_handle(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
+static FlotorCycleCode write_handle(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
     Handle *handle = instance;
     note(handle, COMMANDED, tick->index, wrench);
     return share(handle) < handle->number[UNTAKEN] ? FLOTOR_CYCLE_STALE : FLOTOR_CYCLE_FRESH;

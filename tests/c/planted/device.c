@@ -122,7 +122,7 @@ static uint32_t deactivate(FlotorInstance instance) {
                                                                 : (uint32_t)FlotorCallStatus_WrongPhase;
 }
 
-static uint32_t read_handle(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
+static FlotorCycleCode read_handle(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
     Handle *handle = instance;
     memset(state, 0, sizeof *state);
     state->pose.position_m[2] = -0.001;
@@ -154,7 +154,7 @@ static uint32_t read_handle(FlotorInstance instance, const FlotorTick *tick, Flo
         }
         break;
     case FAULT_far_pose: state->pose.position_m[2] = -1.0e30; break;
-    case FAULT_unknown_cycle: return 0xdeadU;
+    case FAULT_unknown_cycle: return flotor_cycle(0xdeadU);
     case FAULT_read_stale: return FLOTOR_CYCLE_STALE;
     case FAULT_time_lie: state->sampled_ns = UINT64_MAX; break;
     case FAULT_time_zero: state->sampled_ns = 0; break;
@@ -169,7 +169,7 @@ static uint32_t read_handle(FlotorInstance instance, const FlotorTick *tick, Flo
     return FLOTOR_CYCLE_FRESH;
 }
 
-static uint32_t write_handle(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
+static FlotorCycleCode write_handle(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
     (void)tick;
     Handle *handle = instance;
     handle->writes += 1;

@@ -45,6 +45,19 @@ fn device_and_model_in_c_run_a_scene() {
     }
 }
 
+#[test]
+fn a_fault_is_no_cycle_for_a_compiler_and_an_unknown_cycle_is_named() {
+    let scratch = Scratch::default();
+    let fault = std::panic::catch_unwind(|| compiled(&Scratch::default(), "post", &["RESULT=FlotorFault_Disconnected"]));
+    assert!(fault.is_err(), "it compiles");
+    let post = compiled(&scratch, "post", &["RESULT=flotor_cycle(5u)"]);
+    let scene = scratch.file("scene.toml", format!("duration_s = 1\n[device]\nplugin = {post:?}\n"));
+    let ran = Flotor::with(["run", &scene.display().to_string(), "--clock", "virtual"]).run();
+    assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:#?}");
+    let named = "`read` returned 5, which is no cycle; a fault is FLOTOR_CYCLE_FAULT(5)";
+    assert!(ran.stderr.contains(named), "{ran:#?}");
+}
+
 /// A device of another maker rounds its orientation to six decimals or to single precision: its models must not answer zero.
 #[test]
 fn an_orientation_that_the_host_accepts_has_the_force_of_one_of_length_one() {

@@ -4,9 +4,9 @@ use super::capabilities::{check, check_unchanged};
 use super::float_control::keeping_floats;
 use super::model::refusal_from;
 use super::setting::{Setting, index_of, live_index, to_raw};
-use crate::abi::{CallStatus, DeviceTable, Instance, Message};
+use crate::abi::{CallStatus, CycleCode, DeviceTable, Instance, Message};
 use crate::extension::DeviceExtensions;
-use crate::{Axes, Capabilities, Cycle, DeviceState, LoopConfig, Parameter, Refusal, Tick, Wrench};
+use crate::{Axes, Capabilities, Cycle, DeviceState, Fault, LoopConfig, Parameter, Refusal, Tick, Wrench};
 use std::sync::Arc;
 
 /// A function that writes one answer.
@@ -48,8 +48,10 @@ pub struct ActiveDevice {
     handle: Option<Arc<Handle>>,
     told: Option<Box<Capabilities>>,
     instance: Instance,
-    read: unsafe extern "C" fn(Instance, *const Tick, *mut DeviceState) -> u32,
-    write: unsafe extern "C" fn(Instance, *const Tick, *const Wrench) -> u32,
+    read: unsafe extern "C" fn(Instance, *const Tick, *mut DeviceState) -> CycleCode,
+    write: unsafe extern "C" fn(Instance, *const Tick, *const Wrench) -> CycleCode,
+    /// First result outside the contract, with the function that returned it.
+    unknown: Option<(&'static str, CycleCode)>,
     /// Calls that left the floating-point environment changed.
     pub(crate) float_changes: u64,
     /// Those that were told.
@@ -159,6 +161,7 @@ impl OpenedDevice {
                     instance,
                     read,
                     write,
+                    unknown: None,
                     float_changes,
                     float_changes_told: 0,
                 })
@@ -196,7 +199,17 @@ impl ActiveDevice {
     pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         // SAFETY: a live, active instance used by this thread only (`&mut`), pointers valid for the call.
         let read = || unsafe { (self.read)(self.instance, tick, state) };
-        Cycle::from_code(keeping_floats(&mut self.float_changes, read))
+        let code = keeping_floats(&mut self.float_changes, read);
+        self.known("read", code)
+    }
+
+    /// Returns the result that a code stands for; one outside the contract is a fault, and kept for the message.
+    #[inline]
+    fn known(&mut self, function: &'static str, code: CycleCode) -> Cycle {
+        code.cycle().unwrap_or_else(|| {
+            self.unknown.get_or_insert((function, code));
+            Cycle::Fault(Fault::Broken)
+        })
     }
 
     /// Calls so far that left rounding mode, flush-to-zero or traps of the thread changed; each time the host has put them
@@ -219,7 +232,8 @@ impl ActiveDevice {
     pub fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
         // SAFETY: as in `read`.
         let written = || unsafe { (self.write)(self.instance, tick, wrench) };
-        Cycle::from_code(keeping_floats(&mut self.float_changes, written))
+        let code = keeping_floats(&mut self.float_changes, written);
+        self.known("write", code)
     }
 
     /// Changes a live parameter, by its index in the schema, at a tick boundary (for a choice, `value` is its index).
@@ -246,9 +260,14 @@ impl ActiveDevice {
         asked(self.instance, ask, answer)
     }
 
-    /// What the device said when a call failed. Not real-time.
+    /// Returns the device's message about the call that failed, or the result that is outside the contract. Not real-time.
     #[must_use]
     pub fn last_message(&mut self) -> String {
+        if let Some((function, CycleCode { code })) = self.unknown {
+            return format!(
+                "`{function}` returned {code}, which is no cycle; a fault is FLOTOR_CYCLE_FAULT({code})"
+            );
+        }
         let mut message = Message::default();
         if let Some(last_message) = self.handle.as_ref().and_then(|handle| handle.table.last_message) {
             // SAFETY: as in `read`; the out pointer is valid for the call.

@@ -90,7 +90,7 @@ static uint32_t deactivate(FlotorInstance instance) {
 }
 
 /* The newest sample, without waiting: no allocation, no lock. Nothing new is FLOTOR_CYCLE_STALE. */
-static uint32_t read_state(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
+static FlotorCycleCode read_state(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
     const YourName *device = instance;
     double phase_rad = OMEGA_RAD_PER_S * 1.0e-9 * (double)tick->time_ns;
     memset(state, 0, sizeof *state);
@@ -103,7 +103,7 @@ static uint32_t read_state(FlotorInstance instance, const FlotorTick *tick, Flot
 }
 
 /* The wrench from now on, without waiting; none once somebody has stopped the device. */
-static uint32_t write_wrench(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
+static FlotorCycleCode write_wrench(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
     (void)tick;
     YourName *device = instance;
     device->commanded = atomic_load(&device->stopped) ? (FlotorWrench){0} : *wrench;
