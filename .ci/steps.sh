@@ -47,7 +47,7 @@ tools="cc:gcc c++:g++ valgrind:valgrind Xvfb:xvfb xdotool:xdotool qemu-x86_64:qe
 libraries="libegl1 libgl1-mesa-dri libxkbcommon-x11-0"
 
 # What the tests use has to be here: where a tool is missing they fail instead of being skipped.
-export FLOTOR_REQUIRE=${FLOTOR_REQUIRE-cc,cxx,valgrind,display,qemu,python}
+export FLOTOR_REQUIRE=${FLOTOR_REQUIRE-cc,cxx,valgrind,display,qemu,python,rustfmt}
 
 # What is not here, by package.
 missing_packages() {

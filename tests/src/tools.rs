@@ -29,10 +29,12 @@ pub enum Tool {
     SciencePython,
     /// R, without any package.
     R,
+    /// The formatter of Rust. A link of that name may lead nowhere: who needs it calls [`lacks`].
+    Rustfmt,
 }
 
 impl Tool {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::Cc,
         Self::Cxx,
         Self::Valgrind,
@@ -42,6 +44,7 @@ impl Tool {
         Self::Python,
         Self::SciencePython,
         Self::R,
+        Self::Rustfmt,
     ];
 
     /// Its word in [`VARIABLE`].
@@ -56,6 +59,7 @@ impl Tool {
             Self::Python => "python",
             Self::SciencePython => "science-python",
             Self::R => "r",
+            Self::Rustfmt => "rustfmt",
         }
     }
 
@@ -65,7 +69,7 @@ impl Tool {
             Self::Cxx => &["c++"],
             Self::Valgrind => &["valgrind"],
             Self::Display => &["Xvfb", "xdotool"],
-            Self::Adapter | Self::SciencePython => &[],
+            Self::Adapter | Self::SciencePython | Self::Rustfmt => &[],
             Self::Qemu => &["qemu-system-x86_64"],
             Self::Python => &["python3"],
             Self::R => &["Rscript"],

@@ -1,6 +1,7 @@
 //! What a run says about itself: numbers for machines, a page for people.
 
 use crate::feel::Feel;
+use crate::scene::Isolation;
 use crate::telemetry::LinkCounts;
 use crate::{DeviceOutcome, Misbehaved, Observer, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
@@ -376,6 +377,9 @@ pub struct PluginSummary {
     pub version: String,
     /// File it was loaded from.
     pub file: String,
+    /// Of a model: "process" if it runs in a process of its own, "none" if in the loop, as `isolation` of a scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub isolation: Option<&'static str>,
     /// "ok", or what happened to it.
     pub health: String,
     /// Every parameter with the value in force.
@@ -605,7 +609,8 @@ impl RunSummary {
         }
         for plugin in &self.plugins {
             let health = if plugin.health == "ok" { String::new() } else { format!("  {}", plugin.health) };
-            row(plugin.kind, format!("{} {} ({}){health}", plugin.id, plugin.version, plugin.file));
+            let place = if plugin.isolation == Some("process") { ", in a process of its own" } else { "" };
+            row(plugin.kind, format!("{} {} ({}){place}{health}", plugin.id, plugin.version, plugin.file));
             for (name, value) in &plugin.estimates {
                 row("", format!("{name} {value:.1e}, by the model's own estimate"));
             }
@@ -741,6 +746,7 @@ fn summary_of(plugin: &PluginReport, health: String) -> PluginSummary {
         kind: plugin.metadata.kind.word(),
         version: plugin.metadata.version.clone(),
         file: plugin.metadata.path.display().to_string(),
+        isolation: plugin.isolation.map(Isolation::word),
         health,
         parameters: plugin.parameters.iter().cloned().collect(),
         estimates: plugin.estimates.iter().cloned().collect(),

@@ -148,21 +148,26 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
     const MODEL_TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/model-test.toml"));
     const MODEL_CURVE: (&str, &str) = ("your-name.csv", include_str!("templates/model.csv"));
     const WORKFLOW: (&str, &str) = (".github/workflows/haptics.yml", include_str!("templates/workflow.yml"));
+    const DEVICE_TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/device-test.toml"));
     const MANIFEST: (&str, &str) = ("Cargo.toml", include_str!("templates/rust/manifest.toml"));
+    const STYLE: (&str, &str) = ("rustfmt.toml", "max_width = 110\nuse_small_heuristics = \"Max\"\n");
     match (kind, language) {
         (PluginKind::Model, Language::Rust) => {
             const MODEL: (&str, &str) = ("src/lib.rs", include_str!("templates/rust/model.rs"));
-            &[MODEL, MODEL_SCENE, MODEL_TEST, MODEL_CURVE, WORKFLOW, MANIFEST, IGNORE]
+            const SHAPE: (&str, &str) = ("src/shape.rs", include_str!("templates/rust/shape.rs"));
+            &[MODEL, SHAPE, MODEL_SCENE, MODEL_TEST, MODEL_CURVE, WORKFLOW, MANIFEST, STYLE, IGNORE]
         }
         (PluginKind::Device, Language::Rust) => {
-            &[("src/lib.rs", include_str!("templates/rust/device.rs")), DEVICE_SCENE, MANIFEST, IGNORE]
+            const DEVICE: (&str, &str) = ("src/lib.rs", include_str!("templates/rust/device.rs"));
+            &[DEVICE, DEVICE_SCENE, DEVICE_TEST, WORKFLOW, MANIFEST, STYLE, IGNORE]
         }
         (PluginKind::Model, Language::C) => {
             const MODEL: (&str, &str) = ("plugin.c", include_str!("templates/c/model.c"));
             &[MODEL, MODEL_SCENE, MODEL_TEST, MODEL_CURVE, WORKFLOW, HEADER, IGNORE]
         }
         (PluginKind::Device, Language::C) => {
-            &[("plugin.c", include_str!("templates/c/device.c")), DEVICE_SCENE, HEADER, IGNORE]
+            const DEVICE: (&str, &str) = ("plugin.c", include_str!("templates/c/device.c"));
+            &[DEVICE, DEVICE_SCENE, DEVICE_TEST, WORKFLOW, HEADER, IGNORE]
         }
     }
 }

@@ -48,7 +48,9 @@ fn device_and_model_in_c_run_a_scene() {
 #[test]
 fn a_fault_is_no_cycle_for_a_compiler_and_an_unknown_cycle_is_named() {
     let scratch = Scratch::default();
-    let fault = std::panic::catch_unwind(|| compiled(&Scratch::default(), "post", &["RESULT=FlotorFault_Disconnected"]));
+    let fault = std::panic::catch_unwind(|| {
+        compiled(&Scratch::default(), "post", &["RESULT=FlotorFault_Disconnected"])
+    });
     assert!(fault.is_err(), "it compiles");
     let post = compiled(&scratch, "post", &["RESULT=flotor_cycle(5u)"]);
     let scene = scratch.file("scene.toml", format!("duration_s = 1\n[device]\nplugin = {post:?}\n"));

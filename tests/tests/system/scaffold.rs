@@ -4,6 +4,7 @@
 use flotor_tests::library::build_folder;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::{Tool, lacks};
 use flotor_tests::{TestSize, workspace_root};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -48,7 +49,7 @@ fn built_in(language: &str) -> &'static str {
     if language == "rust" { "target/release" } else { "." }
 }
 
-/// Validates it, runs its scene on the virtual clock and returns the peak force on the hand, N.
+/// Validates it, runs its scene on the virtual clock and its test, and returns the peak force on the hand, N.
 fn peak_force_n(folder: &Path, name: &str, language: &str) -> f64 {
     let library = format!("{}/lib{}.so", built_in(language), name.replace('-', "_"));
     let ran = Flotor::with(["validate", &library]).inside(folder).run();
@@ -57,6 +58,8 @@ fn peak_force_n(folder: &Path, name: &str, language: &str) -> f64 {
         Flotor::with(["run", "scene.toml", "--clock", "virtual", "--duration", "2s", "--json", "run.json"]);
     let ran = ran.inside(folder).run();
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:?}");
+    let ran = Flotor::with(["test", &format!("{name}.test.toml")]).inside(folder).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let json = std::fs::read_to_string(folder.join("run.json")).expect("the summary was requested");
     let json: serde_json::Value = serde_json::from_str(&json).expect("a summary is JSON");
     json["peak_force_n"].as_f64().expect("the summary has the peak force")
@@ -107,6 +110,27 @@ fn a_new_device_builds_validates_and_moves() {
         // Spring 1 at 4 mm: k_hand is gamma / L0 = 679 N/m without the demo's scale; the energy form adds little.
         let peak = peak_force_n(&folder, &name, language);
         assert!((peak - 2.7).abs() < 0.3, "{language}: {peak} N");
+    }
+}
+
+#[test]
+fn a_new_plugin_in_rust_is_formatted_whatever_its_name() {
+    let installed = Command::new("rustfmt").arg("--version").output();
+    if !installed.is_ok_and(|output| output.status.success()) {
+        return lacks(Tool::Rustfmt, "rustfmt is not installed");
+    }
+    for name in ["j", "jelly", "jelly-with-a-name-of-32-letters"] {
+        for kind in ["model", "device"] {
+            let scratch = Scratch::default();
+            let ran = new(scratch.path(), &[kind, name]);
+            assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+            let mut format = Command::new("rustfmt");
+            format
+                .args(["--edition", "2024", "--check", "src/lib.rs"])
+                .current_dir(scratch.path().join(name));
+            let checked = format.output().expect("it is installed");
+            assert!(checked.status.success(), "{kind} {name}: {}", String::from_utf8_lossy(&checked.stdout));
+        }
     }
 }
 

@@ -100,27 +100,21 @@ fn a_defect_of_the_model_is_found_with_its_cause_and_a_picture() {
     if !required(Tool::Cc) {
         return;
     }
-    const FORCE: &str = "output->wrench.force_n[2] = model->stiffness_n_per_m * depth_m;";
+    const FORCE: &str = "output->wrench.force_n[2] = values[STIFFNESS] * depth_m;";
     for (name, from, to, case, says) in [
-        (
-            "sign",
-            FORCE,
-            "output->wrench.force_n[2] = -model->stiffness_n_per_m * depth_m;",
-            "curve",
-            "fz_n at z_m",
-        ),
+        ("sign", FORCE, "output->wrench.force_n[2] = -values[STIFFNESS] * depth_m;", "curve", "fz_n at z_m"),
         ("default", ".default_ = 500.0", ".default_ = 505.0", "curve", "got 2.02"),
         (
             "allocation",
             FORCE,
-            "void *volatile lost = malloc(64); free(lost); output->wrench.force_n[2] = model->stiffness_n_per_m * depth_m;",
+            "void *volatile lost = malloc(64); free(lost); output->wrench.force_n[2] = values[STIFFNESS] * depth_m;",
             "validate",
             "rule no-system-calls",
         ),
         (
             "nan",
             FORCE,
-            "output->wrench.force_n[2] = depth_m > 0.001 && depth_m < 0.0015 ? NAN : model->stiffness_n_per_m * depth_m;",
+            "output->wrench.force_n[2] = depth_m > 0.001 && depth_m < 0.0015 ? NAN : values[STIFFNESS] * depth_m;",
             "seed 1",
             "answers were not finite",
         ),

@@ -141,6 +141,17 @@ pub enum Isolation {
     Process,
 }
 
+impl Isolation {
+    /// Returns the value of the key `isolation` in a scene; `ByOrigin`, which has none, runs in the loop once it is settled.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Process => "process",
+            Self::None | Self::ByOrigin => "none",
+        }
+    }
+}
+
 impl ModelUse {
     /// The same place with another plugin, or with none named the same one. Another plugin starts from its own
     /// defaults; `settings` come on top.

@@ -26,7 +26,7 @@ pub use unguarded::Guardian;
 use crate::calls::{Call, CallError, EndReserve, Progress, Unresponsive, end_limit, leave_behind, limit};
 use crate::long_call::Exceeded;
 use crate::registry::{LookupError, Registry};
-use crate::scene::{Pacing, Scene, SceneError};
+use crate::scene::{Isolation, Pacing, Scene, SceneError};
 use ceiling::{norm_notice, under_ceiling};
 use controls::{ChangeLog, Parts};
 use epilogue::Epilogue;
@@ -169,6 +169,8 @@ pub struct PluginReport {
     pub latency_s: f64,
     /// Of a device: the outputs of models that reach the hand there.
     pub felt: Demand,
+    /// Of a model: where it runs, its origin looked at.
+    pub isolation: Option<Isolation>,
     /// Signals of the host that it took away while it was made, and that were taken back.
     pub signals_taken: TakenSignals,
     /// What a model says of its own error when it is ready ([`crate::estimates`]), by name.

@@ -186,7 +186,8 @@ pub(super) fn prepare_model_while(
         config: *config,
         clock,
     };
-    let most = match making.isolation {
+    let isolation = making.isolation;
+    let most = match isolation {
         // A worker that is not made in time has to be ended, not left behind.
         Isolation::Process => limit() + END_OF_A_WORKER,
         Isolation::ByOrigin | Isolation::None => limit(),
@@ -196,6 +197,7 @@ pub(super) fn prepare_model_while(
     let mut report = report(&plugin, &model.name, &model.plugin, &settings, |index| value_at(&values, index));
     report.signals_taken = signals.put_back();
     report.estimates = estimates;
+    report.isolation = Some(isolation);
     Ok((layer, report))
 }
 
@@ -396,6 +398,7 @@ fn report(
         parameters,
         latency_s: 0.0,
         felt: Demand::WRENCH,
+        isolation: None,
         signals_taken: TakenSignals::default(),
         estimates: Vec::new(),
     }

@@ -3,9 +3,9 @@
 //! A device is opened (it answers questions), then active (`read` and `write`, a thousand times a second), then
 //! opened again. Metres, newtons, z up; the wrench is what the hand is to feel.
 
-use flotor_hal::{math, 
-    ActiveDevice, Axes, Capabilities, Cycle, DQuat, DVec3, Device, DeviceInfo, DeviceState, LoopConfig, Parameter,
-    Pose, Refusal, SafeStop, Settings, Tick, Twist, Wrench,
+use flotor_hal::{
+    ActiveDevice, Axes, Capabilities, Cycle, DQuat, DVec3, Device, DeviceInfo, DeviceState, LoopConfig,
+    Parameter, Pose, Refusal, SafeStop, Settings, Tick, Twist, Wrench, math,
 };
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -21,7 +21,11 @@ struct YourName {
 }
 
 impl Device for YourName {
-    const INFO: DeviceInfo = DeviceInfo::new("your-name", "Your name", "A handle that goes up and down by itself");
+    const INFO: DeviceInfo = DeviceInfo::new(
+        "your-name", // in scenes
+        "Your name", // on screens
+        "A handle that goes up and down by itself",
+    );
     const PARAMETERS: &'static [Parameter] =
         &[Parameter::real("amplitude_mm", "mm", 0.0, 10.0, 5.0, "Half the way from lowest to highest point")];
     type Active = ActiveYourName;
@@ -118,7 +122,8 @@ mod tests {
         let Ok(mut active) = opened.activate(&LoopConfig { period_ns: 1_000_000, seed: 0 }) else {
             panic!("it always activates");
         };
-        let (tick, mut state) = (Tick { index: 250, time_ns: 250_000_000, dt_ns: 1_000_000 }, DeviceState::HOME);
+        let (tick, mut state) =
+            (Tick { index: 250, time_ns: 250_000_000, dt_ns: 1_000_000 }, DeviceState::HOME);
         assert_eq!(active.write(&tick, &Wrench::from_force(DVec3::Z)), Cycle::Fresh);
         assert_eq!(active.read(&tick, &mut state), Cycle::Fresh);
         assert_eq!((state.pose.position(), state.delivered.force()), (DVec3::Z * 0.005, DVec3::Z));

@@ -1,29 +1,36 @@
-//! Your name: a floor at home height that pushes the hand up. Change `step`, build, and feel the difference.
+//! Your name: a floor that pushes the hand up. Change `step`, build, and feel the difference.
 //!
-//! A step gets where the handle is (m, z up, home at the origin) and answers with the force on the hand (N).
+//! A step gets the pose of the handle (m; z up, home at the origin) and returns the force on the hand (N).
 
-use flotor_hal::{
-    DVec3, ForceModel, Input, ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings, StepStatus, Wrench,
-};
+mod shape;
 
-/// What one instance knows between two steps.
+use flotor_hal::*;
+
+/// One instance of the model.
 struct YourName {
-    stiffness_n_per_m: f64,
+    /// Values of the parameters, in their order.
+    values: [f64; 3],
+    shape: Shape,
 }
 
-/// Deeper than this the floor pushes no harder, m: no pose may give a force without end.
-const DEEPEST_M: f64 = 0.1;
-
 impl ForceModel for YourName {
-    const INFO: ModelInfo = ModelInfo::new("your-name", "Your name", "A floor that pushes the hand up");
+    const INFO: ModelInfo = ModelInfo::new(
+        "your-name", // in scenes
+        "Your name", // on screens
+        "A floor that pushes the hand up",
+    );
 
-    // Id, unit, smallest, largest, default, words for people. `live`: may change while somebody feels it.
-    const PARAMETERS: &'static [Parameter] =
-        &[Parameter::real("stiffness_n_per_m", "N/m", 0.0, 5000.0, 500.0, "Stiffness of the floor").live()];
+    // Id, unit, smallest, largest, default, description. `live`: may change during a run.
+    const PARAMETERS: &'static [Parameter] = &[
+        Parameter::real("stiffness_n_per_m", "N/m", 0.0, 5000.0, 500.0, "Stiffness of the floor").live(),
+        Parameter::real("height_mm", "mm", -10.0, 10.0, 0.0, "Height of the floor").live(),
+        Parameter::real("thickness_mm", "mm", 1.0, 100.0, 50.0, "Depth of the largest force").live(),
+    ];
 
     // Before the loop: the place to allocate, to read files, and to refuse with a reason.
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        Ok(Self { stiffness_n_per_m: settings.number_or_default("stiffness_n_per_m") })
+        let ids = ["stiffness_n_per_m", "height_mm", "thickness_mm"];
+        Ok(Self { values: ids.map(|id| settings.number_or_default(id)), shape: Shape::default() })
     }
 
     // In the loop, a thousand times a second: no allocation, no lock, no printing; every pose gets an answer.
@@ -31,42 +38,44 @@ impl ForceModel for YourName {
         if !input.pose.is_finite() {
             return Output::new(Wrench::ZERO, f64::NAN, StepStatus::InvalidInput);
         }
-        let depth_m = (-input.pose.position().z).clamp(0.0, DEEPEST_M);
-        Wrench::from_force(DVec3::Z * self.stiffness_n_per_m * depth_m).into()
+        let [stiffness_n_per_m, height_mm, thickness_mm] = self.values;
+        let depth_m = (1e-3 * height_mm - input.pose.position().z).clamp(0.0, 1e-3 * thickness_mm);
+        Wrench::from_force(DVec3::Z * stiffness_n_per_m * depth_m).into()
     }
 
-    // Between two steps: one of the live parameters, already checked against its range.
-    fn set_parameter(&mut self, _index: usize, value: f64) -> Result<(), OutOfRange> {
-        self.stiffness_n_per_m = value;
+    // Between two steps: the new value of a live parameter, inside its range.
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        self.values[index] = value;
         Ok(())
     }
 
-    fn parameter(&self, _index: usize) -> f64 {
-        self.stiffness_n_per_m
+    fn parameter(&self, index: usize) -> f64 {
+        self.values[index]
     }
 }
 
-flotor_hal::export_model!(YourName);
+flotor_hal::export_model!(YourName, shape);
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_hal::{DQuat, Pose};
 
     fn force_n_at_height(z_m: f64) -> DVec3 {
-        let mut model = YourName { stiffness_n_per_m: 500.0 };
-        model.step(&Input::at_rest(Pose::new(DVec3::Z * z_m, DQuat::IDENTITY))).wrench.force()
+        let (values, shape) = ([500.0, 0.0, 50.0], Shape::default());
+        let mut model = YourName { values, shape };
+        let pose = Pose::new(DVec3::Z * z_m, DQuat::IDENTITY);
+        model.step(&Input::at_rest(pose)).wrench.force()
     }
 
     #[test]
-    fn below_home_it_pushes_up_and_above_it_is_not_there() {
+    fn below_home_it_pushes_up_and_above_there_is_nothing() {
         assert_eq!(force_n_at_height(-0.004), DVec3::Z * 2.0); // 500 N/m times 4 mm
         assert_eq!(force_n_at_height(0.004), DVec3::ZERO);
     }
 
     #[test]
-    fn no_pose_gives_a_force_without_end() {
-        assert_eq!(force_n_at_height(-1.0e300), DVec3::Z * 50.0);
+    fn the_force_is_bounded() {
+        assert_eq!(force_n_at_height(-1.0e300), DVec3::Z * 25.0);
         assert_eq!(force_n_at_height(f64::NAN), DVec3::ZERO);
     }
 }
