@@ -9,7 +9,8 @@
 //! them needs it, with [`Real::select`] keeping the others as they were.
 //!
 //! [`angle`] gives squared angles and twists, [`arctangent`] angles from sides, [`saturation`] keeps a quantity short of a pole: polynomials
-//! over [`Real`], without the functions of a math library.
+//! over [`Real`], without the functions of a math library. [`entire`] and [`stability`] are the functions of a loaded column. [`chebyshev`]
+//! fits polynomials, [`basis`] has those of a field along a rod, and [`matrix`] solves small symmetric systems.
 //!
 //! The lanes come from the crate `pulp`, which finds the instruction set of the machine at run time.
 
@@ -19,7 +20,12 @@ use pulp::Simd;
 
 pub mod angle;
 pub mod arctangent;
+pub mod basis;
+pub mod chebyshev;
+pub mod entire;
+pub mod matrix;
 pub mod saturation;
+pub mod stability;
 
 /// Functions that are always inlined. In lanes they must be: only where the code around them is compiled for a set of
 /// instructions do they become those. With `#[inline]` alone a batch takes ten times as many (`energy` 3436 a pose instead

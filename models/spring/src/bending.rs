@@ -15,12 +15,12 @@
 //!
 //! where `kt` is the writhe of the axis: bent in one direction and swayed in the other, the rod winds.
 
-use crate::beam_column::StabilityFunctions;
 use crate::quartic::{Quartic, QuarticEnergy};
 use crate::rigidity::Spring;
 use flotor_lanes::Real;
 use flotor_lanes::angle::SquaredAngle;
 use flotor_lanes::saturation::{Saturated, saturate_above};
+use flotor_lanes::stability::StabilityFunctions;
 
 /// Argument `z` from which on it saturates below the pole at 9.87, where the column buckles. Here
 /// `G0 = 0.062` and the bow stiffness is -16 times that of the unloaded rod.

@@ -11,10 +11,10 @@ use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::math;
 
 use crate::bending::saturated_argument;
-use crate::entire::EntireFunctions;
 use crate::pose::{Pose, quaternion};
 use crate::rigidity::{Geometry, Spring};
 use crate::shape::Shape;
+use flotor_lanes::entire::EntireFunctions;
 
 /// The coil wound around the centerline, for drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]

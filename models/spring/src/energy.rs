@@ -23,7 +23,7 @@
 //! compression; the error of the wrench is of fifth order in them, of third order where the plate is twisted as
 //! well.
 //!
-//! Near buckling (`G0` towards zero, see [`crate::entire`]) the bow stiffness runs to minus infinity. Short of
+//! Near buckling (`G0` towards zero, see [`flotor_lanes::entire`]) the bow stiffness runs to minus infinity. Short of
 //! the pole its argument levels off, see [`KNEE`](crate::bending::KNEE): the spring goes on from there as one
 //! that is about to buckle and never does. `W` stays a smooth function of the pose.
 //!

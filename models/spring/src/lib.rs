@@ -5,7 +5,7 @@
 //! - [`pose`]: where the upper plate is; [`response`], [`validity`]: what a law answers.
 //! - [`flotor_lanes`]: formulas written once, for one pose and for several side by side, angles and saturation among them;
 //!   [`batch`] runs them over many.
-//! - [`entire`] and [`beam_column`]: the functions of the compressed rod, without branches or poles of their own.
+//! - [`beam_column`]: how a compressed rod resists rotations of its ends, without branches or poles of its own.
 //! - [`thesis`]: the thesis's printed code with every branch, window and jump, for comparison.
 //! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`precision`]
 //!   says in which format its numbers are stored.
@@ -28,7 +28,6 @@ pub mod closed_form;
 pub mod contact;
 pub mod contract;
 pub mod energy;
-pub mod entire;
 pub mod held;
 mod pace;
 mod parameters;

@@ -39,13 +39,13 @@
 use std::f64::consts::PI;
 
 use flotor_hal::glam::DVec4;
-use flotor_hal::math;
 
 use crate::beam_column::Column;
 use crate::bending::{KNEE, REACH};
-use crate::entire::EntireFunctions;
 use crate::rigidity::{Rigidities, Spring};
 use crate::shape::Shape;
+use flotor_lanes::chebyshev::interpolated;
+use flotor_lanes::entire::EntireFunctions;
 use flotor_lanes::saturation::{Saturated, saturate_above, saturate_below};
 use flotor_lanes::{Real, polynomial};
 
@@ -130,9 +130,10 @@ impl Quartic {
         let margin = MARGIN.min(0.5 * (longest - 1.0));
         // Lengths from `shortest` to `longest` are mapped to -1 to 1, where the polynomials are fitted.
         let (middle, half_width) = (0.5 * (longest + shortest), 0.5 * (longest - shortest));
-        let powers = fit(|mapped| coefficients(rigidities, free_length_m, middle + half_width * mapped));
+        let powers =
+            interpolated(|mapped| coefficients(rigidities, free_length_m, middle + half_width * mapped));
         Self {
-            powers: std::array::from_fn(|which| powers.map(|powers| powers[which])),
+            powers: std::array::from_fn(|which| powers.map(|powers: DVec4| powers[which])),
             gamma_n: spring.rigidities().gamma_n,
             shortest: Limit { knee_m: knee * free_length_m, reach_m: (knee - shortest) * free_length_m },
             longest: Limit { knee_m: (longest - margin) * free_length_m, reach_m: margin * free_length_m },
@@ -226,44 +227,6 @@ fn relative_length(rigidities: &Rigidities, free_length_m: f64, z: f64) -> Optio
 fn longest_with_shape(rigidities: &Rigidities) -> f64 {
     let excess = 1.0 - rigidities.gamma_n / rigidities.beta_n;
     if excess < 0.0 { 1.0 - 0.5 / excess } else { f64::INFINITY }
-}
-
-/// Interpolates at the Chebyshev nodes and converts to powers, on -1..1.
-fn fit(function: impl Fn(f64) -> DVec4) -> [DVec4; TERMS] {
-    let terms = TERMS as f64;
-    let mut chebyshev = [DVec4::ZERO; TERMS];
-    for node in 0..TERMS {
-        let angle = PI * (node as f64 + 0.5) / terms;
-        let mapped = math::cos(angle);
-        let value = function(mapped) * (2.0 / terms);
-        // T(n+1) = 2 x T(n) - T(n-1)
-        let (mut current, mut next) = (1.0, mapped);
-        for coefficient in &mut chebyshev {
-            *coefficient += value * current;
-            (current, next) = (next, 2.0 * mapped * next - current);
-        }
-    }
-    chebyshev[0] *= 0.5;
-
-    // The same recurrence, carried along as powers.
-    let mut powers = [DVec4::ZERO; TERMS];
-    let (mut current, mut next) = ([0.0; TERMS], [0.0; TERMS]);
-    current[0] = 1.0;
-    next[1] = 1.0;
-    for coefficient in chebyshev {
-        for (power, weight) in powers.iter_mut().zip(current) {
-            *power += coefficient * weight;
-        }
-        let mut after = [0.0; TERMS];
-        for (i, weight) in next.iter().enumerate().take(TERMS - 1) {
-            after[i + 1] = 2.0 * weight;
-        }
-        for (weight, previous) in after.iter_mut().zip(current) {
-            *weight -= previous;
-        }
-        (current, next) = (next, after);
-    }
-    powers
 }
 
 /// Means of products of the two shapes along the rod. Mixed means of odd order in the bow vanish.

@@ -9,12 +9,11 @@
 //! One idea a module:
 //! - `plate`: the upper plate in coordinates free of trigonometry; `section`: the energy of a section in
 //!   them.
-//! - `basis`: the polynomials the shape is made of; `functional`: the energy as a function of their
-//!   coefficients, with all that is quadratic eliminated; its derivatives by the pose are force and torque.
+//! - `functional`: the energy as a function of the coefficients of the polynomials of the shape ([`flotor_lanes::basis`]), with all
+//!   that is quadratic eliminated; its derivatives by the pose are force and torque.
 //! - `contact`: coils that touch.
 //! - `curve`: where the sections are, for drawing.
-//! - `matrix`: solves, and counts unstable directions; `predictor`, `equilibrium`: follow the minimum in
-//!   time; `start`: where to begin without a past.
+//! - `predictor`, `equilibrium`: follow the minimum in time, and count unstable directions by [`flotor_lanes::matrix`]; `start`: where to begin without a past.
 //! - `descent`: the equilibrium of a pose without a past, fast, from the straight `column`; `search_energy`: the energy
 //!   it asks for.
 //!
@@ -44,14 +43,12 @@ use functional::Ratios;
 use plate::Plate;
 use search_energy::{BUBBLES, COEFFICIENTS, STATIONS};
 
-pub(crate) mod basis;
 mod column;
 pub(crate) mod contact;
 mod curve;
 mod descent;
 mod equilibrium;
 mod functional;
-pub(crate) mod matrix;
 mod plate;
 mod predictor;
 mod search_energy;

@@ -11,7 +11,7 @@
 //! magnification `m = 1 + pi²/(pi² - z)` of a bow close to buckling ([`crate::quartic`]); `c`
 //! because the sway of a slender rod takes length from it, and so load. Sines stand for the angles. From
 //! a first bound of that estimate on the rod takes over, and at a second it is alone; likewise by the length of the
-//! chord, as `G0` of [`crate::entire`] falls from 1 at rest to 0 at buckling, because past that `energy` knows no bulge.
+//! chord, as `G0` of [`flotor_lanes::entire`] falls from 1 at rest to 0 at buckling, because past that `energy` knows no bulge.
 //!
 //! Where any two of chord and normals stand more than 66 degrees apart, or the plate is twisted as much, the share falls
 //! again, to zero at 78 degrees: a rod whose plates stand beside one another, or past one another, has several shapes, and
@@ -22,9 +22,9 @@ use std::f64::consts::PI;
 use flotor_hal::glam::{DQuat, DVec3};
 
 use crate::beam_column::TRUSTED_ARGUMENT;
-use crate::entire::EntireFunctions;
 use crate::pose::{Chord, Pose};
 use crate::rigidity::Spring;
+use flotor_lanes::entire::EntireFunctions;
 
 /// Estimated error from which on the rod has a share, and from which on it is alone.
 const FIRST_ERROR: f64 = 2.5e-4;

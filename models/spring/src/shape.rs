@@ -2,7 +2,7 @@
 //!
 //! Seen from the chord, the normals of the two end sections lean by `theta_L` and `theta_U`. Their half sum `S`
 //! bends the rod to an S, their half difference `D` to a C. At `u = position along the chord / L - 1/2`, with
-//! the entire functions of [`crate::entire`], `s = 1 + P/beta'` and rigidities per current length (primed):
+//! the entire functions of [`flotor_lanes::entire`], `s = 1 + P/beta'` and rigidities per current length (primed):
 //!
 //! ```text
 //! theta = S (A C0(4 z u²) + B u² G0(z u²)²) + D 2 u G0(4 z u²) / G0(z)
@@ -14,8 +14,8 @@
 //! are equations 17 and 18 of the thesis, with the shear angle `Q` of the transverse force. `A`, `B` and `Q`
 //! follow from `theta = S` and `y = 0` at both ends.
 
-use crate::entire::EntireFunctions;
 use crate::rigidity::Rigidities;
+use flotor_lanes::entire::EntireFunctions;
 
 /// Lean of a section from the chord, per radian of `S` or `D`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -30,8 +30,8 @@ use flotor_hal::math;
 use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::{Geometry, Material, Rigidities, Spring, Stiffness};
-use crate::rod::basis::gauss_legendre;
-use crate::rod::matrix::{Factored, product};
+use flotor_lanes::basis::gauss_legendre;
+use flotor_lanes::matrix::{Factored, product};
 
 /// Shear force per shear angle of a round wire, in units of `G A`.
 const SHEAR_FACTOR: f64 = 0.9;

@@ -6,7 +6,7 @@
 //! W2 = 1/2 ∫ theta'² + N sigma/2 ∫ theta² + sigma²/(2 shear compliance) (∫ theta)²
 //! ```
 //!
-//! for small turns `theta` of its sections. In the bubbles of [`super::basis`] its matrix of second derivatives is
+//! for small turns `theta` of its sections. In the bubbles of [`flotor_lanes::basis`] its matrix of second derivatives is
 //! tridiagonal, the even ones and the odd ones apart. Bent between the ends of the rod the column has become shorter than
 //! its arc by `1/2 ∫ theta²`, which takes compression from it; where that is much the column is bent anew with the force
 //! that is left. Close to buckling its bend would have no bound otherwise.

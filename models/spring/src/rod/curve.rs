@@ -6,12 +6,12 @@
 
 use flotor_hal::glam::{DQuat, DVec2, DVec3};
 
-use super::basis::{bubbles, gauss_legendre};
 use super::contact::Contact;
 use super::functional::{Functional, Shape};
 use super::plate::Plate;
 use super::section::{Load, Sections};
 use crate::centerline::Section;
+use flotor_lanes::basis::{bubbles, gauss_legendre};
 
 /// Fewest panels over the whole rod, and nodes in each: together far more degrees than the polynomials have.
 const LEAST_PANELS: usize = 64;

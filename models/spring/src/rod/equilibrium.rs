@@ -7,7 +7,7 @@
 //! only where it is stable.
 //!
 //! Sources: Deuflhard, *Newton Methods for Nonlinear Problems* (2011), 2.1 (kept matrix) and 6.4
-//! (pseudo-transient continuation, the damped flow); Morse index by inertia, see [`super::matrix`].
+//! (pseudo-transient continuation, the damped flow); Morse index by inertia, see [`flotor_lanes::matrix`].
 
 use flotor_hal::glam::{DVec2, DVec3};
 
@@ -15,13 +15,13 @@ use super::contact::Touching;
 use super::curve::Curve;
 use super::descent::Found;
 use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value, joined};
-use super::matrix::{Factored, added, dot, length, product};
 use super::plate::{Plate, or_zero};
 use super::predictor::History;
 use super::start;
 use crate::pose::Pose;
 use crate::response::Demand;
 use crate::rigidity::Spring;
+use flotor_lanes::matrix::{Factored, added, dot, length, product};
 
 /// Longest change of shape in a tick that ends in no equilibrium, as the root mean square slope of `p`; of one that does,
 /// beyond what the plates' motion predicts. A full bulge has about 3. Short of 0.1 by what the lean of a bulge adds to its

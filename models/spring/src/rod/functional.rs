@@ -1,7 +1,7 @@
 //! The energy of the rod at given plates, as a function of a few coefficients.
 //!
 //! The shape of the rod is the direction of its sections, a polynomial in stereographic coordinates
-//! ([`super::basis`]). Stretch, shear and twist need no unknowns of their own: for given directions their
+//! ([`flotor_lanes::basis`]). Stretch, shear and twist need no unknowns of their own: for given directions their
 //! energy is a quadratic, and the best of them is in closed form,
 //!
 //! ```text
@@ -22,13 +22,13 @@ use std::f64::consts::PI;
 use flotor_hal::glam::{DMat3, DVec2, DVec3};
 
 use super::Coils;
-use super::basis::Basis;
 use super::contact::{self, Contact, Touching};
 use super::equilibrium::Reading;
-use super::matrix::dot;
 use super::plate::Plate;
 use super::section::{Along, Curvatures, Load, Sections};
 use crate::rigidity::Spring;
+use flotor_lanes::basis::Basis;
+use flotor_lanes::matrix::dot;
 
 /// Coefficients of the bubbles: first those of `p_x`, then those of `p_y`; `N = 2 K`.
 pub(crate) type Shape<const N: usize> = [f64; N];

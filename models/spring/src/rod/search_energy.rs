@@ -8,11 +8,11 @@
 use flotor_hal::glam::{DMat3, DVec2, DVec3};
 use pulp::{Simd, cast};
 
-use super::basis::Basis;
 use super::equilibrium::Reading;
 use super::functional::{Ratios, Shape, solve_symmetric};
 use super::plate::Plate;
 use super::section::Load;
+use flotor_lanes::basis::Basis;
 use flotor_lanes::{Real, Wide};
 
 /// Bubbles in each component, coefficients, and stations.

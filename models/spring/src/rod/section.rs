@@ -21,7 +21,7 @@
 
 use flotor_hal::glam::{DMat3, DVec3};
 
-use super::matrix::dot;
+use flotor_lanes::matrix::dot;
 
 /// One number for each of `Q` sections.
 pub(crate) type Along<const Q: usize> = [f64; Q];

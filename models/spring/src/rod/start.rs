@@ -5,11 +5,11 @@
 
 use flotor_hal::glam::{DVec2, DVec3};
 
-use super::basis::Basis;
 use crate::bending::saturated_argument;
 use crate::pose::Pose;
 use crate::rigidity::Spring;
 use crate::shape::Shape;
+use flotor_lanes::basis::Basis;
 
 /// Largest lean from the chord that a start may have (rad). Close to buckling the linear shape has no bound, the rod's
 /// amplitude does.
@@ -70,7 +70,7 @@ fn rate(along: DVec3, by_s: DVec3) -> DVec2 {
 mod tests {
     use super::*;
     use crate::preset::Preset;
-    use crate::rod::basis::bubbles;
+    use flotor_lanes::basis::bubbles;
 
     #[test]
     fn the_start_is_the_linear_column() {

@@ -18,7 +18,7 @@
 //!
 //! Evaluation: power series of `G1` and `G2` at `z / 16`, recurrences for the rest, then two angle doublings.
 
-use flotor_lanes::Real;
+use crate::Real;
 
 /// Terms of the power series: at `z / 16 = -3.75` the first one left out is below 1e-17 of the sum.
 const TERMS: usize = 12;
@@ -70,7 +70,7 @@ pub struct EntireFunctions<R = f64> {
 
 impl EntireFunctions {
     /// Smallest argument: deeper in tension use the quotients of
-    /// [`StabilityFunctions`](crate::beam_column::StabilityFunctions), which do not grow.
+    /// [`StabilityFunctions`](crate::stability::StabilityFunctions), which do not grow.
     pub const MIN_ARGUMENT: f64 = -60.0;
 
     /// Largest argument: two and a half half-waves, past every pole a spring can reach.

@@ -14,7 +14,7 @@ const INVERSE_ITERATIONS: u32 = 3;
 /// The triangle is kept by columns and by rows, each filled up with zeros: both substitutions then run over
 /// neighbours in memory and over a length known to the compiler.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Factored<const N: usize> {
+pub struct Factored<const N: usize> {
     column: [[f64; N]; N],
     row: [[f64; N]; N],
     inverse_pivot: [f64; N],
@@ -23,13 +23,13 @@ pub(crate) struct Factored<const N: usize> {
 
 impl<const N: usize> Factored<N> {
     /// The factors of the unit matrix.
-    pub(crate) fn unit() -> Self {
+    pub fn unit() -> Self {
         Self { column: [[0.0; N]; N], row: [[0.0; N]; N], inverse_pivot: [1.0; N], negative: 0 }
     }
 
     /// Factors `matrix + shift * unit`, of which the lower triangle is read. Real-time: bounded, no
     /// allocation.
-    pub(crate) fn new(matrix: &[[f64; N]; N], shift: f64) -> Self {
+    pub fn new(matrix: &[[f64; N]; N], shift: f64) -> Self {
         let mut rest = *matrix;
         let mut factored = Self::unit();
         for j in 0..N {
@@ -56,7 +56,7 @@ impl<const N: usize> Factored<N> {
 
     /// Smallest eigenvalue of a definite matrix, by inverse iteration from the direction of the smallest pivot, which is an
     /// upper bound and no more. Real-time: bounded, no allocation.
-    pub(crate) fn smallest_eigenvalue(&self) -> f64 {
+    pub fn smallest_eigenvalue(&self) -> f64 {
         let largest = |(a, x): (usize, f64), (b, y): (usize, f64)| if y > x { (b, y) } else { (a, x) };
         let (softest, _) = self.inverse_pivot.iter().copied().enumerate().fold((0, 0.0), largest);
         let mut direction = [0.0; N];
@@ -71,13 +71,13 @@ impl<const N: usize> Factored<N> {
     }
 
     /// Number of negative eigenvalues.
-    pub(crate) fn negative(&self) -> usize {
+    pub fn negative(&self) -> usize {
         self.negative
     }
 
     /// Newton's step against a slope: minus the solution. Real-time: bounded, no allocation.
     #[inline]
-    pub(crate) fn step_down(&self, slope: &[f64; N]) -> [f64; N] {
+    pub fn step_down(&self, slope: &[f64; N]) -> [f64; N] {
         let mut step = self.solve(slope);
         for entry in &mut step {
             *entry = -*entry;
@@ -87,7 +87,7 @@ impl<const N: usize> Factored<N> {
 
     /// Solves the system. Real-time: bounded, no allocation.
     #[inline]
-    pub(crate) fn solve(&self, right: &[f64; N]) -> [f64; N] {
+    pub fn solve(&self, right: &[f64; N]) -> [f64; N] {
         let mut x = *right;
         for j in 0..N {
             let known = x[j];
@@ -110,13 +110,13 @@ impl<const N: usize> Factored<N> {
 
 /// Matrix times vector.
 #[inline]
-pub(crate) fn product<const N: usize, const R: usize>(matrix: &[[f64; N]; R], vector: &[f64; N]) -> [f64; R] {
+pub fn product<const N: usize, const R: usize>(matrix: &[[f64; N]; R], vector: &[f64; N]) -> [f64; R] {
     std::array::from_fn(|row| dot(&matrix[row], vector))
 }
 
 /// Sum of the products of entries, summed in two lanes.
 #[inline(always)]
-pub(crate) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+pub fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     let mut lanes = [0.0; 2];
     let (pairs_a, rest_a) = a.as_chunks::<2>();
     let (pairs_b, rest_b) = b.as_chunks::<2>();
@@ -133,13 +133,13 @@ pub(crate) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
 
 /// Euclidean length.
 #[inline(always)]
-pub(crate) fn length<const N: usize>(vector: &[f64; N]) -> f64 {
+pub fn length<const N: usize>(vector: &[f64; N]) -> f64 {
     dot(vector, vector).sqrt()
 }
 
 /// `sum + factor * vector`.
 #[inline(always)]
-pub(crate) fn added<const N: usize>(sum: &[f64; N], factor: f64, vector: &[f64; N]) -> [f64; N] {
+pub fn added<const N: usize>(sum: &[f64; N], factor: f64, vector: &[f64; N]) -> [f64; N] {
     let mut result = *sum;
     for (entry, addend) in result.iter_mut().zip(vector) {
         *entry += factor * addend;

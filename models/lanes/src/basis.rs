@@ -18,23 +18,30 @@ use std::f64::consts::PI;
 /// The tables are kept in both orders, so that sums over bubbles and sums over stations both run over
 /// neighbours in memory.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Basis<const K: usize, const Q: usize> {
+pub struct Basis<const K: usize, const Q: usize> {
     /// Gauss weights, of sum 1.
-    pub(crate) weight: [f64; Q],
+    pub weight: [f64; Q],
     /// Scaled arc length of the stations; also the value there of the straight line.
-    pub(crate) station: [f64; Q],
+    pub station: [f64; Q],
     /// Bubbles at the stations, `[k][i]`.
-    pub(crate) bubble: [[f64; Q]; K],
+    pub bubble: [[f64; Q]; K],
     /// Their slopes per scaled arc length.
-    pub(crate) slope: [[f64; Q]; K],
+    pub slope: [[f64; Q]; K],
     /// The same, `[i][k]`.
-    pub(crate) bubble_at: [[f64; K]; Q],
-    pub(crate) slope_at: [[f64; K]; Q],
+    pub bubble_at: [[f64; K]; Q],
+    /// Their slopes, `[i][k]`.
+    pub slope_at: [[f64; K]; Q],
+}
+
+impl<const K: usize, const Q: usize> Default for Basis<K, Q> {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl<const K: usize, const Q: usize> Basis<K, Q> {
     /// Computes the tables. Real-time: bounded, no allocation; some microseconds.
-    pub(crate) fn new() -> Self {
+    pub fn new() -> Self {
         let mut basis = Self {
             weight: [0.0; Q],
             station: [0.0; Q],
@@ -58,7 +65,7 @@ impl<const K: usize, const Q: usize> Basis<K, Q> {
 }
 
 /// The first `K` bubbles and their slopes per scaled arc length, at scaled arc length `(1 + t) / 2`.
-pub(crate) fn bubbles<const K: usize>(t: f64) -> ([f64; K], [f64; K]) {
+pub fn bubbles<const K: usize>(t: f64) -> ([f64; K], [f64; K]) {
     let (mut bubble, mut slope) = ([0.0; K], [0.0; K]);
     let mut legendre = Legendre::at(t);
     for (bubble, slope) in bubble.iter_mut().zip(&mut slope) {
@@ -103,7 +110,7 @@ impl Legendre {
 }
 
 /// Node `i` in ascending order of the rule with `count` nodes on -1..1, and its weight.
-pub(crate) fn gauss_legendre(count: usize, i: usize) -> (f64, f64) {
+pub fn gauss_legendre(count: usize, i: usize) -> (f64, f64) {
     let legendre = |t| {
         let mut polynomial = Legendre::at(t);
         (0..count).for_each(|_| polynomial.advance());
