@@ -29,14 +29,20 @@ pub(crate) fn demand(input: &Input) -> Demand {
 #[inline]
 #[must_use]
 pub fn step<L: Law>(law: &L, input: &Input) -> Output {
-    #[cfg(target_arch = "x86_64")]
-    if let Some(avx2) = pulp::x86::V3::try_new() {
-        return avx2.vectorize(Step { law, input });
-    }
-    Step { law, input }.call()
+    with_all_instructions(Step { law, input })
 }
 
-/// A step, to be compiled for the instructions of the machine it runs on. The bits are the same.
+/// Computes with the instructions of the machine that it runs on. The bits are the same.
+#[inline]
+pub(crate) fn with_all_instructions<C: NullaryFnOnce>(computation: C) -> C::Output {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(avx2) = pulp::x86::V3::try_new() {
+        return avx2.vectorize(computation);
+    }
+    computation.call()
+}
+
+/// A step, to be compiled for the instructions of the machine it runs on.
 struct Step<'a, L> {
     law: &'a L,
     input: &'a Input,

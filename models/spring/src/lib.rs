@@ -10,9 +10,10 @@
 //! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`precision`]
 //!   says in which format its numbers are stored.
 //! - [`energy`]: the conservative law in three dimensions, the default. Its bending part is in [`bending`], to
-//!   fourth order in the angles by [`shape`] and [`quartic`].
+//!   fourth order in the angles by [`shape`] and [`quartic`]; `remainder` adds what is beyond, fitted to the rod.
 //! - [`rod`]: the exact rod, past buckling too, with a memory of where it was.
-//! - [`rod_blend`]: from the law `energy` to the rod where it is better, as one energy; `rod_share` says where.
+//! - [`rod_blend`]: from the law `energy` to the rod where the tolerance needs it, as one energy; `rod_share` says where, in the
+//!   measures of `directions`.
 //! - [`held`]: a law with what a real coil adds to it: [`contact`] of its coils, and the twist and the off-axis ends of
 //!   its [`wire`].
 //! - [`seat`]: a lower plate that may roll up on its rim and lift off.
@@ -27,6 +28,7 @@ pub mod centerline;
 pub mod closed_form;
 pub mod contact;
 pub mod contract;
+mod directions;
 pub mod energy;
 pub mod held;
 mod pace;
@@ -37,6 +39,7 @@ pub mod precision;
 mod prepared;
 pub mod preset;
 pub mod quartic;
+mod remainder;
 pub mod response;
 pub mod rigidity;
 pub mod rod;

@@ -13,6 +13,7 @@ use crate::precision::Precision;
 use crate::preset::Preset;
 use crate::rigidity::{Geometry, LEAST_POISSON_RATIO, Material, Spring, Stiffness};
 use crate::rod::Accuracy;
+use crate::rod_blend::TOLERANCE_N;
 use crate::seat::Friction;
 use flotor_hal::{Choices, OutOfRange, Parameter, Refusal, Settings, choices};
 
@@ -111,7 +112,21 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Friction under a free seat; at 10 hardly any base slides",
     )
     .live(),
-    Parameter::choice("hand_over", OFF_ON, 1, "Near buckling to the rod, as one energy (variant energy)"),
+    Parameter::choice(
+        "hand_over",
+        OFF_ON,
+        1,
+        "To the rod where the law errs by more than the tolerance, as one energy (variant energy)",
+    ),
+    Parameter::real(
+        "tolerance_n",
+        "N",
+        0.0005,
+        0.1,
+        TOLERANCE_N,
+        "Largest error of the force against the rod short of buckling (energy with hand_over)",
+    )
+    .live(),
     Parameter::choice("coil_contact", OFF_ON, 0, "Coils that meet press on each other (energy, rod)"),
     Parameter::choice(
         "wire",
@@ -163,6 +178,7 @@ pub(crate) struct Choice {
     pub(crate) seat: SeatChoice,
     pub(crate) friction: Friction,
     pub(crate) rod_blend: Switch,
+    pub(crate) tolerance_n: f64,
     pub(crate) coil_contact: Switch,
     pub(crate) wire: Switch,
     pub(crate) preset: Preset,
@@ -179,6 +195,11 @@ impl Choice {
         let accuracy = accuracy(settings, variant)?;
         let seat = seat(settings, variant)?;
         let rod_blend = rod_blend(settings, variant)?;
+        if rod_blend == Switch::Off && settings.number("tolerance_n").is_some() {
+            return Err(Refusal::parameter(
+                "`tolerance_n` is of a law that blends into the rod; set `variant` to `energy` and `hand_over` to `on` as well",
+            ));
+        }
         let coil_contact = coil("coil_contact", settings, variant)?;
         let wire = coil("wire", settings, variant)?;
         let (geometry, material, stiffness) = preset.parameters();
@@ -221,6 +242,7 @@ impl Choice {
             seat,
             friction,
             rod_blend,
+            tolerance_n: settings.number_or_default("tolerance_n"),
             coil_contact,
             wire,
             preset,
@@ -241,6 +263,7 @@ impl Choice {
             seat: SeatChoice::Fixed,
             friction: Friction::STICKING,
             rod_blend: if variant == Variant::Energy { Switch::On } else { Switch::Off },
+            tolerance_n: TOLERANCE_N,
             coil_contact: Switch::Off,
             wire: Switch::Off,
             preset,
@@ -253,6 +276,9 @@ impl Choice {
     /// The range that fits the other values; NaN to NaN for a number that follows from others in this mode, or has no effect.
     pub(crate) fn with(&self, index: usize, value: f64) -> Result<Self, OutOfRange> {
         let is_friction = SCHEMA.get(index).map(Parameter::id) == Some("seat_friction");
+        if SCHEMA.get(index).map(Parameter::id) == Some("tolerance_n") && self.rod_blend == Switch::On {
+            return Ok(Self { tolerance_n: value, ..*self });
+        }
         // Under a seat that is held it would change nothing: it is refused below.
         if is_friction && self.seat == SeatChoice::Free {
             return Ok(Self { friction: Friction { coefficient: value }, ..*self });
@@ -317,6 +343,7 @@ impl Choice {
             "seat" => position(&[SeatChoice::Fixed, SeatChoice::Free], &self.seat),
             "seat_friction" => self.friction.coefficient,
             "hand_over" => position(&[Switch::Off, Switch::On], &self.rod_blend),
+            "tolerance_n" => self.tolerance_n,
             "coil_contact" => position(&[Switch::Off, Switch::On], &self.coil_contact),
             "wire" => position(&[Switch::Off, Switch::On], &self.wire),
             "mode" => position(&Mode::ALL, &Mode::of(self.stiffness)),

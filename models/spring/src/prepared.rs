@@ -7,6 +7,7 @@ use crate::centerline::{Centerline, Section};
 use crate::closed_form::{ClosedForm, Form};
 use crate::contact::AxialContact;
 use crate::contract;
+use crate::directions::Directions;
 use crate::energy::EnergyForm;
 use crate::held::{Held, HeldSpring};
 use crate::pace::{Advance, Pace};
@@ -128,11 +129,7 @@ impl Prepared {
         match self {
             Self::ClosedForm(law) => contract::step(law, input),
             Self::Energy(held) if held.is_plain() => contract::step(&held.law, input),
-            Self::RodBlend(held) if held.is_plain() && !held.law.blends(&contract::pose(input)) => {
-                held.law.leave();
-                *pace = Pace::default();
-                contract::step(held.law.energy(), input)
-            }
+            Self::RodBlend(held) if held.is_plain() => blend_step(&mut held.law, pace, input),
             _ => contract::output(
                 &pace.respond(input, |advance, pose, demand| self.respond(advance, pose, demand)),
             ),
@@ -288,7 +285,7 @@ fn rod_to_tip(choice: &Choice) -> Held<Rod> {
 }
 
 fn held_blend(choice: &Choice) -> Held<RodBlend> {
-    Held { law: RodBlend::new(&choice.spring), contact: None, wire: wire(choice) }
+    Held { law: RodBlend::within(&choice.spring, choice.tolerance_n), contact: None, wire: wire(choice) }
 }
 
 fn coils(choice: &Choice) -> Coils {
@@ -298,22 +295,39 @@ fn coils(choice: &Choice) -> Coils {
     }
 }
 
-/// Asks again, in order, where the rod has a share.
+/// Answers again, in order, where the law alone is not the answer.
 fn blend_some(law: &mut RodBlend, pace: &mut Pace, inputs: &[Input], outputs: &mut [Output]) {
     for (input, output) in inputs.iter().zip(outputs) {
-        if law.blends(&contract::pose(input)) {
-            *output = contract::output(
-                &pace.respond(input, |advance, pose, demand| held_response(law, advance, pose, demand)),
-            );
-        } else {
-            law.leave();
-            *pace = Pace::default();
+        match law.examine(&contract::pose(input)) {
+            Some(at) => *output = examined_step(law, pace, input, &at),
+            None => {
+                law.leave();
+                *pace = Pace::default();
+            }
         }
     }
 }
 
+#[inline]
+fn blend_step(law: &mut RodBlend, pace: &mut Pace, input: &Input) -> Output {
+    match law.examine(&contract::pose(input)) {
+        Some(at) => examined_step(law, pace, input, &at),
+        None => {
+            law.leave();
+            *pace = Pace::default();
+            contract::step(law.energy(), input)
+        }
+    }
+}
+
+fn examined_step(law: &mut RodBlend, pace: &mut Pace, input: &Input, at: &Directions) -> Output {
+    contract::output(
+        &pace.respond(input, |advance, pose, demand| law.respond_examined(advance, pose, at, demand)),
+    )
+}
+
 fn retune_blend(held: &mut Held<RodBlend>, to: &Choice) {
-    held.law.set_spring(&to.spring);
+    held.law.set(&to.spring, to.tolerance_n);
     held.wire = held.wire.map(|_| Wire::new(&to.spring));
 }
 

@@ -285,6 +285,15 @@ impl Rod {
         )
     }
 
+    /// The stored energy of the equilibrium that is found from the pose alone; `None` where the search does not end, or for a rod that
+    /// is not for a blend. The rod stays as it is. Real-time: bounded, no allocation.
+    pub(crate) fn energy_at(&mut self, pose: &Pose) -> Option<f64> {
+        let plate = Plate::new(pose, self.constants.free_length_m)?;
+        let Solver::Blend(equilibrium, descent) = &mut self.solver else { return None };
+        let found = descent.find(equilibrium.ratios(), &plate)?;
+        Some(found.reading.energy * self.constants.energy_unit_j)
+    }
+
     #[inline]
     fn answer(
         &mut self,

@@ -1,10 +1,10 @@
-//! The law `energy` where it is good, the exact rod where it is not, as one energy.
+//! The law `energy` with its remainder where that is good enough, the exact rod where it is not, as one energy.
 //!
-//! Where each is, `rod_share` says, by the pose alone: by an estimate of the error of `energy`, from the angles and
-//! from how near the rod is to buckling. In between the energies are mixed, and not the forces,
+//! Where each is, `rod_share` says, by the pose alone: by a bound of the error against the tolerance, and by
+//! how near the rod is to buckling. In between the energies are mixed, and not the forces,
 //!
 //! ```text
-//! W = (1 - s) W_energy + s W_rod        F = -dW/dr = (1 - s) F_energy + s F_rod - (W_rod - W_energy) ds/dr
+//! W = (1 - s) W_law + s W_rod        F = -dW/dr = (1 - s) F_law + s F_rod - (W_rod - W_law) ds/dr
 //! ```
 //!
 //! So the spring stays conservative, and force and stiffness continuous. The last term is a force of its own: it is as
@@ -18,23 +18,34 @@
 //! again. A spring too short to buckle (`ShareOfRod::has_buckling`) has no such poses and no memory.
 
 use flotor_hal::glam::DVec3;
+use pulp::NullaryFnOnce;
 
+use crate::contract;
+use crate::directions::{Directions, Gradient};
 use crate::energy::EnergyForm;
 use crate::held::HeldSpring;
+use crate::pace::Advance;
 use crate::pose::Pose;
-use crate::response::{Demand, Response};
+use crate::remainder::{Remainder, RemainderEnergy};
+use crate::response::{Demand, Law as _, Response};
 use crate::rigidity::Spring;
 use crate::rod::{Rod, State};
-use crate::rod_share::{Share, ShareOfRod};
+use crate::rod_share::{Law, ShareOfRod};
 use crate::validity::Validity;
+
+/// Tolerance of the force by default (N): the error that a loop of 1 kHz itself makes with an exact model by holding a force for a period,
+/// 5.4 mN rms (`flotor bench`, column *hold*).
+pub const TOLERANCE_N: f64 = 0.005;
 
 /// Both laws of one spring.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RodBlend {
     energy: EnergyForm,
+    remainder: Option<Remainder>,
     rod: Rod,
     shares: ShareOfRod,
     spring: Spring,
+    tolerance_n: f64,
     share: f64,
     follows: Follows,
     /// The last two as they were marked.
@@ -51,25 +62,47 @@ enum Follows {
 }
 
 impl RodBlend {
-    /// Prepares both. Not real-time: the rod allocates.
+    /// Prepares both for the tolerance by default. Not real-time: the rod allocates.
     #[must_use]
     pub fn new(spring: &Spring) -> Self {
+        Self::within(spring, TOLERANCE_N)
+    }
+
+    /// Prepares both for a tolerance of the force. Not real-time: the rod allocates.
+    #[must_use]
+    pub fn within(spring: &Spring, tolerance_n: f64) -> Self {
+        let (energy, mut rod) = (EnergyForm::new(spring), Rod::for_a_blend(spring));
+        let remainder = Remainder::new(spring, &energy, &mut rod);
         Self {
-            energy: EnergyForm::new(spring),
-            rod: Rod::for_a_blend(spring),
-            shares: ShareOfRod::new(spring),
+            energy,
+            remainder,
+            rod,
+            shares: shares(spring, tolerance_n, remainder.as_ref()),
             spring: *spring,
+            tolerance_n,
             share: 0.0,
             follows: Follows::Pose,
             marked: (0.0, Follows::Pose),
         }
     }
 
-    /// Takes other parameters at a tick boundary. Real-time: bounded, no allocation.
+    /// Takes other parameters at a tick boundary. Real-time: bounded, no allocation; other proportions take a new remainder, and so 38
+    /// searches of the rod.
     pub fn set_spring(&mut self, spring: &Spring) {
+        self.set(spring, self.tolerance_n);
+    }
+
+    /// Takes other parameters and another tolerance at a tick boundary, as [`Self::set_spring`].
+    pub(crate) fn set(&mut self, spring: &Spring, tolerance_n: f64) {
+        self.tolerance_n = tolerance_n;
         self.energy = self.energy.retuned(&self.spring, spring);
         self.rod.set_spring(spring);
-        self.shares = ShareOfRod::new(spring);
+        self.remainder = if spring.is_proportional_to(&self.spring) {
+            self.remainder.map(|remainder| remainder.restiffened(spring))
+        } else {
+            Remainder::new(spring, &self.energy, &mut self.rod)
+        };
+        self.shares = shares(spring, self.tolerance_n, self.remainder.as_ref());
         self.spring = *spring;
     }
 
@@ -102,22 +135,34 @@ impl RodBlend {
         (self.share >= 1.0).then_some(&mut self.rod)
     }
 
-    /// The law that answers wherever the rod has no share.
+    /// The law that answers wherever neither remainder nor rod is needed.
     pub(crate) fn energy(&self) -> &EnergyForm {
         &self.energy
     }
 
-    /// Whether the rod has a share at a pose.
+    /// The directions of a pose at which the answer may be more than that of [`Self::energy`]; `None` elsewhere. Real-time: bounded, no
+    /// allocation.
     #[inline]
-    pub(crate) fn blends(&self, pose: &Pose) -> bool {
-        self.shares.is_any(pose)
+    pub(crate) fn examine(&self, pose: &Pose) -> Option<Directions> {
+        self.shares.examine(pose)
     }
 
-    /// The hand is where the rod has no share: nothing is left to follow.
+    /// Forgets the rod's shape where it has no share.
     #[inline]
     pub(crate) fn leave(&mut self) {
         self.share = 0.0;
         self.follows = Follows::Pose;
+    }
+
+    #[inline]
+    fn advanced(&mut self, advance: Advance, pose: &Pose, demand: Demand) -> Response {
+        match self.examine(pose) {
+            Some(at) => self.respond_examined(advance, pose, &at, demand),
+            None => {
+                self.leave();
+                self.energy.respond(pose, demand)
+            }
+        }
     }
 
     /// The rod's answer, by the pose alone as long as that says which of its equilibria is meant.
@@ -132,55 +177,115 @@ impl RodBlend {
         response
     }
 
-    /// Where the rod has a share, and answers by `rod`.
-    fn blend(
+    /// The answer at a pose that [`Self::examine`] has the directions of. Real-time: bounded, no allocation.
+    pub(crate) fn respond_examined(
         &mut self,
+        advance: Advance,
         pose: &Pose,
-        share: &Share,
+        at: &Directions,
         demand: Demand,
-        rod: impl FnOnce(&mut Self, Demand) -> Response,
     ) -> Response {
-        self.share = share.value;
-        if share.value >= 1.0 {
-            return rod(self, demand);
+        let upright = at.upright();
+        let share = self.shares.share(at, upright);
+        let Self { energy, remainder, .. } = &*self;
+        let corrected = Corrected { energy, remainder: remainder.as_ref(), pose, at, upright };
+        if share.value == 0.0 {
+            let response = corrected.respond(demand);
+            self.leave();
+            return response;
         }
-        let (rod, energy) =
-            (rod(self, Demand::WrenchAndEnergy), self.energy.respond(pose, Demand::WrenchAndEnergy));
-        let (Some(rod_j), Some(energy_j)) = (rod.energy_j, energy.energy_j) else {
-            return self.energy.respond(pose, demand);
+        let law = (share.value < 1.0).then(|| corrected.respond(Demand::WrenchAndEnergy));
+        let stays = advance == Advance::Stay && self.share > 0.0;
+        self.share = share.value;
+        let rod_demand = if law.is_some() { Demand::WrenchAndEnergy } else { demand };
+        let rod = if stays {
+            self.rod.stay(pose, rod_demand)
+        } else {
+            self.ask_rod(pose, share.is_buckled, rod_demand)
         };
-        // F = (1 - s) F_energy + s F_rod - (W_rod - W_energy) ds/dr of the module documentation, and the torque alike.
-        let difference_j = rod_j - energy_j;
-        let force_n = energy.force_n.lerp(rod.force_n, share.value) - share.by_position_per_m * difference_j;
-        let torque_nm =
-            energy.torque_nm.lerp(rod.torque_nm, share.value) - share.by_rotation_per_rad * difference_j;
+        let Some(law) = law else { return rod };
+        let (Some(rod_j), Some(law_j)) = (rod.energy_j, law.energy_j) else { return demanded(law, demand) };
+        // F = (1 - s) F_law + s F_rod - (W_rod - W_law) ds/dr of the module documentation, and the torque alike.
+        let difference_j = rod_j - law_j;
+        let Gradient { by_position_per_m, by_rotation_per_rad } = share.gradient;
+        let force_n = law.force_n.lerp(rod.force_n, share.value) - by_position_per_m * difference_j;
+        let torque_nm = law.torque_nm.lerp(rod.torque_nm, share.value) - by_rotation_per_rad * difference_j;
+        let energy_j = Some(law_j + share.value * difference_j);
+        let validity = if rod.validity == Validity::NotConverged { rod.validity } else { law.validity };
+        demanded(Response { force_n, torque_nm, energy_j, validity }, demand)
+    }
+}
+
+/// The parts of a whole response that are demanded.
+fn demanded(response: Response, demand: Demand) -> Response {
+    Response {
+        torque_nm: if demand >= Demand::Wrench { response.torque_nm } else { DVec3::ZERO },
+        energy_j: response.energy_j.filter(|_| demand >= Demand::WrenchAndEnergy),
+        ..response
+    }
+}
+
+/// The law `energy` with its remainder at a pose.
+#[derive(Clone, Copy)]
+struct Corrected<'a> {
+    energy: &'a EnergyForm,
+    remainder: Option<&'a Remainder>,
+    pose: &'a Pose,
+    at: &'a Directions,
+    /// See [`Directions::upright`].
+    upright: (f64, Gradient),
+}
+
+impl Corrected<'_> {
+    fn respond(self, demand: Demand) -> Response {
+        contract::with_all_instructions(Answering { law: self, demand })
+    }
+}
+
+/// An answer of a corrected law, to be compiled for the instructions of the machine it runs on.
+struct Answering<'a> {
+    law: Corrected<'a>,
+    demand: Demand,
+}
+
+impl NullaryFnOnce for Answering<'_> {
+    type Output = Response;
+
+    #[inline(always)] // as `contract::Step::call`
+    fn call(self) -> Response {
+        let Self { law: Corrected { energy, remainder, pose, at, upright }, demand } = self;
+        let plain = energy.respond_at(pose, demand);
+        let Some(RemainderEnergy { energy_j, gradient }) =
+            remainder.and_then(|remainder| remainder.at(at, upright))
+        else {
+            return plain;
+        };
         Response {
-            force_n,
-            torque_nm: if demand >= Demand::Wrench { torque_nm } else { DVec3::ZERO },
-            energy_j: (demand >= Demand::WrenchAndEnergy).then_some(energy_j + share.value * difference_j),
-            validity: if rod.validity == Validity::NotConverged { rod.validity } else { energy.validity },
+            force_n: plain.force_n - gradient.by_position_per_m,
+            torque_nm: if demand >= Demand::Wrench {
+                plain.torque_nm - gradient.by_rotation_per_rad
+            } else {
+                DVec3::ZERO
+            },
+            energy_j: plain.energy_j.map(|plain_j| plain_j + energy_j),
+            validity: plain.validity,
         }
     }
+}
+
+/// The shares beside a law with this remainder.
+fn shares(spring: &Spring, tolerance_n: f64, remainder: Option<&Remainder>) -> ShareOfRod {
+    ShareOfRod::new(spring, tolerance_n, if remainder.is_some() { Law::Corrected } else { Law::Plain })
 }
 
 impl HeldSpring for RodBlend {
     #[inline]
     fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
-        let share = self.shares.at(pose);
-        if share.value > 0.0 {
-            return self
-                .blend(pose, &share, demand, |blend, demand| blend.ask_rod(pose, share.is_buckled, demand));
-        }
-        self.leave();
-        self.energy.respond(pose, demand)
+        self.advanced(Advance::Step, pose, demand)
     }
 
     fn stay(&mut self, pose: &Pose, demand: Demand) -> Response {
-        let share = self.shares.at(pose);
-        if share.value > 0.0 && self.share > 0.0 {
-            return self.blend(pose, &share, demand, |blend, demand| blend.rod.stay(pose, demand));
-        }
-        self.respond(pose, demand)
+        self.advanced(Advance::Stay, pose, demand)
     }
 
     fn noise_rad(&self) -> f64 {

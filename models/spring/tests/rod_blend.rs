@@ -10,7 +10,7 @@ use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Response};
 use flotor_spring::rigidity::Spring;
 use flotor_spring::rod::{Accuracy, Rod};
-use flotor_spring::rod_blend::RodBlend;
+use flotor_spring::rod_blend::{RodBlend, TOLERANCE_N};
 use flotor_spring::validity::Validity;
 use std::time::Instant;
 
@@ -84,10 +84,19 @@ fn time_us(spring: &Spring, most: f64, region: Region) -> f64 {
     rounds.fold(f64::INFINITY, f64::min)
 }
 
+/// The name of a preset in the tables of the book.
+fn in_tables(preset: Preset) -> String {
+    match preset {
+        Preset::Slender => "`slender`".to_owned(),
+        thesis => thesis.name().replace("thesis-", "spring "),
+    }
+}
+
 /// Up to rotations of 30 degrees, however the axis points, full shear, and as far down as the coils or buckling allow: five
 /// millinewtons, what a position that is known to ten micrometres is worth.
 #[test]
 fn the_default_law_is_the_rod_to_five_millinewtons() {
+    let mut rows = Vec::new();
     // Springs 1 and 2 to short of their solid lengths at 70 and 80 %, the others to short of buckling at 54.5 and 8.28 %.
     for (preset, most) in Preset::ALL.into_iter().zip([0.68, 0.68, 0.54, 0.082]) {
         let spring = preset.spring();
@@ -108,12 +117,10 @@ fn the_default_law_is_the_rod_to_five_millinewtons() {
             unblended_n = unblended_n.max((unblended.force_n - truth.force_n).length());
         }
         if count == 1000 {
-            let name = match preset {
-                Preset::Slender => "`slender`".to_owned(),
-                thesis => thesis.name().replace("thesis-", "spring "),
-            };
+            let name = in_tables(preset);
             let row = format!("| {name} | {worst_n:.1e} | {worst_nm:.1e} | {unblended_n:.1e} |");
-            assert_chapter_prints("models/spring/energy.md", &row);
+            println!("{row}");
+            rows.push(row);
         }
         let regions = [Region::Reached, Region::FarTurned, Region::NearHome];
         let [all_us, far_us, near_us] = regions.map(|region| time_us(&spring, most, region));
@@ -123,9 +130,105 @@ fn the_default_law_is_the_rod_to_five_millinewtons() {
         );
         assert!(answered * 20 > 19 * count, "{preset:?}: {answered} of {count}");
         assert!(worst_n < 5e-3, "{preset:?}: {worst_n:e} N");
-        // A lever of a tenth of the free length.
-        assert!(worst_nm < 5e-4 * spring.geometry().free_length_m / 0.06, "{preset:?}: {worst_nm:e} N m");
+        // A lever of a tenth of a metre.
+        assert!(worst_nm < 0.1 * TOLERANCE_N, "{preset:?}: {worst_nm:e} N m");
     }
+    rows.iter().for_each(|row| assert_chapter_prints("models/spring/energy.md", row));
+}
+
+/// Relative lengths of the chord at which the springs buckle, by Haringx: 54.5 and 8.28 % of compression.
+const BUCKLED: [f64; 4] = [0.0, 0.0, 0.455, 0.9172];
+
+/// Poses uniform in the device's workspace: 12 mm about home in units of the free length over 15 mm, and 7 degrees.
+fn in_the_workspace(spring: &Spring, count: u32) -> Vec<(DVec3, DVec3)> {
+    let (mut sampler, free_length_m) = (Sampler::new(9), spring.geometry().free_length_m);
+    let mut ball = || loop {
+        let point = sampler.vector([1.0; 3]);
+        if point.length() < 1.0 {
+            return point;
+        }
+    };
+    let poses = (0..count).map(|_| (0.8 * free_length_m * ball(), 7f64.to_radians() * ball()));
+    poses.collect()
+}
+
+/// Mean time of a cold answer at poses, ns: the fastest of five rounds. Printed, not asserted.
+fn mean_ns(law: &mut RodBlend, poses: &[Pose]) -> f64 {
+    let rounds = (0..5).map(|_| {
+        let begin = Instant::now();
+        for pose in poses {
+            let _ = std::hint::black_box(law.respond(std::hint::black_box(pose), Demand::Wrench));
+        }
+        begin.elapsed().as_secs_f64() * 1e9 / poses.len() as f64
+    });
+    rounds.fold(f64::INFINITY, f64::min)
+}
+
+/// Short of buckling the law is the rod to the tolerance over the whole workspace, and springs that never buckle seldom need the rod.
+#[test]
+fn over_the_whole_workspace_the_law_keeps_to_its_tolerance_and_seldom_needs_the_rod() {
+    let mut rows = Vec::new();
+    for (preset, buckled) in Preset::ALL.into_iter().zip(BUCKLED) {
+        let spring = preset.spring();
+        let free_length_m = spring.geometry().free_length_m;
+        let (mut law, count) = (RodBlend::within(&spring, TOLERANCE_N), of(10_000, 400));
+        let (mut worst_n, mut worst_nm, mut compared, mut shared) = (0.0f64, 0.0f64, 0, 0);
+        let poses = in_the_workspace(&spring, count);
+        for &(position_m, rotation_rad) in &poses {
+            law.reset();
+            let answer =
+                law.respond(&Pose::from_rotation_vector(position_m, rotation_rad), Demand::WrenchAndEnergy);
+            shared += u32::from(law.share() > 0.0);
+            if (position_m + DVec3::Z * free_length_m).length() < (buckled + 0.03) * free_length_m {
+                continue;
+            }
+            // The servo's rod errs by less than 1e-4 N, a fiftieth of the bound.
+            let Some(truth) = exact(&spring, Accuracy::Servo, (position_m, rotation_rad)) else { continue };
+            compared += 1;
+            let error_n = (answer.force_n - truth.force_n).length();
+            worst_n = worst_n.max(error_n);
+            worst_nm = worst_nm.max((answer.torque_nm - truth.torque_nm).length());
+        }
+        let poses: Vec<Pose> = poses.into_iter().map(|(p, r)| Pose::from_rotation_vector(p, r)).collect();
+        let mean_ns = mean_ns(&mut law, &poses);
+        let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+        println!(
+            "{preset:?}: {compared} of {count} poses, error up to {worst_n:.1e} N, {worst_nm:.1e} N m; {shared} with the rod; \
+             {mean_ns:.0} ns in the mean, load {}",
+            load.split_whitespace().next().unwrap_or("unknown")
+        );
+        if count == 10_000 {
+            let share = f64::from(shared) / f64::from(count) * 100.0;
+            let row = format!("| {} | {worst_n:.1e} | {share:.1} % |", in_tables(preset));
+            println!("{row}");
+            rows.push(row);
+        }
+        assert!(compared * 3 > count, "{preset:?}: {compared} of {count}");
+        assert!(worst_n < TOLERANCE_N, "{preset:?}: {worst_n:e} N");
+        let is_short = matches!(preset, Preset::Thesis1 | Preset::Thesis2);
+        assert!(!is_short || shared * 10 < count, "{preset:?}: {shared} of {count} with the rod");
+    }
+    rows.iter().for_each(|row| assert_chapter_prints("models/spring/energy.md", row));
+}
+
+/// The tolerance is that of the answer: a smaller one is kept as well, and costs more of the rod.
+#[test]
+fn a_smaller_tolerance_is_kept_and_needs_the_rod_more_often() {
+    let spring = Preset::Thesis1.spring();
+    let count = of(1000, 100);
+    let shared = [1e-3, 2e-2].map(|tolerance_n| {
+        let (mut law, mut shared) = (RodBlend::within(&spring, tolerance_n), 0);
+        for (position_m, rotation_rad) in in_the_workspace(&spring, count) {
+            law.reset();
+            let answer = law.respond(&Pose::from_rotation_vector(position_m, rotation_rad), Demand::Force);
+            shared += u32::from(law.share() > 0.0);
+            let Some(truth) = exact(&spring, Accuracy::Servo, (position_m, rotation_rad)) else { continue };
+            let apart_n = (answer.force_n - truth.force_n).length();
+            assert!(apart_n < tolerance_n, "{tolerance_n}: {apart_n:e} N at {position_m} {rotation_rad}");
+        }
+        shared
+    });
+    assert!(shared[0] > shared[1], "{shared:?}");
 }
 
 /// The share depends on shear, tilt, twist and length; whichever it is that mixes, the wrench is the energy's gradient.
@@ -135,8 +238,9 @@ fn wrench_is_the_gradient_wherever_the_laws_are_mixed() {
         let spring = preset.spring();
         let free_length_m = spring.geometry().free_length_m;
         let (mut law, mut mixed) = (RodBlend::new(&spring), 0);
-        for (position_m, rotation_rad) in reached(&spring, most, 400) {
-            let pose = Pose::from_rotation_vector(position_m * 0.6, rotation_rad * 0.5);
+        for (index, (position_m, rotation_rad)) in reached(&spring, most, 400).into_iter().enumerate() {
+            // From a tenth of the turn to half: one of them mixes.
+            let pose = Pose::from_rotation_vector(position_m, rotation_rad * (0.1 + 1e-3 * index as f64));
             let here = law.respond(&pose, Demand::WrenchAndEnergy);
             if law.share() < 0.02 || law.share() > 0.98 {
                 continue;
@@ -150,9 +254,9 @@ fn wrench_is_the_gradient_wherever_the_laws_are_mixed() {
                 let moved = |s: f64| Pose { position_m: pose.position_m + axis * s, ..pose };
                 let turned =
                     |s: f64| Pose { orientation: DQuat::from_axis_angle(axis, s) * pose.orientation, ..pose };
-                let force_n = -slope(&moved, 1e-4 * free_length_m);
-                let torque_nm = -slope(&turned, 1e-4);
-                // Fourth order in a step of a thousandth of the way through the mix, and rounding of 1e-17 J over it.
+                let force_n = -slope(&moved, 1e-5 * free_length_m);
+                let torque_nm = -slope(&turned, 1e-5);
+                // Second order in a step of a thousandth of the way through the mix, where that begins, and rounding of 1e-17 J over it.
                 assert!((force_n - here.force_n.dot(axis)).abs() < 1e-7, "{preset:?} {pose:?}");
                 assert!((torque_nm - here.torque_nm.dot(axis)).abs() < 1e-9, "{preset:?} {pose:?}");
             }
@@ -301,7 +405,7 @@ fn scattered(spring: &Spring, compressions: [f64; 2], count: usize) -> Vec<Pose>
 /// pose, one that can as long as it has not.
 #[test]
 fn short_of_buckling_the_answer_depends_on_the_pose_alone() {
-    // Spring 1 blends past 60 % and never buckles; spring 3 blends past 24 % and buckles past 54 %.
+    // Spring 1 blends where it is bent far and never buckles; spring 3 blends past 26 % as well and buckles past 54 %.
     for (preset, compressions) in [(Preset::Thesis1, [0.5, 0.9]), (Preset::Thesis3, [0.15, 0.45])] {
         let spring = preset.spring();
         let mut wandering = RodBlend::new(&spring);
@@ -314,7 +418,7 @@ fn short_of_buckling_the_answer_depends_on_the_pose_alone() {
             assert_eq!(found, first, "{preset:?} {pose:?}");
             assert_eq!(wandering.respond(&pose, Demand::WrenchAndEnergy), first, "{preset:?} {pose:?}");
         }
-        assert!(blended > 200, "{preset:?}: {blended} of 500");
+        assert!(blended > 100, "{preset:?}: {blended} of 500");
     }
 }
 
