@@ -18,6 +18,7 @@ mod tally;
 pub mod trajectory;
 pub mod validate;
 pub mod watch;
+mod wording;
 
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};

@@ -177,8 +177,37 @@ fn violated(library: &Path, fault: &str, only: Option<&str>) -> Vec<String> {
     let ran = Flotor::with(&arguments).run();
     let findings: Vec<Value> =
         serde_json::from_str(&ran.stdout).unwrap_or_else(|_| panic!("{fault}: {ran:#?}"));
+    for message in findings.iter().filter_map(|finding| finding["violation"].as_str()) {
+        assert!(!is_debug_text(message), "{fault}: {message}");
+    }
     let rules = findings.iter().filter(|finding| !finding["violation"].is_null());
     rules.filter_map(|finding| Some(finding["rule"].as_str()?.to_owned())).collect()
+}
+
+/// Whether a message has a value as Rust's `Debug` prints it: a name in CamelCase with fields, or a variant with a value.
+fn is_debug_text(message: &str) -> bool {
+    let words =
+        message.split([' ', ',', '[', '"']).filter(|word| word.starts_with(|c: char| c.is_ascii_uppercase()));
+    let opens = |word: &str, brace| message.contains(&format!("{word} {brace}"));
+    let is_camel = |word: &str| {
+        word.chars().all(|c| c.is_ascii_alphanumeric()) && word.chars().any(|c| c.is_ascii_lowercase())
+    };
+    words.into_iter().any(|word| {
+        let variant = word.split_once('(').map(|(name, _)| name);
+        is_camel(word) && opens(word, '{') || variant.is_some_and(|name| !name.is_empty() && is_camel(name))
+    })
+}
+
+#[test]
+fn text_of_debug_is_told_from_messages() {
+    for text in ["at Pose { position: [0.0] }", "it returned Some(3)", "ended: EmergencyStop(Latch)"] {
+        assert!(is_debug_text(text), "{text}");
+    }
+    for text in
+        ["at [0, 0, 1] m it returned 3 N", "`FLOTOR_X` (see DESIGN)", "SIGINT (2)", "NaN (not a number)"]
+    {
+        assert!(!is_debug_text(text), "{text}");
+    }
 }
 
 /// One processor is what a thread is bound to on a machine that has no other.

@@ -67,8 +67,26 @@ pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Resu
     if before == now {
         return Ok(());
     }
+    let numbers = |told: &Capabilities| {
+        [
+            ("range_m", told.range_m.to_vec()),
+            ("range_rad", told.range_rad.to_vec()),
+            ("resolution_m", vec![told.resolution_m]),
+            ("max_force_n", told.max_force_n.to_vec()),
+            ("max_torque_nm", told.max_torque_nm.to_vec()),
+            ("max_force_slew_n_per_s", vec![told.max_force_slew_n_per_s]),
+            ("max_torque_slew_nm_per_s", vec![told.max_torque_slew_nm_per_s]),
+            ("max_stiffness_n_per_m", vec![told.max_stiffness_n_per_m]),
+            ("rate_hz", told.rate_hz.to_vec()),
+            ("latency_s", vec![told.latency_s]),
+        ]
+    };
+    let changed = numbers(before).into_iter().zip(numbers(now)).find(|(before, now)| before != now);
+    let changed = changed.map_or("`sensed` or `actuated`".to_owned(), |((field, before), (_, now))| {
+        format!("`{field}` was {before:?}, then {now:?}")
+    });
     Err(Refusal::broken(format!(
-        "its capabilities changed from one call to the next; they are constant from `open` on: {before:?}, then {now:?}"
+        "its capabilities changed from one call to the next; they are constant from `open` on: {changed}"
     )))
 }
 

@@ -2,6 +2,7 @@
 
 use super::Seen;
 use super::path::CONFIG;
+use crate::wording;
 use flotor_core::plausibility::{PoseBounds, is_rotation};
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{
@@ -217,7 +218,7 @@ impl Running {
     fn plausible(&mut self, sampled: Cycle, tick: &Tick) -> Result<(), String> {
         let state = &self.state;
         if !state.is_finite() || !state.delivered.is_finite() {
-            return Err(format!("{state:?}"));
+            return Err(format!("{} is not finite", wording::sample(state)));
         }
         // A sensor without a pose may leave it as it likes.
         if sampled != Cycle::Fresh || self.told.sensed == Axes::NONE {
@@ -236,7 +237,7 @@ impl Running {
             ));
         }
         if !KNOWN.contains(state.conditions) {
-            return Err(format!("conditions that the contract does not know: {:?}", state.conditions));
+            return Err("`conditions` has bits that the contract does not define".to_owned());
         }
         let Sampled { count, first, last } = self.sampled;
         let now = state.sampled_ns;
@@ -283,7 +284,7 @@ impl Running {
         while at_rest < SAMPLES {
             if started.elapsed() > PATIENCE {
                 return Err(match self.delivers() {
-                    true => format!("it still delivers {:?}", self.state.delivered),
+                    true => format!("it still delivers {}", wording::wrench(&self.state.delivered)),
                     false => format!("it has given {at_rest} samples in {PATIENCE:?} since it was stopped"),
                 });
             }

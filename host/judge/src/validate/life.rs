@@ -6,6 +6,7 @@ use super::checks::Subject;
 use super::device::Running;
 use super::path::{CONFIG, finite, walk};
 use crate::watch::calling;
+use crate::wording;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Model, OpenedDevice};
 use flotor_hal::extension::linear_field::LinearField;
@@ -66,7 +67,7 @@ fn steps(model: &mut Model) -> Result<(), String> {
     let _calls = calling(&inputs);
     match model.step_batch(&inputs, &mut outputs) {
         CallStatus::Ok => Ok(()),
-        other => Err(format!("step_batch returned {other:?}")),
+        other => Err(format!("step_batch returned `{}`", wording::status(other))),
     }
 }
 
@@ -93,7 +94,11 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
             let answer = model.linear_field(&input, &mut field);
             works(model, "linear-field")?;
             if answer != CallStatus::Ok || !field.is_finite() {
-                return Err(format!("linear-field answered {answer:?}: {field:?}"));
+                return Err(format!(
+                    "linear-field answered `{}`: {}",
+                    wording::status(answer),
+                    wording::linear_field(&field)
+                ));
             }
         }
         let drawn = model.centerline().map(|mut line| (line.info(), line.points(&input, POINTS)));
@@ -113,7 +118,7 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
         let answer = model.read_details(&mut values);
         works(model, "details")?;
         if !matches!(answer, CallStatus::Ok | CallStatus::Unsupported) {
-            return Err(format!("details answered {answer:?}"));
+            return Err(format!("details answered `{}`", wording::status(answer)));
         }
     }
     after("an extension", model.float_changes())

@@ -4,6 +4,7 @@ use super::Seen;
 use super::checks::Subject;
 use super::path::{CONFIG, finite, walk};
 use crate::platform::processor_time;
+use crate::wording;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Mutability, Parameter};
@@ -65,7 +66,9 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
             return Err(format!("`{id}` is declared live, but the plugin has no `set_parameter`"));
         }
         CallStatus::Panicked => return Err(format!("`{id}` = {value}: it {}", model.last_message())),
-        CallStatus::WrongPhase => return Err(format!("setting `{id}` = {value} returned {last:?}")),
+        CallStatus::WrongPhase => {
+            return Err(format!("setting `{id}` = {value} returned `{}`", wording::status(last)));
+        }
     };
     took.sort_unstable();
     // The one in the middle: what disturbs this process for a moment does not count.
@@ -78,7 +81,10 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
     let read_back = model.parameter(index);
     let is_told = read_back.is_finite() && expected.is_finite();
     if is_told && (read_back - expected).abs() > 1.0e-9 * read_back.abs().max(expected.abs()) {
-        return Err(format!("`{id}` was set to {value} (answer {last:?}), but reads back {read_back}"));
+        return Err(format!(
+            "`{id}` was set to {value} (answer `{}`), but reads back {read_back}",
+            wording::status(last)
+        ));
     }
     walk(10).try_for_each(|input| {
         finite(model, &input).map(|_| ()).map_err(|words| format!("with `{id}` = {value}, {words}"))

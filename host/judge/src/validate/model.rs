@@ -6,6 +6,7 @@ use super::path::{CONFIG, FAST, directions, finite, grid, step, walk, walk_at};
 use super::untouched::threads;
 use crate::platform::processor_time;
 use crate::subject::input_of;
+use crate::wording;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{
@@ -73,7 +74,7 @@ fn is_other(first: [f64; 3], second: [f64; 3]) -> bool {
 fn demanded(model: &mut Model, of: impl Fn(u64) -> Demand) -> Result<Vec<Output>, String> {
     match model.reset() {
         CallStatus::Ok => {}
-        other => return Err(format!("reset returned {other:?}")),
+        other => return Err(format!("reset returned `{}`", wording::status(other))),
     }
     let serves = model.serves();
     walk(500)
@@ -109,7 +110,7 @@ pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
     let first = run(model)?;
     match model.reset() {
         CallStatus::Ok => {}
-        other => return Err(format!("reset returned {other:?}")),
+        other => return Err(format!("reset returned `{}`", wording::status(other))),
     }
     let second = run(model)?;
     let differs = first.iter().zip(&second).position(|(a, b)| a.wrench != b.wrench);
@@ -262,8 +263,8 @@ pub(super) fn activity(model: &mut Model) -> Result<(), Seen> {
                 let acts = output.wrench != Wrench::ZERO || output.energy_j.abs() > 0.0;
                 if acts && !region.contains(pose.position()) {
                     return Err(Seen::Violation(format!(
-                        "at {position_m} m, outside its active region, it returned {:?} and {} J",
-                        output.wrench, output.energy_j
+                        "at {position_m} m, outside its active region, it returned {}",
+                        wording::output(&output)
                     )));
                 }
             }

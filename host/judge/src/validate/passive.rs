@@ -12,6 +12,7 @@
 
 use super::path::{FAST, finite, walk_at};
 use super::{Figures, Seen};
+use crate::wording;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{
     DVec3, Input, Memory, Pose, Twist, Wrench, math, orientation_from_rotation_vector, rotation_vector,
@@ -113,9 +114,9 @@ fn there_and_back(model: &mut Model) -> Result<f64, String> {
             let largest_nm = ahead.torque().length() + behind.torque().length();
             if given_w > ROUNDING * (largest_n * linear.length() + largest_nm * angular.length()) {
                 return Err(format!(
-                    "forward and back at {:.3} m/s through {:?} it generates {given_w:.3e} W; damping must dissipate",
+                    "forward and back at {:.3} m/s through {} it generates {given_w:.3e} W; damping must dissipate",
                     linear.length(),
-                    there.pose
+                    wording::pose(&there.pose)
                 ));
             }
             let damping_ns_per_m = -(ahead - behind).force().dot(linear) / (2.0 * linear.length_squared());

@@ -2,6 +2,7 @@
 
 use crate::subject::{call, input_of};
 use crate::trajectory::{Series, Trajectory};
+use crate::wording;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{DQuat, DVec3, Input, LoopConfig, Output, Pose, Twist};
@@ -60,7 +61,7 @@ pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
 pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
     call(model, input).map_err(|status| match status {
         CallStatus::Panicked => format!("{} it {}", place(input), model.last_message()),
-        other => format!("{} it returned {other:?}", place(input)),
+        other => format!("{} it returned `{}`", place(input), wording::status(other)),
     })
 }
 
@@ -70,14 +71,15 @@ pub(super) fn finite(model: &mut Model, input: &Input) -> Result<Output, String>
     if output.wrench.is_finite() && !output.energy_j.is_infinite() && output.status().is_some() {
         return Ok(output);
     }
-    Err(format!("{} it returned {output:?}", place(input)))
+    Err(format!("{} it returned {}", place(input), wording::output(&output)))
 }
 
 fn place(input: &Input) -> String {
     if input.twist == Twist::ZERO {
-        return format!("at {:?}", input.pose);
+        return format!("at {}", wording::pose(&input.pose));
     }
-    format!("at tick {}, {:?}, moving with {:?}", input.tick, input.pose, input.twist)
+    let Input { tick, pose, twist, .. } = input;
+    format!("at tick {tick}, {}, moving with {},", wording::pose(pose), wording::twist(twist))
 }
 
 #[cfg(test)]

@@ -1,0 +1,70 @@
+//! Answers of plugins in words and numbers with units, for findings.
+
+use flotor_hal::abi::CallStatus;
+use flotor_hal::{DVec3, DeviceState, LinearField, Output, Pose, Twist, Wrench, rotation_vector};
+
+/// Returns the words for a call status.
+pub(crate) fn status(status: CallStatus) -> &'static str {
+    match status {
+        CallStatus::Ok => "ok",
+        CallStatus::Panicked => "panicked",
+        CallStatus::WrongPhase => "wrong phase",
+        CallStatus::OutOfRange => "out of range",
+        CallStatus::Unsupported => "unsupported",
+    }
+}
+
+/// Returns a vector as `[x, y, z]`.
+fn vector(vector: DVec3) -> String {
+    let [x, y, z] = vector.to_array();
+    format!("[{x}, {y}, {z}]")
+}
+
+/// Returns position, m, and rotation vector, rad, of a pose.
+pub(crate) fn pose(pose: &Pose) -> String {
+    let turned_rad = rotation_vector(pose.orientation());
+    match turned_rad == DVec3::ZERO {
+        true => format!("{} m", vector(pose.position())),
+        false => format!("{} m, turned by {} rad", vector(pose.position()), vector(turned_rad)),
+    }
+}
+
+/// Returns velocity, m/s, and angular velocity, rad/s, of a twist.
+pub(crate) fn twist(twist: &Twist) -> String {
+    format!("{} m/s and {} rad/s", vector(twist.linear()), vector(twist.angular()))
+}
+
+/// Returns force, N, and torque, N·m, of a wrench.
+pub(crate) fn wrench(wrench: &Wrench) -> String {
+    format!("{} N and {} N·m", vector(wrench.force()), vector(wrench.torque()))
+}
+
+/// Returns wrench, energy and status of the answer to a step.
+pub(crate) fn output(output: &Output) -> String {
+    let status = if output.status().is_some() { "" } else { ", with a status unknown to the contract" };
+    format!("{} and {} J{status}", wrench(&output.wrench), output.energy_j)
+}
+
+/// Returns wrench and range of a local linear model.
+pub(crate) fn linear_field(field: &LinearField) -> String {
+    let stiffness =
+        if field.stiffness.iter().flatten().all(|rate| rate.is_finite()) { "finite" } else { "not finite" };
+    format!(
+        "{} at {}, valid within {} m and {} rad; its stiffness is {stiffness}",
+        wrench(&field.wrench),
+        pose(&field.anchor),
+        field.valid_m,
+        field.valid_rad
+    )
+}
+
+/// Returns pose, twist and delivered wrench of a sample.
+pub(crate) fn sample(state: &DeviceState) -> String {
+    let DVec3 { x, y, z } = state.pose.position();
+    format!(
+        "a sample at [{x}, {y}, {z}] m with the quaternion {}, moving with {}, delivering {}",
+        state.pose.orientation(),
+        twist(&state.twist),
+        wrench(&state.delivered)
+    )
+}
