@@ -1,7 +1,7 @@
 //! The chip on the bus, through libusb.
 
 use crate::chip::{Chip, ChipLost, PRODUCT, Request, VENDOR};
-use crate::platform::{OTHER_REMEDY, access_remedy};
+use crate::platform::{OTHER_REMEDY, access_remedy, has_bus};
 use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbContext};
 use std::time::{Duration, Instant};
 
@@ -123,6 +123,9 @@ fn refused(error: Error) -> String {
         Error::NoDevice => "no Falcon has that serial number, or it was unplugged; `address` is usb, or usb: and a serial \
                             number"
             .to_owned(),
+        Error::Other if !has_bus() => "no USB bus can be reached here, as in most containers; start the container with `--device \
+                                       /dev/bus/usb`. Without a Falcon, `flotor emulate falcon` starts one in software"
+            .to_owned(),
         other => format!("the Falcon cannot be used ({other}); {OTHER_REMEDY}"),
     }
 }
@@ -139,6 +142,7 @@ mod tests {
             (Error::Busy, "close that one first"),
             (Error::NoDevice, "serial number"),
             (Error::Io, OTHER_REMEDY),
+            (Error::Other, if has_bus() { OTHER_REMEDY } else { "--device /dev/bus/usb" }),
         ] {
             let said = refused(error);
             assert!(said.contains(words) && said.lines().count() == 1, "{said}");

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Examples:\n  flotor doctor\n  flotor doctor --device openhaptics\n  flotor doctor --device force-dimension --set library=/opt/sdk/libdrd.so.3\n\n\
     The command changes nothing; with `--device` it opens the device, without force. Each finding names its remedy. The exit \
-    code is 0 whatever it finds."
+    code is 0, and with `--device` 1 if the device is not ready to start."
 )]
 pub(crate) struct DoctorArguments {
     /// Id of a device: check why it does not start
@@ -75,18 +75,22 @@ impl Diagnosis {
 
 pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     let registry = arguments.plugin_path.registry();
-    let (diagnoses, subject) = match &arguments.device {
-        Some(id) => (
-            device::diagnose(&registry, id, &arguments.sets, &usb::Machine::at(&arguments.root))?,
-            "to start this device",
-        ),
-        None => (machine(&registry, &arguments.root), "for real time"),
+    let diagnoses = match &arguments.device {
+        Some(id) => device::diagnose(&registry, id, &arguments.sets, &usb::Machine::at(&arguments.root))?,
+        None => machine(&registry, &arguments.root),
     };
     if let Some(file) = arguments.json.file() {
         write_json(file, &diagnoses)?;
     }
+    let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
+    let verdict = match (&arguments.device, bad) {
+        (Some(id), 1..) => {
+            Err(CommandError::Failed(format!("`{id}` does not start; each finding names its remedy")))
+        }
+        _ => Ok(()),
+    };
     if arguments.json.is_on_standard_output() {
-        return Ok(());
+        return verdict;
     }
     for diagnosis in &diagnoses {
         let grade = match diagnosis.grade {
@@ -99,16 +103,15 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
             say!("  {:<5} {:<18} -> {remedy}", "", "");
         }
     }
-    let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
-    let verdict = match bad {
-        0 => "ready".to_owned(),
-        bad if arguments.device.is_some() => format!("not ready {subject}; bad findings: {bad}"),
-        bad => format!(
-            "not ready {subject}; bad findings: {bad}. Runs with `--clock virtual` do not need real time"
+    let words = match (&arguments.device, bad) {
+        (_, 0) => "ready".to_owned(),
+        (Some(_), _) => format!("not ready to start this device; bad findings: {bad}"),
+        (None, _) => format!(
+            "not ready for real time; bad findings: {bad}. Runs with `--clock virtual` do not need real time"
         ),
     };
-    say!("{}", style::title(&verdict));
-    Ok(())
+    say!("{}", style::title(&words));
+    verdict
 }
 
 /// The real-time configuration.

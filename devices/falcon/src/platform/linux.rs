@@ -6,6 +6,11 @@ use std::os::fd::AsRawFd;
 /// What helps where no other advice does.
 pub(crate) const OTHER_REMEDY: &str = "connect it without a hub, and try again";
 
+/// Whether programs can reach a USB bus: a container has none unless it is given one.
+pub(crate) fn has_bus() -> bool {
+    std::path::Path::new("/dev/bus/usb").is_dir()
+}
+
 /// How a user is allowed to use the device.
 pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     format!(

@@ -6,6 +6,6 @@ mod linux;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use linux::{OTHER_REMEDY, access_remedy, descriptor};
+pub(crate) use linux::{OTHER_REMEDY, access_remedy, descriptor, has_bus};
 #[cfg(windows)]
-pub(crate) use windows::{OTHER_REMEDY, access_remedy, descriptor};
+pub(crate) use windows::{OTHER_REMEDY, access_remedy, descriptor, has_bus};

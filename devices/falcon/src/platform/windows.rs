@@ -7,6 +7,11 @@ use std::os::windows::io::AsRawSocket;
 pub(crate) const OTHER_REMEDY: &str =
     "give it the driver WinUSB with the program Zadig, connect it without a hub, and try again";
 
+/// Whether programs can reach a USB bus.
+pub(crate) fn has_bus() -> bool {
+    true
+}
+
 /// How a user is allowed to use the device.
 pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     format!(

@@ -31,6 +31,13 @@ impl KeyValue {
         (&self.key, &self.value)
     }
 
+    /// Returns the setting without the name of a part before its key: `device.address=usb` of a scene is `address=usb` of its device.
+    #[must_use]
+    pub fn within(&self, part: &str) -> Self {
+        let inner = self.key.strip_prefix(part).and_then(|key| key.strip_prefix('.'));
+        Self { key: inner.unwrap_or(&self.key).to_owned(), value: self.value.clone() }
+    }
+
     /// As a parameter of a plugin.
     pub fn parameter(&self) -> ParameterText {
         let location = Location { file: PathBuf::from(format!("--set {}", self.key)), line: 0 };

@@ -29,7 +29,8 @@ pub(super) fn diagnose(
             "--device: `{id}` is a model; `flotor plugins` lists the devices"
         )));
     }
-    let settings = settings(&plugin, "--set", sets)?;
+    let sets: Vec<KeyValue> = sets.iter().map(|set| set.within("device")).collect();
+    let settings = settings(&plugin, "--set", &sets)?;
     let opened = plugin.open_device(&settings);
     let mut diagnoses = connection(machine, plugin.usb_kinds(), opened.is_ok());
     match opened {
