@@ -450,6 +450,23 @@ impl LinkSummary {
     }
 }
 
+/// Returns why a run ended, for people.
+#[must_use]
+pub fn end_cause(end: &RunEnd) -> String {
+    match end {
+        RunEnd::DeviceFault(fault) => format!("device fault, {}", fault.advice()),
+        RunEnd::EmergencyStop(source) => format!("emergency stop ({})", source.word()),
+        RunEnd::TooFast(samples_per_s) => {
+            format!("the device sends {samples_per_s} samples a second, too many")
+        }
+        RunEnd::NotPaced => "the device does not set the pace".to_owned(),
+        RunEnd::Oscillation => "the force swung between its limits".to_owned(),
+        RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
+        RunEnd::Unguarded => "the watchdog process was gone".to_owned(),
+        RunEnd::Finished | RunEnd::Stopped => "it was stopped".to_owned(),
+    }
+}
+
 impl RunSummary {
     /// Puts together everything known after a run.
     #[must_use]

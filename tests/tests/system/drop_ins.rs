@@ -13,6 +13,7 @@ use flotor_tests::{TestSize, workspace_root};
 use object::read::elf::ElfFile64;
 use object::{Object, ObjectSymbol};
 use serde_json::Value;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -156,6 +157,38 @@ fn a_program_in_python_sees_a_type_that_its_bindings_know_and_one_in_c_what_chai
     assert!(compiled.is_ok_and(|compiled| compiled.success()), "it compiles");
     let ran = lent(&program, &["--api", "dhd", "--pace", "lockstep"], "", 0);
     assert_eq!(fact(&ran, "type"), 108.0, "{ran:?}");
+}
+
+#[test]
+fn a_program_that_lost_the_library_path_and_a_duration_that_does_not_apply_are_told() {
+    let scratch = Scratch::default();
+    let scene = scratch.file("scene.toml", "duration_s = 3\n[device]\nplugin = \"simulated\"\n");
+    let ran =
+        Flotor::with(["lend", &scene.display().to_string(), "--", "env", "-i", "/bin/sh", "-c", "exit 7"])
+            .run();
+    assert_eq!(ran.code, Some(7), "{ran:?}");
+    assert!(ran.stderr.contains("opened no device") && ran.stderr.contains("`env -i` removes it"), "{ran:?}");
+    assert!(ran.stderr.contains("`duration_s` does not apply"), "{ran:?}");
+}
+
+#[test]
+fn the_summary_of_a_program_has_numbers_and_causes_that_a_person_reads() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let program = compiled(&scratch, "deeds");
+    // Without a slew limit, under which a square wave is damped and does not end the run.
+    let scene = scratch.file("fast.toml", "[device]\nplugin = \"simulated\"\n[limits]\nforce_n = 8\n");
+    let deed =
+        |way| lent(&program, &["--api", "dhd", "--pace", "lockstep", &scene.display().to_string()], way, 0);
+    let huge = deed("huge");
+    assert!(huge.stdout.contains("asked for 1.7e308 N and 1.7e308 N·m at most"), "{huge:?}");
+    let nan = deed("nan");
+    assert!(nan.stdout.contains("600 wrenches") && nan.stdout.contains("500 refused, not finite"), "{nan:?}");
+    let square = deed("square");
+    let cause = "the run ended before the program: the force swung between its limits";
+    assert!(square.stdout.contains(cause), "{square:?}");
 }
 
 /// A motion that a program has printed: result, number of the error, distance from the place in m, whether it goes on.
@@ -376,6 +409,14 @@ fn what_cannot_be_lent_is_said_in_one_line_with_what_helps() {
         (vec!["--api", "dhd", "--", &linked], "--api openhaptics"),
         (vec!["no-such-scene.toml", "--", &program], "`no-such-scene.toml` is no scene"),
     ];
+    let broken =
+        scratch.file("broken.toml", "[device]\nplugin = \"simulated\"\nspeed = 3\n").display().to_string();
+    cases.push((vec![&broken, "--", &program], "broken.toml:3"));
+    let small = scratch.path().join("small");
+    std::fs::write(&small, b"\x7fELF\x01\x01\x01").expect("there is room");
+    std::fs::set_permissions(&small, std::fs::Permissions::from_mode(0o755)).expect("it is ours");
+    let small = small.display().to_string();
+    cases.push((vec!["--", &small], "32-bit program"));
     let fixed = compile("static", &["-static"]);
     if let Some(fixed) = &fixed {
         cases.push((vec!["--", fixed], "statically linked"));

@@ -12,7 +12,7 @@ use flotor_record::{Note, Recorder, RunDescription, Severity, TraceDigest};
 use flotor_servo::{RunEnd, StopSwitch};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
-use flotor_session::summary::{RunFacts, RunSummary, Tally};
+use flotor_session::summary::{RunFacts, RunSummary, Tally, end_cause};
 use flotor_session::telemetry::{Watched, publish};
 use flotor_session::{
     Lockstep, Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session,
@@ -242,23 +242,23 @@ impl Facts {
     }
 }
 
-/// A force, for people: one that no hand was meant to feel as a power of ten.
-fn newtons(force_n: f64) -> String {
-    if force_n < 1.0e6 { format!("{force_n:.3} N") } else { format!("{force_n:.1e} N") }
+/// Returns a quantity with its unit and so many decimals; one that no hand was meant to feel as a power of ten.
+fn quantity(value: f64, decimals: usize, unit: &str) -> String {
+    if value < 1.0e6 { format!("{value:.decimals$} {unit}") } else { format!("{value:.1e} {unit}") }
 }
 
 /// What a program asked of a station and what the hand got.
 fn line(station: &Station, asked: Asked) -> String {
     let counts = station.counts();
     let mut line = format!(
-        "program    `{}` opened {}; {} wrenches; asked for {} and {:.4} N·m at most, the hand got {:.3} N and {:.4} N·m",
+        "program    `{}` opened {}; {} wrenches; asked for {} and {} at most, the hand got {} and {}",
         station.name(),
         if station.opened() == 1 { "once".to_owned() } else { format!("{} times", station.opened()) },
         counts.commands,
-        newtons(asked.force_n),
-        asked.torque_nm,
-        asked.applied_n,
-        asked.applied_nm
+        quantity(asked.force_n, 3, "N"),
+        quantity(asked.torque_nm, 4, "N·m"),
+        quantity(asked.applied_n, 3, "N"),
+        quantity(asked.applied_nm, 4, "N·m")
     );
     if counts.refused > 0 {
         line += &format!("; {} refused, not finite", counts.refused);
@@ -274,11 +274,8 @@ fn line(station: &Station, asked: Asked) -> String {
 
 /// Why the run ended before the program did, if so.
 fn end_of(outcome: &Outcome) -> Option<String> {
-    match outcome.end {
-        RunEnd::Finished | RunEnd::Stopped => None,
-        RunEnd::DeviceFault(fault) => Some(format!("the run ended before the program: {}", fault.advice())),
-        other => Some(format!("the run ended before the program: {other:?}")),
-    }
+    (!outcome.end.is_in_order())
+        .then(|| format!("the run ended before the program: {}", end_cause(&outcome.end)))
 }
 
 /// Writes a result, to standard error if it is named `-`.
@@ -307,4 +304,15 @@ pub(crate) fn tell(problem: &str) {
 fn tell_plainly(text: &str) {
     use std::io::Write;
     let _ = writeln!(std::io::stderr(), "{}", escaped(text));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quantity;
+
+    #[test]
+    fn a_quantity_beyond_any_hand_is_a_power_of_ten() {
+        assert_eq!(quantity(8.0, 3, "N"), "8.000 N");
+        assert_eq!(quantity(1.7e308, 4, "N·m"), "1.7e308 N·m");
+    }
 }

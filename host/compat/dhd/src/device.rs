@@ -239,6 +239,9 @@ impl Open {
     /// down, now or by the envelope later.
     pub(crate) fn send(&self, device: &mut Device, force_n: DVec3, torque_nm: DVec3) -> Result<bool, Code> {
         if !(force_n.is_finite() && torque_nm.is_finite()) {
+            // The port counts and refuses it.
+            let wrench = Wrench::new(FRAME.to_flotor(force_n), FRAME.to_flotor(torque_nm));
+            let _ = self.station.command(&wrench, self.host.now_ns());
             return Err(Code::Invalid);
         }
         let own = |vector: DVec3, most: f64| if most < 0.0 { vector } else { shortened(vector, most) };

@@ -172,6 +172,9 @@ impl ModelUse {
 }
 
 impl Scene {
+    /// Duration of a run without `duration_s`, s.
+    pub const DURATION_S: f64 = 10.0;
+
     /// The built-in demo.
     ///
     /// # Errors
@@ -240,7 +243,7 @@ impl Scene {
         let title = root.take("title").map(|value| value.text()).transpose()?.unwrap_or_default();
         let rate_hz = root.number("rate_hz", 100.0..=10_000.0)?.unwrap_or(1000.0);
         let pacing = root.take("pacing").map(pacing).transpose()?.unwrap_or(Pacing::Host);
-        let duration_s = root.number("duration_s", 0.0..=31_536_000.0)?.unwrap_or(10.0);
+        let duration_s = root.number("duration_s", 0.0..=31_536_000.0)?.unwrap_or(Self::DURATION_S);
         let folders = root.take("plugin_folders").map(|value| value.texts()).transpose()?.unwrap_or_default();
         let devices = devices::read(&mut root)?;
         let models = root.sections("model")?.into_iter().map(|section| model(section, &devices));

@@ -10,7 +10,9 @@ use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note, say};
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::spawn_unblocked;
+use flotor_session::RunError;
 use flotor_session::registry::PATH_VARIABLE;
+use flotor_session::scene::Scene;
 use program::Program;
 use rustix::process::{Pid, Signal, kill_process};
 use service::Service;
@@ -218,6 +220,7 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
         ));
     };
     let api = arguments.api.as_deref().map(Api::of_word).transpose()?;
+    check_scene(&arguments)?;
     let program = Program::find(name)?;
     let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
     let api = match api {
@@ -256,14 +259,14 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
     let child = spawn_unblocked(&mut command)
         .map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))?;
     let status = wait(child, &stop);
-    if !tell(&status, &program, &report) && (status.code() == Some(0) || status.signal().is_some()) {
+    if !tell(&status, &program, &report) {
         let which = api.map_or_else(
             || "none of dhd, openhaptics and chai3d".to_owned(),
             |api| format!("nothing of `--api {}`", api.word()),
         );
         note(format_args!(
-            "`{}` opened no device: it called {which}, or has its maker's library linked in; linked in, it has to be linked anew \
-             with the library of `flotor lend`",
+            "`{}` opened no device: it called {which}, has its maker's library linked in (link it anew with the library of \
+             `flotor lend`), or lost `LD_LIBRARY_PATH` (a script that sets it keeps the old value behind its own; `env -i` removes it)",
             program.path.display()
         ));
     }
@@ -280,7 +283,6 @@ fn serve(
     own: &Path,
     stop: &StopSwitch,
 ) -> Result<(), CommandError> {
-    is_scene(arguments)?;
     let folder = Folder::new()?;
     let report = folder.0.join("report.txt");
     let mut served = service.start(arguments, &folder, &report, own)?;
@@ -304,15 +306,23 @@ fn end_as(status: &ExitStatus) -> Result<(), CommandError> {
     }
 }
 
-/// Whether the scene is there.
-fn is_scene(arguments: &LendArguments) -> Result<(), CommandError> {
-    match &arguments.scene {
-        Some(scene) if !scene.is_file() => Err(CommandError::Usage(format!(
+/// Reads the scene before the program starts: a program would see a device that is not there.
+fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
+    let Some(file) = &arguments.scene else { return Ok(()) };
+    if file.is_dir() || !file.exists() {
+        return Err(CommandError::Usage(format!(
             "`{}` is no scene: there is no such file; the program stands after `--`",
-            scene.display()
-        ))),
-        _ => Ok(()),
+            file.display()
+        )));
     }
+    let scene = Scene::load(file).map_err(RunError::Scene)?;
+    if scene.duration_s != Scene::DURATION_S {
+        note(format_args!(
+            "`{}`: `duration_s` does not apply; the run lasts as long as the program",
+            file.display()
+        ));
+    }
+    Ok(())
 }
 
 /// All a drop-in is told.
@@ -346,7 +356,6 @@ fn told(
     let absolute = |path: &Path| {
         std::path::absolute(path).map_err(|cause| CommandError::file(path, "cannot be found", cause))
     };
-    is_scene(arguments)?;
     if let Some(scene) = &arguments.scene {
         command.env("FLOTOR_SCENE", absolute(scene)?);
     }

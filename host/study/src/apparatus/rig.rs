@@ -20,28 +20,14 @@ use flotor_record::Recorder;
 use flotor_servo::Clock;
 use flotor_servo::RunEnd;
 use flotor_session::scene::Scene;
+use flotor_session::summary::end_cause;
 use flotor_session::{ControlError, Observer, RunError, RunRecording, Steps};
 use std::path::PathBuf;
 
 /// The run ended before the experiment did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the run ended during a trial: {}", end_words(.0))]
+#[error("the run ended during a trial: {}", end_cause(.0))]
 pub struct RunEnded(pub RunEnd);
-
-fn end_words(end: &RunEnd) -> String {
-    match end {
-        RunEnd::DeviceFault(fault) => format!("device fault, {}", fault.advice()),
-        RunEnd::EmergencyStop(source) => format!("emergency stop ({})", source.word()),
-        RunEnd::TooFast(samples_per_s) => {
-            format!("the device sends {samples_per_s} samples a second, too many")
-        }
-        RunEnd::NotPaced => "the device does not set the pace".to_owned(),
-        RunEnd::Oscillation => "the force swung between its limits".to_owned(),
-        RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
-        RunEnd::Unguarded => "the watchdog process was gone".to_owned(),
-        RunEnd::Finished | RunEnd::Stopped => "it was stopped".to_owned(),
-    }
-}
 
 /// The model did not take a stimulus although the check said it would.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

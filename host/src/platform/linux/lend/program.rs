@@ -19,9 +19,17 @@ pub(super) struct Program {
 /// What a native program's file says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Native {
+    bits: Bits,
     is_dynamic: bool,
     /// Which interfaces its file names, in the order of [`Api::ALL`].
     names: [bool; 3],
+}
+
+/// Size of the addresses of a native program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Bits {
+    ThirtyTwo,
+    SixtyFour,
 }
 
 impl Program {
@@ -59,6 +67,12 @@ impl Program {
     pub(super) fn check(&self, api: Option<Api>) -> Result<(), CommandError> {
         let Some(native) = self.native else { return Ok(()) };
         let name = self.path.display();
+        if native.bits == Bits::ThirtyTwo {
+            return Err(CommandError::Usage(format!(
+                "`{name}` is a 32-bit program, and the drop-in libraries have 64 bits: build it for 64 bits, or use a service \
+                 (`--api haply`, `--api ml-api`), which any program reaches"
+            )));
+        }
         if !native.is_dynamic {
             return Err(CommandError::Usage(format!(
                 "`{name}` is statically linked: no library can be put in its way; link it with the shared library (`flotor lend` \
@@ -94,9 +108,19 @@ fn read_native(path: &Path) -> Option<Native> {
         return None;
     }
     let bytes = std::fs::read(path).ok()?;
-    let is_dynamic = has_interpreter(&bytes)?;
+    let bits = bits(&bytes)?;
+    let is_dynamic = bits == Bits::ThirtyTwo || has_interpreter(&bytes)?;
     let holds = |mark: &&str| bytes.windows(mark.len()).any(|window| window == mark.as_bytes());
-    Some(Native { is_dynamic, names: Api::ALL.map(|api| api.marks().iter().any(holds)) })
+    Some(Native { bits, is_dynamic, names: Api::ALL.map(|api| api.marks().iter().any(holds)) })
+}
+
+/// Returns the size of the addresses of an ELF program; nothing of another file.
+fn bits(bytes: &[u8]) -> Option<Bits> {
+    match bytes.get(..5)? {
+        b"\x7fELF\x01" => Some(Bits::ThirtyTwo),
+        b"\x7fELF\x02" => Some(Bits::SixtyFour),
+        _ => None,
+    }
 }
 
 /// Whether a 64-bit ELF program asks for a loader; nothing if it is none.
@@ -144,9 +168,12 @@ mod tests {
             let program = Program { path: PathBuf::from("/usr/bin/demo"), native: Some(native) };
             program.check(api).map_err(|error| error.to_string())
         };
-        let plain = Native { is_dynamic: true, names: [false, true, false] };
+        let plain = Native { bits: Bits::SixtyFour, is_dynamic: true, names: [false, true, false] };
         let said = refused(Native { is_dynamic: false, ..plain }, None).expect_err("it is static");
         assert!(said.contains("statically linked") && !said.contains('\n'), "{said}");
+        let said = refused(Native { bits: Bits::ThirtyTwo, ..plain }, None).expect_err("it has 32 bits");
+        assert!(said.contains("32-bit program") && !said.contains('\n'), "{said}");
+        assert_eq!((bits(b"\x7fELF\x01"), bits(b"#!/bin/sh")), (Some(Bits::ThirtyTwo), None));
         let said = refused(plain, Some(Api::Dhd)).expect_err("it is another interface");
         assert!(said.contains("--api openhaptics") && !said.contains('\n'), "{said}");
         let said = refused(Native { names: [false, true, true], ..plain }, Some(Api::Dhd));
