@@ -178,17 +178,55 @@ fn the_summary_of_a_program_has_numbers_and_causes_that_a_person_reads() {
     }
     let scratch = Scratch::default();
     let program = compiled(&scratch, "deeds");
-    // Without a slew limit, under which a square wave is damped and does not end the run.
-    let scene = scratch.file("fast.toml", "[device]\nplugin = \"simulated\"\n[limits]\nforce_n = 8\n");
-    let deed =
-        |way| lent(&program, &["--api", "dhd", "--pace", "lockstep", &scene.display().to_string()], way, 0);
+    let deed = |way| lent(&program, &["--api", "dhd", "--pace", "lockstep"], way, 0);
     let huge = deed("huge");
     assert!(huge.stdout.contains("asked for 1.7e308 N and 1.7e308 N·m at most"), "{huge:?}");
     let nan = deed("nan");
     assert!(nan.stdout.contains("600 wrenches") && nan.stdout.contains("500 refused, not finite"), "{nan:?}");
-    let square = deed("square");
+    // Without a slew limit, under which a square wave is damped and does not end the run.
+    let fast = "[device]\nplugin = \"simulated\"\n[limits]\nforce_n = 8\ntorque_nm = 0.15\n";
+    let fast = scratch.file("fast.toml", fast).display().to_string();
+    let square = lent(&program, &["--api", "dhd", "--pace", "lockstep", &fast], "square", 0);
     let cause = "the run ended before the program: the force swung between its limits";
     assert!(square.stdout.contains(cause), "{square:?}");
+}
+
+/// In real time: lockstep has no thread that a deed of the program could harm.
+#[test]
+fn what_a_program_does_to_its_process_leaves_limits_exit_code_and_recording() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let program = compiled(&scratch, "deeds");
+    // In a debug build the standard library aborts the process when a descriptor of its own is closed.
+    let descriptors = if cfg!(debug_assertions) { 128 + 6 } else { 0 };
+    let deeds = [
+        ("descriptors", descriptors),
+        ("pipes", 0),
+        ("room", 0),
+        ("files", 0),
+        ("folder", 0),
+        ("unload", 0),
+        ("reopen", 0),
+        ("exec", 0),
+        ("leave", 7),
+        ("quick", 7),
+        ("signal", 42),
+        ("return", 5),
+    ];
+    show_each(&deeds, |(way, code)| {
+        let recording = scratch.path().join(format!("{way}.mcap"));
+        let ran = lent(&program, &["--api", "dhd", "--record", &recording.display().to_string()], way, 0);
+        assert_eq!(ran.code, Some(*code), "{way}: {ran:?}");
+        let (largest_n, ticks) = largest_n(&recording);
+        // A file that the program closed or replaced ends up to a quarter of a second earlier.
+        let is_cut = ["descriptors", "pipes"].contains(way);
+        let least_n = if is_cut { 0.0 } else { 1.9 };
+        assert!(largest_n >= least_n && largest_n <= MOST_N * (1.0 + 1.0e-12), "{way}: {largest_n} N");
+        assert!(ticks > 10, "{way}: {ticks} ticks");
+        assert!(ran.stdout.contains("  program    `device` opened "), "{way}: {ran:?}");
+    });
 }
 
 /// A motion that a program has printed: result, number of the error, distance from the place in m, whether it goes on.

@@ -229,8 +229,10 @@ impl Facts {
             publication.end("the program ended", flotor_live::EndKind::InOrder);
         }
         if let Some(path) = &settings.report {
-            write(path, format!("{}\n{}\n  {}\n", summary.title, summary.to_text(), lines.join("\n  ")));
-            let _ = std::fs::remove_file(so_far(path));
+            let text = format!("{}\n{}\n  {}\n", summary.title, summary.to_text(), lines.join("\n  "));
+            if write(path, text) {
+                let _ = std::fs::remove_file(so_far(path));
+            }
         }
         if let Some(path) = &settings.json {
             write(path, serde_json::to_string_pretty(&summary).unwrap_or_default() + "\n");
@@ -278,14 +280,17 @@ fn end_of(outcome: &Outcome) -> Option<String> {
         .then(|| format!("the run ended before the program: {}", end_cause(&outcome.end)))
 }
 
-/// Writes a result, to standard error if it is named `-`.
-fn write(path: &Path, text: String) {
+/// Writes a result, to standard error if it is named `-`. Returns whether it was written.
+fn write(path: &Path, text: String) -> bool {
     if path.as_os_str() == "-" {
-        return tell_plainly(text.trim_end());
+        tell_plainly(text.trim_end());
+        return true;
     }
-    if let Err(error) = std::fs::write(path, text) {
+    let written = std::fs::write(path, text);
+    if let Err(error) = &written {
         tell(&format!("cannot write `{}`: {error}", path.display()));
     }
+    written.is_ok()
 }
 
 /// Where the summary so far is, for when the program is killed.
