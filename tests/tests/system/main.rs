@@ -11,6 +11,7 @@ mod campaign;
 mod changes;
 mod composition;
 mod crash;
+mod damaged_inputs;
 mod demand;
 mod determinism;
 #[cfg(feature = "drop-ins")]
