@@ -248,7 +248,7 @@ impl Forces {
         // The couplings first: what is held now is what they and the models asked for last.
         self.couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
         for (stack, port) in self.stacks.iter_mut().zip(&mut *ports) {
-            let demand = TickDemand::new(port.felt, observed);
+            let demand = TickDemand::new(port.felt, observed.limited_to(stack.observable()));
             let (wrench, energy_j) = stack.step(tick, &port.state, demand, heart, &mut port.events);
             port.take(demand, wrench, energy_j);
         }

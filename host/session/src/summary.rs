@@ -201,7 +201,8 @@ pub struct RunSummary {
     pub events: std::collections::BTreeMap<&'static str, u64>,
     /// Digest of the trace without measured times: equal digests, equal runs.
     pub trace_digest: String,
-    /// Outputs of the models that were not computed in every tick, because nobody asked for them: "torque", "energy".
+    /// Outputs of the models that were not computed in every tick, because nobody asked for them or a model gives none: "torque",
+    /// "energy".
     pub not_computed: Vec<&'static str>,
     /// Records lost because an observer was too slow.
     pub dropped_records: u64,

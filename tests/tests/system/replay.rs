@@ -79,7 +79,8 @@ fn edited(recording: &Path, edit: impl Fn(TickRecord) -> Option<TickRecord>) -> 
 fn otherwise(record: TickRecord, events: Events) -> TickRecord {
     let mut other = record;
     let wrench = record.model.wrench().expect("it was recorded") + Wrench::from_force(DVec3::Z);
-    other.model = ModelOutputs::new(wrench, record.model.energy_j().expect("it was recorded"));
+    let energy_j = record.model.energy_j().unwrap_or_default();
+    other.model = ModelOutputs::new(wrench, energy_j).limited_to(record.model.computed());
     other.events.insert(events);
     other
 }

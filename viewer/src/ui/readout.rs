@@ -17,6 +17,9 @@ const MARGIN: f32 = 22.0;
 /// Narrower, the numbers would stand before the body: the time has to do, and those above the traces, points.
 const ROOM_FOR_NUMBERS_PT: f32 = 560.0;
 
+/// The energy of models of which one does not give its own.
+const NOT_GIVEN: &str = "not given";
+
 /// Title of a run and what it was made with.
 #[must_use]
 pub fn title_of(run: &RunDescription) -> String {
@@ -74,7 +77,11 @@ pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, pal
         painter.text(Pos2::new(right - 34.0, y), Align2::LEFT_TOP, unit, small.clone(), palette.faint);
         let mut x = right - 42.0;
         for component in (0..quantity.components().len()).rev() {
-            let value = digits(quantity.value(sample, component) * per_si, units);
+            let value = quantity.value(sample, component) * per_si;
+            let value = match quantity {
+                Quantity::Energy if value.is_nan() => NOT_GIVEN.to_owned(),
+                _ => digits(value, units),
+            };
             let color =
                 if quantity.components().len() == 3 { palette.components[component] } else { palette.text };
             painter.text(Pos2::new(x, y), Align2::RIGHT_TOP, value, mono.clone(), color);

@@ -104,40 +104,27 @@ impl Share {
     }
 }
 
-/// Outputs that a model is asked for, and those that it can give.
-#[derive(Clone, Copy)]
-struct Asked {
-    demand: TickDemand,
-    serves: Demand,
-}
-
-impl Asked {
-    /// Returns the answer with NaN in place of each output that was not asked for; `None` if what reaches the hand is not finite,
-    /// or the status is unknown. Real-time: bounded, no allocation.
-    #[inline(always)] // in the middle of a tick
-    fn usable(self, mut output: Output) -> Option<Output> {
-        let Self { demand, serves } = self;
-        output.status()?;
-        if demand.felt().contains(Demand::TORQUE) {
-            if !output.wrench.is_finite() {
-                return None;
-            }
-        } else {
-            if !output.wrench.force().is_finite() {
-                return None;
-            }
-            if !(demand.computed().contains(Demand::TORQUE) && output.wrench.torque().is_finite()) {
-                output.wrench.torque_nm = [f64::NAN; 3];
-            }
+/// Returns the answer with NaN in place of each output that was not asked for, or that is not finite and reaches an observer
+/// alone; `None` if what reaches the hand is not finite, or the status is unknown. Real-time: bounded, no allocation.
+#[inline(always)] // in the middle of a tick
+fn usable(demand: TickDemand, mut output: Output) -> Option<Output> {
+    output.status()?;
+    if demand.felt().contains(Demand::TORQUE) {
+        if !output.wrench.is_finite() {
+            return None;
         }
-        if !demand.computed().contains(Demand::ENERGY) {
-            output.energy_j = f64::NAN;
-        } else if !output.energy_j.is_finite() {
-            // A model without energy adds none.
-            output.energy_j = if serves.contains(Demand::ENERGY) { f64::NAN } else { 0.0 };
+    } else {
+        if !output.wrench.force().is_finite() {
+            return None;
         }
-        Some(output)
+        if !(demand.computed().contains(Demand::TORQUE) && output.wrench.torque().is_finite()) {
+            output.wrench.torque_nm = [f64::NAN; 3];
+        }
     }
+    if !(demand.computed().contains(Demand::ENERGY) && output.energy_j.is_finite()) {
+        output.energy_j = f64::NAN;
+    }
+    Some(output)
 }
 
 /// A model in all its places.
@@ -205,6 +192,11 @@ impl Layer {
         self.generation
     }
 
+    /// Outputs that its model can give.
+    pub(super) fn serves(&self) -> Demand {
+        self.serves
+    }
+
     /// How it is mixed with the others.
     pub(super) fn blend(&self) -> &Blend {
         &self.blend
@@ -257,11 +249,10 @@ impl Layer {
     #[inline]
     fn ask(&mut self, tick: &Tick, state: &DeviceState, demand: TickDemand, events: &mut Events) -> Share {
         let Self { objects, broad, serves, memory, health, .. } = self;
-        let asked = Asked { demand, serves: *serves };
         let mut share = Share::NONE;
         broad.for_each_near(objects, state.pose.position(), |object| {
             let input = object.mapping.input(tick, state, demand.computed().limited_to(*serves));
-            let Some(output) = object.answer(&input, asked, *memory, health, events) else {
+            let Some(output) = object.answer(&input, demand, *memory, health, events) else {
                 events.insert(Events::MODEL_FAULT);
                 return;
             };
@@ -349,7 +340,7 @@ impl Object {
     fn answer(
         &mut self,
         input: &Input,
-        asked: Asked,
+        demand: TickDemand,
         memory: Memory,
         health: &mut ModelHealth,
         events: &mut Events,
@@ -372,7 +363,7 @@ impl Object {
         }
         match stepped {
             Stepped::Answered => {
-                let usable = asked.usable(output);
+                let usable = usable(demand, output);
                 match usable {
                     Some(_) if self.model.may_be_late() => self.last = usable,
                     Some(_) => {}

@@ -34,6 +34,7 @@ pub(crate) struct ModelStack {
     broad: BroadPhase,
     /// Ascending; none if all layers have one priority, for then nobody is silenced.
     levels: Box<[Level]>,
+    observable: Demand,
 }
 
 /// A model on its way into a running loop.
@@ -44,6 +45,11 @@ pub struct Replacement {
     pub generation: u16,
     /// What takes its place.
     pub layer: Box<Layer>,
+}
+
+/// Outputs that a sum over these models has: it has no energy if a part is unknown.
+fn observable(slots: &[Slot]) -> Demand {
+    if slots.iter().all(Slot::gives_energy) { Demand::ALL } else { Demand::WRENCH }
 }
 
 /// The layers of one priority.
@@ -68,7 +74,14 @@ impl ModelStack {
             priorities.clear();
         }
         let level = |priority| Level { priority, gain: Fade::new(1.0, SILENCE_S), pushes: false };
-        Self { slots, broad, levels: priorities.into_iter().map(level).collect() }
+        let observable = observable(&slots);
+        Self { slots, broad, levels: priorities.into_iter().map(level).collect(), observable }
+    }
+
+    /// Outputs of the models together that exist: no energy if one of them does not give its own. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn observable(&self) -> Demand {
+        self.observable
     }
 
     /// Returns the wrench of the models together at a state of the device, in the device frame, and the energy they store, J. A
@@ -152,6 +165,7 @@ impl ModelStack {
     ) -> Option<Box<Layer>> {
         let Some(slot) = self.slots.get_mut(model) else { return Some(layer) };
         let pushed_out = slot.put(layer, generation, tick);
+        self.observable = observable(&self.slots);
         self.rebound(model);
         pushed_out
     }

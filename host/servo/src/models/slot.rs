@@ -10,7 +10,7 @@ use super::layer::{Layer, LayerReport, ModelHealth, Share};
 use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DeviceState, Tick};
+use flotor_hal::{Demand, DeviceState, Tick};
 
 pub(super) struct Slot {
     /// Of the model in the scene.
@@ -88,6 +88,11 @@ impl Slot {
         }
         (self.rest, self.gap) = (None, None);
         self.leaving.take()
+    }
+
+    /// True if the current model gives its stored energy.
+    pub(super) fn gives_energy(&self) -> bool {
+        self.current.serves().contains(Demand::ENERGY)
     }
 
     /// The box in the device frame in which its objects can act; `None` if that is everywhere. Real-time: bounded by
