@@ -17,7 +17,6 @@
 //! - [`log`]: what happened, line by line, chained; [`dataset`]: where it lies and the tables made from it.
 //! - [`kinematics`]: how a stimulus was explored, from samples of handle and force.
 //! - [`screen`]: a person's way through a sitting, for any front end; [`blinding`]: codes in place of conditions.
-//! - [`curve`]: a measured curve of a real spring, and the spring fitted to it.
 //! - [`conduct`]: a sitting with presenter, simulated subject and log put together.
 //! - [`cohort`]: many simulated subjects at once.
 //! - [`exclusion`]: what does not count, by rules decided beforehand.
@@ -32,7 +31,6 @@ pub mod bias;
 pub mod blinding;
 pub mod cohort;
 pub mod conduct;
-pub mod curve;
 pub mod dataset;
 pub mod estimate;
 pub mod exclusion;

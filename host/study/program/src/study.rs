@@ -2,6 +2,7 @@
 
 mod bias;
 mod choices;
+mod curve;
 mod explore;
 mod front;
 mod noise;

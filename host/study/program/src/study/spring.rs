@@ -1,13 +1,13 @@
 //! `flotor study spring`: a spring fitted to the measured curve of a real one, its plot, and scenes of the fitted spring or of
 //! the curve itself.
 
+use super::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use clap::Args;
 use flotor_command::options::{JsonOption, new_file, number, svg_file};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::{TextProblem, read_text};
 use flotor_plot::{Axis, Figure, Panel, Series};
 use flotor_session::registry::is_same_file;
-use flotor_study::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use std::path::{Path, PathBuf};
 
 #[derive(Args)]

@@ -16,45 +16,45 @@ use serde::Serialize;
 
 /// A measured curve.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MeasuredCurve {
+pub(super) struct MeasuredCurve {
     /// Compression, m, and force, N: in the order measured.
-    pub points: Vec<(f64, f64)>,
+    pub(super) points: Vec<(f64, f64)>,
     /// Length without load, m, where the table gives lengths or somebody measured it.
-    pub free_length_m: Option<f64>,
+    pub(super) free_length_m: Option<f64>,
 }
 
 /// The part of the deflection a stiffness is fitted to, as shares of the largest: ends that do not lie flat yet, and
 /// coils that begin to touch, are no property of the wire (EN 15800 measures a spring's rate between 30 and 70 %).
-pub const FITTED: [f64; 2] = [0.3, 0.7];
+pub(super) const FITTED: [f64; 2] = [0.3, 0.7];
 
 /// A spring fitted to a curve.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SpringFit {
+pub(super) struct SpringFit {
     /// Stiffness, N/m.
-    pub stiffness_n_per_m: f64,
+    pub(super) stiffness_n_per_m: f64,
     /// Its 95 % confidence interval, N/m.
-    pub stiffness_interval_n_per_m: [f64; 2],
+    pub(super) stiffness_interval_n_per_m: [f64; 2],
     /// Compression at which the fitted line meets zero force, m: play of the fixture.
-    pub offset_m: f64,
+    pub(super) offset_m: f64,
     /// Length without load, m, if it is known.
-    pub free_length_m: Option<f64>,
+    pub(super) free_length_m: Option<f64>,
     /// Compression rigidity, N: stiffness times free length.
-    pub gamma_n: Option<f64>,
+    pub(super) gamma_n: Option<f64>,
     /// R² of the line over the fitted part.
-    pub r_squared: f64,
+    pub(super) r_squared: f64,
     /// Points of the fitted part.
-    pub points: usize,
+    pub(super) points: usize,
     /// Largest distance of any point, the ends included, from the line, as a share of the largest force.
-    pub nonlinearity: f64,
+    pub(super) nonlinearity: f64,
 }
 
 /// A measured curve made fit to be felt: without the scatter of the bench, and with a force that never falls.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ServedCurve {
+pub(super) struct ServedCurve {
     /// Compression, m, and force, N: the first (0, 0), both growing.
-    pub knots: Vec<(f64, f64)>,
+    pub(super) knots: Vec<(f64, f64)>,
     /// Root mean square distance of the measured points from the curve, N: scatter, friction, and what was smoothed.
-    pub rms_n: f64,
+    pub(super) rms_n: f64,
 }
 
 /// Equal parts of the deflection within which points are averaged: finer than a hand moves between two ticks, coarse enough
@@ -64,7 +64,7 @@ const PARTS: u32 = 64;
 /// Why a curve cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum CurveError {
+pub(super) enum CurveError {
     /// A line that is not made like one, counted from 1.
     #[error("line {line}: {problem}")]
     Line {
@@ -105,7 +105,7 @@ impl MeasuredCurve {
     ///
     /// # Errors
     /// [`CurveError::Line`].
-    pub fn parse(text: &str, free_length_m: Option<f64>) -> Result<Self, CurveError> {
+    pub(super) fn parse(text: &str, free_length_m: Option<f64>) -> Result<Self, CurveError> {
         let table = Table::parse(text, HashLines::Comments)?;
         let abscissa = match table.columns().join(",").as_str() {
             "length_mm,force_n" => Abscissa::Length,
@@ -135,7 +135,7 @@ impl MeasuredCurve {
     ///
     /// # Errors
     /// [`CurveError`]: too few points there, a force that falls.
-    pub fn fit(&self) -> Result<SpringFit, CurveError> {
+    pub(super) fn fit(&self) -> Result<SpringFit, CurveError> {
         let deepest_m = self.points.iter().map(|(x, _)| *x).fold(0.0, f64::max);
         let [from_m, to_m] = FITTED.map(|share| share * deepest_m);
         let middle = self.points.iter().filter(|(x, _)| (from_m..=to_m).contains(x));
@@ -163,7 +163,7 @@ impl MeasuredCurve {
     ///
     /// # Errors
     /// [`CurveError::Sparse`].
-    pub fn served(&self) -> Result<ServedCurve, CurveError> {
+    pub(super) fn served(&self) -> Result<ServedCurve, CurveError> {
         let deepest_m = self.points.iter().map(|(x, _)| *x).fold(0.0, f64::max);
         let part_m = deepest_m / f64::from(PARTS);
         // Part 0 is around no compression, where the spring gives no force.
@@ -196,7 +196,7 @@ impl MeasuredCurve {
 impl ServedCurve {
     /// The table the force model `measured` reads.
     #[must_use]
-    pub fn to_table(&self) -> String {
+    pub(super) fn to_table(&self) -> String {
         let row = |(x_m, force_n): &(f64, f64)| format!("{:.6},{force_n:.6}\n", x_m * 1.0e3);
         let rows: String = self.knots.iter().map(row).collect();
         format!("compression_mm,force_n\n{rows}")
