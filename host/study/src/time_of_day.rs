@@ -4,7 +4,7 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::str::FromStr;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 const MS_PER_DAY: u64 = 86_400_000;
 
@@ -24,6 +24,49 @@ impl TimeOfDay {
     #[must_use]
     pub fn since_s(self, earlier: Self) -> f64 {
         (self.0 as f64 - earlier.0 as f64) * 1.0e-3
+    }
+}
+
+/// A change of the system's time of day by less than this is its ordinary adjustment, ms.
+const LEAST_JUMP_MS: i64 = 1_000;
+
+/// The clock of a sitting: the time of day at its start, and from there on steady time. Whoever sets the system's time of day
+/// moves no time of the sitting.
+#[derive(Clone, Copy, Debug)]
+pub struct SittingClock {
+    began: TimeOfDay,
+    started: Instant,
+    /// The system's time of day less this clock's when that was noted last, ms.
+    noted_ms: i64,
+}
+
+impl SittingClock {
+    /// Starts at this moment.
+    #[must_use]
+    pub fn start() -> Self {
+        Self { began: TimeOfDay::now(), started: Instant::now(), noted_ms: 0 }
+    }
+
+    /// The time of day by this clock.
+    #[must_use]
+    pub fn now(&self) -> TimeOfDay {
+        let passed_ms = u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX);
+        TimeOfDay(self.began.0.saturating_add(passed_ms))
+    }
+
+    /// How far the system's time of day has jumped since this was called last, ms; none if it has kept pace.
+    pub fn take_jump_ms(&mut self) -> Option<i64> {
+        self.jump_to(TimeOfDay::now())
+    }
+
+    fn jump_to(&mut self, system: TimeOfDay) -> Option<i64> {
+        let apart_ms = system.0.cast_signed().saturating_sub(self.now().0.cast_signed());
+        let jump_ms = apart_ms.saturating_sub(self.noted_ms);
+        let is_jump = jump_ms.saturating_abs() >= LEAST_JUMP_MS;
+        is_jump.then(|| {
+            self.noted_ms = apart_ms;
+            jump_ms
+        })
     }
 }
 
@@ -111,6 +154,21 @@ mod tests {
         ] {
             assert_eq!(wrong.parse::<TimeOfDay>(), Err(NoTime), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_jump_of_the_time_of_day_is_told_once_and_moves_no_time() {
+        let mut clock = SittingClock::start();
+        let hour_ms = 3_600_000;
+        let at = |clock: &SittingClock, by_ms: i64| TimeOfDay(clock.now().0.saturating_add_signed(by_ms));
+        assert_eq!(clock.jump_to(at(&clock, 0)), None);
+        // Milliseconds may pass between two readings of the clock.
+        let back = clock.jump_to(at(&clock, -hour_ms)).expect("it has jumped");
+        assert!((back + hour_ms).abs() < 900, "{back}");
+        assert_eq!(clock.jump_to(at(&clock, -hour_ms)), None);
+        let forth = clock.jump_to(at(&clock, 0)).expect("it was set right");
+        assert!((forth - hour_ms).abs() < 900, "{forth}");
+        assert!((0.0..1.0).contains(&clock.now().since_s(clock.began)));
     }
 
     #[test]

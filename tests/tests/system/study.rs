@@ -16,8 +16,10 @@ use flotor_study::screen::{Attended, Input, May, Screen};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::{Exploration, Modality, Phase, Presented, Response, Trial};
 use flotor_tests::TestSize;
+use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::{Tool, required};
 use rustix::process::Signal;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -650,6 +652,83 @@ fn a_sitting_that_runs_elsewhere_is_not_continued_here() {
     let resumed = person("terminal", "\n\n\n1\nq\n", &["--no-demo", "--subject", "1", "--resume"], &out);
     assert_eq!(resumed.code, Some(exit_code::OK), "{resumed:?}");
     assert_eq!(SittingLog::read(&path).unwrap().trials.len(), 2);
+}
+
+/// Another build of a plugin is another stimulus, also under the same version.
+#[test]
+fn a_sitting_does_not_go_on_with_another_build_of_a_plugin() {
+    let scratch = Scratch::default();
+    let (out, plugins) = (scratch.path().join("data"), scratch.path().join("plugins"));
+    std::fs::create_dir(&plugins).unwrap();
+    let built = plugin_file("flotor-spring");
+    let copy = plugins.join(built.file_name().unwrap());
+    std::fs::copy(&built, &copy).unwrap();
+    let folder = plugins.display().to_string();
+    let more = ["--no-demo", "--subject", "1", "--plugin-path", &folder];
+    let first = person("terminal", "\n\n\n1\nq\n", &more, &out);
+    assert_eq!(first.code, Some(exit_code::OK), "{first:?}");
+    let resumed: Vec<&str> = more.into_iter().chain(["--resume"]).collect();
+    // What a linker adds at the end changes nothing that is felt here, and cannot be known to.
+    let mut bytes = std::fs::read(&copy).unwrap();
+    bytes.push(0);
+    std::fs::remove_file(&copy).unwrap();
+    std::fs::write(&copy, bytes).unwrap();
+    let refused = person("terminal", "\n\n\n1\nq\n", &resumed, &out);
+    assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
+    assert!(refused.error().contains("(spring) is not the file that the sitting began with"), "{refused:?}");
+    std::fs::copy(&built, &copy).unwrap();
+    let resumed = person("terminal", "\n\n\n1\nq\n", &resumed, &out);
+    assert_eq!(resumed.code, Some(exit_code::OK), "{resumed:?}");
+}
+
+/// A library that sets the time of day back by an hour once the log of a sitting has its first line.
+const JUMP: &str = "
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <time.h>
+int clock_gettime(clockid_t clock, struct timespec *time) {
+    static int (*real)(clockid_t, struct timespec *);
+    struct stat log;
+    if (!real) real = (int (*)(clockid_t, struct timespec *))dlsym(RTLD_NEXT, \"clock_gettime\");
+    int result = real(clock, time);
+    if (clock == CLOCK_REALTIME && stat(getenv(\"SITTING_LOG\"), &log) == 0 && log.st_size > 0) time->tv_sec -= 3600;
+    return result;
+}
+";
+
+/// Somebody, or the network, sets the time of day during a sitting: onsets go on, and the log says so.
+#[test]
+fn an_onset_is_no_difference_of_two_times_of_day() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let (source, library) = (scratch.file("jump.c", JUMP), scratch.path().join("jump.so"));
+    let built =
+        std::process::Command::new("cc").args(["-shared", "-fPIC", "-o"]).arg(&library).arg(source).status();
+    assert!(built.unwrap().success());
+    let (out, folder) = (scratch.path().join("data"), Scratch::default());
+    let scene = folder.patient_scene(flotor_session::scene::STUDY).display().to_string();
+    let arguments = PERSON.into_iter().chain(["terminal", "--scene", &scene, "--no-demo", "--subject", "1"]);
+    let ran = study(&arguments.collect::<Vec<_>>(), &out)
+        .env("LD_PRELOAD", library.to_str().unwrap())
+        .env("SITTING_LOG", log_of(&out, 1).to_str().unwrap())
+        .reading("\n\n\n1\n\n\n2\nq\n")
+        .run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let log = SittingLog::read(&log_of(&out, 1)).unwrap();
+    let began = log.began.expect("a person has times");
+    let onsets: Vec<f64> =
+        log.trials.iter().map(|trial| trial.event.exploration.onset.unwrap().since_s(began)).collect();
+    assert!(
+        onsets.len() == 2 && onsets[0] >= 0.0 && onsets[1] > onsets[0] && onsets[1] < 600.0,
+        "{onsets:?}"
+    );
+    let set: Vec<String> = log.incidents.iter().map(|(.., incident)| incident.to_string()).collect();
+    assert!(set.len() >= 1 && set[0].contains("the time of day was set back by 3"), "{set:?}");
+    assert_eq!(set.iter().filter(|incident| incident.contains("time of day")).count(), 1, "{set:?}");
 }
 
 /// By keyboard alone, from the consent to the analysis of a pilot: what was read is in the log, what was said of the person in the list

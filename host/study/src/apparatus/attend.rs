@@ -4,7 +4,6 @@ use super::real_time_rig::RealTimeRig;
 use crate::conduct::{Ending, OutsideError};
 use crate::log::{Event, Incident, LogWriter, TrialEvent, digest};
 use crate::screen::{Attended, Felt, Input, May, Screen, Step};
-use crate::time_of_day::TimeOfDay;
 use crate::trial::Trial;
 use std::time::Instant;
 
@@ -113,7 +112,9 @@ fn sit(
             if let Some(reason) = rig.begin(&trial, value)? {
                 log.write(&Event::Incident(Incident::NotRecorded { reason }))?;
             }
-            attended.felt_from(TimeOfDay::now());
+            if let Some(now) = log.now() {
+                attended.felt_from(now);
+            }
         }
         let felt = stimulus.map(|(trial, _)| trial);
         front.show(&screen)?;

@@ -30,6 +30,11 @@ pub enum Incident {
         /// How many.
         ticks: u64,
     },
+    /// The system's time of day was set; times of the sitting go on without a jump.
+    TimeOfDaySet {
+        /// How far forward, ms.
+        by_ms: i64,
+    },
     /// The movement of a trial could not be recorded; the sitting went on.
     NotRecorded {
         /// Why.
@@ -47,6 +52,10 @@ impl fmt::Display for Incident {
             Self::Signal => f.write_str("asked to end, by a signal or a client"),
             Self::OutOfRange => f.write_str("the handle left its range"),
             Self::MissedTicks { ticks } => write!(f, "{ticks} ticks were missed"),
+            Self::TimeOfDaySet { by_ms } => {
+                let (way, s) = (if *by_ms < 0 { "back" } else { "forward" }, by_ms.unsigned_abs() / 1000);
+                write!(f, "the time of day was set {way} by {s} s; times of the sitting go on without a jump")
+            }
             Self::NotRecorded { reason } => write!(f, "the movement was not recorded: {reason}"),
         }
     }

@@ -28,8 +28,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// Revision of the format: 2 has times of day and incidents, 3 has answers that were taken back.
-pub const FORMAT: u32 = 3;
+/// Revision of the format: 2 has times of day and incidents, 3 has answers that were taken back, 4 has a time of day that was set.
+pub const FORMAT: u32 = 4;
 
 /// What a line says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

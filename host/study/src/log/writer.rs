@@ -1,8 +1,8 @@
 //! Adds lines to a log and does not return before they are on disk.
 
-use super::{CHAIN_START, Event, LogError, LogProblem, chain, line, stamped};
+use super::{CHAIN_START, Event, Incident, LogError, LogProblem, chain, line, stamped};
 use crate::platform::open_alone;
-use crate::time_of_day::TimeOfDay;
+use crate::time_of_day::{SittingClock, TimeOfDay};
 use std::fs::{File, OpenOptions};
 use std::io::{Error, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -16,10 +16,10 @@ pub struct LogWriter {
 }
 
 /// Whether lines have a time of day.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 enum Stamps {
     None,
-    TimeOfDay,
+    Of(SittingClock),
 }
 
 impl LogWriter {
@@ -80,22 +80,42 @@ impl LogWriter {
     /// The same, with the time of day in every line from now on.
     #[must_use]
     pub fn stamped(self) -> Self {
-        Self { stamps: Stamps::TimeOfDay, ..self }
+        Self { stamps: Stamps::Of(SittingClock::start()), ..self }
     }
 
-    /// Writes an event. When this returns, it is on disk.
+    /// The time of day by the clock of the log, where its lines have one.
+    #[must_use]
+    pub fn now(&self) -> Option<TimeOfDay> {
+        match self.stamps {
+            Stamps::None => None,
+            Stamps::Of(clock) => Some(clock.now()),
+        }
+    }
+
+    /// Writes an event, and before it that the time of day was set, if it was. When this returns, it is on disk.
     ///
     /// # Errors
     /// What the system said.
     pub fn write(&mut self, event: &Event) -> Result<(), LogError> {
+        let jump = match &mut self.stamps {
+            Stamps::Of(clock) if !matches!(event, Event::Begin(_)) => clock.take_jump_ms(),
+            _ => None,
+        };
+        if let Some(by_ms) = jump {
+            self.write_line(&Event::Incident(Incident::TimeOfDaySet { by_ms }))?;
+        }
+        self.write_line(event)
+    }
+
+    fn write_line(&mut self, event: &Event) -> Result<(), LogError> {
         let text = serde_json::to_string(event).map_err(|error| LogError {
             path: self.path.clone(),
             line: 0,
             problem: LogProblem::Text(error.to_string()),
         })?;
-        let text = match self.stamps {
-            Stamps::None => text,
-            Stamps::TimeOfDay => stamped(&text, TimeOfDay::now()),
+        let text = match self.now() {
+            None => text,
+            Some(time) => stamped(&text, time),
         };
         let next = chain(&self.chain, &text);
         let mut bytes = line(&next, &text).into_bytes();
