@@ -3,9 +3,9 @@
 use crate::scene::{DeviceUse, ModelUse, PluginUse, Scene};
 use crate::{PluginReport, RunOptions};
 use flotor_core::mapping::Blend;
-use flotor_hal::{Parameter, ParameterKind};
+use flotor_hal::ParameterKind;
 use flotor_record::{NamedFile, PluginDescription, Role, RunDescription};
-use std::path::Path;
+use std::path::PathBuf;
 
 /// Puts together what is known of a run before it begins. Not real-time.
 ///
@@ -57,21 +57,26 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         latency_s: report.latency_s,
         felt: report.felt,
         settings: settings.collect(),
-        parameters: report.parameters.iter().cloned().chain(named_files(report)).collect(),
+        parameters: report.parameters.iter().cloned().chain(contents_of_files(report)).collect(),
     }
+}
+
+/// Returns the parameters of a plugin that name files, each with its path; a name of something built in is none.
+pub fn named_files(report: &PluginReport) -> impl Iterator<Item = (&'static str, PathBuf)> + '_ {
+    let files = report.schema.iter().filter(|parameter| parameter.kind() == ParameterKind::File);
+    files.filter_map(|parameter| {
+        let (_, value) = report.parameters.iter().find(|(id, _)| id == parameter.id())?;
+        let is_built_in = parameter.choices().iter().any(|name| name.as_str() == value);
+        (!is_built_in && !value.is_empty()).then(|| (parameter.id(), PathBuf::from(value)))
+    })
 }
 
 /// What a description of a run keeps of the files a plugin was told about: it belongs beside the plugin's
 /// parameters. Files that cannot be read any more are left out. Not real-time.
-fn named_files(report: &PluginReport) -> Vec<(String, String)> {
-    let named = |parameter: &Parameter| {
-        let (_, value) = report.parameters.iter().find(|(id, _)| id == parameter.id())?;
-        let is_built_in = parameter.choices().iter().any(|name| name.as_str() == value);
-        if parameter.kind() != ParameterKind::File || is_built_in {
-            return None;
-        }
-        let file = NamedFile::read(Path::new(value)).ok()?;
-        Some(file.to_parameters(parameter.id()))
+fn contents_of_files(report: &PluginReport) -> Vec<(String, String)> {
+    let content = |(parameter, path): (&'static str, PathBuf)| {
+        let file = NamedFile::read(&path).ok()?;
+        Some(file.to_parameters(parameter))
     };
-    report.schema.iter().filter_map(named).flatten().collect()
+    named_files(report).filter_map(content).flatten().collect()
 }

@@ -2,7 +2,7 @@
 
 use crate::conduct::{ConductError, OutsideError, Presenter, conduct};
 use crate::dataset::{Dataset, DatasetError, Earlier, Progress};
-use crate::log::{Begin, FORMAT, LogWriter, Plan};
+use crate::log::{Begin, FORMAT, InputFile, LogWriter, Plan};
 use crate::observer::{Population, SimulatedSubject};
 use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::Sitting;
@@ -25,6 +25,8 @@ pub struct Cohort {
     pub population: Population,
     /// What presents the stimuli, for the log.
     pub apparatus: serde_json::Value,
+    /// Files that decide what is presented, for the log.
+    pub inputs: Vec<InputFile>,
     /// Version of the program, for the log.
     pub version: String,
     /// The study file that is followed, for the log.
@@ -86,6 +88,7 @@ impl Cohort {
             protocol: self.protocol.clone(),
             observer: json!({ "simulated": self.population }),
             apparatus: self.apparatus.clone(),
+            inputs: self.inputs.clone(),
         }
     }
 

@@ -475,6 +475,7 @@ fn simulate(common: &Common, protocol: Protocol, apparatus: Option<&Apparatus>) 
             json!(null),
             |apparatus| json!({ "feel_s": common.feel, "scene": apparatus.description() }),
         ),
+        inputs: apparatus.map_or_else(|| Ok(Vec::new()), Apparatus::input_files).map_err(unfit)?,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         plan: common.plan.clone(),
         earlier: common.earlier(),

@@ -1,20 +1,22 @@
 //! The apparatus of an experiment: a scene, and the parameter of a model in it that is varied. Everything that can be
 //! wrong with either is found before the first trial.
 
+use crate::log::InputFile;
 use crate::observer::HandManner;
 use crate::protocol::{Protocol, ProtocolError, Stimulus, SubjectNumber};
 use flotor_core::limits::CEILING;
 use flotor_hal::{Mutability, Parameter, ParameterKind};
-use flotor_record::RunDescription;
+use flotor_record::{NamedFile, RunDescription};
 use flotor_servo::Clock;
 use flotor_session::registry::Registry;
-use flotor_session::run_description::describe;
+use flotor_session::run_description::{describe, named_files};
 use flotor_session::scene::{Location, ModelUse, ParameterText, Scene, nearest};
 use flotor_session::{
     ControlError, Controls, NewValue, PluginReport, RunError, RunOptions, Session, Strength, StrongDevice,
 };
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 
 /// What is kept of how people moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -61,6 +63,15 @@ pub enum ApparatusError {
         nearest: Option<String>,
         /// All numbers.
         numbers: Vec<String>,
+    },
+    /// A file of the scene cannot be read any more.
+    #[error("{}: {cause}; the file was there a moment ago: start again", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Message of the system.
+        #[source]
+        cause: io::Error,
     },
     /// A stimulus outside the range of its parameter.
     #[error(transparent)]
@@ -228,6 +239,26 @@ impl Apparatus {
         })
     }
 
+    /// Files that settings of the scene name, by their content. Not real-time: reads them.
+    ///
+    /// # Errors
+    /// One of them cannot be read any more.
+    pub fn input_files(&self) -> Result<Vec<InputFile>, ApparatusError> {
+        let named = self.plugins.iter().flat_map(|plugin| {
+            named_files(plugin).map(move |(parameter, path)| (format!("{}.{parameter}", plugin.name), path))
+        });
+        named.map(|(used_as, path)| input(used_as, &path)).collect()
+    }
+
+    /// Files of the plugins, by their content: another build of one version is another stimulus. Not real-time: reads them.
+    ///
+    /// # Errors
+    /// One of them cannot be read any more.
+    pub fn plugin_files(&self) -> Result<Vec<InputFile>, ApparatusError> {
+        let in_files = self.plugins.iter().filter(|plugin| !plugin.metadata.path.as_os_str().is_empty());
+        in_files.map(|plugin| input(plugin.name.clone(), &plugin.metadata.path)).collect()
+    }
+
     /// What a second of fully recorded movement takes on disk, bytes, about: 466 a tick were measured with one device.
     #[must_use]
     pub fn recording_bytes_per_s(&self) -> f64 {
@@ -300,6 +331,13 @@ impl Apparatus {
         }
         scene
     }
+}
+
+fn input(used_as: String, path: &Path) -> Result<InputFile, ApparatusError> {
+    let unreadable = |cause| ApparatusError::Unreadable { path: path.to_path_buf(), cause };
+    let file = NamedFile::read(path).map_err(unreadable)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(InputFile { used_as, name, hash: file.hash_text() })
 }
 
 fn options(clock: Clock, seed: u64) -> RunOptions {

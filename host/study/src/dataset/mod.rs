@@ -14,7 +14,7 @@
 mod table;
 
 use crate::exclusion::Exclusion;
-use crate::log::{Begin, Event, LogError, LogProblem, LogWriter, SittingLog};
+use crate::log::{Begin, Event, InputFile, LogError, LogProblem, LogWriter, SittingLog};
 use crate::protocol::SubjectNumber;
 use crate::sitting::Sitting;
 use std::path::{Path, PathBuf};
@@ -93,6 +93,17 @@ pub enum DatasetError {
         path: PathBuf,
         /// What differs.
         what: String,
+    },
+    /// A file that was changed since a sitting began.
+    #[error("{}: `{}` ({}) is not the file that the sitting began with: its content is {}, and was {}; put the earlier file back, or use another folder",
+        path.display(), now.name, now.used_as, now.hash, then)]
+    OtherInput {
+        /// One of the logs.
+        path: PathBuf,
+        /// The file.
+        now: InputFile,
+        /// Hash of the file that the sitting began with.
+        then: String,
     },
     /// A subject who has been there.
     #[error("{subject} is already complete in {}; add --resume to skip complete subjects (simulated), choose another --subject \
@@ -296,8 +307,16 @@ pub fn trials_csv(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
 
 /// Whether a sitting belongs to the study of a log.
 fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
-    let changed = |what| DatasetError::Changed { path: log.path().to_path_buf(), what };
-    begin.differs(&log.begin).map_or(Ok(()), |what| Err(changed(what)))
+    let path = || log.path().to_path_buf();
+    if let Some(what) = begin.differs(&log.begin) {
+        return Err(DatasetError::Changed { path: path(), what });
+    }
+    match begin.changed_input(&log.begin) {
+        None => Ok(()),
+        Some((now, then)) => {
+            Err(DatasetError::OtherInput { path: path(), now: now.clone(), then: then.hash.clone() })
+        }
+    }
 }
 
 /// Returns true for the log of a sitting. A name that begins with a dot belongs to the system: macOS puts a file `._NAME` beside each

@@ -28,7 +28,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// Revision of the format: 2 has times of day and incidents, 3 has answers that were taken back, 4 has a time of day that was set.
+/// Revision of the format: 2 has times of day and incidents, 3 has answers that were taken back, 4 has the contents of files and the
+/// time of day that was set.
 pub const FORMAT: u32 = 4;
 
 /// What a line says.
@@ -88,6 +89,20 @@ pub struct Begin {
     pub observer: serde_json::Value,
     /// What presents the stimuli, with everything that decides how, as JSON.
     pub apparatus: serde_json::Value,
+    /// Files that decide what is presented, by their content; a log of an earlier revision has none.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub inputs: Vec<InputFile>,
+}
+
+/// A file that decides what a sitting presents.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputFile {
+    /// Its use: `measured.curve`, `spring` for the file of a plugin.
+    pub used_as: String,
+    /// Its name, without its folder.
+    pub name: String,
+    /// Hash of its content, as text.
+    pub hash: String,
 }
 
 impl Begin {
@@ -110,6 +125,15 @@ impl Begin {
                 )
             });
         what.map(|what| format!("begun with {what}"))
+    }
+
+    /// The first file with another content than the file of the same use in an earlier sitting, and that file.
+    #[must_use]
+    pub fn changed_input<'b>(&'b self, earlier: &'b Self) -> Option<(&'b InputFile, &'b InputFile)> {
+        self.inputs.iter().find_map(|now| {
+            let of_same_use = |then: &&InputFile| then.used_as == now.used_as && then.hash != now.hash;
+            earlier.inputs.iter().find(of_same_use).map(|then| (now, then))
+        })
     }
 
     /// Whether a person sits, and times of day mean something.

@@ -43,6 +43,7 @@ fn begin() -> Begin {
         protocol: Protocol::Jnd(jnd),
         observer: serde_json::Value::Null,
         apparatus: serde_json::Value::Null,
+        inputs: Vec::new(),
     }
 }
 
@@ -118,6 +119,23 @@ fn line_ends_of_windows_change_nothing() {
     assert_eq!((after.complete, after.trials), (true, before.trials));
     SittingLog::read(&path).unwrap().annotate("copied").unwrap();
     assert_eq!(SittingLog::read(&path).unwrap().notes.len(), before.notes.len() + 1);
+}
+
+#[test]
+fn a_file_is_what_is_in_it() {
+    let input = |used_as: &str, hash: &str| InputFile {
+        used_as: used_as.to_owned(),
+        name: "curve.csv".to_owned(),
+        hash: hash.to_owned(),
+    };
+    let with = |inputs: Vec<InputFile>| Begin { inputs, ..begin() };
+    let then = with(vec![input("spring", "a"), input("measured.curve", "b")]);
+    assert_eq!(then.changed_input(&then), None);
+    assert_eq!(then.changed_input(&begin()), None, "a log of an earlier revision has none");
+    let now = with(vec![input("spring", "a"), input("measured.curve", "c")]);
+    let (changed, before) = now.changed_input(&then).unwrap();
+    assert_eq!((changed.used_as.as_str(), before.hash.as_str()), ("measured.curve", "b"));
+    assert_eq!(now.differs(&then), None, "what differs is the content of a file");
 }
 
 /// Whatever rules a study file may have, the log that follows it is read again.

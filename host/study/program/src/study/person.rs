@@ -36,6 +36,11 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         protocol: protocol.clone(),
         observer: json!("human"),
         apparatus: apparatus.description(),
+        inputs: [apparatus.input_files(), apparatus.plugin_files()]
+            .into_iter()
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(super::unfit)?
+            .concat(),
     };
     let earlier = match dataset.progress(&begin, common.earlier()).map_err(of_dataset)? {
         Progress::New => None,
