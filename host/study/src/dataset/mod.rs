@@ -9,14 +9,20 @@
 //! ```
 //!
 //! The logs are the data. Tables are made from them, whole or not at all (written aside, then renamed), and can be made
-//! again at any time.
+//! again at any time. The lists of participants and scans, and the descriptions, are completed and not replaced: BIDS asks people
+//! to add to them (`kept`).
 
+mod kept;
 mod table;
+
+pub use kept::Unmergeable;
 
 use crate::exclusion::Exclusion;
 use crate::log::{Begin, Event, InputFile, LogError, LogProblem, LogWriter, SittingLog};
 use crate::protocol::SubjectNumber;
 use crate::sitting::Sitting;
+use serde_json::{Map, Value};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// A folder with the data of a study.
@@ -60,6 +66,14 @@ pub enum DatasetError {
         action: &'static str,
         /// What the system said.
         cause: std::io::Error,
+    },
+    /// A file that people complete, which cannot be read any more.
+    #[error("{}: {problem}; mend the file, or remove it to have it written anew", path.display())]
+    Unmergeable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: Unmergeable,
     },
     /// There is no study.
     #[error("{}: no study (no logs under sourcedata/); give the folder of `study --out`", .0.display())]
@@ -264,18 +278,56 @@ impl Dataset {
                 self.replace(&path, &table::trials(&log))?;
                 if let Some(scans) = table::scans(&log) {
                     let subject = log.begin.subject;
-                    self.replace(&self.root.join(format!("{subject}/{subject}_scans.tsv")), &scans)?;
+                    let path = self.root.join(format!("{subject}/{subject}_scans.tsv"));
+                    self.complete_table(&path, &scans, table::SCAN)?;
                 }
             }
             first.get_or_insert(log.begin);
             Ok(())
         })?;
         let Some(begin) = first else { return Ok(()) };
-        let task = begin.protocol.task();
-        self.replace(&self.root.join(format!("task-{task}_beh.json")), &table::columns(&begin.protocol))?;
-        self.replace(&self.root.join("dataset_description.json"), &table::description(&begin))?;
-        self.replace(&self.root.join("participants.tsv"), &participants)?;
-        self.replace(&self.root.join("participants.json"), &table::participant_columns())
+        self.complete_table(&self.root.join("participants.tsv"), &participants, table::PARTICIPANT)?;
+        let task = format!("task-{}_beh.json", begin.protocol.task());
+        for (name, (object, owned)) in [
+            (task.as_str(), table::columns(&begin.protocol)),
+            ("dataset_description.json", table::description(&begin)),
+            ("participants.json", table::participant_columns()),
+        ] {
+            self.complete_object(&self.root.join(name), object, owned)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a table that people complete; what is theirs stays.
+    fn complete_table(&self, path: &Path, generated: &str, key: &'static str) -> Result<(), DatasetError> {
+        let Some(earlier) = self.read_earlier(path)? else { return self.replace(path, generated) };
+        let merged = kept::table(&earlier, generated, key);
+        let merged = merged.map_err(|problem| DatasetError::Unmergeable { path: path.into(), problem })?;
+        merged.map_or(Ok(()), |text| self.replace(path, &text))
+    }
+
+    /// Writes a JSON object that people complete; what is theirs stays, but for the keys that are the program's own.
+    fn complete_object(
+        &self,
+        path: &Path,
+        generated: Map<String, Value>,
+        owned: &[&str],
+    ) -> Result<(), DatasetError> {
+        let Some(earlier) = self.read_earlier(path)? else { return self.replace(path, &pretty(generated)) };
+        let merged = kept::object(&earlier, generated, owned);
+        let merged = merged.map_err(|problem| DatasetError::Unmergeable { path: path.into(), problem })?;
+        merged.map_or(Ok(()), |object| self.replace(path, &pretty(object)))
+    }
+
+    /// Reads a file that was written before; none if there is no such file.
+    fn read_earlier(&self, path: &Path) -> Result<Option<String>, DatasetError> {
+        match std::fs::read_to_string(path) {
+            Ok(text) => Ok(Some(text)),
+            Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
+            Err(cause) => {
+                Err(DatasetError::File { path: path.into(), action: "cannot read the file", cause })
+            }
+        }
     }
 
     /// Writes a file whole or not at all.
@@ -303,6 +355,10 @@ impl Dataset {
 #[must_use]
 pub fn trials_csv(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
     table::long(logs, excluded)
+}
+
+fn pretty(object: Map<String, Value>) -> String {
+    serde_json::to_string_pretty(&Value::Object(object)).unwrap_or_default() + "\n"
 }
 
 /// Whether a sitting belongs to the study of a log.

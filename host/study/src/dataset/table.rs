@@ -8,10 +8,10 @@ use crate::protocol::Protocol;
 use crate::sitting::Verdict;
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Judgement, Position, Presented, Response};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// Missing, as BIDS writes it.
-const MISSING: &str = "n/a";
+pub(super) const MISSING: &str = "n/a";
 
 /// Name and meaning of each column.
 const COLUMNS: [(&str, &str); 29] = [
@@ -163,21 +163,21 @@ fn row(record: &TrialRecord, codes: &Codes, began: Option<TimeOfDay>) -> Vec<Str
     ]
 }
 
-/// The sidecar of the tables.
-pub(super) fn columns(protocol: &Protocol) -> String {
-    let mut sidecar = serde_json::Map::new();
+/// The sidecar of the tables, and the keys of it that people leave alone.
+pub(super) fn columns(protocol: &Protocol) -> (Map<String, Value>, &'static [&'static str]) {
+    let mut sidecar = Map::new();
     sidecar.insert("TaskName".to_owned(), json!(protocol.task()));
     sidecar.insert("Stimulus".to_owned(), json!(protocol.stimulus().to_string()));
     sidecar.insert("Protocol".to_owned(), json!(protocol));
     for (name, meaning) in COLUMNS {
         sidecar.insert(name.to_owned(), json!({ "Description": meaning }));
     }
-    pretty(&Value::Object(sidecar))
+    (sidecar, &["TaskName", "Stimulus", "Protocol"])
 }
 
-/// What the dataset is.
-pub(super) fn description(begin: &Begin) -> String {
-    pretty(&json!({
+/// The description of the dataset, and the keys of it that people leave alone.
+pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'static str]) {
+    let description = json!({
         "Name": format!("Perception study: {}", begin.protocol.task()),
         "BIDSVersion": "1.9.0",
         "DatasetType": "raw",
@@ -186,8 +186,12 @@ pub(super) fn description(begin: &Begin) -> String {
         "ConfigHash": begin.config_hash(),
         "Observer": begin.observer,
         "Apparatus": begin.apparatus,
-    }))
+    });
+    (members(description), &["Seed", "ConfigHash", "Observer", "Apparatus"])
 }
+
+/// First column of the list of scans.
+pub(super) const SCAN: &str = "filename";
 
 /// The list of what was recorded of a subject, with the time of day; none where nobody knows it.
 pub(super) fn scans(log: &SittingLog) -> Option<String> {
@@ -195,6 +199,9 @@ pub(super) fn scans(log: &SittingLog) -> Option<String> {
     let began = log.began?;
     Some(format!("filename\tacq_time\nbeh/{subject}_task-{task}_beh.tsv\t{began}\n"))
 }
+
+/// First column of the list of who took part.
+pub(super) const PARTICIPANT: &str = "participant_id";
 
 /// First line of the list of who took part.
 pub(super) const PARTICIPANTS_HEAD: &str =
@@ -212,9 +219,9 @@ pub(super) fn participant(log: &SittingLog) -> String {
     format!("{subject}\t{first}\t{complete}\t{}\t{}\n", counts.join("\t"), person.join("\t"))
 }
 
-/// What the columns of the list of participants mean.
-pub(super) fn participant_columns() -> String {
-    pretty(&json!({
+/// What the columns of the list of participants mean; people may leave none of it alone.
+pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static str]) {
+    let columns = json!({
         "first_modality": { "Description": "Modality the subject started with: vh (vision and haptics) or h (haptics alone)" },
         "complete": { "Description": "1 if the sitting came to its end" },
         "presentations": { "Description": "Presentations, practice and repeats included" },
@@ -223,9 +230,13 @@ pub(super) fn participant_columns() -> String {
         "sex": { "Description": "Sex, if it was given" },
         "handedness": { "Description": "Preferred hand, if it was given" },
         "incidents": { "Description": "Interruptions and disturbances in the event log" },
-    }))
+    });
+    (members(columns), &[])
 }
 
-fn pretty(value: &Value) -> String {
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+fn members(object: Value) -> Map<String, Value> {
+    match object {
+        Value::Object(members) => members,
+        _ => Map::new(),
+    }
 }
