@@ -19,6 +19,7 @@ mod platform;
 mod progress;
 mod reference;
 pub mod separate;
+mod shell;
 pub mod stopping;
 pub mod style;
 mod supervision;
@@ -33,4 +34,5 @@ pub use output::{
 };
 pub use progress::{Redrawn, progress_bar, while_preparing};
 pub use reference::reference;
+pub use shell::{command_line, quoted};
 pub use supervision::supervised;

@@ -8,7 +8,7 @@ use crate::minimise::shortest;
 use crate::numbers::at;
 use crate::process::{Flotor, Ran};
 use crate::rule::Told;
-use flotor_command::note;
+use flotor_command::{command_line, note};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -115,16 +115,6 @@ pub(crate) fn run_arguments(
         arguments.extend(["--duration".to_owned(), duration.to_owned()]);
     }
     arguments
-}
-
-/// A command line that a shell reads as these arguments of `flotor`.
-pub(crate) fn command_line(arguments: &[String]) -> String {
-    let is_plain = |c: char| c.is_alphanumeric() || "-_./=,:@+%".contains(c);
-    let quoted = arguments.iter().map(|word| {
-        let plain = !word.is_empty() && word.chars().all(is_plain);
-        if plain { format!(" {word}") } else { format!(" '{}'", word.replace('\'', "'\\''")) }
-    });
-    format!("flotor{}", quoted.collect::<String>())
 }
 
 /// Carries out a case. `models` are those of its scene, or why they are not known.
@@ -469,12 +459,5 @@ mod tests {
             assert_eq!(is_missed(verdict, MeasureDemand::NotFailed), missed, "{verdict}");
         }
         assert!(measure(&json("pass"), "M4", MeasureDemand::NotFailed).is_some(), "it is not there");
-    }
-
-    #[test]
-    fn a_command_line_survives_a_shell() {
-        let arguments = ["run", "my scene.toml", "--set", "a.b=it's"].map(str::to_owned);
-        let line = command_line(&arguments);
-        assert_eq!(line, "flotor run 'my scene.toml' --set 'a.b=it'\\''s'");
     }
 }

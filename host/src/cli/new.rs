@@ -3,7 +3,7 @@
 use crate::scaffold::{Contract, Language, PluginName, Scaffold, ScaffoldError, scaffold};
 use clap::{Args, ValueEnum};
 use flotor_command::say;
-use flotor_command::{CommandError, style};
+use flotor_command::{CommandError, command_line, quoted, style};
 use flotor_hal::abi::PluginKind;
 use flotor_session::registry::Registry;
 use std::path::{Path, PathBuf};
@@ -72,15 +72,15 @@ fn report(name: &PluginName, made: &Scaffold) {
     }
     say!("\nNext:");
     for command in [
-        &format!("cd {}", made.folder.display()),
+        &format!("cd {}", quoted(&made.folder.display().to_string())),
         &made.build,
-        &format!("flotor validate {}", made.library),
+        &command_line(["validate", made.library.as_str()]),
         "flotor run scene.toml --plot run.svg",
     ] {
         say!("  {command}");
     }
     if let Some(test) = made.files.iter().find(|file| file.ends_with(".test.toml")) {
-        say!("  flotor test {test}");
+        say!("  {}", command_line(["test", test.as_str()]));
     }
 }
 

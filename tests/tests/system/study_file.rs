@@ -138,3 +138,101 @@ fn a_changed_study_file_is_refused_with_the_lines_that_changed() {
         assert!(ran.error().contains(reason) && ran.stderr.lines().count() == 1, "{ran:?}");
     }
 }
+
+/// BIDS asks people to complete these files; a study that goes on leaves what they wrote.
+#[test]
+fn what_people_add_to_the_files_of_a_study_stays() {
+    let scratch = Scratch::default();
+    let folder = scratch.path();
+    let _ = scratch.file("a.study.toml", FILE);
+    assert_eq!(flotor(folder, &["study", "run", "a.study.toml"]).code, Some(exit_code::OK));
+    let data = folder.join("data");
+    let read = |name: &str| std::fs::read_to_string(data.join(name)).unwrap();
+    // As a spreadsheet writes it: another order of columns, a typed age, a column of the laboratory.
+    let list = read("participants.tsv");
+    let with_group = list.lines().enumerate().map(|(row, line)| match row {
+        0 => format!("{line}\tgroup\r\n"),
+        _ => format!("{}\tpatients\r\n", line.replacen("\tn/a", "\t61", 1)),
+    });
+    std::fs::write(data.join("participants.tsv"), with_group.collect::<String>()).unwrap();
+    let edit = |name: &str, edits: &[(&str, Value)]| {
+        let mut object: Value = serde_json::from_str(&read(name)).unwrap();
+        edits.iter().for_each(|(key, value)| object[*key] = value.clone());
+        std::fs::write(data.join(name), object.to_string()).unwrap();
+    };
+    edit("dataset_description.json", &[("Name", "Federn".into()), ("Authors", vec!["A. B."].into())]);
+    edit("participants.json", &[("group", serde_json::json!({ "Description": "Gruppe" }))]);
+    edit("task-jnd_beh.json", &[("InstitutionName", "Labor".into())]);
+
+    // With one subject more, for the files to be written again.
+    let _ = scratch.file("a.study.toml", FILE.replace("subjects = 6", "subjects = 7"));
+    let ran = flotor(folder, &["study", "run", "a.study.toml", "--resume"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let list = read("participants.tsv");
+    let rows: Vec<Vec<&str>> = list.lines().map(|line| line.split('\t').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|column| *column == name).unwrap();
+    let cells = |name: &str| rows[1..].iter().map(|row| row[column(name)]).collect::<Vec<_>>();
+    assert_eq!(cells("participant_id").len(), 7, "{list}");
+    assert_eq!(cells("group"), [["patients"; 6].as_slice(), &["n/a"]].concat());
+    assert_eq!(cells("age"), [["61"; 6].as_slice(), &["n/a"]].concat());
+    let object = |name: &str| -> Value { serde_json::from_str(&read(name)).unwrap() };
+    let description = object("dataset_description.json");
+    assert_eq!((&description["Name"], &description["Authors"][0]), (&"Federn".into(), &"A. B.".into()));
+    assert_eq!(object("participants.json")["group"]["Description"], "Gruppe");
+    assert_eq!(object("task-jnd_beh.json")["InstitutionName"], "Labor");
+
+    // What cannot be read is not replaced.
+    let damaged = "participant_id;group\nsub-01;patients\n";
+    std::fs::write(data.join("participants.tsv"), damaged).unwrap();
+    let ran = flotor(folder, &["study", "run", "a.study.toml", "--resume"]);
+    assert_ne!(ran.code, Some(exit_code::OK));
+    assert!(
+        ran.stderr.contains("participants.tsv: its first line has no column `participant_id`"),
+        "{ran:?}"
+    );
+    assert_eq!(read("participants.tsv"), damaged);
+}
+
+#[test]
+fn printed_commands_are_quoted() {
+    let scratch = Scratch::default();
+    let _ = scratch.file("a.study.toml", FILE.replace("\"data\"", "\"Daten Müller\""));
+    let ran = flotor(scratch.path(), &["study", "run", "a.study.toml"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let command = ran.stdout.lines().find_map(|line| line.trim().strip_prefix("flotor ")).expect("a command");
+    let again = Flotor::with(Vec::<&str>::new()).through_shell(&format!("exec \"$@\" {command}"));
+    let again = again.inside(scratch.path()).run();
+    assert_eq!(again.code, Some(exit_code::OK), "{command}: {again:?}");
+}
+
+/// A file is what is in it: a study does not go on with another one of the same name.
+#[test]
+fn a_study_does_not_go_on_with_a_changed_file() {
+    let scratch = Scratch::default();
+    let curve = |force_n: f64| format!("compression_mm,force_n\n0,0\n5,{force_n}\n10,9\n");
+    let _ = scratch.file("curve.csv", curve(3.0));
+    let scene = "title = \"Measured\"\nrate_hz = 1000\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"measured\"\n\
+                 [model.parameters]\ncurve = \"curve.csv\"\n";
+    let _ = scratch.file("scene.toml", scene);
+    let study = |subjects: &str| {
+        let task = ["study", "jnd", "--scene", "scene.toml", "--stimulus", "measured.stiffness_scale"];
+        let more =
+            ["--bases", "1", "--replications", "2", "--feel", "20ms", "--no-demo", "--subjects", subjects];
+        let words: Vec<&str> = task.into_iter().chain(more).chain(["--out", "data", "--resume"]).collect();
+        flotor(scratch.path(), &words)
+    };
+    let begun = study("1");
+    assert_eq!(begun.code, Some(exit_code::OK), "{begun:?}");
+    let inputs = log(scratch.path(), 1).begin.inputs;
+    assert_eq!((inputs.len(), inputs[0].used_as.as_str()), (1, "measured.curve"), "{inputs:?}");
+    let _ = scratch.file("curve.csv", curve(4.0));
+    let changed = study("2");
+    assert_eq!(changed.code, Some(exit_code::CONFIGURATION), "{changed:?}");
+    assert!(
+        changed.error().contains("`curve.csv` (measured.curve) is not the file that the sitting began with"),
+        "{changed:?}"
+    );
+    let _ = scratch.file("curve.csv", curve(3.0));
+    let goes_on = study("2");
+    assert_eq!(goes_on.code, Some(exit_code::OK), "{goes_on:?}");
+}

@@ -21,7 +21,7 @@ use flotor_command::options::{
 };
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
-use flotor_command::{CommandError, progress_bar, style};
+use flotor_command::{CommandError, command_line, progress_bar, style};
 use flotor_servo::RunEnd;
 use flotor_session::RunError;
 use flotor_session::scene::Scene;
@@ -541,7 +541,7 @@ fn tell(dataset: &Dataset) -> Result<(), CommandError> {
     if complete < logs.len() {
         say!("  continue with --resume");
     } else {
-        say!("  flotor analyse {root}");
+        say!("  {}", command_line(["analyse", root.to_string().as_str()]));
     }
     Ok(())
 }

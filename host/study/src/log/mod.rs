@@ -181,6 +181,7 @@ pub struct Plan {
 
 impl Plan {
     /// How the file that is followed now differs from the earlier one, in words; an equal digest is an equal text, whatever its name.
+    /// The number of subjects may change: it is no part of what a sitting presents.
     fn differs(now: Option<&Self>, earlier: Option<&Self>) -> Option<String> {
         match (earlier, now) {
             (None, None) => None,
@@ -188,10 +189,21 @@ impl Plan {
             (None, Some(now)) => Some(format!("no study file, and there is {} now", now.file)),
             (Some(earlier), Some(now)) if earlier.sha256 == now.sha256 => None,
             (Some(earlier), Some(now)) => {
-                Some(format!("another version of {}{}", now.file, changed(&earlier.text, &now.text)))
+                let [before, after] = [earlier, now].map(|plan| without_number_of_subjects(&plan.text));
+                let is_same = !before.is_empty() && before == after;
+                (!is_same).then(|| format!("another version of {}{}", now.file, changed(&before, &after)))
             }
         }
     }
+}
+
+/// The text of a study file with nothing in the lines that set the number of subjects, so that all others keep their numbers.
+fn without_number_of_subjects(text: &str) -> String {
+    let is_number_of_subjects = |line: &&str| {
+        line.trim_start().strip_prefix("subjects").is_some_and(|rest| rest.trim_start().starts_with('='))
+    };
+    let lines = text.split_inclusive('\n');
+    lines.map(|line| if is_number_of_subjects(&line) { "\n" } else { line }).collect()
 }
 
 /// The lines that changed from one version of a text to the next; nothing of an early log, which has the digest alone.

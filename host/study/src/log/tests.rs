@@ -316,6 +316,12 @@ fn a_sitting_of_another_study_says_where_it_differs() {
         let said = other.differs(&one).expect("another file");
         assert_eq!(said, format!("begun with another version of a.study.toml: {expected}"));
     }
+    // How many people take part is no part of what they feel.
+    for after in ["x\nsubjects = 4\ny", "x\n subjects=4 # pilot\ny"] {
+        let (one, other) =
+            (Begin { plan: plan("x\nsubjects = 3\ny"), ..begin() }, Begin { plan: plan(after), ..begin() });
+        assert_eq!(other.differs(&one), None, "{after}");
+    }
     for after in ["x\n y = 1\n", "x\n\ny = 1\n", "x\ny = 1", "x\ny=1\n", "x\ny = 1\r\n"] {
         let (one, other) =
             (Begin { plan: plan("x\ny = 1\n"), ..begin() }, Begin { plan: plan(after), ..begin() });
