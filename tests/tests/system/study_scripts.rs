@@ -126,6 +126,48 @@ fn the_script_in_python_repeats_every_line() {
     repeats_every_line(&python, "py");
 }
 
+/// Ways to start the script in a folder `Meine Daten (Übung)`, each with the folder in which R works.
+const STARTS_OF_R: [(&str, &str); 9] = [
+    ("Rscript trials.R", "Meine Daten (Übung)"),
+    ("Rscript 'Meine Daten (Übung)/trials.R'", "."),
+    ("Rscript \"$PWD/Meine Daten (Übung)/trials.R\" 'Meine Daten (Übung)/trials.csv'", "."),
+    ("R --no-echo --no-save -f 'Meine Daten (Übung)/trials.R'", "."),
+    ("Rscript -e 'source(\"Meine Daten (Übung)/trials.R\")'", "."),
+    ("Rscript -e 'source(\"Meine Daten (Übung)/trials.R\", chdir = TRUE)'", "."),
+    ("Rscript -e 'setwd(\"Meine Daten (Übung)\"); source(\"trials.R\")' of another script", "."),
+    ("R --no-echo --no-save < trials.R", "Meine Daten (Übung)"),
+    ("cp trials.R renamed.R && Rscript renamed.R", "Meine Daten (Übung)"),
+];
+
+#[test]
+fn the_script_in_r_finds_its_table_however_it_is_started() {
+    if !required(Tool::R) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let ran = Flotor::with(
+        ["study", "jnd", "--bases", "26.5", "--replications", "2", "--subjects", "3"].iter().chain(&[
+            "--apparatus",
+            "none",
+            "--no-demo",
+            "--out",
+            "data",
+        ]),
+    );
+    assert_eq!(ran.inside(scratch.path()).run().code, Some(exit_code::OK));
+    let data = scratch.path().join("Meine Daten (Übung)");
+    std::fs::create_dir(&data).unwrap();
+    let expected = numbers_of(scratch.path(), "data", "Meine Daten (Übung)/trials.csv");
+    assert!(expected.len() > 8, "{expected:?}");
+    for (command, folder) in STARTS_OF_R {
+        let folder = scratch.path().join(folder);
+        let ran = Command::new("sh").args(["-c", command]).current_dir(&folder).output().unwrap();
+        let said = String::from_utf8(ran.stdout).unwrap();
+        assert!(ran.status.success(), "{command}: {said} {}", String::from_utf8_lossy(&ran.stderr));
+        assert_eq!(numbers(&said), expected, "{command}");
+    }
+}
+
 #[test]
 fn the_script_in_r_repeats_every_line() {
     if required(Tool::R) {

@@ -9,7 +9,7 @@ use flotor_statistics::anova::SumOfSquares;
 use flotor_study::analysis::{
     Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectChecks, SubjectQuality, SubjectRecord,
 };
-use flotor_study::analysis::{SCRIPT_PYTHON, SCRIPT_R};
+use flotor_study::analysis::{SCRIPT_PYTHON, script_in_r};
 use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, trials_csv};
 use flotor_study::exclusion::{Applied, Exclusion, NotApplied};
@@ -163,7 +163,8 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let complete: Vec<SittingLog> = logs.into_iter().filter(|log| log.complete).collect();
     write_text(Some(path), || trials_csv(&complete, &applied.excluded))?;
     write_text(Some(&path.with_extension("py")), || SCRIPT_PYTHON.to_owned())?;
-    write_text(Some(&path.with_extension("R")), || SCRIPT_R.to_owned())
+    let table = path.file_name().unwrap_or_default().to_string_lossy();
+    write_text(Some(&path.with_extension("R")), || script_in_r(&table))
 }
 
 /// A result with what came of checks and exclusion rules; the keys beside those of the analysis are there where the study has them.

@@ -29,11 +29,21 @@ use serde::Serialize;
 
 /// A script in Python that repeats the tables from [`crate::dataset::trials_csv`].
 pub const SCRIPT_PYTHON: &str = include_str!("scripts/analysis.py");
-/// The same in R.
-pub const SCRIPT_R: &str = include_str!("scripts/analysis.R");
+/// The same in R, for a table of another name.
+const SCRIPT_R: &str = include_str!("scripts/analysis.R");
 
 /// Confidence of every interval.
 const CONFIDENCE: f64 = 0.95;
+
+/// Name of the table in [`SCRIPT_R`], as the script writes it.
+const TABLE_IN_R: &str = "\"trials.csv\"";
+
+/// Returns the script in R that repeats the tables from [`crate::dataset::trials_csv`], for the table of this name beside it.
+#[must_use]
+pub fn script_in_r(table_name: &str) -> String {
+    let escaped = table_name.replace('\\', "\\\\").replace('"', "\\\"");
+    SCRIPT_R.replace(TABLE_IN_R, &format!("\"{escaped}\""))
+}
 
 /// One subject's data.
 #[derive(Clone, Debug)]

@@ -1,13 +1,47 @@
 # Repeats the tables of `flotor analyse` from the trials, line by line, and draws figures 17 and 18 of CMU-RI-TR-07-21.
 #
 #     Rscript THIS.R [TRIALS.csv]
+#     source("THIS.R")                in a session of R, in RStudio too
 #
 # Needs base R alone. Written beside the trials by `flotor analyse --trials`. It knows the defaults of `flotor analyse`: thresholds
 # of the procedure, ratings divided by the mean, sums of squares of type III.
 
-arguments <- commandArgs(trailingOnly = TRUE)
-script <- sub("^--file=", "", grep("^--file=", commandArgs(), value = TRUE))
-path <- if (length(arguments) > 0) arguments[1] else sub("\\.R$", ".csv", script)
+# The table of trials as `flotor analyse` named it: it lies beside this script.
+table_name <- "trials.csv"
+
+# The file that source() reads now; none outside of source(), and of pasted lines.
+sourced_file <- function() {
+  for (frame in rev(sys.frames())) {
+    file <- frame$ofile
+    # With chdir = TRUE, R is in the folder of the file already.
+    if (is.character(file)) return(if (file.exists(file)) file else basename(file))
+  }
+  character(0)
+}
+
+# The file that R was started with, as Rscript or `R -f` hand it on: blanks are `~+~` there.
+started_file <- function() {
+  words <- commandArgs()
+  words <- words[seq_len(match("--args", words, nomatch = length(words) + 1) - 1)]
+  files <- c(sub("^--file=", "", grep("^--file=", words, value = TRUE)), words[which(words == "-f") + 1])
+  gsub("~+~", " ", files[!is.na(files)], fixed = TRUE)
+}
+
+table_of_trials <- function() {
+  script <- sourced_file()
+  # Whoever sources this script has arguments of their own.
+  arguments <- if (length(script) == 0) commandArgs(trailingOnly = TRUE) else character(0)
+  if (length(arguments) > 0) return(arguments[1])
+  if (length(script) == 0) script <- started_file()
+  folder <- if (length(script) > 0) dirname(script[1]) else "."
+  named_alike <- if (length(script) > 0) sub("(\\.[Rr])?$", ".csv", basename(script[1]))
+  places <- file.path(folder, c(named_alike, table_name))
+  found <- places[file.exists(places)]
+  if (length(found) == 0) stop("no table of trials at ", paste(places, collapse = " or "), "; put it beside this script")
+  found[1]
+}
+
+path <- table_of_trials()
 trials <- read.csv(path, na.strings = "n/a", stringsAsFactors = FALSE)
 main <- trials[trials$phase == "main" & is.na(trials$excluded), ]
 counted <- main[main$repeated == 0, ]
