@@ -100,6 +100,7 @@ pub struct MessageReader<R, T> {
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, T>,
     ending: Ending,
+    library: String,
 }
 
 impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
@@ -125,7 +126,14 @@ impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             ending,
+            library: String::new(),
         })
+    }
+
+    /// Returns the name of the library that wrote the file; empty before the first message.
+    #[must_use]
+    pub fn library(&self) -> &str {
+        &self.library
     }
 
     /// Returns how the file ends; known from the start.
@@ -186,6 +194,11 @@ impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
                     self.reader.notify_read(bytes);
                 }
                 Some(Ok(LinearReadEvent::Record { opcode, data })) => match opcode {
+                    op::HEADER => {
+                        if let Record::Header(header) = mcap::parse_record(opcode, data)? {
+                            self.library = header.library;
+                        }
+                    }
                     op::CHUNK => return records_of_chunk(data).map(Some),
                     op::SCHEMA | op::CHANNEL | op::MESSAGE => {
                         return Ok(Some(vec![mcap::parse_record(opcode, data)?.into_owned()]));

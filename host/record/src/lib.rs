@@ -39,6 +39,7 @@ mod file;
 mod files;
 mod messages;
 mod reader;
+mod repair;
 mod run;
 mod schema;
 mod writer;
@@ -52,6 +53,7 @@ pub use files::NamedFile;
 pub use flotor_mcap::Ending;
 pub use messages::{NoMessage, TickMessages, change_from_bytes, change_to_bytes, tick_from_messages};
 pub use reader::{Damage, ReadError, Recording};
+pub use repair::{RepairError, Repaired, repair};
 pub use run::{NoRun, PluginDescription, Role, RunDescription};
 pub use writer::{RecordError, Recorder};
 

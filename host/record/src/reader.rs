@@ -12,6 +12,9 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// End of the name of the library that wrote a repaired file.
+pub(crate) const REPAIRED: &str = " (repaired)";
+
 /// What keeps a recording from being read on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -107,7 +110,7 @@ pub enum ReadError {
         compression: String,
     },
     /// It cannot be read any further.
-    #[error("`{}` is damaged {}: {cause}; ticks before that are good, `mcap recover` may save later ones",
+    #[error("`{}` is damaged {}: {cause}; ticks before that are good: `flotor repair` copies them to a new file",
         path.display(),
         after_tick.map_or_else(|| "before its first tick".to_owned(), |tick| format!("after tick {tick}")))]
     Damaged {
@@ -181,7 +184,28 @@ impl Recording {
     /// Whether the end of the run is there; known from the start.
     #[must_use]
     pub fn ending(&self) -> Ending {
-        self.messages.ending()
+        if self.is_repaired() { Ending::CutOff } else { self.messages.ending() }
+    }
+
+    /// True if the file has an end, that of a repair included.
+    pub(crate) fn has_end(&self) -> bool {
+        self.messages.ending() == Ending::Finished
+    }
+
+    /// True if [`repair`](crate::repair) made the file from a truncated one.
+    #[must_use]
+    pub fn is_repaired(&self) -> bool {
+        self.messages.library().ends_with(REPAIRED)
+    }
+
+    /// Returns the next message as it is stored, but for the description of the run.
+    pub(crate) fn next_message(&mut self) -> Result<Option<Message<Topic>>, Damage> {
+        while let Some(message) = self.messages.next_message()? {
+            if message.topic != Topic::Run {
+                return Ok(Some(message));
+            }
+        }
+        Ok(None)
     }
 
     /// What happened, in words, up to the tick read last.

@@ -243,6 +243,58 @@ fn a_file_cut_off_at_any_byte_gives_its_whole_chunks_and_says_so() {
     }
 }
 
+/// Whatever is left of a file, the repaired one has an index and an end, all that could be read, and still says that it is truncated.
+#[test]
+fn a_truncated_file_is_repaired_for_every_reader() {
+    let ticks = three_chunks();
+    let (file, cut, whole) = (TestFile::new("to-cut"), TestFile::new("is-cut"), TestFile::new("repaired"));
+    write(&file.0, &ticks);
+    let bytes = std::fs::read(&file.0).unwrap();
+    assert!(matches!(repair(&file.0, &whole.0), Err(RepairError::Whole { .. })));
+    assert!(!whole.0.exists(), "nothing was to be written");
+    let mut counts = std::collections::BTreeSet::new();
+    for length in (0..bytes.len()).step_by(7) {
+        std::fs::write(&cut.0, &bytes[..length]).unwrap();
+        let (back, end) = read(&cut.0);
+        let _ = std::fs::remove_file(&whole.0);
+        let repaired = repair(&cut.0, &whole.0);
+        if let Err(ReadError::CutOffAtStart { .. }) = end {
+            assert!(matches!(repaired, Err(RepairError::Read(ReadError::CutOffAtStart { .. }))), "{length}");
+            continue;
+        }
+        let repaired = repaired.unwrap();
+        assert_eq!((repaired.ticks, repaired.damage.is_none()), (back.len() as u64, true), "{length}");
+        let (again, ending) = read(&whole.0);
+        assert!(words(&again) == words(&back), "cut at {length}");
+        assert_eq!(ending.unwrap(), Ending::CutOff, "cut at {length}");
+        let bytes = std::fs::read(&whole.0).unwrap();
+        let summary = mcap::Summary::read(&bytes).unwrap().expect("it has a summary");
+        let messages =
+            mcap::MessageStream::new(&bytes).unwrap().map(|message| message.unwrap()).count() as u64;
+        assert_eq!(summary.stats.unwrap().message_count, messages, "cut at {length}");
+        counts.insert(back.len());
+    }
+    assert_eq!(counts.into_iter().collect::<Vec<_>>(), [0, 3, 6, 9]);
+    // A repaired file is whole: there is nothing more to repair.
+    assert!(matches!(repair(&whole.0, &cut.0.with_extension("again")), Err(RepairError::Whole { .. })));
+}
+
+#[test]
+fn a_damaged_file_is_repaired_up_to_the_damage() {
+    let (file, whole) = (TestFile::new("damaged"), TestFile::new("repaired-damage"));
+    write(&file.0, &three_chunks());
+    let mut bytes = std::fs::read(&file.0).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x20;
+    std::fs::write(&file.0, &bytes).unwrap();
+    let (back, end) = read(&file.0);
+    assert!(matches!(end, Err(ReadError::Damaged { .. })), "{end:?}");
+    let repaired = repair(&file.0, &whole.0).unwrap();
+    assert!(repaired.damage.is_some() && repaired.ticks == back.len() as u64, "{repaired:?}");
+    let (again, ending) = read(&whole.0);
+    assert_eq!((words(&again), ending.unwrap()), (words(&back), Ending::CutOff));
+}
+
 #[test]
 fn a_process_killed_at_any_tick_loses_less_than_250_ms() {
     for (rate_hz, count) in [(1_000, 1_100), (100, 110), (10_000, 11_000), (3, 10)] {

@@ -2,10 +2,12 @@
 
 use crate::chunked::ChunkedFile;
 use crate::file::{FileError, NewFile};
+use crate::reader::REPAIRED;
 use crate::schema::{Change as ChangeMessage, DESCRIPTOR_SET, ENCODING, FrameTransform, Log, Tick, Topic};
 use crate::{Note, RunDescription};
 use flotor_core::Change;
 use flotor_core::trace::{Events, TickRecord};
+use flotor_mcap::Message as StoredMessage;
 use mcap::records::{Channel, MessageHeader, Metadata, SchemaHeader};
 use prost::Message;
 use std::collections::BTreeMap;
@@ -90,15 +92,29 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`]: the file exists, or cannot be created or written to.
     pub fn create(path: &Path, run: &RunDescription) -> Result<Self, RecordError> {
-        let file = NewFile::create(path).map_err(|cause| match cause.kind() {
-            io::ErrorKind::AlreadyExists => RecordError::Exists { path: path.into() },
-            _ => RecordError::Create { path: path.into(), cause },
-        })?;
-        Self::begin(path, file, run)
+        Self::begin(path, new_file(path)?, run)
+    }
+
+    /// Creates the file of a repaired recording. Not real-time.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub(crate) fn create_repaired(path: &Path, run: &RunDescription) -> Result<Self, RecordError> {
+        let library = library(run) + REPAIRED;
+        Self::begin_as(path, new_file(path)?, run, library)
     }
 
     pub(crate) fn begin(path: &Path, file: NewFile, run: &RunDescription) -> Result<Self, RecordError> {
-        let file = write_head(path, file, run).map_err(|cause| write_error(path, cause))?;
+        Self::begin_as(path, file, run, library(run))
+    }
+
+    fn begin_as(
+        path: &Path,
+        file: NewFile,
+        run: &RunDescription,
+        library: String,
+    ) -> Result<Self, RecordError> {
+        let file = write_head(path, file, run, library).map_err(|cause| write_error(path, cause))?;
         let names: Vec<&str> = run.devices().map(|device| device.name.as_str()).collect();
         let poses = match names.as_slice() {
             [] | [_] => vec![FrameTransform::of_handle()],
@@ -137,6 +153,21 @@ impl Recorder {
         // Words are rare and explain why a run ended: they do not wait for the chunk to fill.
         self.write_now(Topic::Log, &Log::new(note), note.time_ns)
             .map_err(|cause| write_error(&self.path, cause))
+    }
+
+    /// Appends a message of another recording as it is. Not real-time: every quarter of a second it writes a chunk to the file.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`].
+    pub(crate) fn copy(&mut self, message: &StoredMessage<Topic>) -> Result<(), RecordError> {
+        let StoredMessage { topic, sequence, time_ns, ref data } = *message;
+        self.sequence = sequence;
+        self.buffer.clear();
+        self.buffer.extend_from_slice(data);
+        let start_ns = *self.chunk_start_ns.get_or_insert(time_ns);
+        let is_full = topic == Topic::Tick && time_ns.saturating_sub(start_ns) >= CHUNK_NS;
+        let written = self.write(topic, time_ns).and_then(|()| if is_full { self.flush() } else { Ok(()) });
+        written.map_err(|cause| write_error(&self.path, cause))
     }
 
     /// Writes the last chunk and the index, and closes the file. Not real-time.
@@ -197,9 +228,21 @@ impl Recorder {
     }
 }
 
+fn new_file(path: &Path) -> Result<NewFile, RecordError> {
+    NewFile::create(path).map_err(|cause| match cause.kind() {
+        io::ErrorKind::AlreadyExists => RecordError::Exists { path: path.into() },
+        _ => RecordError::Create { path: path.into(), cause },
+    })
+}
+
+/// Name of the library that wrote the recording of a run.
+fn library(run: &RunDescription) -> String {
+    format!("flotor/{}", run.flotor_version)
+}
+
 /// Writes the head of the file: its library, the metadata of the run, and schemas and channels of all messages.
-fn write_head(path: &Path, file: NewFile, run: &RunDescription) -> io::Result<ChunkedFile> {
-    let mut file = ChunkedFile::create(file, path, format!("flotor/{}", run.flotor_version))?;
+fn write_head(path: &Path, file: NewFile, run: &RunDescription, library: String) -> io::Result<ChunkedFile> {
+    let mut file = ChunkedFile::create(file, path, library)?;
     file.add_metadata(&Metadata { name: RUN_METADATA.to_owned(), metadata: run.to_metadata() })?;
     let event_bits = BTreeMap::from([(EVENT_BITS.to_owned(), Events::NAMES.join(" "))]);
     for topic in Topic::ALL {

@@ -9,6 +9,7 @@ mod new;
 mod plugins;
 mod record;
 mod release;
+mod repair;
 mod run;
 mod scenes;
 mod swap;
@@ -107,6 +108,8 @@ enum Command {
     Stress(Separate),
     /// Attach to a running session and record it until it ends
     Record(record::RecordArguments),
+    /// Copy a truncated recording to a file that every reader of MCAP takes
+    Repair(repair::RepairArguments),
     /// Hot-swap a model of a running session, without a jump in the force
     Swap(swap::SwapArguments),
     /// Release the emergency stop of this machine: runs may start again
@@ -188,6 +191,7 @@ fn carry_out(command: Command) -> Result<(), CommandError> {
         Command::Bench(separate) => LAB.carry_out("bench", &separate.arguments),
         Command::Stress(separate) => LAB.carry_out("stress", &separate.arguments),
         Command::Record(arguments) => record::run(&arguments),
+        Command::Repair(arguments) => repair::run(&arguments),
         Command::Swap(arguments) => swap::run(&arguments),
         Command::Release(arguments) => release::run(&arguments),
         Command::Bridge(separate) => BRIDGE.become_with(&separate.arguments),

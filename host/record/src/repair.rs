@@ -1,0 +1,72 @@
+//! Repair of a truncated recording: its whole chunks in a new file with an end, which every reader of MCAP takes.
+
+use crate::reader::{Damage, ReadError, Recording};
+use crate::schema::Topic;
+use crate::writer::{RecordError, Recorder};
+use std::path::{Path, PathBuf};
+
+/// Error of repairing a recording.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RepairError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The repaired recording cannot be written.
+    #[error(transparent)]
+    Write(#[from] RecordError),
+    /// There is nothing to repair.
+    #[error("`{}` is whole: there is nothing to repair", path.display())]
+    Whole {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// What a repair kept and lost.
+#[derive(Debug)]
+pub struct Repaired {
+    /// Ticks in the new file, counted once for each device.
+    pub ticks: u64,
+    /// Recorded time of the last tick, ns.
+    pub end_ns: u64,
+    /// Length of the run as planned, s.
+    pub planned_s: f64,
+    /// What is wrong in the middle of the file, if it is not only truncated: nothing after that place was kept.
+    pub damage: Option<Damage>,
+}
+
+/// Copies the whole chunks of a truncated or damaged recording to a new file, message by message and bit for bit, and
+/// closes it with index and end. The new file says that it is repaired: [`Recording::ending`] stays
+/// [`Ending::CutOff`](crate::Ending::CutOff). The
+/// old file is not touched. Not real-time.
+///
+/// # Errors
+/// [`RepairError`]; a new file without any message is removed.
+pub fn repair(from: &Path, to: &Path) -> Result<Repaired, RepairError> {
+    let mut recording = Recording::open(from)?;
+    let is_truncated = !recording.has_end();
+    let mut recorder = Recorder::create_repaired(to, recording.run())?;
+    let mut repaired = Repaired { ticks: 0, end_ns: 0, planned_s: recording.run().duration_s, damage: None };
+    loop {
+        match recording.next_message() {
+            Ok(Some(message)) => {
+                if message.topic == Topic::Tick {
+                    (repaired.ticks, repaired.end_ns) = (repaired.ticks + 1, message.time_ns);
+                }
+                recorder.copy(&message)?;
+            }
+            Ok(None) => break,
+            Err(damage) => {
+                repaired.damage = Some(damage);
+                break;
+            }
+        }
+    }
+    if !is_truncated && repaired.damage.is_none() {
+        recorder.discard();
+        return Err(RepairError::Whole { path: from.into() });
+    }
+    recorder.finish()?;
+    Ok(repaired)
+}
