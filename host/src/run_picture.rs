@@ -23,9 +23,19 @@ struct DeviceTraces {
     force_n: [Trace; 3],
     torque_mnm: [Trace; 3],
     energy_mj: Trace,
-    /// Time of the first contact with the boundary, s.
-    boundary_s: Option<f64>,
+    /// Time of the first tick with each of [`MARKED`], s.
+    first_s: [Option<f64>; MARKED.len()],
 }
+
+/// Events whose first tick is marked, and their names.
+const MARKED: [(Events, &str); 6] = [
+    (Events::BOUNDARY, "boundary"),
+    (Events::MODEL_FAULT, "model fault"),
+    (Events::NOT_FINITE, "not finite"),
+    (Events::DEVICE_FAULT, "device fault"),
+    (Events::FORCE_LIMITED, "force limited"),
+    (Events::TORQUE_LIMITED, "torque limited"),
+];
 
 impl RunPicture {
     /// An empty picture of a run with these devices.
@@ -80,7 +90,7 @@ impl DeviceTraces {
             force_n: Default::default(),
             torque_mnm: Default::default(),
             energy_mj: Trace::default(),
-            boundary_s: None,
+            first_s: [None; MARKED.len()],
         }
     }
 
@@ -92,16 +102,17 @@ impl DeviceTraces {
         add_components(&mut self.force_n, time_s, record.commanded.force());
         add_components(&mut self.torque_mnm, time_s, record.commanded.torque() * 1.0e3);
         self.energy_mj.add(time_s, record.model.energy_j().map_or(f64::NAN, |joule| joule * 1.0e3));
-        if self.boundary_s.is_none() && record.events.intersects(Events::BOUNDARY) {
-            self.boundary_s = Some(time_s);
+        for (first_s, (event, _)) in self.first_s.iter_mut().zip(MARKED) {
+            if first_s.is_none() && record.events.intersects(event) {
+                *first_s = Some(time_s);
+            }
         }
     }
 
     /// The panels of the only device of a run.
     fn all_panels(self) -> Vec<Panel> {
-        let boundary_s = self.boundary_s;
-        let vector =
-            |label: &str, unit: &str, traces: [Trace; 3]| vector_panel(label, unit, traces, boundary_s);
+        let first_s = self.first_s;
+        let vector = |label: &str, unit: &str, traces: [Trace; 3]| vector_panel(label, unit, traces, first_s);
         let vectors = [
             vector("Position", "mm", self.position_mm),
             vector("Rotation", "°", self.rotation_deg),
@@ -115,8 +126,8 @@ impl DeviceTraces {
     fn main_panels(self) -> Vec<Panel> {
         let label = |quantity: &str| format!("{quantity}, {}", self.name);
         let vectors = [
-            vector_panel(&label("Position"), "mm", self.position_mm, self.boundary_s),
-            vector_panel(&label("Force"), "N", self.force_n, self.boundary_s),
+            vector_panel(&label("Position"), "mm", self.position_mm, self.first_s),
+            vector_panel(&label("Force"), "N", self.force_n, self.first_s),
         ];
         vectors.into_iter().chain(energy_panel(&label("Stored energy"), self.energy_mj)).collect()
     }
@@ -128,13 +139,15 @@ fn add_components(traces: &mut [Trace; 3], time_s: f64, vector: DVec3) {
     }
 }
 
-/// Three components over time; the first contact with the boundary is marked.
-fn vector_panel(label: &str, unit: &str, traces: [Trace; 3], boundary_s: Option<f64>) -> Panel {
+/// Three components over time; the first tick with each marked event is named.
+fn vector_panel(label: &str, unit: &str, traces: [Trace; 3], first_s: [Option<f64>; MARKED.len()]) -> Panel {
     let named = ["x", "y", "z"].into_iter().zip(traces).enumerate();
     let panel = named.fold(Panel::new(Axis::linear(label, unit)), |panel, (axis, (name, trace))| {
         panel.series(Series::trace(name, trace).axis(axis))
     });
-    boundary_s.into_iter().fold(panel, |panel, time_s| panel.mark(Mark::at_x(time_s, "boundary")))
+    let marks =
+        first_s.into_iter().zip(MARKED).filter_map(|(time_s, (_, name))| Some(Mark::at_x(time_s?, name)));
+    marks.fold(panel, Panel::mark)
 }
 
 /// The stored energy over time; none if no model gives it.

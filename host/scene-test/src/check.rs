@@ -159,7 +159,11 @@ pub(crate) fn check(
             (outcome.failures, plotted) = (judged.failures, Some(arguments));
         }
         (_, Err(why)) => outcome.failures.push(Failure::new("the scene", "one that runs", why)),
-        (Check::Curve, Ok(models)) => curve(flotor, case.file, models, &mut outcome),
+        (Check::Curve, Ok(models)) => {
+            let picture = plots.map(|folder| picture(folder, case));
+            curve(flotor, case.file, models, picture.as_deref(), &mut outcome);
+            plotted = None;
+        }
         (Check::Golden, Ok(models)) => plotted = golden(flotor, case.file, models, &mut outcome),
         (Check::Validate, Ok(models)) => validate(flotor, case.file, models, &mut outcome),
         (Check::Stress, Ok(models)) => plotted = stress(flotor, case.file, models, &mut outcome),
@@ -264,7 +268,8 @@ fn missed(what: &str, bound: &Bound, value: Option<&Value>) -> Option<Failure> {
     Some(Failure::new(what, bound.text(), got))
 }
 
-fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outcome) {
+/// Compares a model with a curve; a failure is drawn as `picture`, if there is one.
+fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], picture: Option<&Path>, outcome: &mut Outcome) {
     let Some(curve) = &file.curve else { return };
     let named = |model: &&Model| curve.model.as_ref().is_none_or(|name| *name == model.name);
     let mut chosen = models.iter().filter(named);
@@ -298,6 +303,10 @@ fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outco
             let header = POSE.join(",");
             let eval = command_line(&arguments);
             outcome.detail = Some(format!("printf '{header}\\n{}\\n' | {eval}", pose.join(",")));
+            let drawn = picture.zip(curve.points.picture(&outcome.case, &answers, tolerance).ok());
+            outcome.picture = drawn
+                .filter(|(path, svg)| std::fs::write(path, svg).is_ok())
+                .map(|(path, _)| path.to_path_buf());
         }
     }
 }

@@ -1,6 +1,7 @@
 //! A force-position curve: a CSV with poses and the wrench expected at each.
 
 use flotor_hal::{HashLines, Table, TextProblem, read_text};
+use flotor_plot::{Axis, Figure, Panel, Series};
 use std::path::Path;
 
 /// Columns of a pose, as `flotor eval` reads them.
@@ -67,6 +68,23 @@ impl Points {
         rows.join("\n") + "\n"
     }
 
+    /// The wrench at each pose, of the columns that are compared, and its status. `answers` is what `flotor eval` wrote.
+    ///
+    /// # Errors
+    /// In words: the answers are not those of these poses.
+    fn answers(&self, answers: &str) -> Result<Vec<Answer>, String> {
+        let mut lines = answers.lines();
+        let head: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+        let place = |name: &str| head.iter().position(|known| *known == name);
+        let answer = |_: &([f64; 6], [f64; 6])| {
+            let cells: Vec<&str> = lines.next().ok_or("eval gave too few answers")?.split(',').collect();
+            let cell = |name: &str| place(name).and_then(|place| cells.get(place).copied());
+            let number = |name: &str| cell(name).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN);
+            Ok(Answer { wrench: WRENCH.map(number), status: cell("status").unwrap_or_default().to_owned() })
+        };
+        self.rows.iter().map(answer).collect()
+    }
+
     /// The worst point for which `error` over its tolerance is largest, if one is outside: the column, the pose, expected and
     /// got. `answers` is what `flotor eval` wrote.
     ///
@@ -77,36 +95,99 @@ impl Points {
         answers: &str,
         tolerance: impl Fn(usize) -> f64,
     ) -> Result<Option<Worst>, String> {
-        let mut lines = answers.lines();
-        let head: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-        let place = |name: &str| head.iter().position(|known| *known == name);
         let mut worst: Option<(f64, Worst)> = None;
-        for (pose, expected) in &self.rows {
-            let cells: Vec<&str> = lines.next().ok_or("eval gave too few answers")?.split(',').collect();
-            let cell = |name: &str| place(name).and_then(|place| cells.get(place).copied());
-            let status = cell("status").unwrap_or_default();
+        for ((pose, expected), Answer { wrench, status }) in self.rows.iter().zip(self.answers(answers)?) {
             for index in self.compared.iter().copied() {
-                let got: f64 = cell(WRENCH[index]).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN);
+                let got = wrench[index];
                 let error = (got - expected[index]).abs();
                 let is_inside =
                     error <= tolerance(index) && status != "invalid_input" && status != "not_converged";
                 let excess = if is_inside { continue } else { error };
                 if worst.as_ref().is_none_or(|(largest, _)| excess > *largest || excess.is_nan()) {
                     let column = WRENCH[index];
-                    let found = Worst {
-                        column,
-                        pose: *pose,
-                        expected: expected[index],
-                        got,
-                        status: status.to_owned(),
-                    };
+                    let found =
+                        Worst { column, pose: *pose, expected: expected[index], got, status: status.clone() };
                     worst = Some((excess, found));
                 }
             }
         }
         Ok(worst.map(|(_, worst)| worst))
     }
+
+    /// Draws each compared column with its bounds and the answers, over the coordinate of the pose that changes most.
+    ///
+    /// # Errors
+    /// In words: the answers are not those of these poses.
+    pub(crate) fn picture(
+        &self,
+        title: &str,
+        answers: &str,
+        tolerance: impl Fn(usize) -> f64,
+    ) -> Result<String, String> {
+        let answers = self.answers(answers)?;
+        let along = self.coordinate_that_changes();
+        let (name, unit, scale) = COORDINATES[along];
+        let panel = |figure: Figure, index: usize| {
+            let (quantity, unit, scale_y) = COLUMNS[index];
+            let at = |value: &dyn Fn(usize) -> f64| {
+                let mut samples: Vec<(f64, f64)> = (0..self.rows.len())
+                    .map(|row| (self.rows[row].0[along] * scale, value(row) * scale_y))
+                    .collect();
+                samples.sort_by(|one, other| one.0.total_cmp(&other.0));
+                samples
+            };
+            let expected = |row: usize| self.rows[row].1[index];
+            let within = tolerance(index);
+            let panel = Panel::new(Axis::linear(quantity, unit))
+                .series(Series::line("expected", at(&expected)).slot(0))
+                .series(Series::line("least", at(&|row| expected(row) - within)).slot(7))
+                .series(Series::line("most", at(&|row| expected(row) + within)).slot(7))
+                .series(Series::points("got", at(&|row| answers[row].wrench[index])).slot(1));
+            figure.panel(panel)
+        };
+        let figure = Figure::new(title, Axis::linear(name, unit)).panel_height_px(220.0);
+        Ok(self.compared.iter().copied().fold(figure, panel).to_svg())
+    }
+
+    /// Number of the coordinate with the widest range, in millimetres and degrees.
+    fn coordinate_that_changes(&self) -> usize {
+        let range = |index: usize| {
+            let numbers = self.rows.iter().map(|(pose, _)| pose[index] * COORDINATES[index].2);
+            let (low, high) =
+                numbers.fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
+            high - low
+        };
+        (0..6).max_by(|one, other| range(*one).total_cmp(&range(*other)).then(other.cmp(one))).unwrap_or(0)
+    }
 }
+
+/// An answer of `flotor eval`.
+struct Answer {
+    wrench: [f64; 6],
+    status: String,
+}
+
+/// Name, unit and units a metre or radian of each coordinate of a pose.
+const COORDINATES: [(&str, &str, f64); 6] = [
+    ("x", "mm", 1.0e3),
+    ("y", "mm", 1.0e3),
+    ("z", "mm", 1.0e3),
+    ("Rotation, x", "°", DEGREES),
+    ("Rotation, y", "°", DEGREES),
+    ("Rotation, z", "°", DEGREES),
+];
+
+/// Name, unit and units a newton or newton metre of each column of a wrench.
+const COLUMNS: [(&str, &str, f64); 6] = [
+    ("Force, x", "N", 1.0),
+    ("Force, y", "N", 1.0),
+    ("Force, z", "N", 1.0),
+    ("Torque, x", "mN·m", 1.0e3),
+    ("Torque, y", "mN·m", 1.0e3),
+    ("Torque, z", "mN·m", 1.0e3),
+];
+
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// A point that is too far from the curve.
 #[derive(Debug, PartialEq)]
@@ -136,6 +217,27 @@ mod tests {
         assert_eq!((worst.column, worst.expected, worst.got), ("fz_n", 2.0, 1.0));
         assert!(points.worst("fz_n\n", |_| 0.0).is_err());
         assert!(points.worst(&answers(0.5, 2.0).replace("ok", "invalid_input"), |_| 0.0).unwrap().is_some());
+    }
+
+    #[test]
+    fn a_picture_shows_the_curve_its_bounds_and_the_answers() {
+        let points = Points::parse("z_m,fz_n\n-0.004,2.0\n-0.001,0.5\n").unwrap();
+        let answers =
+            "id,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm,energy_j,status\n0,0,0,1.0,0,0,0,,ok\n1,0,0,0.5,0,0,0,,ok\n";
+        let svg = points.picture("floor: curve", answers, |_| 0.25).unwrap();
+        assert!(
+            svg.contains("<title>floor: curve</title>") && svg.contains("Force, z (N) against z (mm)"),
+            "{svg}"
+        );
+        for series in [
+            "expected, 2 samples, 0.5 to 2",
+            "least, 2 samples, 0.25 to 1.75",
+            "most, 2 samples, 0.75 to 2.25",
+            "got, 2 samples, 0.5 to 1",
+        ] {
+            assert!(svg.contains(series), "{series}: {svg}");
+        }
+        assert!(points.picture("t", "fz_n\n", |_| 0.0).is_err());
     }
 
     #[test]

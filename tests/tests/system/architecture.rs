@@ -106,7 +106,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/lab", Lab, &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Judge]),
     ("host/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
     // Neither the session nor the loader: everything it runs is a process of its own.
-    ("host/scene-test", SceneTest, &[Contract, Core, Command]),
+    ("host/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
     ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
     (
         "host/study/program",

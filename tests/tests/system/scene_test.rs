@@ -125,8 +125,15 @@ fn a_defect_of_the_model_is_found_with_its_cause_and_a_picture() {
         assert_eq!(ran.code, Some(exit_code::OTHER), "{name}: {ran:#?}");
         assert!(ran.stdout.contains(says), "{name}: {}", ran.stdout);
         assert!(ran.stdout.contains(&format!("FAILED  jelly: {case}\n")), "{name}: {}", ran.stdout);
-        let pictures = std::fs::read_dir(folder.join("pictures")).expect("the folder was made").count();
-        assert_eq!(pictures, 1, "{name}");
+        let pictures = std::fs::read_dir(folder.join("pictures")).expect("the folder was made");
+        let pictures: Vec<PathBuf> = pictures.map(|file| file.expect("it can be read").path()).collect();
+        assert_eq!(pictures.len(), 1, "{name}");
+        let picture = std::fs::read_to_string(&pictures[0]).expect("it is text");
+        for (of, shown) in
+            [("curve", "expected"), ("curve", "Force, z (N) against z (mm)"), ("seed 1", "model fault")]
+        {
+            assert!(of != case || picture.contains(shown), "{name}: no {shown} in the picture of {case}");
+        }
     }
 }
 
