@@ -184,7 +184,7 @@ fn judging_again(case: &Case<'_>) -> String {
     let file = case.file.path.display().to_string();
     let folders = case.file.plugin_path.arguments().map(|word| word.to_string_lossy().into_owned());
     let words = ["test".to_owned(), file, "--filter".to_owned(), case.name()];
-    command_line(&words.into_iter().chain(folders).collect::<Vec<_>>())
+    command_line(words.into_iter().chain(folders))
 }
 
 /// The file of a case's picture.
