@@ -5,7 +5,7 @@ use crate::process::Owned;
 use crate::scratch::Scratch;
 use std::ffi::OsStr;
 use std::io::Write;
-use std::ops::Deref;
+use std::ops::{Deref, DerefMut};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -159,6 +159,12 @@ impl Deref for Running {
 
     fn deref(&self) -> &Owned {
         &self.process
+    }
+}
+
+impl DerefMut for Running {
+    fn deref_mut(&mut self) -> &mut Owned {
+        &mut self.process
     }
 }
 

@@ -38,7 +38,7 @@ pub use calls::{
 pub use estimates::estimates;
 pub use flotor_servo::THREAD_ADVICE;
 pub use long_call::{Exceeded, LongCall, step_limit};
-pub use platform::ThreadClock;
+pub use platform::{ThreadClock, end_with_this_thread};
 pub use plugin_process::PluginProcess;
 pub use run_recording::RunRecording;
 pub use session::{

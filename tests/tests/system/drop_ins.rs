@@ -12,11 +12,14 @@ use flotor_tests::tools::{self, Tool};
 use flotor_tests::{TestSize, workspace_root};
 use object::read::elf::ElfFile64;
 use object::{Object, ObjectSymbol};
+use rustix::process::Signal;
 use serde_json::Value;
+use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 /// What a plugin looks for before it loads a maker's library.
 const MARKER: &str = "flotor_dropin";
@@ -474,4 +477,86 @@ fn what_cannot_be_lent_is_said_in_one_line_with_what_helps() {
         Command::new(&alone).args(["lend", "--api", "chai3d", "--", &program]).output().expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("-p flotor-chai3d` builds it") && said.trim_end().lines().count() == 1, "{said}");
+}
+
+/// What a run has told, as JSON.
+fn json_of(file: &Path) -> Value {
+    let text = std::fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    serde_json::from_str(&text).expect("it is JSON")
+}
+
+#[test]
+fn the_summary_as_json_is_there_however_the_program_ends() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let program = phantom(&scratch);
+    for (way, end) in [("kill", "killed by signal 9"), ("crash", "killed by signal "), ("plain", "stopped")] {
+        let json = scratch.path().join(format!("{way}.json"));
+        let _ = lent(&program, &["--json", &json.display().to_string()], way, 1600);
+        let summary = json_of(&json);
+        assert!(
+            summary["end"].as_str().is_some_and(|told| told.starts_with(end)),
+            "{way}: {}",
+            summary["end"]
+        );
+        assert!(summary["ticks"].as_u64().is_some_and(|ticks| ticks > 100), "{way}: {summary:#}");
+    }
+    let json = scratch.path().join("none.json");
+    let ran = Flotor::with(["lend", "--json", &json.display().to_string(), "--", "sh", "-c", "exit 7"]).run();
+    assert_eq!(ran.code, Some(7), "{ran:?}");
+    let end = json_of(&json)["end"].to_string();
+    assert!(end.contains("opened no device: ended with exit code 7"), "{end}");
+}
+
+#[test]
+fn processes_of_one_program_have_files_of_their_own_that_the_report_names() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let program = phantom(&scratch).display().to_string();
+    let [record, json] = ["r.mcap", "r.json"].map(|name| scratch.path().join(name).display().to_string());
+    for both in ["\"$0\" plain 600 & \"$0\" plain 600 & wait", "\"$0\" plain 600; \"$0\" plain 600"] {
+        let options = ["lend", "--api", "chai3d", "--record", &record, "--json", &json];
+        let ran = Flotor::with(options.iter().chain(&["--", "sh", "-c", both, &program])).run();
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        let second = scratch.path().join("r-2.mcap");
+        assert!(
+            ran.stderr.contains(&format!("the recording of this run is `{}`", second.display())),
+            "{ran:?}"
+        );
+        for recording in [Path::new(&record), &second] {
+            let records = Recording::open(recording).expect("it can be read");
+            assert!(records.map(|record| record.expect("it is whole")).count() > 100);
+            std::fs::remove_file(recording).expect("it is there");
+        }
+        for file in ["r.json", "r-2.json"] {
+            assert_eq!(json_of(&scratch.path().join(file))["end"], "stopped", "{file}");
+        }
+    }
+}
+
+#[test]
+fn a_program_ends_with_the_command_that_lends_it_a_device() {
+    let program =
+        ["lend", "--", "sh", "-c", "trap '' TERM INT HUP; echo $$ >&2; while :; do sleep 0.1; done"];
+    let mut lend = Flotor::with(program).start();
+    let mut errors = lend.stderr.take().map(BufReader::new).expect("it is a pipe");
+    let mut line = String::new();
+    let shell = loop {
+        line.clear();
+        assert!(errors.read_line(&mut line).expect("text") > 0, "the program did not start");
+        if let Ok(number) = line.trim().parse::<u32>() {
+            break number;
+        }
+    };
+    lend.signal(Signal::KILL);
+    let state = || std::fs::read_to_string(format!("/proc/{shell}/stat")).unwrap_or_default();
+    let since = Instant::now();
+    while !state().is_empty() && !state().contains(") Z ") {
+        assert!(since.elapsed() < Duration::from_secs(30), "the program goes on: {}", state());
+        std::thread::sleep(Duration::from_millis(5));
+    }
 }

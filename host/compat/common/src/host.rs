@@ -95,6 +95,9 @@ impl Host {
         if !is_first() {
             settings.keep_apart(library().as_deref().and_then(Path::file_stem).unwrap_or_default());
         }
+        if let Some(folder) = said("FLOTOR_PROCESSES") {
+            settings.keep_processes_apart(Path::new(&folder));
+        }
         let folder = library().and_then(|file| file.parent().map(Path::to_path_buf)).unwrap_or_default();
         guest::be_guest(settings.signals, executable(&folder));
         let scene = match &settings.scene {

@@ -9,7 +9,7 @@ use flotor_core::trace::TickRecord;
 use flotor_hal::{DVec3, Demand};
 use flotor_live::Directory;
 use flotor_record::{Note, Recorder, RunDescription, Severity, TraceDigest};
-use flotor_servo::{RunEnd, StopSwitch};
+use flotor_servo::{Place, RunEnd, StopSwitch, Stuck};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary, Tally, end_cause};
@@ -39,8 +39,7 @@ struct Watchers {
 
 /// The summary so far: what is left of it if the program is killed.
 struct Draft {
-    path: PathBuf,
-    title: String,
+    facts: Facts,
     /// When it was written last.
     written: Option<Instant>,
 }
@@ -51,7 +50,7 @@ const DRAFT_LOOK: u64 = 64;
 
 impl Draft {
     /// Writes it, whole or not at all, if it is time.
-    fn update(&mut self, record: &TickRecord, asked: &[Asked]) {
+    fn update(&mut self, record: &TickRecord, asked: &[Asked], tally: &Tally, digest: &TraceDigest) {
         let is_fresh = |written: Instant| written.elapsed() < DRAFT_PERIOD;
         if !record.tick.is_multiple_of(DRAFT_LOOK) || self.written.is_some_and(is_fresh) {
             return;
@@ -60,11 +59,27 @@ impl Draft {
         let lines: Vec<String> =
             stations_so_far().iter().zip(asked).map(|(station, asked)| line(station, *asked)).collect();
         let ran_s = record.time_ns as f64 * 1.0e-9;
-        let text = format!("{}\n  ran        {ran_s:.3} s so far\n  {}\n", self.title, lines.join("\n  "));
-        let new = self.path.with_extension("new");
-        // Without room for it the run goes on without.
-        let _ = std::fs::write(&new, text).and_then(|()| std::fs::rename(&new, &self.path));
+        let Facts { scene, settings, .. } = &self.facts;
+        if let Some(path) = settings.report.as_deref().filter(|path| path.as_os_str() != "-") {
+            let text =
+                format!("{}\n  ran        {ran_s:.3} s so far\n  {}\n", scene.title, lines.join("\n  "));
+            replace(&so_far(path), &text);
+        }
+        if let Some(path) = settings.json.as_deref().filter(|path| path.as_os_str() != "-") {
+            let here = Stuck { tick: record.tick, place: Place::Waiting };
+            let outcome = Outcome::of_hung_loop(here, record.time_ns);
+            let mut summary =
+                serde_json::to_value(self.facts.summary(&outcome, tally, digest)).unwrap_or_default();
+            summary["end"] = "not ended".into();
+            replace(&so_far(path), &summary.to_string());
+        }
     }
+}
+
+/// Replaces a file, whole or not at all. Without room for it the run goes on without.
+fn replace(path: &Path, text: &str) {
+    let new = path.with_extension("new");
+    let _ = std::fs::write(&new, text).and_then(|()| std::fs::rename(&new, path));
 }
 
 /// What a program asked for at a device, at most.
@@ -101,7 +116,7 @@ impl Observer for Watchers {
             asked.applied_nm = asked.applied_nm.max(record.commanded.torque().length());
         }
         if let (0, Some(draft)) = (record.device, &mut self.draft) {
-            draft.update(record, &self.asked);
+            draft.update(record, &self.asked, &self.tally, &self.digest);
         }
     }
 }
@@ -113,6 +128,7 @@ fn length(vector: DVec3) -> f64 {
 }
 
 /// What is known of a run beside its ticks.
+#[derive(Clone)]
 struct Facts {
     scene: Scene,
     settings: Settings,
@@ -129,18 +145,16 @@ impl Prepared {
         let recorder = settings.record.as_deref().map(|path| Recorder::create(path, &description));
         let recorder = recorder.transpose().map_err(|error| error.to_string())?;
         let publication = publish(&Directory::of_this_user(), scene, &description, session, stop);
+        let facts = Facts { scene: scene.clone(), settings: settings.clone(), seed: options.seed, plugins };
+        let is_to_file = |path: &PathBuf| path.as_os_str() != "-";
+        let is_reported = settings.report.iter().chain(&settings.json).any(is_to_file);
         let watchers = Watchers {
             tally: Tally::default(),
             digest: TraceDigest::new(),
             recording: RunRecording::new(recorder),
             asked: Vec::new(),
-            draft: settings.report.as_deref().filter(|path| path.as_os_str() != "-").map(|path| Draft {
-                path: so_far(path),
-                title: scene.title.clone(),
-                written: None,
-            }),
+            draft: is_reported.then(|| Draft { facts: facts.clone(), written: None }),
         };
-        let facts = Facts { scene: scene.clone(), settings: settings.clone(), seed: options.seed, plugins };
         Ok((Watched { observer: watchers, publication: publication.ok() }, facts))
     }
 
@@ -195,21 +209,26 @@ impl LockstepRun {
 }
 
 impl Facts {
-    /// Finishes the recording and writes the summary where it is wanted.
-    fn report(self, watched: Watched<Watchers>, outcome: Outcome, stations: &[Station]) {
-        let Self { scene, settings, seed, plugins } = self;
-        let Watched { observer: Watchers { tally, digest, mut recording, asked, .. }, publication } = watched;
+    /// Returns the summary of a run that ended so, or has come so far.
+    fn summary(&self, outcome: &Outcome, tally: &Tally, digest: &TraceDigest) -> RunSummary {
         let facts = RunFacts {
-            title: &scene.title,
-            clock: if settings.pace == Pace::Real { "real" } else { "virtual" },
-            seed,
-            rate_hz: scene.rate_hz,
-            plugins: &plugins,
-            couplings: &scene.couplings,
+            title: &self.scene.title,
+            clock: if self.settings.pace == Pace::Real { "real" } else { "virtual" },
+            seed: self.seed,
+            rate_hz: self.scene.rate_hz,
+            plugins: &self.plugins,
+            couplings: &self.scene.couplings,
             carried: &[],
             trace_digest: digest.finish(),
         };
-        let summary = RunSummary::new(facts, &outcome, &tally);
+        RunSummary::new(facts, outcome, tally)
+    }
+
+    /// Finishes the recording and writes the summary where it is wanted.
+    fn report(self, watched: Watched<Watchers>, outcome: Outcome, stations: &[Station]) {
+        let Watched { observer: Watchers { tally, digest, mut recording, asked, .. }, publication } = watched;
+        let summary = self.summary(&outcome, &tally, &digest);
+        let settings = &self.settings;
         let mut lines: Vec<String> =
             stations.iter().zip(&asked).map(|(station, asked)| line(station, *asked)).collect();
         lines.extend(end_of(&outcome));
@@ -236,6 +255,7 @@ impl Facts {
         }
         if let Some(path) = &settings.json {
             write(path, serde_json::to_string_pretty(&summary).unwrap_or_default() + "\n");
+            let _ = std::fs::remove_file(so_far(path));
         }
         // Last of all: the code of a plugin may hang, or end the process.
         if let Err(hung) = outcome.remains.free() {

@@ -2,7 +2,9 @@
 
 use flotor_servo::guest::Signals;
 use std::ffi::OsStr;
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 /// Variable of [`Settings::shared_control_group`].
 const CONSENT: &str = "FLOTOR_SHARED_CONTROL_GROUP";
@@ -70,20 +72,37 @@ impl Settings {
         Self { signals: Signals::StopFirst, ..self }
     }
 
-    /// Puts the name of a library into the names of all files: another drop-in of this process writes to the others.
-    pub(crate) fn keep_apart(&mut self, library: &OsStr) {
+    /// Puts a word into the names of all files, the name of a library or the number of a process: another drop-in writes to the
+    /// others.
+    pub(crate) fn keep_apart(&mut self, word: &OsStr) {
         for file in [&mut self.record, &mut self.report, &mut self.json].into_iter().flatten() {
             if file.as_os_str() == "-" {
                 continue;
             }
             let mut name = file.file_stem().unwrap_or_default().to_owned();
             name.push("-");
-            name.push(library);
+            name.push(word);
             if let Some(extension) = file.extension() {
                 name.push(".");
                 name.push(extension);
             }
             file.set_file_name(name);
+        }
+    }
+
+    /// Puts the number of this process among those of one `flotor lend` into the names of all files, from the second on. Each claims
+    /// its number by a file in `folder`.
+    pub(crate) fn keep_processes_apart(&mut self, folder: &Path) {
+        let stem = self.report.as_deref().and_then(Path::file_stem).unwrap_or_default().to_owned();
+        let is_free = |number: &u32| {
+            let mut name = stem.clone();
+            name.push(format!("-process-{number}"));
+            // Where no file can be made, nothing is kept apart.
+            !File::create_new(folder.join(name)).is_err_and(|error| error.kind() == ErrorKind::AlreadyExists)
+        };
+        match (1..).find(is_free) {
+            None | Some(1) => {}
+            Some(number) => self.keep_apart(number.to_string().as_ref()),
         }
     }
 
@@ -149,6 +168,15 @@ mod tests {
         let accepted = read(CONSENT, "accept").map(|settings| settings.shared_control_group);
         assert_eq!(accepted, Ok(SharedControlGroup::Accepted));
         assert_eq!(read(CONSENT, "1"), Err(format!("{CONSENT}=1: must be `accept`")));
+        let folder = std::env::temp_dir().join(format!("flotor-processes-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("it can be made");
+        let names = [1, 2, 3].map(|_| {
+            let mut settings = read("FLOTOR_RECORD", "run.mcap").expect("it is a file");
+            settings.keep_processes_apart(&folder);
+            settings.record.expect("it is a file").display().to_string()
+        });
+        assert_eq!(names, ["run.mcap", "run-2.mcap", "run-3.mcap"]);
+        std::fs::remove_dir_all(&folder).expect("it is ours");
         assert!(read("FLOTOR_SEED", "-1").is_err_and(|said| said.contains("whole number")));
     }
 }

@@ -16,10 +16,10 @@ pub(crate) use linux::{
     MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, process_group, user_folder,
 };
 #[cfg(not(windows))]
-pub use linux::{ThreadClock, is_same_file};
+pub use linux::{ThreadClock, end_with_this_thread, is_same_file};
 #[cfg(windows)]
 pub(crate) use windows::{
     MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, process_group, user_folder,
 };
 #[cfg(windows)]
-pub use windows::{ThreadClock, is_same_file};
+pub use windows::{ThreadClock, end_with_this_thread, is_same_file};

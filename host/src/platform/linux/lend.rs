@@ -1,18 +1,20 @@
 //! `flotor lend`: somebody's program on a Flotor device, without a changed line: a drop-in library answers where the program
 //! calls its maker's.
 
+mod outcome;
 mod program;
 mod service;
 
 use clap::{Args, ValueEnum};
 use flotor_command::options::{ControlGroupOption, PluginPathOption, json_file, mcap_file, seed};
 use flotor_command::stopping::stop_on_signals;
-use flotor_command::{CommandError, note, say};
+use flotor_command::{CommandError, note};
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::spawn_unblocked;
-use flotor_session::RunError;
 use flotor_session::registry::PATH_VARIABLE;
 use flotor_session::scene::Scene;
+use flotor_session::{RunError, end_with_this_thread};
+use outcome::Runs;
 use program::Program;
 use rustix::process::{Pid, Signal, kill_process};
 use service::Service;
@@ -32,7 +34,7 @@ use std::time::{Duration, Instant};
     flotor lend --pace lockstep --record run.mcap -- ./my_test   one call, one tick: repeatable, fast\n\n\
     Environment variables: FLOTOR_SIGNALS=stop stops the devices before a signal ends the program. FLOTOR_DHD_TYPE,\n\
     FLOTOR_HD_MODEL and FLOTOR_PHANTOM_TYPE set the type of device that the program sees.\n\n\
-    The exit code is that of the program.")]
+    The exit code is that of the program; 4 if the program ended with 0 after its run had failed.")]
 pub(crate) struct LendArguments {
     /// The interface that the program calls (default: the program finds the three libraries)
     #[arg(long, value_name = "dhd|openhaptics|chai3d|haply|ml-api")]
@@ -252,14 +254,12 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
             .err()
             .unwrap_or_else(|| CommandError::Failed("no library".to_owned())));
     }
-    let report = folder.0.join("report.txt");
     let mut command = Command::new(&program.path);
     command.args(rest);
-    environment(&mut command, &arguments, &folder.0, &report, &own)?;
-    let child = spawn_unblocked(&mut command)
-        .map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))?;
-    let status = wait(child, &stop);
-    if !tell(&status, &program, &report) {
+    environment(&mut command, &arguments, &folder.0, &own)?;
+    let status = wait(start(&mut command, &program)?, &stop);
+    let runs = Runs::read(&folder.0, &status);
+    if !runs.tell(&program, arguments.record.as_deref()) {
         let which = api.map_or_else(
             || "none of dhd, openhaptics and chai3d".to_owned(),
             |api| format!("nothing of `--api {}`", api.word()),
@@ -270,8 +270,13 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
             program.path.display()
         ));
     }
-    drop(folder);
-    end_as(&status)
+    end_as(&runs, arguments.json.as_deref(), folder)
+}
+
+/// Starts the program, which ends with this process, however that ends.
+fn start(command: &mut Command, program: &Program) -> Result<Child, CommandError> {
+    end_with_this_thread(command);
+    spawn_unblocked(command).map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))
 }
 
 /// Serves a program by the network.
@@ -284,25 +289,23 @@ fn serve(
     stop: &StopSwitch,
 ) -> Result<(), CommandError> {
     let folder = Folder::new()?;
-    let report = folder.0.join("report.txt");
-    let mut served = service.start(arguments, &folder, &report, own)?;
+    let mut served = service.start(arguments, &folder, own)?;
     let mut command = Command::new(&program.path);
-    command.args(rest);
-    let child = spawn_unblocked(&mut command)
-        .map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))?;
-    let status = wait(child, stop);
+    let status = wait(start(command.args(rest), program)?, stop);
     served.tell();
-    tell(&status, program, &report);
-    drop((served, folder));
-    end_as(&status)
+    drop(served);
+    let runs = Runs::read(&folder.0, &status);
+    runs.tell(program, arguments.record.as_deref());
+    end_as(&runs, arguments.json.as_deref().filter(|_| service.leaves_its_summary_here()), folder)
 }
 
-/// The exit code of the program.
-fn end_as(status: &ExitStatus) -> Result<(), CommandError> {
-    match (status.code(), status.signal()) {
-        (Some(0), _) => Ok(()),
-        (Some(code), _) => std::process::exit(code),
-        (None, signal) => std::process::exit(128 + signal.unwrap_or_default()),
+/// Writes the summaries, removes the folder, and ends with the exit code of the program and its runs.
+fn end_as(runs: &Runs<'_>, json: Option<&Path>, folder: Folder) -> Result<(), CommandError> {
+    json.map_or(Ok(()), |json| runs.write(json))?;
+    drop(folder);
+    match runs.exit_code() {
+        0 => Ok(()),
+        code => std::process::exit(code),
     }
 }
 
@@ -330,7 +333,6 @@ fn environment(
     command: &mut Command,
     arguments: &LendArguments,
     folder: &Path,
-    report: &Path,
     own: &Path,
 ) -> Result<(), CommandError> {
     let before = std::env::var_os("LD_LIBRARY_PATH").filter(|path| !path.is_empty());
@@ -343,14 +345,14 @@ fn environment(
             command.env(variable, folder);
         }
     }
-    told(command, arguments, report, own)
+    told(command, arguments, folder, own)
 }
 
 /// What a run behind a program is told, whether that is a library or a service.
 fn told(
     command: &mut Command,
     arguments: &LendArguments,
-    report: &Path,
+    folder: &Path,
     own: &Path,
 ) -> Result<(), CommandError> {
     let absolute = |path: &Path| {
@@ -361,9 +363,6 @@ fn told(
     }
     if let Some(record) = &arguments.record {
         command.env("FLOTOR_RECORD", absolute(record)?);
-    }
-    if let Some(json) = &arguments.json {
-        command.env("FLOTOR_JSON", absolute(json)?);
     }
     if !arguments.plugin_path.folders().is_empty() {
         let before = std::env::var_os(PATH_VARIABLE);
@@ -380,7 +379,9 @@ fn told(
     if arguments.control_group.is_accepted() {
         command.env("FLOTOR_SHARED_CONTROL_GROUP", "accept");
     }
-    command.env("FLOTOR_REPORT", report).env("FLOTOR_PROGRAM", own);
+    let [report, summary] = Runs::files(folder);
+    command.env("FLOTOR_REPORT", report).env("FLOTOR_JSON", summary);
+    command.env("FLOTOR_PROCESSES", folder).env("FLOTOR_PROGRAM", own);
     Ok(())
 }
 
@@ -412,28 +413,4 @@ fn wait(mut child: Child, stop: &StopSwitch) -> ExitStatus {
         }
         std::thread::sleep(LOOK);
     }
-}
-
-/// What became of the program and of the run behind it; whether anything is known of that.
-fn tell(status: &ExitStatus, program: &Program, report: &Path) -> bool {
-    let name = program.path.display();
-    if let Ok(text) = std::fs::read_to_string(report) {
-        say!("{}", text.trim_end());
-        return true;
-    }
-    let mut so_far = report.as_os_str().to_owned();
-    so_far.push(".so-far");
-    if let Ok(text) = std::fs::read_to_string(&so_far) {
-        say!("{}", text.trim_end());
-        match status.signal() {
-            Some(signal) => note(format_args!(
-                "`{name}` was ended by signal {signal}: this is its summary up to half a second before"
-            )),
-            None => note(format_args!(
-                "`{name}` ended without an end of its run: this is its summary up to half a second before"
-            )),
-        }
-        return true;
-    }
-    false
 }

@@ -6,6 +6,7 @@ pub(crate) mod process_group;
 mod thread_clock;
 
 pub(crate) use machine::MachineState;
+pub use process_group::end_with_this_thread;
 pub use thread_clock::ThreadClock;
 
 use rustix::process::geteuid;

@@ -11,6 +11,11 @@ use std::process::{Child, Command};
 
 /// Makes a command the leader of a process group. The system kills it when the thread that starts it ends.
 pub(crate) fn lead_until_parent_ends(command: &mut Command) {
+    end_with_this_thread(command.process_group(0));
+}
+
+/// Lets the system kill the process of a command when the thread that starts it ends, however that ends. Not real-time.
+pub fn end_with_this_thread(command: &mut Command) {
     let parent = getpid();
     let end_with_parent = move || {
         set_parent_process_death_signal(Some(Signal::KILL))?;
@@ -18,7 +23,7 @@ pub(crate) fn lead_until_parent_ends(command: &mut Command) {
         if getppid() == Some(parent) { Ok(()) } else { Err(io::ErrorKind::NotFound.into()) }
     };
     // SAFETY: system calls alone, without a lock or an allocation.
-    unsafe { command.process_group(0).pre_exec(end_with_parent) };
+    unsafe { command.pre_exec(end_with_parent) };
 }
 
 /// Whether a child has ended, which is not waited for yet.

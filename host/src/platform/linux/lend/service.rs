@@ -36,6 +36,11 @@ impl Service {
         }
     }
 
+    /// Whether its summary appears in the folder of `flotor lend`; the other is a `flotor run` with a file of its own.
+    pub(super) fn leaves_its_summary_here(self) -> bool {
+        self == Self::Haply
+    }
+
     /// Where it listens unless another place is wanted.
     fn usual(self) -> &'static str {
         match self {
@@ -49,7 +54,6 @@ impl Service {
         self,
         arguments: &LendArguments,
         folder: &Folder,
-        report: &Path,
         own: &Path,
     ) -> Result<Served, CommandError> {
         let mut command = match self {
@@ -60,7 +64,7 @@ impl Service {
                     build: "cargo build --release -p flotor-haply-service",
                 };
                 let mut command = program.command()?;
-                told(&mut command, arguments, report, own)?;
+                told(&mut command, arguments, &folder.0, own)?;
                 command.arg("--lent");
                 if let Some(listen) = &arguments.listen {
                     command.args(["--listen", listen, "--events", "127.0.0.1:0"]);

@@ -1,0 +1,166 @@
+//! What the runs behind a program have left in the folder of `flotor lend`: one of each process that opened a device.
+
+use super::program::Program;
+use flotor_command::{CommandError, note, say, write_json};
+use flotor_servo::last_stop::SignalName;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
+
+/// Exit code of a run that a device, the watchdog or an oscillation has ended, as that of `flotor run`.
+const RUN_FAILED: i32 = 4;
+/// End of the name of a file that a run has not completed.
+const SO_FAR: &str = "so-far";
+
+/// What one run has left.
+#[derive(Default)]
+struct Run {
+    text: Option<String>,
+    summary: Option<Value>,
+    /// The run has ended before its process did.
+    is_whole: bool,
+}
+
+/// The runs behind a program, by what is in the names of their files.
+pub(super) struct Runs<'a> {
+    runs: BTreeMap<String, Run>,
+    status: &'a ExitStatus,
+}
+
+impl<'a> Runs<'a> {
+    /// Names of the files that a run is told to write in this folder: its text and its summary.
+    pub(super) fn files(folder: &Path) -> [PathBuf; 2] {
+        ["report.txt", "report.json"].map(|name| folder.join(name))
+    }
+
+    /// Reads what is there at the end of the program.
+    pub(super) fn read(folder: &Path, status: &'a ExitStatus) -> Self {
+        let mut runs = BTreeMap::<String, Run>::new();
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
+            // report-2.txt, report-2.json.so-far
+            let Some((suffix, kind)) = name.strip_prefix("report").and_then(|rest| rest.split_once('.'))
+            else {
+                continue;
+            };
+            let Ok(text) = std::fs::read_to_string(&path) else { continue };
+            let run = runs.entry(suffix.to_owned()).or_default();
+            let (kind, is_so_far) =
+                kind.strip_suffix(&format!(".{SO_FAR}")).map_or((kind, false), |kind| (kind, true));
+            run.is_whole |= !is_so_far;
+            match kind {
+                "txt" if !is_so_far || run.text.is_none() => run.text = Some(text),
+                "json" if !is_so_far || run.summary.is_none() => {
+                    run.summary = serde_json::from_str(&text).ok()
+                }
+                _ => {}
+            }
+        }
+        Self { runs, status }
+    }
+
+    /// Prints what is known of each run; whether anything is.
+    pub(super) fn tell(&self, program: &Program, record: Option<&Path>) -> bool {
+        let name = program.path.display();
+        for (suffix, run) in &self.runs {
+            let Some(text) = &run.text else { continue };
+            say!("{}", text.trim_end());
+            match record {
+                Some(record) if !suffix.is_empty() => {
+                    note(format_args!("the recording of this run is `{}`", named(record, suffix).display()));
+                }
+                _ => {}
+            }
+            if !run.is_whole {
+                let end = self.end();
+                note(format_args!("`{name}`: {end}: this is its summary up to half a second before"));
+            }
+        }
+        self.runs.values().any(|run| run.text.is_some())
+    }
+
+    /// How the program ended, for a run that did not end before.
+    fn end(&self) -> String {
+        match (self.status.signal(), self.status.code()) {
+            (Some(signal), _) => format!("killed by {}", SignalName(signal)),
+            (None, code) => {
+                format!("ended with exit code {} without an end of its run", code.unwrap_or_default())
+            }
+        }
+    }
+
+    /// Writes the summary of each run: of the first into `file`, of others beside it.
+    pub(super) fn write(&self, file: &Path) -> Result<(), CommandError> {
+        if self.runs.is_empty() {
+            return write_json(
+                file,
+                &json!({ "end": format!("the program opened no device: {}", self.end()) }),
+            );
+        }
+        for (suffix, run) in &self.runs {
+            let mut summary = run.summary.clone().unwrap_or_else(|| json!({}));
+            if !run.is_whole || run.summary.is_none() {
+                summary["end"] = self.end().into();
+            }
+            write_json(&named(file, suffix), &summary)?;
+        }
+        Ok(())
+    }
+
+    /// Returns the exit code of the whole: that of the program, or of a run that ended before a program which did not mind.
+    pub(super) fn exit_code(&self) -> i32 {
+        let ended_early = |run: &Run| {
+            let end = run.summary.as_ref().and_then(|summary| summary.get("end")).and_then(Value::as_str);
+            run.is_whole && end.is_some_and(|end| !["finished", "stopped"].contains(&end))
+        };
+        match (self.status.code(), self.status.signal()) {
+            (Some(0), _) if self.runs.values().any(ended_early) => RUN_FAILED,
+            (Some(code), _) => code,
+            (None, signal) => 128 + signal.unwrap_or_default(),
+        }
+    }
+}
+
+/// The name of a file with what distinguishes a run.
+fn named(file: &Path, suffix: &str) -> PathBuf {
+    let mut name = file.file_stem().unwrap_or_default().to_owned();
+    name.push(suffix);
+    if let Some(extension) = file.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    file.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_run_has_a_summary_with_its_end() {
+        let folder = std::env::temp_dir().join(format!("flotor-outcome-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("it can be made");
+        let write =
+            |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("it can be written");
+        let end = |name: &str| {
+            let text = std::fs::read_to_string(folder.join(name)).expect("it was written");
+            serde_json::from_str::<Value>(&text).expect("JSON")["end"].as_str().expect("an end").to_owned()
+        };
+        let crashed = ExitStatus::from_raw(11);
+        Runs::read(&folder, &crashed).write(&folder.join("out.json")).expect("it can be written");
+        assert!(end("out.json").starts_with("the program opened no device: killed by signal 11"));
+        write("report.json.so-far", "{\"end\": \"watchdog\", \"ticks\": 5}");
+        write("report-2.txt", "two");
+        write("report-2.json", "{\"end\": \"oscillation\"}");
+        let runs = Runs::read(&folder, &crashed);
+        runs.write(&folder.join("out.json")).expect("it can be written");
+        assert!(end("out.json").starts_with("killed by signal 11"), "{}", end("out.json"));
+        assert_eq!(end("out-2.json"), "oscillation");
+        assert_eq!(runs.exit_code(), 128 + 11);
+        assert_eq!(Runs::read(&folder, &ExitStatus::from_raw(7 << 8)).exit_code(), 7);
+        assert_eq!(Runs::read(&folder, &ExitStatus::from_raw(0)).exit_code(), RUN_FAILED);
+        std::fs::remove_dir_all(&folder).expect("it is ours");
+    }
+}
