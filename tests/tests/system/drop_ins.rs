@@ -316,6 +316,25 @@ pub(super) fn largest_n(recording: &Path) -> (f64, usize) {
 }
 
 #[test]
+fn the_motion_of_a_lent_run_is_replayed_with_a_model_in_the_place_of_the_program() {
+    if !tools::required(Tool::Cc) {
+        return;
+    }
+    let scratch = Scratch::default();
+    let recording = scratch.path().join("lent.mcap").display().to_string();
+    let ran = lent(&phantom(&scratch), &["--pace", "lockstep", "--record", &recording], "plain", 300);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let ran = Flotor::with(["replay", &recording]).run();
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(
+        ran.error().contains("a program commanded `program`")
+            && ran.error().contains("--model program=spring")
+    );
+    let ran = Flotor::with(["replay", &recording, "--model", "program=spring"]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+}
+
+#[test]
 fn a_program_drives_a_device_without_a_changed_line_and_in_lockstep_bit_for_bit() {
     if !tools::required(Tool::Cc) {
         return;

@@ -21,6 +21,7 @@ use flotor_hal::abi::PluginKind;
 use flotor_hal::{Axes, Capabilities, Demand, DeviceState, LoopConfig, Tick};
 use flotor_record::{Ending, ReadError, Recording, Role, RunDescription};
 use flotor_servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
+use flotor_session::program;
 use flotor_session::registry::Registry;
 use flotor_session::scene::{
     Isolation, KeyValue, Location, ModelUse, ParameterText, PluginKeyValue, PluginUse,
@@ -47,6 +48,15 @@ pub enum ReplayError {
     Apart {
         /// Its name.
         coupling: String,
+    },
+    /// The forces of a model came from a program, which the recording does not have.
+    #[error(
+        "a program commanded `{model}`, and the program is not in the recording; to compare the forces of a model on the same motion, \
+         put the model in its place: `--model {model}=spring`"
+    )]
+    Program {
+        /// Name of the model in the scene.
+        model: String,
     },
     /// The requested change does not fit the recording.
     #[error("{0}")]
@@ -131,6 +141,9 @@ impl<'r> Replay<'r> {
         let recording = Recording::open(path)?;
         let mut uses = models_of(path, recording.run());
         let held = Held::apply(&mut uses, models, sets).map_err(ReplayError::Change)?;
+        if let Some(lent) = uses.iter().find(|model| model.plugin.plugin == program::ID) {
+            return Err(ReplayError::Program { model: lent.name.clone() });
+        }
         use_recorded_files(&mut uses, &held, path, recording.run())?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
         let period_ns = (1.0e9 / recording.run().rate_hz).round() as u64;
