@@ -10,9 +10,12 @@ mod inverse3;
 mod ml_api;
 
 use flotor_core::trace::TickRecord;
-use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Plugin, Setting};
-use flotor_hal::{Cycle, Demand, DeviceState, Input, LoopConfig, Output, Pose, Tick};
+use flotor_hal::abi::{CallStatus, Entry, model_entry};
+use flotor_hal::{
+    Cycle, Demand, DeviceState, ForceModel, Input, LoopConfig, ModelInfo, Output, Pose, Refusal, Settings,
+    Tick, Wrench,
+};
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
@@ -21,7 +24,8 @@ use flotor_tests::TestSize;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::process::Command;
-use std::sync::atomic::{AtomicIsize, Ordering};
+use std::sync::atomic::{AtomicIsize, AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 thread_local! {
@@ -69,44 +73,67 @@ fn the_counter_counts() {
     assert_eq!(counted(|| ()), 0);
 }
 
-/// Notes how often the allocator was called when it sees a tick; keeps nothing that grows.
-#[derive(Default)]
-struct Watch {
-    first: Option<u64>,
-    last: u64,
-    ticks: u64,
+/// A model without force that notes the ticks at which the allocator was called on the loop's thread since its step before.
+struct Allocations {
+    calls: Option<u64>,
 }
 
-impl Observer for Watch {
-    fn observe(&mut self, _: &TickRecord) {
-        self.first.get_or_insert(CALLS.get());
-        self.last = CALLS.get();
-        self.ticks += 1;
+/// Steps of [`Allocations`], and the ticks noted: more are not expected.
+static STEPS: AtomicU64 = AtomicU64::new(0);
+static ALLOCATED: [AtomicU64; 4] = [const { AtomicU64::new(NEVER) }; 4];
+const NEVER: u64 = u64::MAX;
+/// One run at a time has the model.
+static ONE_RUN: Mutex<()> = Mutex::new(());
+static ENTRY: Entry = model_entry::<Allocations>();
+
+impl ForceModel for Allocations {
+    const INFO: ModelInfo = ModelInfo::new("allocations", "Allocations", "Counts calls of the allocator");
+
+    fn create(_: &Settings<'_>) -> Result<Self, Refusal> {
+        Ok(Self { calls: None })
     }
+
+    fn step(&mut self, _: &Input) -> Output {
+        let tick = STEPS.fetch_add(1, Ordering::Relaxed);
+        if self.calls.replace(CALLS.get()).is_some_and(|before| before != CALLS.get()) {
+            let free = ALLOCATED.iter().find(|noted| noted.load(Ordering::Relaxed) == NEVER);
+            free.unwrap_or(&ALLOCATED[3]).store(tick, Ordering::Relaxed);
+        }
+        Wrench::ZERO.into()
+    }
+}
+
+/// Runs a scene of one-tick steps on the virtual clock; returns its ticks with calls of the allocator on the loop's thread.
+fn ticks_with_allocations(scene: &str, device: &str, ticks: u64) -> Vec<u64> {
+    let _alone = ONE_RUN.lock().unwrap_or_else(PoisonError::into_inner);
+    STEPS.store(0, Ordering::Relaxed);
+    ALLOCATED.iter().for_each(|noted| noted.store(NEVER, Ordering::Relaxed));
+    let text = format!("{scene}\n[[model]]\nplugin = \"allocations\"\n{device}");
+    let scene = Scene::parse(std::path::Path::new("scene.toml"), &text).expect("the scene is right");
+    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
+    let registry = Registry::search(&[]).with_linked(&ENTRY).expect("it is a plugin");
+    let session = Session::prepare(&scene, &registry, &options).expect("the scene starts");
+    assert!(session.run(&mut Unseen, &StopSwitch::default()).is_ok());
+    assert_eq!(STEPS.load(Ordering::Relaxed), ticks);
+    ALLOCATED.iter().map(|noted| noted.load(Ordering::Relaxed)).filter(|tick| *tick != NEVER).collect()
+}
+
+/// Keeps nothing.
+struct Unseen;
+
+impl Observer for Unseen {
+    fn observe(&mut self, _: &TickRecord) {}
 }
 
 #[test]
 fn the_host_allocates_nothing_in_ten_thousand_ticks() {
-    let scene = Scene::demo().expect("the demo is right");
-    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
-    let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the demo starts");
-    let mut watch = Watch::default();
-    let outcome = session.run(&mut watch, &StopSwitch::default());
-    assert!(outcome.is_ok() && watch.ticks == 10_000);
-    // Between the first and the last tick seen lie ten batches of ticks, run on this thread.
-    assert_eq!(watch.first, Some(watch.last));
+    assert_eq!(ticks_with_allocations(flotor_session::scene::DEMO, "", 10_000), []);
 }
 
 #[test]
 fn the_host_allocates_nothing_with_two_devices_and_a_coupling() {
-    let text = include_str!("../../host/scenes/teleoperation.toml");
-    let scene = Scene::parse(std::path::Path::new("teleoperation.toml"), text).expect("the scene is right");
-    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
-    let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the scene starts");
-    let mut watch = Watch::default();
-    let outcome = session.run(&mut watch, &StopSwitch::default());
-    assert!(outcome.is_ok() && watch.ticks == 20_000);
-    assert_eq!(watch.first, Some(watch.last));
+    let scene = include_str!("../../host/scenes/teleoperation.toml");
+    assert_eq!(ticks_with_allocations(scene, "device = \"left\"\n", 10_000), []);
 }
 
 /// The demo with a change at tick 5000 and another spring from tick 7000 on, in the middle of batches of ticks.
@@ -115,30 +142,8 @@ const CHANGED: &str = "[[change]]\nat_s = 5.0\nset = \"spring.gamma_n=20\"\n\
 
 #[test]
 fn the_host_allocates_nothing_for_a_change_of_a_parameter_or_a_model() {
-    /// Ticks before whose observation the allocator was called, but for the first.
-    struct Calls {
-        before: Option<u64>,
-        ticks: Vec<u64>,
-    }
-    impl Observer for Calls {
-        fn observe(&mut self, record: &TickRecord) {
-            if self.before.replace(CALLS.get()).is_some_and(|before| before != CALLS.get()) {
-                self.ticks.push(record.tick);
-            }
-        }
-    }
-    let text = format!("{}{CHANGED}", flotor_session::scene::DEMO);
-    let scene = Scene::parse(std::path::Path::new("changed demo"), &text).expect("the demo is right");
-    let options = RunOptions { clock: Clock::Virtual, seed: 1 };
-    let session = Session::prepare(&scene, &Registry::search(&[]), &options).expect("the demo starts");
-    let mut calls = Calls { before: None, ticks: Vec::with_capacity(16) };
-    assert!(session.run(&mut calls, &StopSwitch::default()).is_ok());
-    // The loop ran tick 5000 before tick 4096 was observed, and 7000 to 7100 before 6144; only telling the observer of
-    // them takes memory, and giving the old spring to a thread that frees it at the end of its batch. A later batch may hear
-    // of that.
-    let (changes, heard) = calls.ticks.split_at(3);
-    assert_eq!(changes, [5000, 7000, 7168]);
-    assert!(heard.len() <= 1 && heard.iter().all(|tick| tick.is_multiple_of(1024)), "{heard:?}");
+    let scene = format!("{}{CHANGED}", flotor_session::scene::DEMO);
+    assert_eq!(ticks_with_allocations(&scene, "", 10_000), []);
 }
 
 /// Replaces the spring as often as the loop lets it, and looks at the memory of the process.
