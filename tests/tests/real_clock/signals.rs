@@ -77,13 +77,16 @@ fn after_a_second_signal_nothing_holds_the_process_for_long() {
         dies().display()
     );
     let scene = scratch.file("scene.toml", scene);
-    // On the virtual clock nobody watches the loop: it hangs for good.
+    // Without a limit of a step the loop would hang for good.
     let run = Flotor::with(["run".as_ref(), scene.as_os_str(), "--clock".as_ref(), "virtual".as_ref()]);
     let run = run.env("FIXTURE_MARK", &mark_in(&scratch).display().to_string());
+    let run = run.env("FLOTOR_STEP_LIMIT_S", "600");
     let running = run.env("FIXTURE_DEATH", "loop-in-step").start();
     wait_until("the model loops", || mark_in(&scratch).exists());
     running.signal(Signal::INT);
     std::thread::sleep(Duration::from_millis(200)); // another request
     running.signal(Signal::INT);
-    assert_eq!(running.wait().code, Some(130));
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+    assert!(ran.stderr.contains("did not return from `step`"), "{ran:#?}");
 }

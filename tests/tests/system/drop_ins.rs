@@ -530,7 +530,7 @@ fn the_summary_as_json_is_there_however_the_program_ends() {
 }
 
 #[test]
-fn processes_of_one_program_have_files_of_their_own_that_the_report_names() {
+fn processes_of_one_program_have_files_of_their_own_which_a_note_names() {
     if !tools::required(Tool::Cc) {
         return;
     }

@@ -167,9 +167,9 @@ fn a_wrong_file_is_told_with_file_and_line() {
         (String::new(), format!(" no poses; the header is {expected}")),
         (
             format!("{POSE_HEADER}\n{good}\nb,0,0,zero,0,0,0\n"),
-            "3: z_m must be a number, not `zero`".to_owned(),
+            "3: `z_m` must be a number, not `zero`".to_owned(),
         ),
-        (format!("{POSE_HEADER}\n{good}\n\nb,0,0,,0,0,0\n"), "4: z_m must be a number, not ``".to_owned()),
+        (format!("{POSE_HEADER}\n{good}\n\nb,0,0,,0,0,0\n"), "4: `z_m` must be a number, not ``".to_owned()),
     ];
     for (poses, cause) in wrong {
         let scratch = Scratch::default();

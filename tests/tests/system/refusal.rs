@@ -717,7 +717,7 @@ fn validate_survives_a_plugin_that_hangs() {
     let ran = Flotor::with(arguments).env(fixture_faulty_model::FAULT_VARIABLE, "hangs").run();
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
     assert!(ran.stdout.contains("FAILED  finite-near-home"), "{ran:#?}");
-    assert!(ran.stdout.contains("it did not return within 3s"), "{ran:#?}");
+    assert!(ran.stdout.contains("`step` did not return in tick 0 within 1 s"), "{ran:#?}");
 }
 
 /// One rule, asked in the process of its own that `flotor validate` starts for it.

@@ -266,7 +266,7 @@ fn a_second_signal_is_an_emergency_stop() {
 #[test]
 fn a_third_signal_ends_a_process_whatever_holds_it_up() {
     let scratch = Scratch::default();
-    // On the virtual clock nobody watches a loop: it hangs in its first tick for good.
+    // It hangs in its first tick; a second after the first signal the run would end by itself, with the name of the plugin.
     let hangs = scene("", "fault = \"hangs\"", "");
     let flotor = in_real_time(&scratch, &hangs, "-".as_ref()).through_shell("exec \"$@\" --clock virtual");
     let _alone = alone();
@@ -280,7 +280,10 @@ fn a_third_signal_ends_a_process_whatever_holds_it_up() {
         std::thread::sleep(ANOTHER_REQUEST);
         running.signal(Signal::INT);
     }
-    assert_eq!(running.wait().code, Some(130));
+    let ran = running.wait();
+    let named =
+        ran.code == Some(exit_code::PLUGIN_REFUSED) && ran.stderr.contains("did not return from `step`");
+    assert!(ran.code == Some(130) || named, "{ran:#?}");
 }
 
 #[test]
