@@ -127,13 +127,13 @@ impl Observer for Unseen {
 
 #[test]
 fn the_host_allocates_nothing_in_ten_thousand_ticks() {
-    assert_eq!(ticks_with_allocations(flotor_session::scene::DEMO, "", 10_000), []);
+    assert_eq!(ticks_with_allocations(flotor_session::scene::DEMO, "", 10_000), Vec::<u64>::new());
 }
 
 #[test]
 fn the_host_allocates_nothing_with_two_devices_and_a_coupling() {
     let scene = include_str!("../../host/scenes/teleoperation.toml");
-    assert_eq!(ticks_with_allocations(scene, "device = \"left\"\n", 10_000), []);
+    assert_eq!(ticks_with_allocations(scene, "device = \"left\"\n", 10_000), Vec::<u64>::new());
 }
 
 /// The demo with a change at tick 5000 and another spring from tick 7000 on, in the middle of batches of ticks.
@@ -143,7 +143,7 @@ const CHANGED: &str = "[[change]]\nat_s = 5.0\nset = \"spring.gamma_n=20\"\n\
 #[test]
 fn the_host_allocates_nothing_for_a_change_of_a_parameter_or_a_model() {
     let scene = format!("{}{CHANGED}", flotor_session::scene::DEMO);
-    assert_eq!(ticks_with_allocations(&scene, "", 10_000), []);
+    assert_eq!(ticks_with_allocations(&scene, "", 10_000), Vec::<u64>::new());
 }
 
 /// Replaces the spring as often as the loop lets it, and looks at the memory of the process.
