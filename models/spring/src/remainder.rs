@@ -166,10 +166,9 @@ impl Remainder {
         .then_some(remainder)
     }
 
-    /// The remainder of a spring of other stiffness but equal proportions, see [`Spring::is_proportional_to`]. Real-time: bounded, no
-    /// allocation.
-    pub(crate) fn restiffened(self, spring: &Spring) -> Self {
-        Self { unit_j: spring.rigidities().alpha_n_m2 / spring.geometry().free_length_m, ..self }
+    /// Takes the stiffness of another spring of equal proportions, see [`Spring::is_proportional_to`]. Real-time: bounded, no allocation.
+    pub(crate) fn restiffen(&mut self, spring: &Spring) {
+        self.unit_j = spring.rigidities().alpha_n_m2 / spring.geometry().free_length_m;
     }
 
     /// The remainder at a pose, `None` where there is none. Real-time: bounded, no allocation.

@@ -97,11 +97,11 @@ impl RodBlend {
         self.tolerance_n = tolerance_n;
         self.energy = self.energy.retuned(&self.spring, spring);
         self.rod.set_spring(spring);
-        self.remainder = if spring.is_proportional_to(&self.spring) {
-            self.remainder.map(|remainder| remainder.restiffened(spring))
-        } else {
-            Remainder::new(spring, &self.energy, &mut self.rod)
-        };
+        if !spring.is_proportional_to(&self.spring) {
+            self.remainder = Remainder::new(spring, &self.energy, &mut self.rod);
+        } else if let Some(remainder) = &mut self.remainder {
+            remainder.restiffen(spring);
+        }
         self.shares = shares(spring, self.tolerance_n, self.remainder.as_ref());
         self.spring = *spring;
     }

@@ -45,8 +45,8 @@ const MIDDLE_MAGNIFICATION: f64 = 1.0 + BUCKLING_ARGUMENT / (BUCKLING_ARGUMENT -
 const MIDDLE_LENGTH: f64 = 0.6;
 const MIDDLE_TILT: f64 = 0.0037;
 const MIDDLE_TWIST: f64 = 0.015;
-/// Halvings of the search for the middle.
-const MIDDLE_HALVINGS: u32 = 30;
+/// Halvings of the search for the middle, which runs inside a tick: its lower end is the answer, so a coarse one costs a check at few poses.
+const MIDDLE_HALVINGS: u32 = 12;
 
 /// The share at a pose and its derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
