@@ -727,7 +727,7 @@ fn an_onset_is_no_difference_of_two_times_of_day() {
         "{onsets:?}"
     );
     let set: Vec<String> = log.incidents.iter().map(|(.., incident)| incident.to_string()).collect();
-    assert!(set.len() >= 1 && set[0].contains("the time of day was set back by 3"), "{set:?}");
+    assert!(!set.is_empty() && set[0].contains("the time of day was set back by 3"), "{set:?}");
     assert_eq!(set.iter().filter(|incident| incident.contains("time of day")).count(), 1, "{set:?}");
 }
 
