@@ -319,9 +319,10 @@ fn a_model_from_outside_runs_in_a_process_of_its_own_where_a_hand_is_and_only_th
     assert_eq!(processes(&scene("simulated", "isolation = \"process\"")), 1, "the scene decides");
     for (isolation, says) in [("", "), in a process of its own"), ("isolation = \"none\"", ")")] {
         let ran = Flotor::with(["run", &scene("real", isolation), "--duration", "50ms"]).run();
-        let model =
-            ran.stdout.lines().find(|line| line.starts_with("  model ")).expect("a summary").to_owned();
-        assert!(model.ends_with(&format!("libmodel_HONEST.so{says}")), "{ran:#?}");
+        let model = ran.stdout.lines().find(|line| line.starts_with("  model ")).expect("a summary");
+        // On a busy machine its time in excess of the budget follows.
+        let (_, rest) = model.split_once("libmodel_HONEST.so").expect("its file");
+        assert_eq!(rest.split("  ").next(), Some(says), "{ran:#?}");
     }
 }
 
