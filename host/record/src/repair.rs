@@ -23,7 +23,7 @@ pub enum RepairError {
     },
 }
 
-/// What a repair kept and lost.
+/// Extent of a repaired recording.
 #[derive(Debug)]
 pub struct Repaired {
     /// Ticks in the new file, counted once for each device.
@@ -32,14 +32,13 @@ pub struct Repaired {
     pub end_ns: u64,
     /// Length of the run as planned, s.
     pub planned_s: f64,
-    /// What is wrong in the middle of the file, if it is not only truncated: nothing after that place was kept.
+    /// Damage in the middle of the file, if it is not only truncated: nothing after that place was kept.
     pub damage: Option<Damage>,
 }
 
 /// Copies the whole chunks of a truncated or damaged recording to a new file, message by message and bit for bit, and
-/// closes it with index and end. The new file says that it is repaired: [`Recording::ending`] stays
-/// [`Ending::CutOff`](crate::Ending::CutOff). The
-/// old file is not touched. Not real-time.
+/// closes it with index and end. The new file is marked as repaired: [`Recording::ending`] stays
+/// [`Ending::CutOff`](crate::Ending::CutOff). The old file is not touched. Not real-time.
 ///
 /// # Errors
 /// [`RepairError`]; a new file without any message is removed.

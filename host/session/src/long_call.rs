@@ -1,4 +1,4 @@
-//! A call of a plugin that may not return: how long it lasts, and the limit that it exceeds.
+//! Limits of a call that may not return: processor time, waiting time, and time after a request to stop.
 //!
 //! Time in which others have the processor is no fault of the call. So the limit is one of processor time, and, ten times as long,
 //! one of time in which its thread needs no processor.

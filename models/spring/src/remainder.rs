@@ -1,4 +1,4 @@
-//! What the law `energy` leaves out where the chord sways far: the energy beyond the fourth order, from the exact rod.
+//! Energy beyond the fourth order, from the exact rod: the part that the law `energy` lacks where the chord sways far.
 //!
 //! The law is right to fourth order in the angles of bending ([`crate::quartic`]). At 30 degrees of sway the orders beyond make
 //! millinewtons, at 50 degrees a tenth of a newton. In the measures of [`crate::directions`], with `u = S² - 0.06`,

@@ -38,63 +38,47 @@ enum Layout {
     Binary,
 }
 
-/// Damage to a file, or what stands in its place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Damage {
-    Empty,
-    Cut,
-    CutInTheHead,
-    Doubled,
-    LostPart,
-    ZeroedBlock,
-    ZeroedEnd,
-    WrongBit,
-    LineEndsOfWindows,
-    LineEndsOfOldMacs,
-    ByteOrderMark,
-    Utf16,
-    ForeignText,
-    OtherFormat,
-    GermanTable,
-    SeparatorLine,
-    QuotedCells,
-    BlankLinesAtTheEnd,
-    Folder,
-    Missing,
-    NoRights,
-    Pipe,
-    Device,
-    Gigabyte,
+/// Declares the kinds of damage, and the list of all of them.
+macro_rules! kinds_of_damage {
+    ($($name:ident)*) => {
+        /// Damage to a file, or its replacement.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        enum Damage {
+            $($name),*
+        }
+
+        const DAMAGE: &[Damage] = &[$($name),*];
+    };
+}
+
+kinds_of_damage! {
+    Empty
+    Cut
+    CutInTheHead
+    Doubled
+    LostPart
+    ZeroedBlock
+    ZeroedEnd
+    WrongBit
+    LineEndsOfWindows
+    LineEndsOfOldMacs
+    ByteOrderMark
+    Utf16
+    ForeignText
+    OtherFormat
+    GermanTable
+    SeparatorLine
+    QuotedCells
+    BlankLinesAtTheEnd
+    Folder
+    Missing
+    NoRights
+    Pipe
+    Device
+    Gigabyte
 }
 
 use Damage::*;
-
-const DAMAGE: [Damage; 24] = [
-    Empty,
-    Cut,
-    CutInTheHead,
-    Doubled,
-    LostPart,
-    ZeroedBlock,
-    ZeroedEnd,
-    WrongBit,
-    LineEndsOfWindows,
-    LineEndsOfOldMacs,
-    ByteOrderMark,
-    Utf16,
-    ForeignText,
-    OtherFormat,
-    GermanTable,
-    SeparatorLine,
-    QuotedCells,
-    BlankLinesAtTheEnd,
-    Folder,
-    Missing,
-    NoRights,
-    Pipe,
-    Device,
-    Gigabyte,
-];
 
 impl Damage {
     /// Whether it can happen to such a file.
@@ -467,7 +451,7 @@ fn damage_to_any_file_is_reported_or_does_no_harm() {
         .collect();
     let stride = if TestSize::of_this_run().leaves_out_long_tests() { 5 } else { 1 };
     let tries: Vec<(usize, Damage)> = (0..inputs.len())
-        .flat_map(|index| DAMAGE.map(|damage| (index, damage)))
+        .flat_map(|index| DAMAGE.iter().map(move |&damage| (index, damage)))
         .filter(|(index, damage)| damage.befalls(inputs[*index].layout))
         .step_by(stride)
         .collect();

@@ -1,4 +1,4 @@
-//! What a command leaves running when it is killed while a plugin hangs: nothing. And a step that does not return has a name.
+//! No process is left when a command is killed while a plugin hangs, and a step that does not return is named.
 
 use flotor_record::{Ending, Recording};
 use flotor_tests::library::compile_c_file;

@@ -26,7 +26,7 @@ pub fn end_with_this_thread(command: &mut Command) {
     unsafe { command.pre_exec(end_with_parent) };
 }
 
-/// Whether a child has ended, which is not waited for yet.
+/// Returns true once a child has ended, without waiting for it.
 pub(crate) fn has_ended(child: &mut Child) -> io::Result<bool> {
     let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
     Ok(waitid(WaitId::Pid(Pid::from_child(child)), options)?.is_some())

@@ -1,4 +1,4 @@
-//! What a thread uses of the processors, as other threads see it.
+//! Processor time and state of a thread, read by other threads.
 
 use rustix::thread::gettid;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! What the runs behind a program have left in the folder of `flotor lend`: one of each process that opened a device.
+//! Summaries of the runs behind a program in the folder of `flotor lend`: one of each process that opened a device.
 
 use super::program::Program;
 use flotor_command::{CommandError, note, say, write_json};
