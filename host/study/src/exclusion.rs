@@ -1,4 +1,4 @@
-//! What does not count, by rules that were decided before there were data, and what each rule found.
+//! Rules of exclusion, decided before there are data, and their findings. `flotor-analysis` applies them.
 //!
 //! A rule is about a whole sitting (`most_...`, `least_agreement`), or about single trials (`response_time_s`,
 //! `least_movement_mm`). A trial of ratings is left out by itself. A trial of an adaptive track takes the track with it, because
@@ -7,12 +7,9 @@
 
 mod check;
 
-use crate::analysis::{Estimator, SubjectChecks, SubjectRecord};
-use crate::log::TrialEvent;
-use crate::protocol::{Protocol, SubjectNumber};
-use crate::trial::{Modality, Phase, Presented, Response, Trial};
+use crate::protocol::SubjectNumber;
+use crate::trial::{Phase, Trial};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 
 /// The rules of a study; what is not said excludes nothing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -85,35 +82,6 @@ impl Exclusion {
     }
 }
 
-/// What the rules leave, and what they took.
-#[derive(Clone, Debug, Default)]
-pub struct Applied {
-    /// What is left to analyse.
-    pub kept: Vec<SubjectRecord>,
-    /// What was excluded.
-    pub excluded: Vec<Exclusion>,
-    /// Rules that could not be applied.
-    pub not_applied: Vec<NotApplied>,
-}
-
-/// A rule that could not be applied to some subjects.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct NotApplied {
-    /// As the study file has it.
-    pub rule: &'static str,
-    /// What is not known.
-    pub why: &'static str,
-    /// Of whom.
-    pub subjects: Vec<SubjectNumber>,
-}
-
-impl std::fmt::Display for NotApplied {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let subjects: Vec<String> = self.subjects.iter().map(SubjectNumber::to_string).collect();
-        write!(f, "{}: {} ({})", self.rule, self.why, subjects.join(", "))
-    }
-}
-
 impl Exclusion {
     /// One line for people.
     #[must_use]
@@ -139,132 +107,6 @@ impl ExclusionRules {
         *self == Self::default()
     }
 
-    /// Applies the rules to complete sittings; `rate_hz` is the rate of the servo, if there was one.
-    #[must_use]
-    pub fn apply(
-        &self,
-        protocol: &Protocol,
-        subjects: Vec<SubjectRecord>,
-        estimator: Estimator,
-        rate_hz: Option<f64>,
-    ) -> Applied {
-        let mut applied = Applied::default();
-        for record in subjects {
-            let before = applied.excluded.len();
-            let trials = self.trials(&record, estimator, &mut applied);
-            self.sitting(&record, &trials, rate_hz, &mut applied);
-            let new = applied.excluded.split_off(before);
-            let is_out = |exclusion: &&Exclusion| exclusion.scope == Scope::Sitting;
-            if let Some(whole) = new.iter().find(is_out) {
-                applied.excluded.push(whole.clone());
-                continue;
-            }
-            let kept = without(&record, &new);
-            applied.excluded.extend(new);
-            match emptied(protocol, estimator, &record, &kept) {
-                // Nothing to compare with would be left: the whole sitting goes.
-                Some(found) => applied.excluded.push(Exclusion {
-                    subject: record.subject,
-                    scope: Scope::Sitting,
-                    rule: EMPTY_CONDITION,
-                    found,
-                }),
-                None => applied.kept.push(kept),
-            }
-        }
-        applied
-    }
-
-    /// Rules about trials. Returns the numbers of the trials excluded.
-    fn trials(&self, record: &SubjectRecord, estimator: Estimator, applied: &mut Applied) -> BTreeSet<u32> {
-        let mut numbers = BTreeSet::new();
-        for event in record.counted() {
-            let Some((rule, found)) = self.of_trial(record.subject, event, applied) else { continue };
-            let Trial { number, track, .. } = event.trial;
-            numbers.insert(number);
-            let (scope, found) = match estimator {
-                Estimator::Procedure if track > 0 => {
-                    (Scope::Track(track), format!("trial {number}: {found}"))
-                }
-                _ => (Scope::Trial(number), found),
-            };
-            let is_known = |known: &Exclusion| known.subject == record.subject && known.scope == scope;
-            if !applied.excluded.iter().any(is_known) {
-                applied.excluded.push(Exclusion { subject: record.subject, scope, rule, found });
-            }
-        }
-        numbers
-    }
-
-    fn of_trial(
-        &self,
-        subject: SubjectNumber,
-        event: &TrialEvent,
-        applied: &mut Applied,
-    ) -> Option<(&'static str, String)> {
-        let exploration = &event.exploration;
-        if let Some([shortest, longest]) = self.response_time_s {
-            match exploration.response_time_s {
-                Some(time_s) if !(shortest..=longest).contains(&time_s) => {
-                    return Some(("response_time_s", format!("{time_s:.2} s")));
-                }
-                Some(_) => {}
-                None => applied.cannot("response_time_s", "not known of simulated observers", subject),
-            }
-        }
-        let least_mm = self.least_movement_mm?;
-        if exploration.kinematics.is_empty() {
-            applied.cannot("least_movement_mm", "no movement was stored", subject);
-        }
-        // Who felt a trial again has entries for each stimulus several times: their ways are added up.
-        let (felt, stimuli) = (&exploration.kinematics, event.trial.presented.values().len().max(1));
-        let way_mm = |stimulus: usize| {
-            let here = felt.iter().skip(stimulus).step_by(stimuli);
-            here.map(|one| 1.0e3 * one.mean_speed_m_per_s * one.duration_s).sum::<f64>()
-        };
-        let ways_mm = (0..stimuli.min(felt.len())).map(way_mm);
-        let least = ways_mm.fold(f64::INFINITY, f64::min);
-        (least < least_mm).then(|| ("least_movement_mm", format!("{least:.1} mm")))
-    }
-
-    fn sitting(
-        &self,
-        record: &SubjectRecord,
-        trials: &BTreeSet<u32>,
-        rate_hz: Option<f64>,
-        applied: &mut Applied,
-    ) {
-        let checks = SubjectChecks::of(record);
-        let counted: Vec<&TrialEvent> = record.counted().collect();
-        let share = |part: usize| (!counted.is_empty()).then(|| part as f64 / counted.len() as f64);
-        let unsure = counted.iter().filter(|event| event.response == Response::DontKnow).count();
-        let missed = missed_share(&counted, rate_hz);
-        if self.most_missed_ticks.is_some() && missed.is_none() {
-            applied.cannot("most_missed_ticks", "no movement was stored", record.subject);
-        }
-        let above = |most: Option<f64>, found: Option<f64>| {
-            Some((most?, found?)).filter(|(most, found)| found > most)
-        };
-        let below = |least: Option<f64>, found: Option<f64>| {
-            Some((least?, found?)).filter(|(least, found)| found < least)
-        };
-        let found = [
-            ("most_false_alarms", above(self.most_false_alarms, checks.false_alarm_share())),
-            ("least_agreement", below(self.least_agreement, checks.agreement)),
-            ("most_retest_deviation", above(self.most_retest_deviation, checks.retest_deviation)),
-            ("most_dont_know", above(self.most_dont_know, share(unsure))),
-            ("most_missed_ticks", above(self.most_missed_ticks, missed)),
-            ("most_excluded_trials", above(self.most_excluded_trials, share(trials.len()))),
-        ];
-        let first = found.into_iter().find_map(|(rule, outside)| Some((rule, outside?.1)));
-        applied.excluded.extend(first.map(|(rule, value)| Exclusion {
-            subject: record.subject,
-            scope: Scope::Sitting,
-            rule,
-            found: format!("{value:.3}"),
-        }));
-    }
-
     /// The rule as the study file has it: `most_false_alarms = 0.5`.
     #[must_use]
     pub fn text_of(&self, rule: &str) -> String {
@@ -279,88 +121,3 @@ impl ExclusionRules {
         said.as_object().map(|rules| rules.keys().cloned().collect()).unwrap_or_default()
     }
 }
-
-impl Applied {
-    fn cannot(&mut self, rule: &'static str, why: &'static str, subject: SubjectNumber) {
-        match self.not_applied.iter_mut().find(|known| (known.rule, known.why) == (rule, why)) {
-            Some(known) if known.subjects.contains(&subject) => {}
-            Some(known) => known.subjects.push(subject),
-            None => self.not_applied.push(NotApplied { rule, why, subjects: vec![subject] }),
-        }
-    }
-
-    /// What was excluded by which rule, for people.
-    #[must_use]
-    pub fn to_text(&self, rules: &ExclusionRules) -> String {
-        let mut lines = vec![
-            "  Excluded                      by rule of the study file                     found".to_owned(),
-        ];
-        for Exclusion { subject, scope, rule, found } in &self.excluded {
-            lines.push(format!("  {:<30}{:<46}{found}", format!("{subject} {scope}"), rules.text_of(rule)));
-        }
-        for rule in rules.names() {
-            let unknown = self.not_applied.iter().find(|one| one.rule == rule);
-            let took = self.excluded.iter().any(|exclusion| exclusion.rule == rule);
-            match unknown {
-                Some(why) => lines.push(format!("  not applied                   {why}")),
-                None if !took => {
-                    lines.push(format!("  nothing                       {}", rules.text_of(&rule)))
-                }
-                None => {}
-            }
-        }
-        lines.join("\n")
-    }
-}
-
-/// Share of the ticks missed while stimuli were felt.
-fn missed_share(counted: &[&TrialEvent], rate_hz: Option<f64>) -> Option<f64> {
-    let felt = counted.iter().filter(|event| !event.exploration.kinematics.is_empty());
-    let time_s =
-        |event: &&&TrialEvent| event.exploration.kinematics.iter().map(|one| one.duration_s).sum::<f64>();
-    let ticks = felt.clone().map(|event| time_s(&event)).sum::<f64>() * rate_hz?;
-    let missed: u64 = felt.map(|event| event.exploration.missed_ticks).sum();
-    (ticks > 0.0).then(|| missed as f64 / ticks)
-}
-
-fn without(record: &SubjectRecord, excluded: &[Exclusion]) -> SubjectRecord {
-    let mut kept = record.clone();
-    kept.trials
-        .retain(|event| !excluded.iter().any(|exclusion| exclusion.covers(record.subject, &event.trial)));
-    kept.tracks
-        .retain(|track| !excluded.iter().any(|exclusion| exclusion.scope == Scope::Track(track.track)));
-    kept
-}
-
-/// A condition of which the rules left nothing to compute a result from, where there was something, in words.
-fn emptied(
-    protocol: &Protocol,
-    estimator: Estimator,
-    before: &SubjectRecord,
-    kept: &SubjectRecord,
-) -> Option<String> {
-    let level = |event: &TrialEvent| match event.trial.presented {
-        Presented::Pair(pair) => pair.base,
-        Presented::One { value } => value,
-    };
-    // A track without a threshold has answers, and no result.
-    let by_tracks = matches!((protocol, estimator), (Protocol::Jnd(_), Estimator::Procedure));
-    let has_result = |record: &SubjectRecord, (modality, at): (Modality, f64)| {
-        if by_tracks {
-            let mut tracks = record.tracks.iter().filter(|track| track.threshold.is_some());
-            tracks.any(|track| track.modality == modality && track.base == at)
-        } else {
-            record.counted().any(|event| event.trial.modality == modality && level(event) == at)
-        }
-    };
-    let mut all = Modality::ALL
-        .into_iter()
-        .flat_map(|modality| protocol.levels().iter().map(move |at| (modality, *at)));
-    let (modality, at) =
-        all.find(|condition| has_result(before, *condition) && !has_result(kept, *condition))?;
-    let what = if by_tracks { "track with a threshold" } else { "answer" };
-    Some(format!("{} at {at}: no {what} is left", modality.word()))
-}
-
-#[cfg(test)]
-mod tests;

@@ -1,5 +1,4 @@
-//! Perception experiments: what is presented when, what the answers are worth, and how both are kept. Knows trials
-//! and statistics, and no device.
+//! Perception experiments: presentations, answers, and the log of both. Knows trials, and no device.
 //!
 //! ```text
 //!                      +----------------- a person, a simulated observer
@@ -19,12 +18,12 @@
 //! - [`screen`]: a person's way through a sitting, for any front end; [`blinding`]: codes in place of conditions.
 //! - [`conduct`]: a sitting with presenter, simulated subject and log put together.
 //! - [`cohort`]: many simulated subjects at once.
-//! - [`exclusion`]: what does not count, by rules decided beforehand.
-//! - [`analysis`]: from logs to thresholds, tests and effects.
+//! - [`exclusion`]: rules of exclusion, decided beforehand.
+//!
+//! `flotor-analysis` computes thresholds, tests and effects from the logs.
 //!
 //! Nothing here is real-time.
 
-pub mod analysis;
 #[cfg(feature = "apparatus")]
 pub mod apparatus;
 pub mod bias;
@@ -38,7 +37,6 @@ pub mod kinematics;
 pub mod log;
 pub mod observer;
 mod platform;
-pub mod power;
 pub mod procedure;
 pub mod protocol;
 mod random;

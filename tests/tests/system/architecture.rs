@@ -62,6 +62,8 @@ enum Role {
     /// Judges runs from outside.
     SceneTest,
     Study,
+    /// Results from logs.
+    Analysis,
     StudyProgram,
     Host,
     Viewer,
@@ -71,9 +73,9 @@ enum Role {
 }
 
 use Role::{
-    Calibration, Command, Compat, Container, Contract, Core, Coupling, Drawing, DropIn, Emulator, Fixture,
-    Guard, Host, Judge, Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record, SceneTest,
-    Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
+    Analysis, Calibration, Command, Compat, Container, Contract, Core, Coupling, Drawing, DropIn, Emulator,
+    Fixture, Guard, Host, Judge, Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record,
+    SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -108,10 +110,11 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     // Neither the session nor the loader: everything it runs is a process of its own.
     ("host/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
     ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
+    ("host/study/analysis", Analysis, &[Statistics, Study]),
     (
         "host/study/program",
         StudyProgram,
-        &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command, Study],
+        &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command, Study, Analysis],
     ),
     // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
     ("host", Host, &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Plugin]),
@@ -138,6 +141,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
             Calibration,
             SceneTest,
             Study,
+            Analysis,
             StudyProgram,
             Plugin,
             Emulator,
@@ -512,6 +516,7 @@ const PORTED: &[&str] = &[
     "host/session/src/",
     "host/src/",
     "host/statistics/src/",
+    "host/study/analysis/src/",
     "host/study/program/src/",
     "host/study/src/",
     "host/sync/src/",

@@ -2,17 +2,18 @@
 
 use crate::page::html;
 use clap::{Args, ValueEnum};
+use flotor_analysis::exclusion::{Applied, NotApplied, apply};
+use flotor_analysis::{
+    Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectChecks, SubjectQuality, SubjectRecord,
+};
+use flotor_analysis::{SCRIPT_PYTHON, script_in_r};
 use flotor_command::options::JsonOption;
 use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, print_result, style, write_text};
 use flotor_statistics::anova::SumOfSquares;
-use flotor_study::analysis::{
-    Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectChecks, SubjectQuality, SubjectRecord,
-};
-use flotor_study::analysis::{SCRIPT_PYTHON, script_in_r};
 use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, trials_csv};
-use flotor_study::exclusion::{Applied, Exclusion, NotApplied};
+use flotor_study::exclusion::Exclusion;
 use flotor_study::log::{Incident, SittingLog};
 use flotor_study::protocol::{Protocol, RatingScale};
 use serde::Serialize;
@@ -113,7 +114,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     };
     let protocol = &first.begin.protocol;
     let rules = first.begin.exclusion();
-    let applied = rules.apply(protocol, subjects, options.estimator, first.begin.rate_hz());
+    let applied = apply(&rules, protocol, subjects, options.estimator, first.begin.rate_hz());
     let subjects = &applied.kept;
     if !applied.excluded.is_empty() {
         let (kept, excluded) = (subjects.len(), applied.excluded.len());
@@ -197,7 +198,7 @@ fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), Co
             .extend((withdrawn > 0).then(|| format!("{withdrawn} answers taken back and given anew")));
         if log.complete {
             let rules = log.begin.exclusion();
-            let applied = rules.apply(protocol, vec![record], arguments.estimator, log.begin.rate_hz());
+            let applied = apply(&rules, protocol, vec![record], arguments.estimator, log.begin.rate_hz());
             quality.flags.extend(applied.excluded.iter().map(|one| one.to_text(&rules)));
         }
         quality

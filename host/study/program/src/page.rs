@@ -3,14 +3,15 @@
 
 mod figures;
 
-use flotor_statistics::anova::Effect;
-use flotor_statistics::describe::MeanInterval;
-use flotor_study::analysis::published::Beside;
-use flotor_study::analysis::{
+use flotor_analysis::exclusion::Applied;
+use flotor_analysis::published::Beside;
+use flotor_analysis::{
     Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, effect_text,
     p_text, published,
 };
-use flotor_study::exclusion::{Applied, Exclusion, ExclusionRules};
+use flotor_statistics::anova::Effect;
+use flotor_statistics::describe::MeanInterval;
+use flotor_study::exclusion::{Exclusion, ExclusionRules};
 use flotor_study::log::Begin;
 use flotor_study::protocol::{Protocol, Stimulus};
 use std::fmt::Write;

@@ -1,11 +1,11 @@
 //! The figures of a study: 17 and 18 of CMU-RI-TR-07-21 with this study's data, what lies behind them, and how people
 //! moved.
 
-use flotor_plot::{Axis, Bin, Figure, Panel, Series};
-use flotor_statistics::describe::MeanInterval;
-use flotor_study::analysis::{
+use flotor_analysis::{
     JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, ThresholdCell, published,
 };
+use flotor_plot::{Axis, Bin, Figure, Panel, Series};
+use flotor_statistics::describe::MeanInterval;
 use flotor_study::log::TrialEvent;
 use flotor_study::protocol::Stimulus;
 use flotor_study::sitting::Verdict;

@@ -1,9 +1,9 @@
 //! `flotor study power`: how many subjects a difference experiment needs.
 
 use clap::Args;
+use flotor_analysis::power::{Power, population, power, study};
 use flotor_command::options::{JsonOption, count, real, seed};
 use flotor_command::{CommandError, print_result, progress_bar, style};
-use flotor_study::power::{Power, population, power, study};
 use flotor_study::protocol::{JndProtocol, Protocol, SubjectNumber};
 use rayon::prelude::*;
 

@@ -4,12 +4,12 @@
 //! The test is the paired t-test of `flotor analyse`. With equal observers in both modalities the same share is the rate of
 //! false alarms, which must be the level of the test.
 
-use crate::analysis::{AnalysisError, AnalysisOptions, SubjectRecord, analyse_jnd};
-use crate::log::TrialEvent;
-use crate::observer::{Population, Sensitivity, SimulatedSubject};
-use crate::protocol::{JndProtocol, Protocol, SubjectNumber};
-use crate::sitting::Sitting;
-use crate::trial::Exploration;
+use crate::{AnalysisError, AnalysisOptions, SubjectRecord, analyse_jnd};
+use flotor_study::log::TrialEvent;
+use flotor_study::observer::{Population, Sensitivity, SimulatedSubject};
+use flotor_study::protocol::{JndProtocol, Protocol, SubjectNumber};
+use flotor_study::sitting::Sitting;
+use flotor_study::trial::Exploration;
 use serde::Serialize;
 
 /// Level of the test.

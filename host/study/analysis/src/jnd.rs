@@ -6,14 +6,14 @@ use super::{
     AnalysisError, AnalysisOptions, CONFIDENCE, Estimator, PostHoc, ResponseRow, SubjectRecord,
     mean_responses, order_factor, post_hoc, response_rows, within_factors,
 };
-use crate::estimate::{Observation, Prior, most_likely};
-use crate::protocol::JndProtocol;
-use crate::sitting::Verdict;
-use crate::trial::{Modality, Presented};
 use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
 use flotor_statistics::describe::{MeanInterval, mean, mean_interval};
 use flotor_statistics::t_test::{TTest, paired};
 use flotor_statistics::trend;
+use flotor_study::estimate::{Observation, Prior, most_likely};
+use flotor_study::protocol::JndProtocol;
+use flotor_study::sitting::Verdict;
+use flotor_study::trial::{Modality, Presented};
 use serde::Serialize;
 
 /// A number for each modality.

@@ -1,8 +1,8 @@
 use super::*;
-use crate::kinematics::StimulusKinematics;
-use crate::protocol::{Checks, JndProtocol, MagnitudeProtocol};
-use crate::sitting::Sitting;
-use crate::trial::{Exploration, Position};
+use flotor_study::kinematics::StimulusKinematics;
+use flotor_study::protocol::{Checks, JndProtocol, MagnitudeProtocol};
+use flotor_study::sitting::Sitting;
+use flotor_study::trial::{Exploration, Phase, Position};
 
 fn number(number: u16) -> SubjectNumber {
     SubjectNumber::new(number).unwrap()
@@ -82,7 +82,7 @@ fn each_rule_excludes_what_it_names_and_nothing_else() {
     let protocol = jnd();
     let excluded = |rules: &ExclusionRules, estimator| {
         rules.check(&protocol).unwrap();
-        rules.apply(&protocol, all(&protocol), estimator, Some(1000.0))
+        apply(rules, &protocol, all(&protocol), estimator, Some(1000.0))
     };
     let none = excluded(&ExclusionRules::default(), Estimator::Procedure);
     assert_eq!((none.kept.len(), none.excluded.len()), (4, 0));
@@ -134,7 +134,7 @@ fn a_rule_that_is_not_applied_names_the_subjects() {
         record.trials.iter_mut().for_each(|event| event.exploration.response_time_s = None);
     }
     let rules = ExclusionRules { response_time_s: Some([0.2, 20.0]), ..ExclusionRules::default() };
-    let applied = rules.apply(&protocol, records, Estimator::Procedure, None);
+    let applied = apply(&rules, &protocol, records, Estimator::Procedure, None);
     let [one] = applied.not_applied.as_slice() else { panic!("{:?}", applied.not_applied) };
     assert_eq!(one.to_string(), "response_time_s: not known of simulated observers (sub-01, sub-02)");
     assert!(applied.to_text(&rules).contains(&one.to_string()) && applied.excluded.len() == 1);
@@ -157,7 +157,7 @@ fn feeling_again_adds_to_the_way() {
             let at = |speed: &f64| StimulusKinematics { mean_speed_m_per_s: *speed, ..one };
             event.exploration.kinematics = speeds.iter().map(at).collect();
         }
-        let applied = rules.apply(&protocol, vec![record], Estimator::Procedure, None);
+        let applied = apply(&rules, &protocol, vec![record], Estimator::Procedure, None);
         assert_eq!(applied.excluded.is_empty(), is_kept, "{speeds:?}: {:?}", applied.excluded);
     }
 }
@@ -176,13 +176,13 @@ fn a_condition_without_a_threshold_left_takes_the_sitting() {
     others.for_each(|track| track.threshold = None);
     records[0].tracks.iter_mut().for_each(|track| track.threshold = None);
     let times = ExclusionRules { response_time_s: Some([0.2, 20.0]), ..ExclusionRules::default() };
-    let applied = times.apply(&protocol, records.clone(), Estimator::Procedure, None);
+    let applied = apply(&times, &protocol, records.clone(), Estimator::Procedure, None);
     let [_, Exclusion { subject, scope: Scope::Sitting, rule, found }] = applied.excluded.as_slice() else {
         panic!("{:?}", applied.excluded)
     };
     assert_eq!((subject.get(), *rule, applied.kept.len()), (4, EMPTY_CONDITION, 3));
     assert_eq!(*found, format!("{} at 26: no track with a threshold is left", modality.word()));
-    let applied = times.apply(&protocol, records, Estimator::Map, None);
+    let applied = apply(&times, &protocol, records, Estimator::Map, None);
     assert_eq!(applied.kept.len(), 4, "all answers of the other track: {:?}", applied.excluded);
 }
 

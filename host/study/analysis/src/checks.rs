@@ -1,10 +1,10 @@
 //! How a subject did in the trials that check them: catch trials and trials presented once more.
 
 use super::SubjectRecord;
-use crate::log::TrialEvent;
-use crate::sitting::Verdict;
-use crate::trial::{Phase, Response};
 use flotor_statistics::describe::mean;
+use flotor_study::log::TrialEvent;
+use flotor_study::sitting::Verdict;
+use flotor_study::trial::{Phase, Response};
 use serde::Serialize;
 
 /// What came of the checks of one subject.

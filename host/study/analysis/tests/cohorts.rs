@@ -8,14 +8,14 @@
 
 #![allow(clippy::unwrap_used)] // tests may panic
 
-use flotor_statistics::anova::Effect;
-use flotor_study::analysis::{
+use flotor_analysis::power::{population, power, study};
+use flotor_analysis::{
     AnalysisOptions, PostHoc, SubjectQuality, SubjectRecord, analyse_jnd, analyse_magnitude,
 };
+use flotor_statistics::anova::Effect;
 use flotor_study::kinematics::StimulusKinematics;
 use flotor_study::log::TrialEvent;
 use flotor_study::observer::{Population, SimulatedSubject};
-use flotor_study::power::{population, power, study};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, SubjectNumber};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::Exploration;

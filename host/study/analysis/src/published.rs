@@ -1,6 +1,6 @@
 //! What CMU-RI-TR-07-21 reports (section 4.3), to stand beside one's own results.
 
-use crate::protocol::{JndProtocol, MagnitudeProtocol, Stimulus};
+use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Stimulus};
 
 /// What of the thesis may stand beside a study: its numbers are of springs, at its bases and stimuli, and of nothing else.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

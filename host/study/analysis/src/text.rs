@@ -3,10 +3,10 @@
 use super::blinded::BlindedAnalysis;
 use super::published::Beside;
 use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PostHoc, published};
-use crate::trial::Modality;
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
 use flotor_statistics::effect_size::{EffectSize, Reach, partial_eta_squared};
+use flotor_study::trial::Modality;
 
 pub(super) fn jnd(analysis: &JndAnalysis) -> String {
     let mut page = Page::beside(analysis.beside);

@@ -1,9 +1,9 @@
 //! Results under codes: whether anything differs can be seen, but not what is which.
 
 use super::{Analysis, ResponseRow};
-use crate::blinding::Codes;
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::mean;
+use flotor_study::blinding::Codes;
 use serde::Serialize;
 
 /// A response under a coded condition: a row of the table for other programs.

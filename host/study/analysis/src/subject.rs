@@ -2,12 +2,12 @@
 //! answers are those of somebody who felt what was presented.
 
 use super::{SubjectChecks, SubjectRecord};
-use crate::estimate::{Observation, Prior, Psychometric, psychometric};
-use crate::log::Incident;
-use crate::protocol::Protocol;
-use crate::sitting::{TrackResult, Verdict};
-use crate::trial::{Judgement, Modality, Phase, Presented, Response};
 use flotor_statistics::describe::quantile;
+use flotor_study::estimate::{Observation, Prior, Psychometric, psychometric};
+use flotor_study::log::Incident;
+use flotor_study::protocol::Protocol;
+use flotor_study::sitting::{TrackResult, Verdict};
+use flotor_study::trial::{Judgement, Modality, Phase, Presented, Response};
 use serde::Serialize;
 
 /// Less time with a stimulus than this is suspicious, s.
@@ -79,7 +79,7 @@ impl SubjectQuality {
 
     fn suspicions(&self, record: &SubjectRecord, named: f64, incidents: &[Incident]) -> Vec<String> {
         let mut flags = Vec::new();
-        let felt = |event: &&crate::log::TrialEvent| !event.exploration.kinematics.is_empty();
+        let felt = |event: &&flotor_study::log::TrialEvent| !event.exploration.kinematics.is_empty();
         let short = record
             .counted()
             .filter(felt)
@@ -132,7 +132,7 @@ impl SubjectQuality {
                 |condition: &&SubjectCondition| condition.modality == modality && condition.base == base;
             self.conditions.iter().find(known).map(|condition| condition.function.threshold)
         };
-        let is_lapse = |event: &&crate::log::TrialEvent| match (event.trial.presented, event.verdict) {
+        let is_lapse = |event: &&flotor_study::log::TrialEvent| match (event.trial.presented, event.verdict) {
             (Presented::Pair(pair), Verdict::Judged { judgement: Judgement::Wrong, .. }) => {
                 threshold(event.trial.modality, pair.base).is_some_and(|known| pair.delta > LARGE * known)
             }
@@ -181,7 +181,7 @@ impl SubjectQuality {
 
 /// A track whose smallest difference is none comes there: such an answer is right or wrong by chance, and moves the track.
 fn without_difference(record: &SubjectRecord) -> usize {
-    let is_judged = |event: &&crate::log::TrialEvent| {
+    let is_judged = |event: &&flotor_study::log::TrialEvent| {
         let named = matches!(event.response, Response::First | Response::Second);
         named && matches!(event.trial.presented, Presented::Pair(pair) if pair.delta == 0.0)
     };

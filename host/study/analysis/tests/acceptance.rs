@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::cast_possible_truncation, clippy::cast_sign_loss)] // tests may panic
 
-use flotor_study::analysis::{AnalysisOptions, JndAnalysis, SubjectRecord, analyse_jnd, analyse_magnitude};
+use flotor_analysis::{AnalysisOptions, JndAnalysis, SubjectRecord, analyse_jnd, analyse_magnitude};
 use flotor_study::bias::{BiasRow, Method, observer_of, rows};
 use flotor_study::log::TrialEvent;
 use flotor_study::observer::{Population, Sensitivity, SimulatedSubject};
@@ -172,7 +172,7 @@ fn better_estimators_find_the_threshold() {
 /// say yes in 5 % of the studies.
 #[test]
 fn false_alarms_are_as_often_as_they_should_be_and_power_grows_with_the_subjects() {
-    use flotor_study::power::{population, power, study};
+    use flotor_analysis::power::{population, power, study};
     // Ten seconds of a core.
     if !matches!(std::env::var("FLOTOR_TEST_SIZE").as_deref(), Ok("daily" | "full")) {
         return;

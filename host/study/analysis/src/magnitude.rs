@@ -6,11 +6,11 @@ use super::{
     AnalysisError, AnalysisOptions, PostHoc, ResponseRow, SubjectRecord, conditions, mean_responses,
     order_factor, post_hoc, response_rows, within_factors,
 };
-use crate::protocol::{MagnitudeProtocol, RatingScale};
-use crate::trial::{Modality, Presented, Response};
 use flotor_statistics::anova::{Design, Effect, analyse};
 use flotor_statistics::describe::{MeanInterval, mean};
 use flotor_statistics::trend::{self, LinearTrend};
+use flotor_study::protocol::{MagnitudeProtocol, RatingScale};
+use flotor_study::trial::{Modality, Presented, Response};
 use serde::Serialize;
 
 /// Mean rating of a stimulus: a point of figure 17.
@@ -106,7 +106,7 @@ fn scaled(
 ) -> Result<Vec<f64>, AnalysisError> {
     let subject = record.subject;
     let refuse = |problem| Err(AnalysisError::Ratings { subject, problem });
-    let rated = |event: &crate::log::TrialEvent| match (event.trial.presented, event.response) {
+    let rated = |event: &flotor_study::log::TrialEvent| match (event.trial.presented, event.response) {
         (Presented::One { value }, Response::Rating(rating)) => Some((event.trial.modality, value, rating)),
         _ => None,
     };

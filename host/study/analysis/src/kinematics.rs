@@ -1,11 +1,11 @@
 //! How people moved: mean speed, acceleration and force along the vertical, over stimulus and modality.
 
 use super::{AnalysisError, AnalysisOptions, SubjectRecord, conditions, within_factors};
-use crate::kinematics::StimulusKinematics;
-use crate::log::TrialEvent;
-use crate::trial::Presented;
 use flotor_statistics::anova::{Design, Effect, analyse};
 use flotor_statistics::describe::mean;
+use flotor_study::kinematics::StimulusKinematics;
+use flotor_study::log::TrialEvent;
+use flotor_study::trial::Presented;
 use serde::Serialize;
 
 /// A measure of movement: its name, and the number it is.

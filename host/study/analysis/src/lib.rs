@@ -2,10 +2,12 @@
 
 mod blinded;
 mod checks;
+pub mod exclusion;
 mod jnd;
 mod kinematics;
 mod magnitude;
 mod post_hoc;
+pub mod power;
 pub mod published;
 mod subject;
 mod text;
@@ -18,16 +20,16 @@ pub use magnitude::{MagnitudeAnalysis, RatingCell, analyse_magnitude};
 pub use post_hoc::PostHoc;
 pub use subject::{SubjectCondition, SubjectQuality};
 
-use crate::log::{SittingLog, TrialEvent};
-use crate::protocol::{Protocol, SubjectNumber};
-use crate::sitting::{TrackResult, Verdict};
-use crate::trial::{Modality, Phase};
 use flotor_statistics::StatisticsError;
 use flotor_statistics::anova::{BetweenFactor, Effect, SumOfSquares, WithinFactor};
 use flotor_statistics::describe::{MeanInterval, mean_interval};
+use flotor_study::log::{SittingLog, TrialEvent};
+use flotor_study::protocol::{Protocol, SubjectNumber};
+use flotor_study::sitting::{TrackResult, Verdict};
+use flotor_study::trial::{Modality, Phase};
 use serde::Serialize;
 
-/// A script in Python that repeats the tables from [`crate::dataset::trials_csv`].
+/// A script in Python that repeats the tables from [`flotor_study::dataset::trials_csv`].
 pub const SCRIPT_PYTHON: &str = include_str!("scripts/analysis.py");
 /// The same in R, for a table of another name.
 const SCRIPT_R: &str = include_str!("scripts/analysis.R");
@@ -38,7 +40,7 @@ const CONFIDENCE: f64 = 0.95;
 /// Name of the table in [`SCRIPT_R`], as the script writes it.
 const TABLE_IN_R: &str = "\"trials.csv\"";
 
-/// Returns the script in R that repeats the tables from [`crate::dataset::trials_csv`], for the table of this name beside it.
+/// Returns the script in R that repeats the tables from [`flotor_study::dataset::trials_csv`], for the table of this name beside it.
 #[must_use]
 pub fn script_in_r(table_name: &str) -> String {
     let escaped = table_name.replace('\\', "\\\\").replace('"', "\\\"");
@@ -96,7 +98,7 @@ pub struct AnalysisOptions {
     /// Sums of squares.
     pub sums_of_squares: SumOfSquares,
     /// How ratings are made comparable.
-    pub rating_scale: crate::protocol::RatingScale,
+    pub rating_scale: flotor_study::protocol::RatingScale,
     /// How thresholds are found.
     pub estimator: Estimator,
 }
