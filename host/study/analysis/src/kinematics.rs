@@ -1,11 +1,14 @@
 //! How people moved: mean speed, acceleration and force along the vertical, over stimulus and modality.
+//!
+//! Of a pair, the base alone counts. An adaptive procedure presents larger comparisons where thresholds are larger, and a larger
+//! stimulus is moved otherwise by the same hand: the comparisons would give each modality an effect that is its threshold's.
 
 use super::{AnalysisError, AnalysisOptions, SubjectRecord, conditions, within_factors};
 use flotor_statistics::anova::{Design, Effect, analyse};
 use flotor_statistics::describe::mean;
 use flotor_study::kinematics::StimulusKinematics;
 use flotor_study::log::TrialEvent;
-use flotor_study::trial::Presented;
+use flotor_study::trial::{Position, Presented};
 use serde::Serialize;
 
 /// A measure of movement: its name, and the number it is.
@@ -53,15 +56,21 @@ pub(super) fn measures(
 
 /// Means of one subject, modality by level; none if one of them was never measured.
 fn cells(levels: &[f64], record: &SubjectRecord, value: fn(&StimulusKinematics) -> f64) -> Option<Vec<f64>> {
-    let level_of = |event: &TrialEvent| match event.trial.presented {
-        Presented::One { value } => value,
-        Presented::Pair(pair) => pair.base,
-    };
     let cell = |(modality, level)| {
-        let is_here = |event: &&TrialEvent| event.trial.modality == modality && level_of(event) == level;
-        let felt = record.counted().filter(is_here).flat_map(|event| &event.exploration.kinematics);
+        let here = record.counted().filter(|event| event.trial.modality == modality);
+        let felt = here.flat_map(|event| with_level(event, level));
         let values: Vec<f64> = felt.map(value).collect();
         (!values.is_empty()).then(|| mean(&values))
     };
     conditions(levels).map(cell).collect()
+}
+
+/// Movements with the stimulus of this level, each time it was felt: with a stimulus that was rated, or with the base of a pair.
+fn with_level(event: &TrialEvent, level: f64) -> impl Iterator<Item = &StimulusKinematics> {
+    let (of_trial, place, stimuli) = match event.trial.presented {
+        Presented::One { value } => (value, 0, 1),
+        Presented::Pair(pair) => (pair.base, usize::from(pair.comparison_at == Position::First), 2),
+    };
+    let felt = event.exploration.kinematics.iter().skip(place).step_by(stimuli);
+    felt.filter(move |_| of_trial == level)
 }

@@ -61,10 +61,46 @@ impl Random {
             felt_stiffness_n_per_m: None,
         }
     }
+
+    /// A compliant hand (2 kN/m) on a spring of 25 mm at 5/3 times its stiffness, with a scatter of 2 %: it moves a stiffer spring less
+    /// and pushes harder, as the simulated hand does, and knows nothing of modalities.
+    fn movement_with(&mut self, gamma_n: f64) -> StimulusKinematics {
+        let share = 2000.0 / (2000.0 + gamma_n / 0.015);
+        let scatter = [(); 3].map(|()| 1.0 + 0.02 * self.normal());
+        StimulusKinematics {
+            duration_s: 1.0,
+            mean_speed_m_per_s: 0.036 * share * scatter[0],
+            mean_acceleration_m_per_s2: 0.34 * share * scatter[1],
+            mean_force_n: 9.0 * (1.0 - share) * scatter[2],
+            peak_force_n: 9.0,
+            cycles: 1,
+            felt_stiffness_n_per_m: Some(gamma_n / 0.015),
+        }
+    }
 }
 
-/// So many subjects of a population, who move as they like.
+/// How the hands of a study move.
+#[derive(Clone, Copy)]
+enum Hands {
+    /// By chance.
+    AtRandom,
+    /// As the stimulus lets them.
+    Compliant,
+}
+
+/// So many subjects of a population, who move by chance.
 fn subjects(protocol: &Protocol, population: &Population, count: u16, seed: u64) -> Vec<SubjectRecord> {
+    subjects_with(Hands::AtRandom, protocol, population, count, seed)
+}
+
+/// So many subjects of a population with such hands.
+fn subjects_with(
+    hands: Hands,
+    protocol: &Protocol,
+    population: &Population,
+    count: u16,
+    seed: u64,
+) -> Vec<SubjectRecord> {
     let sit = |subject| {
         let middle = flotor_statistics::describe::mean(protocol.levels());
         let simulated = SimulatedSubject::new(population, seed, subject, middle);
@@ -75,7 +111,11 @@ fn subjects(protocol: &Protocol, population: &Population, count: u16, seed: u64)
         let mut trials = Vec::new();
         while let Some(trial) = sitting.next() {
             let response = simulated.respond(&trial);
-            let kinematics = trial.presented.values().iter().map(|_| random.movement()).collect();
+            let movement = |value: &f64| match hands {
+                Hands::AtRandom => random.movement(),
+                Hands::Compliant => random.movement_with(*value),
+            };
+            let kinematics = trial.presented.values().iter().map(movement).collect();
             let exploration = Exploration { kinematics, ..Exploration::default() };
             let verdict = sitting.answer(response, &exploration).unwrap();
             trials.push(TrialEvent { trial, response, verdict, exploration });
@@ -178,6 +218,28 @@ fn every_p_of_a_difference_experiment_is_one() {
     assert_eq!(tally.held.len(), 1 + 7 + 2 + 2 + 3 * 3, "{:?}", tally.held.keys());
     // A threshold in newtons is larger at a larger base: that is there.
     tally.check(&["thresholds: base"]);
+}
+
+/// Without vision thresholds are higher, so comparisons are stiffer, and a stiffer spring moves less under the same hand: where
+/// comparisons counted, "modality" on mean speed was below 5 % in 5 of 12 studies.
+#[test]
+fn a_modality_that_hands_do_not_know_is_no_effect_on_movement() {
+    let protocol = JndProtocol { replications: 2, ..JndProtocol::default() };
+    let whole = Protocol::Jnd(protocol.clone());
+    let mut tally = Tally::default();
+    for seed in 0..studies() {
+        let records = subjects_with(Hands::Compliant, &whole, &Population::default(), 12, 70_000 + seed);
+        let analysis = analyse_jnd(&protocol, &records, &AnalysisOptions::default()).unwrap();
+        assert_eq!(analysis.kinematics.len(), 3);
+        for measure in &analysis.kinematics {
+            let modality = measure.anova.iter().find(|effect| effect.effect == "modality").unwrap();
+            tally.take(&format!("{}: modality", measure.measure), modality.p);
+        }
+    }
+    tally.check(&[]);
+    // Of a thousand studies, 2.2 standard errors above the level.
+    let most = tally.held.values().map(|(yes, all)| *yes as f64 / *all as f64).fold(0.0, f64::max);
+    assert!(studies() < 1000 || most <= 0.065, "{most}");
 }
 
 #[test]

@@ -220,10 +220,12 @@ if (is_jnd && several) {
   }
 }
 for (measure in c("speed", "acceleration", "force")) {
-  # One number for each stimulus of a trial.
+  # One number for each stimulus of a trial; of a pair the base alone counts.
   each <- strsplit(as.character(counted[[paste0(measure, "_each")]]), " ")
-  rows <- counted[rep(seq_along(each), lengths(each)), c("subject", "modality", "level")]
+  rows <- counted[rep(seq_along(each), lengths(each)), c("subject", "modality", "level", "comparison_at")]
   rows$value <- as.numeric(unlist(each))
+  place <- sequence(lengths(each)) - 1
+  if (is_jnd) rows <- rows[place %% 2 == (rows$comparison_at == "first"), ]
   moved <- cells_of(rows[!is.na(rows$value), ])
   if (!anyNA(moved)) effects(moved, c("modality", if (several) "stimulus"), counts, rep("", n), FALSE)
 }

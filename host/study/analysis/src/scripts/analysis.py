@@ -217,8 +217,12 @@ if is_jnd:
             print(f"fraction over base, {modality}", effect_text(effect))
 
 for measure in ("speed", "acceleration", "force"):
-    # One number for each stimulus of a trial.
-    each = counted[["subject", "modality", LEVEL]].assign(value=counted[f"{measure}_each"].astype(str).str.split(" "))
+    # One number for each stimulus of a trial; of a pair the base alone counts.
+    texts = counted[f"{measure}_each"].astype(str).str.split(" ")
+    if is_jnd:
+        places = (counted.comparison_at == "first").astype(int)
+        texts = pd.Series([text[place::2] for text, place in zip(texts, places)], index=texts.index)
+    each = counted[["subject", "modality", LEVEL]].assign(value=texts)
     each = each.explode("value").assign(value=lambda rows: pd.to_numeric(rows.value, errors="coerce")).dropna()
     moved = each.groupby(["subject", "modality", LEVEL]).value.mean().unstack([1, 2])
     if set(columns) <= set(moved.columns) and len(moved) == subjects and moved.notna().all(axis=None):
