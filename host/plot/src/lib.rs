@@ -69,6 +69,7 @@ const DEFAULT_PANEL_HEIGHT_PX: f64 = 120.0;
 pub struct Figure {
     title: String,
     subtitle: String,
+    watermark: String,
     shared_x: Axis,
     columns: usize,
     panel_height_px: f64,
@@ -85,6 +86,7 @@ impl Figure {
         Self {
             title: title.into(),
             subtitle: String::new(),
+            watermark: String::new(),
             shared_x,
             columns: 1,
             panel_height_px: DEFAULT_PANEL_HEIGHT_PX,
@@ -100,6 +102,13 @@ impl Figure {
     #[must_use]
     pub fn subtitle(mut self, subtitle: impl Into<String>) -> Self {
         self.subtitle = subtitle.into();
+        self
+    }
+
+    /// The text behind the panels, large and pale: a restriction that must stay with the picture wherever it is copied to.
+    #[must_use]
+    pub fn watermark(mut self, watermark: impl Into<String>) -> Self {
+        self.watermark = watermark.into();
         self
     }
 

@@ -38,6 +38,7 @@ pub(super) fn document(figure: &Figure, layout: &Layout<'_>) -> String {
     writer.element("desc", &description(figure, layout));
     writer.raw(&format!("<style>\n{}</style>\n", style_sheet(figure.paper)));
     writer.raw(&format!("<rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n"));
+    writer.watermark(&figure.watermark, figure.width_px, layout.height);
     let mut y = MARGIN_PX;
     for line in &layout.title {
         writer.text("title", MARGIN_PX, y + 0.7 * TITLE_LINE_PX, line);
@@ -113,6 +114,25 @@ impl Writer {
             px(x),
             px(y),
             escape(content)
+        ));
+    }
+
+    /// A text across the middle of the picture, over most of its width; nothing for an empty one.
+    fn watermark(&mut self, content: &str, width: f64, height: f64) {
+        /// Width of a character in units of the size of the type, about.
+        const CHARACTER: f64 = 0.6;
+        /// Share of the width that the text takes.
+        const SHARE: f64 = 0.85;
+        if content.is_empty() {
+            return;
+        }
+        let size = SHARE * width / (CHARACTER * content.chars().count() as f64);
+        self.raw(&format!(
+            "<text class=\"watermark middle\" style=\"font-size:{}px\" x=\"{}\" y=\"{}\">{}</text>\n",
+            px(size),
+            px(0.5 * width),
+            px(0.5 * height + 0.35 * size),
+            escape(content),
         ));
     }
 

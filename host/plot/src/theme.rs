@@ -115,6 +115,7 @@ pub(super) fn style_sheet(paper: Paper) -> String {
          .plot .title{{font-size:{title}px;font-weight:600}}\n\
          .plot .subtitle{{font-size:{subtitle}px}}\n\
          .plot .heading{{font-size:{heading}px;font-weight:600}}\n\
+         .plot .watermark{{font-weight:600;fill-opacity:.13}}\n\
          .plot .unit{{font-weight:400}}\n\
          .plot .label{{font-size:{label}px}}\n\
          .plot .middle{{text-anchor:middle}}\n\

@@ -62,6 +62,7 @@ mod services;
 mod simulated;
 mod stop_delivery;
 mod study;
+mod study_claims;
 mod study_file;
 mod study_scripts;
 mod supply;

@@ -756,7 +756,7 @@ fn a_sitting_goes_from_consent_to_analysis_by_keyboard() {
     assert!(log.trials[0].event.exploration.onset >= log.began, "an onset has a time of day");
     let list = std::fs::read_to_string(out.join("participants.tsv")).unwrap();
     assert!(list.contains("\t31\tf\tright\n"), "{list}");
-    let ran = Flotor::with(["analyse", out.to_str().unwrap()]).run();
+    let ran = Flotor::with(["analyse", out.to_str().unwrap(), "--each"]).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     assert!(
         ran.stdout.contains("sub-01: 1 answers") && ran.stdout.contains("stopped at the keyboard"),

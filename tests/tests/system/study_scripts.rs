@@ -60,8 +60,9 @@ fn numbers_of(folder: &Path, data: &str, table: &str) -> Vec<String> {
     let ran = Flotor::with(["analyse", data, "--trials", table]).inside(folder).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     assert!(!ran.stderr.contains("the scripts beside"), "{ran:?}");
-    // The checks stand after the tables.
-    numbers(ran.stdout.split("\n  Checks").next().unwrap())
+    // Checks and origin stand after the tables.
+    let tables = ran.stdout.split("\n  Checks").next().unwrap().split("\n  Provenance").next().unwrap();
+    numbers(tables.split("\n  Excluded").next().unwrap())
 }
 
 /// A study whose rules took sittings and tracks, which the table marks.

@@ -1,21 +1,22 @@
 //! `flotor analyse`: thresholds, effects and tests from the data of a study.
 
+pub(crate) mod choices;
+pub(crate) mod provenance;
+
 use crate::page::html;
-use clap::{Args, ValueEnum};
+use choices::Choices;
+use clap::Args;
 use flotor_analysis::exclusion::{Applied, NotApplied, apply};
-use flotor_analysis::{
-    Analysis, AnalysisOptions, BlindedAnalysis, Estimator, SubjectChecks, SubjectQuality, SubjectRecord,
-};
+use flotor_analysis::{Analysis, BlindedAnalysis, SubjectChecks, SubjectQuality, SubjectRecord};
 use flotor_analysis::{SCRIPT_PYTHON, script_in_r};
 use flotor_command::options::JsonOption;
 use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, print_result, style, write_text};
-use flotor_statistics::anova::SumOfSquares;
 use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, trials_csv};
 use flotor_study::exclusion::Exclusion;
-use flotor_study::log::{Incident, SittingLog};
-use flotor_study::protocol::{Protocol, RatingScale};
+use flotor_study::log::{Incident, ObserverKind, SittingLog};
+use provenance::Provenance;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -50,35 +51,16 @@ pub(crate) struct AnalyseArguments {
     /// Codes instead of modalities and stimuli, without the values of the thesis
     #[arg(long, conflicts_with = "html")]
     blind: bool,
-    /// Threshold estimator
-    #[arg(long, value_enum, default_value_t)]
-    estimator: Estimator,
-    /// Sums of squares of the analysis of variance
-    #[arg(long = "type", value_enum, default_value_t)]
-    sums: SumsOption,
-    /// Normalisation of the ratings between subjects
-    #[arg(long, value_enum, default_value_t)]
-    ratings: RatingScale,
-}
-
-/// `--type`
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum SumsOption {
-    /// Each effect beyond those that do not contain it
-    #[value(name = "II")]
-    Two,
-    /// Each effect beyond all others
-    #[default]
-    #[value(name = "III")]
-    Three,
+    #[command(flatten)]
+    choices: Choices,
 }
 
 pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
     let Some(first) = logs.first() else { return Ok(()) };
+    let complete = logs.iter().filter(|log| log.complete).count();
     // A pilot is analysed before there is anybody to compare it with.
-    let is_pilot = logs.iter().filter(|log| log.complete).count() < 2;
-    if arguments.each || is_pilot {
+    if arguments.each || complete < 2 {
         let needs_all = [&arguments.html, &arguments.csv, &arguments.trials].into_iter().any(Option::is_some);
         if arguments.blind || needs_all {
             return Err(CommandError::Usage(
@@ -87,14 +69,29 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
                     .to_owned(),
             ));
         }
-        return tell_each(arguments, &logs);
+        if arguments.each {
+            return tell_each(arguments, &logs);
+        }
+    }
+    if complete == 0 {
+        let (data, each): (_, Vec<String>) =
+            (arguments.data.display(), logs.iter().map(incomplete).collect());
+        return Err(CommandError::Usage(format!(
+            "{data}: no sitting is complete ({}); --each shows what there is of each",
+            each.join(", ")
+        )));
     }
     for log in logs.iter().filter(|log| !log.complete) {
-        note(format_args!("{}: incomplete after {} trials, omitted", log.begin.subject, log.trials.len()));
+        note(format_args!("{}, omitted", incomplete(log)));
     }
-    if !first.begin.is_of_a_person() {
+    if complete < 2 {
+        let complete: Vec<SittingLog> = logs.into_iter().filter(|log| log.complete).collect();
+        return tell_each(arguments, &complete);
+    }
+    let observer = first.begin.observer_kind();
+    if let Some(restriction) = observer.restriction() {
         note(format_args!(
-            "simulated observers, seed {}: one of many draws, and no result about people; another --seed gives another",
+            "{restriction}: seed {} is one of many draws; another --seed gives another",
             first.begin.seed
         ));
     }
@@ -104,14 +101,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         true => subjects.iter().map(SubjectChecks::of).collect(),
         false => Vec::new(),
     };
-    let options = AnalysisOptions {
-        sums_of_squares: match arguments.sums {
-            SumsOption::Two => SumOfSquares::Two,
-            SumsOption::Three => SumOfSquares::Three,
-        },
-        rating_scale: arguments.ratings,
-        estimator: arguments.estimator,
-    };
+    let options = arguments.choices.options();
     let protocol = &first.begin.protocol;
     let rules = first.begin.exclusion();
     let applied = apply(&rules, protocol, subjects, options.estimator, first.begin.rate_hz());
@@ -131,31 +121,38 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     })?;
     if arguments.blind {
         let codes = Codes::new(protocol, first.begin.seed);
-        return tell_blinded(arguments, &BlindedAnalysis::of(&analysis, &codes));
+        return tell_blinded(arguments, &BlindedAnalysis::of(&analysis, &codes), observer);
     }
+    let provenance = Provenance::of(&first.begin, &logs, arguments.choices, &applied);
+    let Applied { excluded, not_applied, .. } = &applied;
+    let report = Report {
+        observer,
+        analysis: &analysis,
+        checks: &checks,
+        excluded,
+        not_applied,
+        provenance: &provenance,
+    };
     let text = || {
-        let title = format!("{} of {}", protocol.task(), protocol.stimulus());
+        let title = titled(format!("{} of {}", protocol.task(), protocol.stimulus()), observer);
         let analysed = format!("{}\n{}", style::title(&title), analysis.to_text());
         let excluded = (!rules.are_none()).then(|| applied.to_text(&rules));
         let checked = (!checks.is_empty()).then(|| checks_text(&checks));
-        [Some(analysed), checked, excluded].into_iter().flatten().collect::<Vec<_>>().join("\n\n")
+        let blocks = [Some(analysed), checked, excluded, Some(provenance.to_text())];
+        blocks.into_iter().flatten().collect::<Vec<_>>().join("\n\n")
     };
-    let Applied { excluded, not_applied, .. } = &applied;
-    let report = Report { analysis: &analysis, checks: &checks, excluded, not_applied };
     print_result(arguments.json.file(), &report, text)?;
-    write_text(arguments.html.as_deref(), || html(&first.begin, subjects, &analysis, &applied))?;
-    write_text(arguments.csv.as_deref(), || to_csv([], analysis.responses()))?;
+    write_text(arguments.html.as_deref(), || html(&first.begin, &report, &applied))?;
+    write_text(arguments.csv.as_deref(), || {
+        let head = ["subject", "first_modality", "modality", "stimulus", "response", "observer"];
+        to_csv(head, analysis.responses().iter().map(|row| (row, observer)))
+    })?;
     let Some(path) = &arguments.trials else { return Ok(()) };
     if path.extension().is_none_or(|extension| extension != "csv") {
         let path = path.display();
         return Err(CommandError::Usage(format!("--trials {path}: name a file that ends in .csv")));
     }
-    let usual = AnalysisOptions::default();
-    let of_this_task = match protocol {
-        Protocol::Jnd(_) => AnalysisOptions { rating_scale: usual.rating_scale, ..options },
-        Protocol::Magnitude(_) => AnalysisOptions { estimator: usual.estimator, ..options },
-    };
-    if of_this_task != usual {
+    if !arguments.choices.deviations(Choices::default(), protocol).is_empty() {
         note(format_args!(
             "the scripts beside {} know the defaults of --estimator, --type and --ratings: their tables differ from these",
             path.display()
@@ -168,17 +165,35 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     write_text(Some(&path.with_extension("R")), || script_in_r(&table))
 }
 
-/// A result with what came of checks and exclusion rules; the keys beside those of the analysis are there where the study has them.
+/// A result with its origin, and with what came of checks and exclusion rules where the study has them.
 #[derive(Serialize)]
-struct Report<'a> {
+pub(crate) struct Report<'a> {
+    pub(crate) observer: ObserverKind,
     #[serde(flatten)]
-    analysis: &'a Analysis,
+    pub(crate) analysis: &'a Analysis,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    checks: &'a [SubjectChecks],
+    pub(crate) checks: &'a [SubjectChecks],
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     excluded: &'a [Exclusion],
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     not_applied: &'a [NotApplied],
+    pub(crate) provenance: &'a Provenance,
+}
+
+/// A result of one subject, or under codes, with the origin of its answers.
+#[derive(Serialize)]
+struct WithObserver<'a, T> {
+    observer: ObserverKind,
+    #[serde(flatten)]
+    result: &'a T,
+}
+
+/// Returns a title with the restriction that the origin of the answers sets.
+fn titled(title: String, observer: ObserverKind) -> String {
+    match observer.restriction() {
+        Some(restriction) => format!("{title}: {restriction}"),
+        None => title,
+    }
 }
 
 fn checks_text(checks: &[SubjectChecks]) -> String {
@@ -186,9 +201,22 @@ fn checks_text(checks: &[SubjectChecks]) -> String {
     format!("  Checks{}", checks.iter().map(line).collect::<String>())
 }
 
-/// Every subject by themselves.
-fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), CommandError> {
-    let of = |log: &SittingLog| {
+/// Returns the state of a sitting that did not come to its end, as text.
+fn incomplete(log: &SittingLog) -> String {
+    format!("{}: incomplete after {} trials", log.begin.subject, log.trials.len())
+}
+
+/// A subject's data with the origin of its answers and the state of the sitting.
+#[derive(Serialize)]
+struct Each {
+    observer: ObserverKind,
+    complete: bool,
+    #[serde(flatten)]
+    quality: SubjectQuality,
+}
+
+impl Each {
+    fn of(log: &SittingLog, choices: Choices) -> Self {
         let (protocol, record) = (&log.begin.protocol, SubjectRecord::of_log(log));
         let incidents: Vec<Incident> = log.incidents.iter().map(|(.., incident)| incident.clone()).collect();
         let mut quality = SubjectQuality::of(protocol, &record, &incidents);
@@ -198,28 +226,57 @@ fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), Co
             .extend((withdrawn > 0).then(|| format!("{withdrawn} answers taken back and given anew")));
         if log.complete {
             let rules = log.begin.exclusion();
-            let applied = apply(&rules, protocol, vec![record], arguments.estimator, log.begin.rate_hz());
+            let applied = apply(&rules, protocol, vec![record], choices.estimator, log.begin.rate_hz());
             quality.flags.extend(applied.excluded.iter().map(|one| one.to_text(&rules)));
+        } else {
+            let trials = log.trials.len();
+            quality.flags.insert(0, format!("incomplete after {trials} trials: no data of the study"));
         }
-        quality
-    };
-    let each: Vec<SubjectQuality> = logs.iter().map(of).collect();
+        Self { observer: log.begin.observer_kind(), complete: log.complete, quality }
+    }
+}
+
+/// Prints every subject by themselves.
+fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), CommandError> {
+    let each: Vec<Each> = logs.iter().map(|log| Each::of(log, arguments.choices)).collect();
     let text = || {
-        let with_incidents = |(quality, log): (&SubjectQuality, &SittingLog)| {
-            let lines = log.incidents.iter().map(|(trials, time, incident)| {
-                let time = time.map_or(String::new(), |time| format!("  {time}"));
-                format!("\n  after {trials} trials{time}: {incident}")
-            });
-            quality.to_text() + &lines.collect::<String>()
-        };
-        each.iter().zip(logs).map(with_incidents).collect::<Vec<_>>().join("\n\n")
+        let restriction = each.first().and_then(|one| one.observer.restriction());
+        let blocks = each.iter().zip(logs).map(|(one, log)| one.quality.to_text() + &incidents_text(log));
+        let title = restriction.map(|restriction| style::title(&format!("each subject: {restriction}")));
+        title.into_iter().chain(blocks).collect::<Vec<_>>().join("\n\n")
     };
     print_result(arguments.json.file(), &each, text)
 }
 
+/// Returns a line for each incident of a log, and one for all ticks that were missed.
+fn incidents_text(log: &SittingLog) -> String {
+    let (mut lines, mut missed) = (String::new(), Vec::new());
+    for (trials, time, incident) in &log.incidents {
+        if let Incident::MissedTicks { ticks } = incident {
+            missed.push(*ticks);
+            continue;
+        }
+        let time = time.map_or(String::new(), |time| format!("  {time}"));
+        lines += &format!("\n  after {trials} trials{time}: {incident}");
+    }
+    if !missed.is_empty() {
+        let ticks = Incident::MissedTicks { ticks: missed.iter().sum() };
+        lines += &format!("\n  while {} stimuli were felt: {ticks}", missed.len());
+    }
+    lines
+}
+
 /// Results under codes.
-fn tell_blinded(arguments: &AnalyseArguments, analysis: &BlindedAnalysis) -> Result<(), CommandError> {
-    let text = || format!("{}\n{}", style::title(analysis.task), analysis.to_text());
-    print_result(arguments.json.file(), analysis, text)?;
-    write_text(arguments.csv.as_deref(), || to_csv([], &analysis.responses))
+fn tell_blinded(
+    arguments: &AnalyseArguments,
+    analysis: &BlindedAnalysis,
+    observer: ObserverKind,
+) -> Result<(), CommandError> {
+    let title = titled(analysis.task.to_owned(), observer);
+    let text = || format!("{}\n{}", style::title(&title), analysis.to_text());
+    print_result(arguments.json.file(), &WithObserver { observer, result: analysis }, text)?;
+    write_text(arguments.csv.as_deref(), || {
+        let head = ["subject", "first_modality", "modality", "level", "response", "observer"];
+        to_csv(head, analysis.responses.iter().map(|row| (row, observer)))
+    })
 }

@@ -3,36 +3,40 @@
 
 mod figures;
 
+use crate::analyse::Report;
+use crate::analyse::provenance::Provenance;
 use flotor_analysis::exclusion::Applied;
 use flotor_analysis::published::Beside;
 use flotor_analysis::{
-    Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, effect_text,
-    p_text, published,
+    Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PostHoc, SubjectChecks,
+    SubjectRecord, effect_text, p_text, published,
 };
+use flotor_plot::Figure;
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
+use flotor_statistics::effect_size::{EffectSize, Reach, partial_eta_squared};
 use flotor_study::exclusion::{Exclusion, ExclusionRules};
 use flotor_study::log::Begin;
-use flotor_study::protocol::{Protocol, Stimulus};
+use flotor_study::protocol::Stimulus;
+use flotor_study::trial::Modality;
 use std::fmt::Write;
 
-/// The page.
+/// Returns the page of a result.
 ///
-/// `begin` is the first line of any log of the study; `subjects` are the sittings that were analysed, `applied` what the
-/// rules of the study file left and took.
+/// `begin` is the first line of any log of the study, `applied` has the sittings that were analysed and what the rules of the study
+/// file excluded.
 #[must_use]
-pub(crate) fn html(
-    begin: &Begin,
-    subjects: &[SubjectRecord],
-    analysis: &Analysis,
-    applied: &Applied,
-) -> String {
+pub(crate) fn html(begin: &Begin, report: &Report<'_>, applied: &Applied) -> String {
     let stimulus = begin.protocol.stimulus();
     let levels = begin.protocol.levels();
-    let mut page = Page::default();
-    let title = match analysis {
+    let restriction = report.observer.restriction();
+    let mut page = Page { text: String::new(), watermark: restriction.unwrap_or_default() };
+    if let Some(restriction) = restriction {
+        page.paragraph(&format!("{}: no number of this page is about people.", capitalised(restriction)));
+    }
+    let title = match report.analysis {
         Analysis::Jnd(jnd) => {
-            jnd_page(&mut page, jnd, subjects, stimulus, levels);
+            jnd_page(&mut page, jnd, &applied.kept, stimulus, levels);
             format!("Just noticeable difference of {stimulus}")
         }
         Analysis::Magnitude(magnitude) => {
@@ -40,8 +44,10 @@ pub(crate) fn html(
             format!("Perceived magnitude of {stimulus}")
         }
     };
+    let title = restriction.map_or(title.clone(), |restriction| format!("{title}: {restriction}"));
+    checks(&mut page, report.checks);
     exclusions(&mut page, &begin.exclusion(), applied);
-    provenance(&mut page, begin);
+    provenance(&mut page, begin, report.provenance);
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<style>{STYLE}</style>\n</head>\n<body>\n\
@@ -49,6 +55,17 @@ pub(crate) fn html(
         title = escaped(&title),
         body = page.text,
     )
+}
+
+/// What came of the checks of each subject; nothing where there are none.
+fn checks(page: &mut Page, checks: &[SubjectChecks]) {
+    if checks.is_empty() {
+        return;
+    }
+    page.heading("Checks");
+    page.table(&["Subject", "Catch trials and repeated trials"], |rows| {
+        checks.iter().for_each(|one| rows.row(&[one.subject.clone(), one.to_text()]));
+    });
 }
 
 /// What the rules of the study file took, and those that could not be applied; nothing where there are no rules.
@@ -96,7 +113,7 @@ fn jnd_page(
         p_text(analysis.t.p),
     ));
     page.figure(
-        &figures::thresholds(analysis, stimulus),
+        figures::thresholds(analysis, stimulus),
         match analysis.beside {
             Beside::Thesis => {
                 "Thresholds by base and modality, as figure 18 of CMU-RI-TR-07-21. Its bars are printed without numbers; \
@@ -128,8 +145,12 @@ fn jnd_page(
             analysis.beside.text(published::T).to_owned(),
         ]);
     });
+    page.heading("Thresholds");
+    let cells = analysis.thresholds.iter().map(|cell| (cell.modality, cell.base, &cell.threshold));
+    page.means("Base", cells);
     page.heading("Effects on thresholds");
     page.effects(&analysis.anova, analysis.beside.effects(&published::JND));
+    page.comparisons(&analysis.post_hoc);
     page.paragraph("Is the Weber fraction the same at every base? Within each modality, on fractions:");
     let constancy =
         [("Vision and haptics", &analysis.constancy.vh), ("Haptics alone", &analysis.constancy.h)];
@@ -143,11 +164,11 @@ fn jnd_page(
     }
     page.effects(&lines, analysis.beside.effects(&beside));
     page.figure(
-        &figures::subjects(analysis),
+        figures::subjects(analysis),
         "Each subject's Weber fraction without vision against that with it.",
     );
     if let Some(first) = subjects.first() {
-        page.figure(&figures::tracks(first), "The adaptive tracks of one subject.");
+        page.figure(figures::tracks(first), "The adaptive tracks of one subject.");
     }
     movements(page, (analysis.task, analysis.beside), &analysis.kinematics, levels, stimulus);
     if analysis.unfinished_tracks > 0 {
@@ -172,14 +193,17 @@ fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stim
         p_text(trend.p),
     ));
     page.figure(
-        &figures::ratings(analysis, stimulus),
+        figures::ratings(analysis, stimulus),
         match analysis.beside {
             Beside::Thesis => "Mean ratings over the stimulus, as figure 17 of CMU-RI-TR-07-21.",
             Beside::Nothing => "Mean ratings over the stimulus.",
         },
     );
+    page.heading("Ratings");
+    page.means("Stimulus", analysis.ratings.iter().map(|cell| (cell.modality, cell.stimulus, &cell.rating)));
     page.heading("Effects on ratings");
     page.effects(&analysis.anova, analysis.beside.effects(&published::MAGNITUDE));
+    page.comparisons(&analysis.post_hoc);
     movements(page, (analysis.task, analysis.beside), &analysis.kinematics, levels, stimulus);
 }
 
@@ -192,32 +216,29 @@ fn movements(
 ) {
     let Some(figure) = figures::movements(measures, levels, stimulus) else { return };
     page.heading("Exploration of the stimuli");
-    page.figure(&figure, "Mean speed, acceleration and force along the vertical (thesis: section 4.3).");
+    page.figure(figure, "Mean speed, acceleration and force along the vertical (thesis: section 4.3).");
     for measure in measures {
         page.paragraph(&format!("Effects on {}:", measure.measure));
         page.effects(&measure.anova, beside.effects(published::movement(task, measure.measure)));
     }
 }
 
-/// Everything needed to do it again.
-fn provenance(page: &mut Page, begin: &Begin) {
+/// Everything needed to compute the result again.
+fn provenance(page: &mut Page, begin: &Begin, provenance: &Provenance) {
     page.heading("Protocol and provenance");
-    let observer = if begin.observer.get("simulated").is_some() { "simulated observers" } else { "people" };
-    let procedure = match &begin.protocol {
-        Protocol::Jnd(_) => "flotor study jnd",
-        Protocol::Magnitude(_) => "flotor study magnitude",
-    };
-    page.paragraph(&format!(
-        "{procedure}, {observer}, seed {}, flotor {}, configuration {}.",
-        begin.seed,
-        begin.version,
-        begin.config_hash(),
-    ));
+    page.table(&["", ""], |rows| {
+        rows.row(&["command".to_owned(), format!("flotor study {}", begin.protocol.task())]);
+        for (name, value) in provenance.lines() {
+            rows.row(&[name.to_owned(), value]);
+        }
+    });
+    if let Some((name, text)) = provenance.study_file() {
+        page.details(&format!("Study file {name}"), text);
+    }
     let settings = serde_json::to_string_pretty(&begin.protocol).unwrap_or_default();
     let apparatus = serde_json::to_string_pretty(&begin.apparatus).unwrap_or_default();
     for (name, text) in [("Protocol", settings), ("Apparatus", apparatus)] {
-        let _ =
-            writeln!(page.text, "<details><summary>{name}</summary><pre>{}</pre></details>", escaped(&text));
+        page.details(name, &text);
     }
 }
 
@@ -237,10 +258,22 @@ fn percent(value: &MeanInterval) -> String {
     format!("{:.1} %", value.mean * 100.0)
 }
 
+/// Returns a text with its first letter as a capital one.
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Returns a p-value for a column named p.
+fn p_cell(p: f64) -> String {
+    p_text(p).replace("p = ", "").replace("p ", "")
+}
+
 /// A page in the making.
-#[derive(Default)]
 struct Page {
     text: String,
+    /// Text behind every figure.
+    watermark: &'static str,
 }
 
 impl Page {
@@ -252,7 +285,13 @@ impl Page {
         let _ = writeln!(self.text, "<p>{}</p>", escaped(text));
     }
 
-    fn figure(&mut self, svg: &str, caption: &str) {
+    fn details(&mut self, name: &str, text: &str) {
+        let [name, text] = [name, text].map(escaped);
+        let _ = writeln!(self.text, "<details><summary>{name}</summary><pre>{text}</pre></details>");
+    }
+
+    fn figure(&mut self, figure: Figure, caption: &str) {
+        let svg = figure.watermark(self.watermark).to_svg();
         let _ = writeln!(self.text, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
     }
 
@@ -266,31 +305,72 @@ impl Page {
         self.text.push_str("</tbody></table>\n");
     }
 
+    /// Means and standard errors under each condition, the modalities side by side.
+    fn means<'m>(&mut self, level: &str, cells: impl Iterator<Item = (Modality, f64, &'m MeanInterval)>) {
+        let cells: Vec<_> = cells.collect();
+        let of = |modality| cells.iter().filter(move |(of, ..)| *of == modality);
+        let cell = |value: &MeanInterval| format!("{:.3} (se {:.3})", value.mean, value.se);
+        self.table(&[level, "Vision and haptics", "Haptics alone"], |rows| {
+            for ((_, level, vh), (_, _, h)) in of(Modality::Vh).zip(of(Modality::H)) {
+                rows.row(&[format!("{:.2}", level), cell(vh), cell(h)]);
+            }
+        });
+    }
+
+    fn comparisons(&mut self, comparisons: &[PostHoc]) {
+        if comparisons.is_empty() {
+            return;
+        }
+        self.paragraph(
+            "Comparisons by paired t-tests, p after Holm's correction for each kind of comparison:",
+        );
+        self.table(&["Comparison", "t", "p (Holm)", "Cohen's d of the pairs", "95 % interval"], |rows| {
+            for PostHoc { comparison, t, p_holm, d } in comparisons {
+                rows.row(&[
+                    comparison.clone(),
+                    format!("t({}) = {:.2}", t.df, t.value),
+                    p_cell(*p_holm),
+                    format!("{:.2}", d.value),
+                    interval_cell(d),
+                ]);
+            }
+        });
+    }
+
     fn effects(&mut self, effects: &[Effect], report: &[published::Published]) {
-        self.table(&["Effect", "F", "p", "ε (HF)", "p (HF)", "η² partial", "thesis"], |rows| {
+        let head = ["Effect", "F", "p", "ε (HF)", "p (HF)", "η² partial", "95 % interval", "thesis"];
+        self.table(&head, |rows| {
             for effect in effects {
+                let name = effect.effect.replace(':', " × ");
                 if !effect.is_testable() {
-                    let name = effect.effect.replace(':', " × ");
-                    let blank = String::new;
-                    rows.row(&[name, effect_text(effect), blank(), blank(), blank(), blank(), blank()]);
+                    rows.row(&[name, effect_text(effect)]);
                     continue;
                 }
                 let beside = report.iter().find(|(name, _)| *name == effect.effect);
                 let corrected = |value: fn(&flotor_statistics::anova::Sphericity) -> String| {
                     effect.sphericity.as_ref().map_or(String::new(), value)
                 };
+                let size = partial_eta_squared(effect.f, effect.df, effect.error_df);
                 rows.row(&[
-                    effect.effect.replace(':', " × "),
+                    name,
                     format!("F({}, {}) = {:.2}", effect.df, effect.error_df, effect.f),
-                    p_text(effect.p).replace("p = ", "").replace("p ", ""),
+                    p_cell(effect.p),
                     corrected(|s| format!("{:.3}", s.epsilon_hf.min(1.0))),
-                    corrected(|s| p_text(s.p_hf).replace("p = ", "").replace("p ", "")),
-                    format!("{:.3}", effect.partial_eta_squared),
+                    corrected(|s| p_cell(s.p_hf)),
+                    format!("{:.2}", size.value),
+                    interval_cell(&size),
                     beside.map_or(String::new(), |(_, text)| (*text).to_owned()),
                 ]);
             }
         });
     }
+}
+
+/// Returns the interval of an effect size.
+fn interval_cell(size: &EffectSize) -> String {
+    let [low, high] = size.interval;
+    let wider = if size.reach == Reach::OrWider { ", or wider" } else { "" };
+    format!("{low:.2} to {high:.2}{wider}")
 }
 
 /// Rows of a table in the making.

@@ -7,7 +7,7 @@ mod explore;
 mod front;
 mod noise;
 mod person;
-mod plan;
+pub(crate) mod plan;
 mod power;
 mod space;
 mod spring;

@@ -6,7 +6,6 @@ use crate::kinematics::StimulusKinematics;
 use crate::log::{Begin, SittingLog, TrialRecord};
 use crate::protocol::Protocol;
 use crate::sitting::Verdict;
-use crate::time_of_day::TimeOfDay;
 use crate::trial::{Judgement, Position, Presented, Response};
 use serde_json::{Map, Value, json};
 
@@ -14,7 +13,7 @@ use serde_json::{Map, Value, json};
 pub(super) const MISSING: &str = "n/a";
 
 /// Name and meaning of each column.
-const COLUMNS: [(&str, &str); 29] = [
+const COLUMNS: [(&str, &str); 30] = [
     ("trial", "Count of presentations in the sitting, from 1"),
     (
         "phase",
@@ -50,13 +49,14 @@ const COLUMNS: [(&str, &str); 29] = [
         "onset",
         "When the first stimulus could be felt, s after the begin of the sitting (acq_time in the list of scans)",
     ),
+    ("observer", "human, or simulated: nobody was tested"),
 ];
 
 /// The table of one sitting.
 pub(super) fn trials(log: &SittingLog) -> String {
     let head: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
     let codes = Codes::new(&log.begin.protocol, log.begin.seed);
-    let rows = log.trials.iter().map(|record| row(record, &codes, log.began).join("\t"));
+    let rows = log.trials.iter().map(|record| row(record, &codes, log).join("\t"));
     [head.join("\t")].into_iter().chain(rows).fold(String::new(), |text, line| text + &line + "\n")
 }
 
@@ -71,7 +71,7 @@ pub(super) fn long(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
         let subject = log.begin.subject;
         let first = log.begin.protocol.first_modality().of(subject).word();
         for record in &log.trials {
-            let cells = row(record, &codes, log.began).into_iter().map(|cell| cell.replace(',', " "));
+            let cells = row(record, &codes, log).into_iter().map(|cell| cell.replace(',', " "));
             let by = excluded.iter().find(|exclusion| exclusion.covers(subject, &record.event.trial));
             let by = by.map_or(MISSING, |exclusion| exclusion.rule).to_owned();
             let cells = [subject.to_string(), first.to_owned()]
@@ -98,7 +98,7 @@ fn each(record: &TrialRecord) -> [String; 3] {
     })
 }
 
-fn row(record: &TrialRecord, codes: &Codes, began: Option<TimeOfDay>) -> Vec<String> {
+fn row(record: &TrialRecord, codes: &Codes, log: &SittingLog) -> Vec<String> {
     let event = &record.event;
     let trial = &event.trial;
     let number = |value: Option<f64>| value.map_or(MISSING.to_owned(), |value| value.to_string());
@@ -159,7 +159,8 @@ fn row(record: &TrialRecord, codes: &Codes, began: Option<TimeOfDay>) -> Vec<Str
         number(any.then(|| felt.iter().map(|one| one.peak_force_n).fold(0.0, f64::max))),
         if any { stiffness.join(",") } else { MISSING.to_owned() },
         event.exploration.missed_ticks.to_string(),
-        number(event.exploration.onset.zip(began).map(|(onset, began)| onset.since_s(began))),
+        number(event.exploration.onset.zip(log.began).map(|(onset, began)| onset.since_s(began))),
+        log.begin.observer_kind().word().to_owned(),
     ]
 }
 
@@ -204,24 +205,25 @@ pub(super) fn scans(log: &SittingLog) -> Option<String> {
 pub(super) const PARTICIPANT: &str = "participant_id";
 
 /// First line of the list of who took part.
-pub(super) const PARTICIPANTS_HEAD: &str =
-    "participant_id\tfirst_modality\tcomplete\tpresentations\tresumed\tincidents\tage\tsex\thandedness\n";
+pub(super) const PARTICIPANTS_HEAD: &str = "participant_id\tobserver\tfirst_modality\tcomplete\tpresentations\tresumed\tincidents\tage\tsex\thandedness\n";
 
 /// One who took part: a line.
 pub(super) fn participant(log: &SittingLog) -> String {
     let subject = log.begin.subject;
+    let observer = log.begin.observer_kind().word();
     let first = log.begin.protocol.first_modality().of(subject).word();
     let complete = u8::from(log.complete);
     let counts = [log.trials.len(), log.resumed as usize, log.incidents.len()].map(|count| count.to_string());
     let person = log.begin.person.clone().unwrap_or_default();
     let age = person.age.map(|age| age.to_string());
     let person = [age, person.sex, person.handedness].map(|known| known.unwrap_or(MISSING.to_owned()));
-    format!("{subject}\t{first}\t{complete}\t{}\t{}\n", counts.join("\t"), person.join("\t"))
+    format!("{subject}\t{observer}\t{first}\t{complete}\t{}\t{}\n", counts.join("\t"), person.join("\t"))
 }
 
 /// What the columns of the list of participants mean; people may leave none of it alone.
 pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static str]) {
     let columns = json!({
+        "observer": { "Description": "human, or simulated: nobody was tested" },
         "first_modality": { "Description": "Modality the subject started with: vh (vision and haptics) or h (haptics alone)" },
         "complete": { "Description": "1 if the sitting came to its end" },
         "presentations": { "Description": "Presentations, practice and repeats included" },

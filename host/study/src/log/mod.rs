@@ -94,6 +94,36 @@ pub struct Begin {
     pub inputs: Vec<InputFile>,
 }
 
+/// Origin of the answers of a sitting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObserverKind {
+    /// A person.
+    Human,
+    /// A program with known thresholds.
+    Simulated,
+}
+
+impl ObserverKind {
+    /// Returns the word of the tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Human => "human",
+            Self::Simulated => "simulated",
+        }
+    }
+
+    /// Returns the restriction that every result of such answers must carry; none for people.
+    #[must_use]
+    pub fn restriction(self) -> Option<&'static str> {
+        match self {
+            Self::Human => None,
+            Self::Simulated => Some("simulated observers, nobody was tested"),
+        }
+    }
+}
+
 /// A file that decides what a sitting presents.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputFile {
@@ -136,10 +166,20 @@ impl Begin {
         })
     }
 
-    /// Whether a person sits, and times of day mean something.
+    /// Returns true for the sitting of a person, where times of day mean something.
     #[must_use]
     pub fn is_of_a_person(&self) -> bool {
-        self.observer == serde_json::json!("human")
+        self.observer_kind() == ObserverKind::Human
+    }
+
+    /// Returns the origin of the answers.
+    #[must_use]
+    pub fn observer_kind(&self) -> ObserverKind {
+        if self.observer == serde_json::json!("human") {
+            ObserverKind::Human
+        } else {
+            ObserverKind::Simulated
+        }
     }
 
     /// Rate of the servo, Hz, where a scene was presented.
@@ -181,7 +221,7 @@ pub struct Plan {
 
 impl Plan {
     /// How the file that is followed now differs from the earlier one, in words; an equal digest is an equal text, whatever its name.
-    /// The number of subjects may change: it is no part of what a sitting presents.
+    /// The number of subjects and the folder of the data may change: neither is a part of what a sitting presents.
     fn differs(now: Option<&Self>, earlier: Option<&Self>) -> Option<String> {
         match (earlier, now) {
             (None, None) => None,
@@ -189,7 +229,7 @@ impl Plan {
             (None, Some(now)) => Some(format!("no study file, and there is {} now", now.file)),
             (Some(earlier), Some(now)) if earlier.sha256 == now.sha256 => None,
             (Some(earlier), Some(now)) => {
-                let [before, after] = [earlier, now].map(|plan| without_number_of_subjects(&plan.text));
+                let [before, after] = [earlier, now].map(|plan| without_size_and_folder(&plan.text));
                 let is_same = !before.is_empty() && before == after;
                 (!is_same).then(|| format!("another version of {}{}", now.file, changed(&before, &after)))
             }
@@ -197,13 +237,16 @@ impl Plan {
     }
 }
 
-/// The text of a study file with nothing in the lines that set the number of subjects, so that all others keep their numbers.
-fn without_number_of_subjects(text: &str) -> String {
-    let is_number_of_subjects = |line: &&str| {
-        line.trim_start().strip_prefix("subjects").is_some_and(|rest| rest.trim_start().starts_with('='))
+/// Returns the text of a study file without the content of the lines that set the number of subjects or the folder of the data; all
+/// lines keep their numbers.
+fn without_size_and_folder(text: &str) -> String {
+    let sets = |line: &str, key: &str| {
+        line.trim_start().strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
     };
     let lines = text.split_inclusive('\n');
-    lines.map(|line| if is_number_of_subjects(&line) { "\n" } else { line }).collect()
+    lines
+        .map(|line| if ["subjects", "out"].iter().any(|key| sets(line, key)) { "\n" } else { line })
+        .collect()
 }
 
 /// The lines that changed from one version of a text to the next; nothing of an early log, which has the digest alone.

@@ -20,7 +20,7 @@ const MODALITIES: [(Modality, &str); 2] =
 
 /// Figure 18: thresholds as bars over the base, a bar for each modality, with standard errors; what the thesis's Weber
 /// fractions come to at each base.
-pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> String {
+pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> Figure {
     let cells = |modality| analysis.thresholds.iter().filter(move |cell| cell.modality == modality);
     let mut bases: Vec<f64> = cells(Modality::Vh).map(|cell| cell.base).collect();
     bases.sort_by(f64::total_cmp);
@@ -54,11 +54,10 @@ pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> String 
         .subtitle("Mean over subjects; strokes: one standard error each way")
         .panel_height_px(HEIGHT_PX)
         .panel(panel)
-        .to_svg()
 }
 
 /// Every subject's Weber fraction in one modality against the other.
-pub(super) fn subjects(analysis: &JndAnalysis) -> String {
+pub(super) fn subjects(analysis: &JndAnalysis) -> Figure {
     let mut points: Vec<(String, [Vec<f64>; 2])> = Vec::new();
     for row in &analysis.responses {
         if points.last().is_none_or(|(subject, _)| *subject != row.subject) {
@@ -82,11 +81,10 @@ pub(super) fn subjects(analysis: &JndAnalysis) -> String {
         .subtitle("Above the line: worse without vision")
         .panel_height_px(HEIGHT_PX)
         .panel(panel)
-        .to_svg()
 }
 
 /// The tracks of the first subject.
-pub(super) fn tracks(record: &SubjectRecord) -> String {
+pub(super) fn tracks(record: &SubjectRecord) -> Figure {
     let mut figure = Figure::new("Adaptive tracks", Axis::linear("Trial of the track", ""))
         .subtitle(format!("{}: difference presented, one line per track", record.subject))
         .columns(2)
@@ -106,11 +104,11 @@ pub(super) fn tracks(record: &SubjectRecord) -> String {
         }
         figure = figure.panel(panel);
     }
-    figure.to_svg()
+    figure
 }
 
 /// Figure 17: mean ratings over the stimulus, with standard errors and the linear trend.
-pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> String {
+pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Figure {
     let cells = |modality| analysis.ratings.iter().filter(move |cell| cell.modality == modality);
     let values: Vec<f64> = cells(Modality::Vh).map(|cell| cell.stimulus).collect();
     let span = values.iter().fold(0.0_f64, |most, value| most.max(*value))
@@ -134,7 +132,6 @@ pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Stri
         .subtitle("Mean over subjects; strokes: one standard error each way")
         .panel_height_px(HEIGHT_PX)
         .panel(panel)
-        .to_svg()
 }
 
 /// How people moved, over the stimulus; nothing where it was not measured.
@@ -142,7 +139,7 @@ pub(super) fn movements(
     measures: &[KinematicMeasure],
     levels: &[f64],
     stimulus: &Stimulus,
-) -> Option<String> {
+) -> Option<Figure> {
     if measures.is_empty() {
         return None;
     }
@@ -164,7 +161,7 @@ pub(super) fn movements(
             .series(Series::points("", points).slot(0));
         figure = figure.panel(panel);
     }
-    Some(figure.to_svg())
+    Some(figure)
 }
 
 /// A vertical stroke of one standard error each way, and a break behind it.

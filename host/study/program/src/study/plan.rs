@@ -5,6 +5,7 @@
 //! of the plan a sitting followed.
 
 use super::{StudyArguments, Task};
+use crate::analyse::choices::{Choices, PlannedTable};
 use clap::{Args, FromArgMatches};
 use flotor_command::CommandError;
 use flotor_core::LARGEST_SEED;
@@ -32,6 +33,8 @@ const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
     out = \"data\"\n  \
     bases = [17, 26, 35]\n  \
     catch_trials = 1\n  \
+    [analyse]\n  \
+    estimator = \"procedure\"\n  \
     [exclusion]\n  \
     most_false_alarms = 0.5\n  \
     response_time_s = [0.2, 20]\n\n\
@@ -39,9 +42,11 @@ const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
     catch trials), least_agreement (of repeated pairs), most_retest_deviation (of repeated ratings), most_dont_know, \
     most_missed_ticks, most_excluded_trials. About a trial: response_time_s = [shortest, longest], least_movement_mm; a \
     trial of an adaptive track takes the track with it, unless the estimator is map.\n\n\
+    Planned options of `flotor analyse`, which says whether a result is as planned: estimator, type, ratings.\n\n\
     Examples:\n  \
     flotor study run weber.study.toml\n  \
     flotor study run weber.study.toml --observer human --subject 3\n  \
+    flotor study run --observer human weber.study.toml\n  \
     flotor study run                              the one study file here: begins, or goes on"
 )]
 pub(super) struct RunArguments {
@@ -62,10 +67,12 @@ struct StudyFile {
     /// When a sitting or a trial does not count, decided beforehand.
     #[serde(default)]
     exclusion: ExclusionRules,
-    /// What is to be computed, decided beforehand.
+    /// What is to be computed, decided beforehand, for people.
     #[serde(default)]
-    #[allow(dead_code)] // for people, and for the digest
     analysis: String,
+    /// Options of `flotor analyse`, decided beforehand.
+    #[serde(default)]
+    analyse: PlannedTable,
     /// Options of the experiment, by their names without dashes.
     #[serde(default)]
     options: toml::Table,
@@ -79,17 +86,65 @@ enum TaskName {
     Force,
 }
 
+impl StudyFile {
+    fn read(file: &Path, text: &str) -> Result<Self, CommandError> {
+        toml::from_str(text).map_err(|error| {
+            let start = error.span().map_or(0, |span| span.start);
+            let line = 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
+            let message = error.message().replace('\n', " ");
+            let is_large = message.contains("too large");
+            let message =
+                if is_large { format!("{message}; the largest seed is {LARGEST_SEED}") } else { message };
+            CommandError::Usage(format!("{}:{line}: {message}", file.display()))
+        })
+    }
+}
+
+/// What a study file decides of the analysis.
+pub(crate) struct Planned {
+    /// In words, for people.
+    pub(crate) analysis: String,
+    /// Options of `flotor analyse`.
+    pub(crate) choices: Choices,
+    /// Number of subjects, if it is stated.
+    pub(crate) subjects: Option<usize>,
+}
+
+/// Returns what the text of a study file decides of the analysis; none if this version cannot read the text.
+pub(crate) fn planned(text: &str) -> Option<Planned> {
+    let study = StudyFile::read(Path::new(""), text).ok()?;
+    let choices = Choices::planned(&study.analyse).ok()?;
+    let subjects = study.options.get("subjects").and_then(toml::Value::as_integer);
+    let subjects = subjects.and_then(|count| usize::try_from(count).ok());
+    Some(Planned { analysis: study.analysis, choices, subjects })
+}
+
+impl RunArguments {
+    /// Separates the study file from the options before and after it.
+    fn file_and_options(&self) -> (Option<PathBuf>, Vec<OsString>) {
+        let mut words: Vec<OsString> =
+            self.file.iter().map(OsString::from).chain(self.further.iter().cloned()).collect();
+        let study = StudyArguments::augment_args(clap::Command::new("study"));
+        let options = || study.get_subcommands().flat_map(clap::Command::get_arguments);
+        let takes_value = |word: &str| {
+            let name = word.strip_prefix("--");
+            options().any(|option| option.get_long() == name && option.get_action().takes_values())
+        };
+        let mut is_value = false;
+        let place = words.iter().position(|word| {
+            let word = word.to_string_lossy();
+            let is_file = !is_value && !word.starts_with('-');
+            is_value = !is_value && word.starts_with("--") && takes_value(&word);
+            is_file
+        });
+        let file = place.map(|place| PathBuf::from(words.remove(place)));
+        (file, words)
+    }
+}
+
 /// Carries out what the file says: begins, or goes on with what was broken off; complete subjects are skipped.
 pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
-    // Without a file the first word may be an option.
-    let (file, mut further) = (arguments.file.clone(), arguments.further.clone());
-    let file = match file {
-        Some(word) if word.to_string_lossy().starts_with('-') => {
-            further.insert(0, word.into());
-            None
-        }
-        file => file,
-    };
+    let (file, further) = arguments.file_and_options();
     let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
     let text = read_text(&file, "the study file").map_err(|wrong| {
         CommandError::Usage(format!("{}; name a study file", wrong.in_file(file.display())))
@@ -139,15 +194,9 @@ fn words(
     text: &str,
     further: Vec<OsString>,
 ) -> Result<(Vec<OsString>, ExclusionRules), CommandError> {
-    let study: StudyFile = toml::from_str(text).map_err(|error| {
-        let start = error.span().map_or(0, |span| span.start);
-        let line = 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
-        let message = error.message().replace('\n', " ");
-        let is_large = message.contains("too large");
-        let message =
-            if is_large { format!("{message}; the largest seed is {LARGEST_SEED}") } else { message };
-        CommandError::Usage(format!("{}:{line}: {message}", file.display()))
-    })?;
+    let study = StudyFile::read(file, text)?;
+    Choices::planned(&study.analyse)
+        .map_err(|why| CommandError::Usage(format!("{}: {why}", file.display())))?;
     let task = match study.task {
         TaskName::Jnd => "jnd",
         TaskName::Magnitude => "magnitude",
@@ -274,14 +323,34 @@ mod tests {
     }
 
     #[test]
-    fn options_may_stand_without_a_file() {
+    fn the_file_stands_before_between_or_after_the_options() {
         let command = RunArguments::augment_args(clap::Command::new("run").no_binary_name(true));
-        for line in [&["--subject", "3"][..], &["a.study.toml", "--subject", "3"]] {
+        for (line, file, options) in [
+            (&["--subject", "3"][..], None, 2),
+            (&["a.study.toml", "--subject", "3"], Some("a.study.toml"), 2),
+            (&["--observer", "human", "a.study.toml"], Some("a.study.toml"), 2),
+            (&["--no-demo", "a.study.toml", "--resume"], Some("a.study.toml"), 2),
+            (&["--observer=human", "a.study.toml"], Some("a.study.toml"), 1),
+            (&["--least-movement-mm", "-2", "a.study.toml", "--bases", "17"], Some("a.study.toml"), 4),
+        ] {
             let matches = command.clone().try_get_matches_from(line);
             let arguments =
                 RunArguments::from_arg_matches(&matches.expect("it is read")).expect("it is whole");
-            assert_eq!(arguments.further.len(), line.len() - 1, "{line:?}");
+            let (found, rest) = arguments.file_and_options();
+            assert_eq!((found, rest.len()), (file.map(PathBuf::from), options), "{line:?}");
         }
+    }
+
+    #[test]
+    fn the_plan_of_an_analysis_is_checked_and_read_back() {
+        let text = "task = \"jnd\"\nanalysis = \"paired t\"\n[options]\nsubjects = 4\n[analyse]\nestimator = \"map\"\n";
+        let planned = planned(text).expect("a plan");
+        assert_eq!((planned.analysis.as_str(), planned.subjects), ("paired t", Some(4)));
+        assert_eq!(planned.choices.options().estimator, flotor_analysis::Estimator::Map);
+        let wrong = text.replace("\"map\"", "\"mpa\"");
+        let error = words(Path::new("a.study.toml"), &wrong, Vec::new()).expect_err("no such estimator");
+        let said = "a.study.toml: analyse.estimator: `mpa` is none of procedure, map";
+        assert_eq!(error.to_string(), said);
     }
 
     #[test]

@@ -1,0 +1,164 @@
+//! The origin of a result: who answered, what was planned, and everything needed to compute it again.
+
+use super::choices::Choices;
+use crate::study::plan::{Planned, planned};
+use flotor_analysis::exclusion::Applied;
+use flotor_study::exclusion::ExclusionRules;
+use flotor_study::log::{Begin, ObserverKind, Plan, SittingLog, digest};
+use flotor_study::procedure::Procedure;
+use flotor_study::protocol::Protocol;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The origin of a result.
+#[derive(Serialize)]
+pub(crate) struct Provenance {
+    /// Origin of the answers.
+    #[serde(skip)]
+    pub(crate) observer: ObserverKind,
+    /// Seed of order, presentation and simulated answers.
+    seed: u64,
+    /// Version of the program that carried the study out.
+    version: String,
+    /// Digest of the configuration of the sittings.
+    configuration: String,
+    /// Options of the analysis that change a result of this task.
+    options: BTreeMap<&'static str, String>,
+    /// Rule by which the tracks of a difference experiment came to thresholds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    threshold_rule: Option<Procedure>,
+    /// Exclusion rules of the study file.
+    exclusion_rules: ExclusionRules,
+    /// SHA-256 of the exclusion rules as JSON.
+    exclusion_sha256: String,
+    /// The study file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    study_file: Option<StudyFile>,
+    /// Agreement of the analysis with the study file.
+    plan: Agreement,
+}
+
+/// The study file that the sittings followed.
+#[derive(Serialize)]
+struct StudyFile {
+    name: String,
+    sha256: String,
+    text: String,
+    /// What it says of the analysis.
+    analysis: String,
+}
+
+/// Agreement of an analysis with its plan.
+#[derive(Serialize)]
+#[serde(rename_all = "kebab-case")]
+enum Agreement {
+    /// There is no study file.
+    NoPlan,
+    /// Options, rules and number of subjects are those of the study file.
+    AsPlanned,
+    /// Some are not.
+    NotAsPlanned(Vec<String>),
+    /// The log has no text of the study file that this version can read.
+    Unknown,
+}
+
+impl Provenance {
+    /// Returns the origin of a result of these logs, computed by these choices after these exclusions.
+    pub(crate) fn of(begin: &Begin, logs: &[SittingLog], choices: Choices, applied: &Applied) -> Self {
+        let rules = begin.exclusion();
+        let planned = begin.plan.as_ref().map(|plan| planned(&plan.text));
+        let study_file = begin.plan.as_ref().map(|Plan { file, sha256, text, .. }| StudyFile {
+            name: file.clone(),
+            sha256: sha256.clone(),
+            text: text.clone(),
+            analysis: planned.iter().flatten().map(|planned| planned.analysis.clone()).collect(),
+        });
+        Self {
+            observer: begin.observer_kind(),
+            seed: begin.seed,
+            version: begin.version.clone(),
+            configuration: begin.config_hash(),
+            options: choices.of_task(&begin.protocol).into_iter().collect(),
+            threshold_rule: match &begin.protocol {
+                Protocol::Jnd(jnd) => Some(jnd.procedure.clone()),
+                Protocol::Magnitude(_) => None,
+            },
+            exclusion_sha256: digest(&serde_json::to_string(&rules).unwrap_or_default()),
+            exclusion_rules: rules,
+            study_file,
+            plan: match planned {
+                None => Agreement::NoPlan,
+                Some(None) => Agreement::Unknown,
+                Some(Some(planned)) => Agreement::of(&planned, begin, logs, choices, applied),
+            },
+        }
+    }
+
+    /// Returns name and value of everything that is printed, in order.
+    pub(crate) fn lines(&self) -> Vec<(&'static str, String)> {
+        let observer = self.observer.restriction().unwrap_or("people").to_owned();
+        let options: Vec<String> =
+            self.options.iter().map(|(name, value)| format!("--{name} {value}")).collect();
+        let mut lines = vec![("observer", observer)];
+        match &self.study_file {
+            None => lines.push(("study file", "none".to_owned())),
+            Some(file) => {
+                lines.push(("study file", file.name.clone()));
+                lines.push(("its SHA-256", file.sha256.clone()));
+                lines.push(("planned analysis", format!("\"{}\"", file.analysis)));
+            }
+        }
+        lines.push(("analysis", self.plan.to_text()));
+        lines.push(("options", options.join(", ")));
+        if self.exclusion_rules.are_none() {
+            lines.push(("exclusion rules", "none".to_owned()));
+        } else {
+            lines.push(("exclusion rules, SHA-256", self.exclusion_sha256.clone()));
+        }
+        lines.push(("seed", self.seed.to_string()));
+        lines.push(("version", format!("flotor {}", self.version)));
+        lines.push(("configuration", self.configuration.clone()));
+        lines
+    }
+
+    /// Returns the block of a text.
+    pub(crate) fn to_text(&self) -> String {
+        let line = |(name, value): (&'static str, String)| format!("\n  {name:<30}{value}");
+        format!("  Provenance{}", self.lines().into_iter().map(line).collect::<String>())
+    }
+
+    /// Returns the text of the study file, if the logs have one.
+    pub(crate) fn study_file(&self) -> Option<(&str, &str)> {
+        self.study_file.as_ref().map(|file| (file.name.as_str(), file.text.as_str()))
+    }
+}
+
+impl Agreement {
+    fn of(
+        planned: &Planned,
+        begin: &Begin,
+        logs: &[SittingLog],
+        choices: Choices,
+        applied: &Applied,
+    ) -> Self {
+        let mut deviations = choices.deviations(planned.choices, &begin.protocol);
+        let complete = logs.iter().filter(|log| log.complete).count();
+        deviations.extend(
+            planned
+                .subjects
+                .filter(|planned| *planned != complete)
+                .map(|planned| format!("complete sittings: {complete}, planned {planned}")),
+        );
+        deviations.extend(applied.not_applied.iter().map(|rule| format!("not applied: {rule}")));
+        if deviations.is_empty() { Self::AsPlanned } else { Self::NotAsPlanned(deviations) }
+    }
+
+    fn to_text(&self) -> String {
+        match self {
+            Self::NoPlan => "without a plan".to_owned(),
+            Self::AsPlanned => "as planned".to_owned(),
+            Self::NotAsPlanned(deviations) => format!("not as planned: {}", deviations.join("; ")),
+            Self::Unknown => "the log lacks a plan that this version reads".to_owned(),
+        }
+    }
+}
