@@ -134,7 +134,7 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
     }
     let (mut shapes, missing) = shapes_of(&two_devices(), &[library("solid")]);
     assert!(missing.is_empty() && shapes.len() == 1, "{missing:?}");
-    let camera = Camera::experimenter(SceneBuilder::framing_mm(&shapes, 2));
+    let camera = Camera::fitting(SceneBuilder::extent(&shapes, 2), 1.6);
     let mut builder = SceneBuilder::default();
     let mut moment_s = 0.0;
     criterion.bench_function("shape and mesh, a solid and two devices", |bench| {

@@ -7,8 +7,9 @@ use crate::flat::FlatRasterizer;
 use crate::history::History;
 use crate::palette::{Look, Palette};
 use crate::quantity::Units;
-use crate::scene::SceneBuilder;
+use crate::scene::{SceneBuilder, SceneFacts};
 use crate::shape::Shape;
+use crate::ui::overlay::Overlay;
 use crate::ui::plot_stack::{PlotStack, TooLow, Window};
 use crate::ui::view3d::{Subject, View3d};
 use crate::ui::{legend, readout, style};
@@ -126,39 +127,65 @@ pub fn picture(
     shapes: &mut [Shape],
     options: &PictureOptions,
 ) -> Result<ColorImage, PictureError> {
-    let palette = Palette::of(options.look);
+    let interface = interface(histories, shapes, options)?;
+    Ok(draw_without_window(options.size_px, options.scale, options.look, interface))
+}
+
+/// Returns the interface that shows a moment of a run, for [`draw_without_window`].
+///
+/// # Errors
+/// [`PictureError::Empty`], [`PictureError::TooLow`].
+pub fn interface(
+    histories: Vec<History>,
+    shapes: &mut [Shape],
+    options: &PictureOptions,
+) -> Result<impl FnMut(&mut Ui), PictureError> {
+    let (look, palette) = (options.look, Palette::of(options.look));
     let mut devices = Devices::new(histories);
     devices.choose(options.chosen.device);
     let mut plots = PlotStack::new(Window::Whole);
     plots.choose(&options.chosen);
     plots.has_room(options.size_px[1], least_height_of_px(&plots, options.scale))?;
-    let history = devices.history();
     let sample = match options.at_s {
-        Some(at_s) => history.at(at_s),
-        None => history.strongest(),
+        Some(at_s) => devices.history().at(at_s),
+        None => devices.history().strongest(),
     };
     let sample = *sample.ok_or(PictureError::Empty)?;
     let samples = devices.at(sample.time_s()).ok_or(PictureError::Empty)?;
     let scale = devices.scale().with_chosen(options.chosen.arrow_force_n);
-    let height_mm = SceneBuilder::framing_mm(shapes, devices.count());
-    let mut view3d = View3d::new(Canvas::on_processor(SAMPLES), height_mm);
-    view3d.camera = Camera::of(options.view, height_mm);
-    Ok(draw_without_window(options.size_px, options.scale, options.look, |ui| {
+    let extent = SceneBuilder::extent(shapes, devices.count());
+    let mut view3d = View3d::new(Canvas::on_processor(SAMPLES), extent);
+    let aspect = options.size_px[0] as f64 / (options.size_px[1] as f64 * f64::from(VIEW_PART));
+    view3d.camera = Camera::of(options.view, extent, aspect);
+    let mut facts = SceneFacts::default();
+    Ok(move |ui: &mut Ui| {
         let area = ui.max_rect();
         let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * VIEW_PART).round()));
+        let events = devices.names().zip(&samples).map(|(name, sample)| (name, sample.events));
+        let warnings = readout::warnings(&events.collect::<Vec<_>>(), &facts);
+        // Warnings do not stand before the body they are about.
+        let (heading, below_heading) =
+            view.split_top_bottom_at_y(view.top() + readout::heading_pt(warnings.len()));
+        let body = if warnings.is_empty() { view } else { below_heading };
         let subject = Subject { shapes, version: 0, samples: &samples, scale };
-        let facts = view3d.show(ui, view, options.look, subject);
-        readout::title(ui.painter(), view, history.run(), &palette);
-        readout::numbers(ui.painter(), view, &sample, Units::default(), &palette);
-        readout::paint_warnings(ui.painter(), view, &readout::warnings(&sample, &facts), &palette);
-        legend::paint(ui.painter(), view, &facts, &view3d.camera, &palette);
-        legend::axes(ui.painter(), view, &facts, &view3d.camera, &palette);
+        facts = view3d.show(ui, body, look, subject);
+        let mut overlay = Overlay::new(ui.painter(), if warnings.is_empty() { view } else { heading });
+        readout::title(&mut overlay, devices.history().run(), &palette);
+        readout::paint_warnings(&mut overlay, &warnings, &palette);
+        if !warnings.is_empty() {
+            overlay = Overlay::new(ui.painter(), body);
+        }
+        let (units, camera) = (Units::default(), view3d.camera);
+        let rows = readout::rows(&sample, units, &palette);
+        readout::numbers(&mut overlay, sample.time_s(), &rows, units, &palette);
+        legend::paint(&mut overlay, body, &facts, &camera, &palette);
+        legend::axes(&mut overlay, &facts, &camera, &palette);
         let names = (devices.names(), devices.chosen());
-        legend::names(ui.painter(), view, &facts, &view3d.camera, names, &palette);
+        legend::names(&mut overlay, body, &facts, &camera, names, &palette);
         let below = Rect::from_min_max(view.left_bottom() + vec2(14.0, 8.0), area.max - vec2(4.0, 4.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below));
-        plots.still(&mut ui, (history, devices.name()), sample.time_s(), &palette);
-    }))
+        plots.still(&mut ui, (devices.history(), devices.name()), sample.time_s(), &palette);
+    })
 }
 
 /// Runs an interface for the few passes it takes to settle, and draws it on the CPU.
@@ -170,6 +197,8 @@ pub fn draw_without_window(
 ) -> ColorImage {
     /// Plots know their bounds in the second pass; the third draws what the second laid out.
     const PASSES: usize = 3;
+    /// Width and height of a texture, pixels, at most: those of the largest picture.
+    const MOST_TEXTURE_PX: usize = 8192;
     let context = Context::default();
     style::apply(&context, look);
     let mut rasterizer = FlatRasterizer::default();
@@ -179,6 +208,7 @@ pub fn draw_without_window(
         let mut input = RawInput {
             screen_rect: Some(Rect::from_min_size(pos2(0.0, 0.0), size)),
             time: Some(pass as f64),
+            max_texture_side: Some(MOST_TEXTURE_PX),
             ..RawInput::default()
         };
         if let Some(viewport) = input.viewports.get_mut(&egui::ViewportId::ROOT) {

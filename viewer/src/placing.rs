@@ -25,13 +25,10 @@ impl Placing {
         DVec3::X * (self.spacing_m * (device as f64 - middle))
     }
 
-    /// How much larger than one body all of them are in the picture, which is wider than high.
+    /// Returns the distance of the first device from the last, m.
     #[must_use]
-    pub fn framing(&self, height_m: f64) -> f64 {
-        /// Width of a picture in which a body of height 1 fills the height.
-        const WIDTH: f64 = 2.2;
-        let width_m = self.spacing_m * (self.count.max(1) - 1) as f64 + height_m;
-        (width_m / (WIDTH * height_m)).max(1.0)
+    pub fn width_m(&self) -> f64 {
+        self.spacing_m * (self.count.max(1) - 1) as f64
     }
 }
 
@@ -60,7 +57,7 @@ mod tests {
         assert_eq!(placing.place_m(0), -placing.place_m(1));
         assert!(placing.place_m(1).x > 0.012);
         assert_eq!(Placing::of(1, 0.025, 0.006).place_m(0), DVec3::ZERO);
-        assert_eq!(Placing::of(1, 0.025, 0.006).framing(0.025), 1.0);
+        assert_eq!(Placing::of(1, 0.025, 0.006).width_m(), 0.0);
     }
 
     #[test]

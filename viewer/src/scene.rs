@@ -4,7 +4,7 @@ use crate::history::Sample;
 use crate::palette::{Palette, strain_color};
 use crate::placing::{Placing, round_below};
 use crate::shape::{Posed, Rest, Shape};
-use flotor_drawing::camera::Camera;
+use flotor_drawing::camera::{Camera, Extent};
 use flotor_drawing::geometry::{
     Body, Color, Curve, Detail, Ground, LocalStrain, MM_PER_M, Mesh, Section, Shadow, Strain,
     append_primitive, append_surface, append_tube, contact_strain, force_arrow, plate, torque_arrow,
@@ -85,8 +85,8 @@ pub struct SceneFacts {
     pub placing: Placing,
     /// Distance of the lines of the ground, m, and its height.
     pub grid_m: f64,
-    /// Height of the ground, m.
-    pub ground_m: f64,
+    /// Height of the lower end of the bodies, m.
+    pub foot_m: f64,
     /// Axes of the device frame in the frame of the picture.
     pub axes: [DVec3; 3],
     /// How long arrows are; none where none are drawn.
@@ -119,6 +119,8 @@ const FULL_STRAIN: f64 = 0.5;
 const PLATE_THICKNESS: f64 = 0.16;
 /// How far plates reach beyond the outer edge of the coil.
 const PLATE_OVERHANG: f64 = 1.18;
+/// Depth of a handle without a body below its home, part of the height of the scene.
+const BARE_DEPTH: f64 = 0.3;
 /// Height of a scene without any body, m: a hand's breadth.
 const EMPTY_HEIGHT_M: f64 = 0.025;
 
@@ -136,12 +138,13 @@ impl SceneBuilder {
         self.corners_made
     }
 
-    /// The height with which a camera has all devices in sight, mm.
+    /// Returns the extent of the bodies of so many devices.
     #[must_use]
-    pub fn framing_mm(shapes: &[Shape], devices: usize) -> f64 {
-        let height_m = Self::height_mm(shapes) / MM_PER_M;
+    pub fn extent(shapes: &[Shape], devices: usize) -> Extent {
+        let height_mm = Self::height_mm(shapes);
+        let height_m = height_mm / MM_PER_M;
         let placing = Placing::of(devices, height_m, plates_m(shapes, height_m));
-        MM_PER_M * height_m * placing.framing(height_m)
+        Extent { height_mm, width_mm: MM_PER_M * placing.width_m() }
     }
 
     /// Puts together the scene at a sample of each device, seen at a height of so many pixels.
@@ -158,14 +161,14 @@ impl SceneBuilder {
     ) -> (&Mesh, SceneFacts) {
         let height_m = Self::height_mm(shapes) / MM_PER_M;
         let plate_radius_m = plates_m(shapes, height_m);
-        let depth_m = shapes.iter().map(Shape::ground_m).fold(0.0, f64::max);
-        let depth_m = if depth_m > 0.0 { depth_m } else { height_m };
+        let body_m = shapes.iter().map(Shape::ground_m).fold(0.0, f64::max);
+        let depth_m = if body_m > 0.0 { body_m } else { height_m };
         let ground = ground(palette, height_m, depth_m + PLATE_THICKNESS * plate_radius_m);
         let placing = Placing::of(samples.len(), height_m, plate_radius_m);
         let mut facts = SceneFacts {
             placing,
             grid_m: ground.spacing_m,
-            ground_m: ground.height_m,
+            foot_m: if body_m > 0.0 { ground.height_m } else { -BARE_DEPTH * height_m },
             axes: axes(shapes.first()),
             arrows: shows_arrows.then_some(ArrowKey {
                 mm_per_n: MM_PER_M * height_m / scale.force_n,

@@ -18,6 +18,23 @@ pub struct Camera {
     pub target_mm: DVec3,
 }
 
+/// Size of bodies that stand side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Height of the tallest, mm.
+    pub height_mm: f64,
+    /// Distance of the first from the last, mm: 0 for one body.
+    pub width_mm: f64,
+}
+
+impl Extent {
+    /// Returns the extent of one body of a height, mm.
+    #[must_use]
+    pub const fn of_one(height_mm: f64) -> Self {
+        Self { height_mm, width_mm: 0.0 }
+    }
+}
+
 /// From where a picture is to be seen, as a person writes it: `AZIMUTH,INCLINATION` or `AZIMUTH,INCLINATION,ZOOM`, degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
@@ -53,6 +70,8 @@ impl std::str::FromStr for View {
 
 /// Vertical angle of view, rad: that of a 70 mm lens on a full frame, which flatters small things.
 const FIELD_OF_VIEW_RAD: f64 = 0.34;
+/// Half the width of a body with its plates, part of its height.
+const HALF_BODY: f64 = 0.35;
 /// Legal inclinations, rad: a little below the ground to straight above.
 const INCLINATION_RAD: std::ops::RangeInclusive<f64> = -0.05..=1.55;
 /// Nearest and farthest distance relative to the size of what is shown.
@@ -71,13 +90,28 @@ impl Camera {
         }
     }
 
-    /// The view that was requested of a body of this height; without a request the experimenter's.
+    /// The experimenter's view of bodies side by side, as near as all of them are in a picture of this width to height.
     #[must_use]
-    pub fn of(view: Option<View>, height_mm: f64) -> Self {
-        let mut camera = Self::experimenter(height_mm);
+    pub fn fitting(extent: Extent, aspect: f64) -> Self {
+        /// Part of half the picture that the bodies fill.
+        const FILLED: f64 = 0.92;
+        let mut camera = Self::experimenter(extent.height_mm);
+        let half_mm = 0.5 * extent.width_mm;
+        // The body at the right is nearer than the point looked at.
+        let nearer_mm = half_mm * camera.azimuth_rad.sin();
+        let beside_mm = half_mm * camera.azimuth_rad.cos() + HALF_BODY * extent.height_mm;
+        let seen = (0.5 * FIELD_OF_VIEW_RAD).tan() * FILLED * aspect.max(1.0e-3);
+        camera.distance_mm = camera.distance_mm.max(nearer_mm + beside_mm / seen);
+        camera
+    }
+
+    /// The view that was requested of bodies in a picture of this width to height; without a request the experimenter's.
+    #[must_use]
+    pub fn of(view: Option<View>, extent: Extent, aspect: f64) -> Self {
+        let mut camera = Self::fitting(extent, aspect);
         if let Some(View { azimuth_rad, inclination_rad, zoom }) = view {
             (camera.azimuth_rad, camera.inclination_rad) = (azimuth_rad, inclination_rad);
-            camera.zoom(zoom, height_mm);
+            camera.zoom(zoom, extent.height_mm);
         }
         camera
     }
@@ -149,6 +183,23 @@ mod tests {
         assert!(right > 0.5, "seen from the user, x is to the right");
     }
 
+    /// The bodies fill the picture from 60 % of its width or 90 % of the usual height on, and are inside.
+    #[test]
+    fn bodies_side_by_side_are_in_a_picture_of_any_shape_and_fill_it() {
+        for (bodies, aspect) in
+            [(1.0, 0.4), (1.0, 3.0), (2.0, 1.0), (3.0, 0.6), (3.0, 2.0), (4.0, 1.5), (4.0, 4.0)]
+        {
+            let extent = Extent { height_mm: 25.0, width_mm: 27.5 * (bodies - 1.0) };
+            let camera = Camera::fitting(extent, aspect);
+            let on_screen =
+                |x: f64| camera.on_screen(DVec3::new(x, 0.0, -10.0), aspect).expect("before the eye");
+            let [left, right] = [-1.0, 1.0].map(|side| on_screen(side * (0.5 * extent.width_mm + 6.0))[0]);
+            assert!(left > 0.0 && right < 1.0, "{bodies} bodies at {aspect}: {left} to {right}");
+            let is_near = camera.distance_mm < 1.1 * Camera::experimenter(25.0).distance_mm;
+            assert!(is_near || right - left > 0.6, "{bodies} bodies at {aspect}: {left} to {right}");
+        }
+    }
+
     #[test]
     fn a_millimetre_has_the_size_it_says() {
         let camera = Camera { inclination_rad: 0.0, ..Camera::experimenter(25.0) };
@@ -169,12 +220,12 @@ mod tests {
 
     #[test]
     fn a_view_is_read_in_degrees_and_what_is_none_is_refused() {
-        let camera = Camera::of(Some("90,30,2".parse().expect("a view")), 25.0);
+        let camera = Camera::of(Some("90,30,2".parse().expect("a view")), Extent::of_one(25.0), 1.6);
         let eye = camera.eye_mm() - camera.target_mm;
         assert!(eye.x > 0.0 && eye.y.abs() < 1.0e-9 * eye.x, "from the right: {eye}");
         assert!((eye.z / eye.length() - 0.5).abs() < 1.0e-12, "30 degrees above the horizon");
         assert!((camera.distance_mm - 0.5 * Camera::experimenter(25.0).distance_mm).abs() < 1.0e-9);
-        assert_eq!(Camera::of(None, 25.0), Camera::experimenter(25.0));
+        assert_eq!(Camera::of(None, Extent::of_one(25.0), 1.6), Camera::experimenter(25.0));
         for wrong in ["", "30", "30,95", "a,b", "30,15,9", "1,2,1,1", "NaN,0"] {
             assert!(wrong.parse::<View>().is_err(), "{wrong}");
         }

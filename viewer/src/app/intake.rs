@@ -68,7 +68,7 @@ impl Viewer {
         self.limits = feed.greeting().limits;
         self.player = Player::live();
         self.plots.start_over();
-        self.view.reset(SceneBuilder::framing_mm(&parts.shapes, self.devices.count()));
+        self.view.reset(SceneBuilder::extent(&parts.shapes, self.devices.count()));
         (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);
         self.shape_version += 1;
         self.source = Source::Live { feed: Box::new(feed), wanted: wanted.clone() };

@@ -84,7 +84,7 @@ impl Viewer {
         if pressed(Key::L) {
             self.switch_look(ui.ctx());
         }
-        self.view.keys(ui, SceneBuilder::framing_mm(&self.shapes, self.devices.count()));
+        self.view.keys(ui, SceneBuilder::extent(&self.shapes, self.devices.count()));
     }
 
     pub(super) fn switch_look(&mut self, context: &Context) {

@@ -1,46 +1,72 @@
-//! The parts of an experimenter's window and where they stand: bar, side, middle.
+//! The parts of an experimenter's window and where they stand: bar, messages, side, view, traces.
+//!
+//! The room is shared by priority: emergency stop and state of the run ([`top_bar`]), messages ([`messages`]), the clock (in the bar of
+//! the playback and over the view), numbers and the other texts over the view ([`overlay`]), traces, panel.
+//!
+//! [`top_bar`]: crate::ui::top_bar
+//! [`messages`]: crate::ui::messages
+//! [`overlay`]: crate::ui::overlay
 
+use super::words::State;
 use super::{Audience, Source, VIEW_PARTS, Viewer};
 use crate::export::export;
 use crate::history::Sample;
 use crate::palette::Palette;
 use crate::scene::SceneBuilder;
-use crate::ui::plot_stack::PlotRequest;
+use crate::ui::messages::{Extent, Messages};
+use crate::ui::overlay::{Corner, Overlay};
+use crate::ui::plot_stack::{PlotRequest, PlotStack};
 use crate::ui::style::SMALL_PT;
 use crate::ui::top_bar::{PanelSwitch, TopBar, TopBarRequest};
 use crate::ui::view3d::Subject;
-use crate::ui::{legend, parameters, readout, standing, style, warnings};
-use egui::{Button, CursorIcon, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
+use crate::ui::{device_row, legend, parameters, readout, standing, style};
+use egui::{
+    Align, Button, CursorIcon, Frame, Layout, Margin, Panel as Edge, Rect, RichText, Role, ScrollArea, Sense,
+    Ui, WidgetInfo, vec2,
+};
 use flotor_live::{Ask, SetValue};
 use std::time::Instant;
 
+/// Part of the height of the window that the messages of a run that has failed may take.
+const MOST_OF_HEIGHT: f32 = 0.3;
 /// What the border is called.
 const BORDER: &str = "Border between view and traces";
-/// Part of the height that the 3D view gets: low windows leave room for two traces first.
-fn view_part(height_pt: f32) -> f32 {
-    match height_pt {
-        ..360.0 => 0.30,
+/// Part of the height that the 3D view has at least, where there are traces.
+const LEAST_VIEW_PART: f32 = 0.27;
+/// Height of the row with the names of the devices, points.
+const DEVICES_PT: f32 = 28.0;
+
+/// Returns the part of the height that the 3D view gets: in low windows, and above many traces, it gives way to them.
+fn view_part(height_pt: f32, traces_pt: f32) -> f32 {
+    let most = match height_pt {
+        ..360.0 => LEAST_VIEW_PART,
         ..480.0 => 0.46,
         _ => 0.56,
-    }
+    };
+    most.min(1.0 - traces_pt / height_pt).max(LEAST_VIEW_PART)
+}
+
+/// Returns whether an area, so high, has room for traces beneath the 3D view.
+fn has_room_for_traces(height_pt: f32) -> bool {
+    (1.0 - LEAST_VIEW_PART) * height_pt >= PlotStack::least_height_of_one_pt()
 }
 
 impl Viewer {
     pub(super) fn top(&mut self, ui: &mut Ui, palette: &Palette) {
-        let (standing, status) = self.standing();
-        let (title, subtitle) = match &self.source {
-            Source::Waiting(_) => ("Flotor", ""),
+        let State { words, status } = self.state();
+        let title = match (&self.source, self.audience) {
+            (Source::Waiting(_), _) => "Flotor",
             // Names of parameters are nothing for a subject's eyes.
-            _ if self.audience == Audience::Subject => ("", ""),
-            _ => (self.heading.title.as_str(), self.heading.subtitle.as_str()),
+            (_, Audience::Subject) => "",
+            _ => self.heading.title.as_str(),
         };
+        // A rehearsal shows what a person sees.
+        let can_stop = self.source.is_running() || self.is_rehearsal();
         let bar = TopBar {
             title,
-            subtitle,
-            standing: &standing,
+            state: words,
             status,
-            // A rehearsal shows what a person sees.
-            can_stop: self.source.is_running() || self.is_rehearsal(),
+            stop_key: can_stop.then(|| self.stop_key().name()),
             panel: match (self.audience, self.is_panel_shown(ui.ctx())) {
                 (Audience::Subject, _) => PanelSwitch::None,
                 (Audience::Experimenter, true) => PanelSwitch::PutAway,
@@ -54,6 +80,31 @@ impl Viewer {
             Some(TopBarRequest::SwitchPanel) => self.switch_panel(ui.ctx()),
             None => {}
         }
+    }
+
+    /// Returns the key that is the emergency stop: the largest one, except in a sitting.
+    fn stop_key(&self) -> egui::Key {
+        self.sitting.as_ref().map_or(egui::Key::Space, |prompt| prompt.stop_key.key())
+    }
+
+    /// Shows the row of messages beneath the bar.
+    pub(super) fn messages(&mut self, ui: &mut Ui, palette: &Palette) {
+        const MARGIN_PT: i8 = 16;
+        let warnings = self.warnings();
+        let otherwise = self.done().unwrap_or_else(|| self.heading.subtitle.clone());
+        let is_over = matches!(self.source, Source::Live { .. }) && !self.source.is_running();
+        let extent = if is_over {
+            Extent::Lines { most_pt: MOST_OF_HEIGHT * ui.available_height() }
+        } else {
+            Extent::Line
+        };
+        let messages = Messages { warnings: &warnings, otherwise: &otherwise, extent };
+        let height_pt = messages.height_pt(ui, ui.available_width() - 2.0 * f32::from(MARGIN_PT));
+        Edge::top("messages")
+            .exact_size(height_pt)
+            .show_separator_line(false)
+            .frame(Frame::new().fill(palette.panel).inner_margin(Margin::symmetric(MARGIN_PT, 0)))
+            .show(ui, |ui| messages.show(ui, palette));
     }
 
     pub(super) fn side(&mut self, ui: &mut Ui, palette: &Palette) {
@@ -98,24 +149,50 @@ impl Viewer {
             self.nothing(ui, area, palette);
             return;
         };
-        let part = self.view_part.unwrap_or_else(|| view_part(area.height()));
+        let area = self.choose_device(ui, area);
+        let has_traces = has_room_for_traces(area.height());
+        let traces_pt = self.plots.good_height_pt();
+        let part = self.view_part.unwrap_or_else(|| view_part(area.height(), traces_pt));
+        let part = if has_traces { part } else { 1.0 };
         let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * part).round()));
         self.scene(ui, view, &samples);
-        readout::numbers(ui.painter(), view, &sample, self.plots.units, palette);
-        let camera = self.view.camera;
-        legend::paint(ui.painter(), view, &self.facts, &camera, palette);
-        legend::axes(ui.painter(), view, &self.facts, &camera, palette);
-        let names = (self.devices.names(), self.devices.chosen());
-        legend::names(ui.painter(), view, &self.facts, &camera, names, palette);
-        let row = self.choose_device(ui, view);
-        warnings::warnings(ui, view.with_min_y(row), &self.warnings(&sample), palette);
-        if let Some(done) = self.done() {
-            warnings::done(ui, view, done, palette);
+        self.texts(ui, view, &sample, palette);
+        if has_traces {
+            self.border(ui, area, view.bottom());
+            let below = Rect::from_min_max(view.left_bottom() + vec2(12.0, 6.0), area.max - vec2(16.0, 2.0));
+            self.traces(ui, below, palette);
         }
-        self.border(ui, area, view.bottom());
+    }
 
-        let below = Rect::from_min_max(view.left_bottom() + vec2(12.0, 6.0), area.max - vec2(16.0, 2.0));
-        let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below).id_salt("plots"));
+    /// Shows texts over the 3D view, by priority.
+    fn texts(&mut self, ui: &mut Ui, view: Rect, sample: &Sample, palette: &Palette) {
+        let mut overlay = Overlay::new(ui.painter(), view);
+        let (units, camera) = (self.plots.units, self.view.camera);
+        let rows = readout::rows(sample, units, palette);
+        readout::numbers(&mut overlay, sample.time_s(), &rows, units, palette);
+        legend::paint(&mut overlay, view, &self.facts, &camera, palette);
+        legend::axes(&mut overlay, &self.facts, &camera, palette);
+        self.reset_button(ui, &mut overlay);
+        let names = (self.devices.names(), self.devices.chosen());
+        legend::names(&mut overlay, view, &self.facts, &camera, names, palette);
+    }
+
+    /// Shows the button that returns to the experimenter's view, once the view was turned.
+    fn reset_button(&mut self, ui: &mut Ui, overlay: &mut Overlay) {
+        let size = vec2(78.0, 22.0);
+        let Some(place) = self.view.is_turned().then(|| overlay.take(Corner::RightBottom, size)).flatten()
+        else {
+            return;
+        };
+        let button = Button::new(RichText::new("Reset view").size(SMALL_PT));
+        if ui.put(place, button).on_hover_text("The experimenter's view (R)").clicked() {
+            self.view.reset(SceneBuilder::extent(&self.shapes, self.devices.count()));
+        }
+    }
+
+    /// Shows the traces in an area.
+    fn traces(&mut self, ui: &mut Ui, area: Rect, palette: &Palette) {
+        let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(area).id_salt("plots"));
         let motion = self.player.motion;
         let seen = (self.devices.history(), self.devices.name());
         let requests = self.plots.show(&mut ui, seen, self.player.now_s, motion, palette);
@@ -150,27 +227,21 @@ impl Viewer {
         response.on_hover_cursor(CursorIcon::ResizeVertical);
     }
 
-    /// The names of the devices, where there are several, to choose the one that numbers and traces are of; the height beneath them.
-    fn choose_device(&mut self, ui: &mut Ui, view: Rect) -> f32 {
+    /// Shows the names of the devices, where there are several, to choose the one that numbers and traces are of; returns the area
+    /// beneath.
+    fn choose_device(&mut self, ui: &mut Ui, area: Rect) -> Rect {
         if self.devices.count() < 2 {
-            return view.top();
+            return area;
         }
-        let inside = Rect::from_min_max(view.min + vec2(16.0, 8.0), view.max);
-        let mut row = ui.new_child(egui::UiBuilder::new().max_rect(inside).id_salt("devices"));
-        let mut chosen = None;
-        let shown = row.horizontal(|ui| {
-            for (number, name) in self.devices.names().enumerate() {
-                let help = format!("Numbers and traces of {name} ({})", number + 1);
-                let label = ui.selectable_label(number == self.devices.chosen(), name);
-                if label.on_hover_text(help).clicked() {
-                    chosen = Some(number);
-                }
-            }
-        });
-        if let Some(number) = chosen {
+        let (row, beneath) = area.split_top_bottom_at_y(area.top() + DEVICES_PT);
+        let inside = row.shrink2(vec2(16.0, 0.0));
+        let layout = Layout::left_to_right(Align::Center);
+        let mut row = ui.new_child(egui::UiBuilder::new().max_rect(inside).id_salt("devices").layout(layout));
+        let names: Vec<&str> = self.devices.names().collect();
+        if let Some(number) = device_row::choose(&mut row, &names, self.devices.chosen()) {
             self.look_at(number);
         }
-        shown.response.rect.bottom()
+        beneath
     }
 
     /// Numbers and traces are of this device from now on.
@@ -185,15 +256,6 @@ impl Viewer {
         let (shapes, version, scale) =
             (&mut self.shapes, self.shape_version, self.devices.scale().with_chosen(self.arrow_force_n));
         self.facts = self.view.show(ui, area, self.look, Subject { shapes, version, samples, scale });
-        let has_room = area.height() > 200.0 && area.width() > 200.0;
-        if has_room && self.view.is_turned() && self.audience == Audience::Experimenter {
-            // Above the axes, which it puts back.
-            let place = Rect::from_center_size(area.right_bottom() - vec2(53.0, 106.0), vec2(78.0, 22.0));
-            let button = Button::new(RichText::new("Reset view").size(SMALL_PT));
-            if ui.put(place, button).on_hover_text("The experimenter's view (R)").clicked() {
-                self.view.reset(SceneBuilder::framing_mm(&self.shapes, self.devices.count()));
-            }
-        }
     }
 
     /// There is nothing to show: what to do.

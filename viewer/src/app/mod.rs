@@ -42,6 +42,10 @@ const SIDE_RANGE_PT: std::ops::RangeInclusive<f32> = 240.0..=480.0;
 pub(super) const VIEW_PARTS: std::ops::RangeInclusive<f32> = 0.15..=0.85;
 /// Width of a window from which on the panel stands beside the run unasked, points: narrower, the run would be squeezed.
 const ROOM_FOR_PANEL_PT: f32 = 900.0;
+/// Width of a window below which the panel takes the room of view and traces, points.
+const ROOM_BESIDE_PANEL_PT: f32 = 560.0;
+/// Height of a window below which its bars are lower, points.
+const LOW_PT: f32 = 480.0;
 
 /// What the window begins with.
 pub enum Start {
@@ -140,7 +144,7 @@ impl Viewer {
                 (Source::Recording, devices, parts, Player::at(moment_s), Window::Whole)
             }
         };
-        let height_mm = SceneBuilder::framing_mm(&parts.shapes, devices.count());
+        let extent = SceneBuilder::extent(&parts.shapes, devices.count());
         Self {
             source,
             heading: Heading::of(devices.history().run()),
@@ -151,7 +155,7 @@ impl Viewer {
             limits: WrenchLimits::default(),
             missing: parts.missing,
             player,
-            view: View3d::new(Canvas::new(device), height_mm),
+            view: View3d::new(Canvas::new(device), extent),
             arrow_force_n: None,
             facts: SceneFacts::default(),
             plots: PlotStack::new(window),
@@ -275,13 +279,20 @@ impl Viewer {
             ui.ctx().request_repaint_after(self.frame);
         }
         let plain = |x: i8, y: i8| Frame::new().fill(palette.panel).inner_margin(Margin::symmetric(x, y));
-        Edge::top("top").exact_size(48.0).frame(plain(16, 4)).show(ui, |ui| self.top(ui, &palette));
+        let is_low = ui.available_height() < LOW_PT;
+        let [top_pt, playback_pt] = if is_low { [40.0, 34.0] } else { [48.0, 44.0] };
+        Edge::top("top").exact_size(top_pt).frame(plain(16, 3)).show(ui, |ui| self.top(ui, &palette));
+        self.messages(ui, &palette);
         if !self.devices.history().is_empty() {
             let is_live = self.source.is_running();
-            Edge::bottom("playback").exact_size(44.0).frame(plain(16, 4)).show(ui, |ui| {
+            Edge::bottom("playback").exact_size(playback_pt).frame(plain(16, 3)).show(ui, |ui| {
                 playback::playback(ui, &mut self.player, self.devices.history(), is_live, &palette);
             });
             if self.is_panel_shown(ui.ctx()) {
+                if ui.available_width() < ROOM_BESIDE_PANEL_PT {
+                    CentralPanel::default().frame(plain(14, 10)).show(ui, |ui| self.side(ui, &palette));
+                    return;
+                }
                 let side = Edge::right("side")
                     .default_size(self.side_pt)
                     .size_range(SIDE_RANGE_PT)

@@ -69,7 +69,7 @@ impl Viewer {
                     // What to press stands beneath it, not before it.
                     let view = area.with_max_y(area.bottom() - ROOM_FOR_WORDS_PT);
                     self.scene(ui, view, &samples);
-                    self.view.keys(ui, SceneBuilder::framing_mm(&self.shapes, self.devices.count()));
+                    self.view.keys(ui, SceneBuilder::extent(&self.shapes, self.devices.count()));
                 }
                 screens::show(ui, area, prompt, palette);
             }

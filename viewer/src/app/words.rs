@@ -1,8 +1,7 @@
-//! How things stand, in words: the state of the run, and what a person should know at this moment.
+//! The state of the run and the messages of the moment, in words.
 
 use super::{Source, Viewer};
 use crate::feed::FeedState;
-use crate::history::Sample;
 use crate::player::Motion;
 use crate::ui::readout;
 use crate::ui::top_bar::RunStatus;
@@ -18,58 +17,65 @@ const FATAL: Events = Events::from_bits(Events::EMERGENCY_STOP.bits() | Events::
 /// How long a remark stays in sight.
 const REMARK: Duration = Duration::from_secs(6);
 
+/// State of the run.
+pub(super) struct State {
+    /// In a word or two, which always have room.
+    pub(super) words: &'static str,
+    /// Whether the state is in order.
+    pub(super) status: RunStatus,
+}
+
 impl Viewer {
-    /// How the run stands, and how well that is.
-    pub(super) fn standing(&self) -> (String, RunStatus) {
+    /// Returns the state of the run.
+    pub(super) fn state(&self) -> State {
         let events = self.devices.newest_events();
-        match &self.source {
-            Source::Waiting(_) => ("no run".to_owned(), RunStatus::Idle),
-            Source::Recording if self.is_rehearsal() => ("running".to_owned(), RunStatus::InOrder),
-            Source::Recording => ("recording".to_owned(), RunStatus::Idle),
+        let (words, status) = match &self.source {
+            Source::Waiting(_) => ("no run", RunStatus::Idle),
+            Source::Recording if self.is_rehearsal() => ("running", RunStatus::InOrder),
+            Source::Recording => ("recording", RunStatus::Idle),
             Source::Live { feed, .. } => match feed.state() {
-                FeedState::Ended(words, EndKind::InOrder) if !events.intersects(FATAL) => {
-                    (words, RunStatus::Idle)
+                FeedState::Ended(_, EndKind::InOrder) if !events.intersects(FATAL) => {
+                    ("ended", RunStatus::Idle)
                 }
-                FeedState::Ended(words, _) => (words, RunStatus::Failed),
-                FeedState::Lost(_) => ("connection lost".to_owned(), RunStatus::Failed),
-                FeedState::Running if feed.is_stale() => ("no ticks come".to_owned(), RunStatus::Failed),
-                FeedState::Running if events.intersects(Events::HOLDING) => {
-                    ("holding".to_owned(), RunStatus::Warning)
+                FeedState::Ended(..) if events.intersects(Events::EMERGENCY_STOP) => {
+                    ("stopped", RunStatus::Failed)
                 }
+                FeedState::Ended(..) => ("failed", RunStatus::Failed),
+                FeedState::Lost(_) => ("connection lost", RunStatus::Failed),
+                FeedState::Running if feed.is_stale() => ("no ticks come", RunStatus::Failed),
+                FeedState::Running if events.intersects(Events::HOLDING) => ("holding", RunStatus::Warning),
                 FeedState::Running if events.intersects(Events::RELEASING) => {
-                    ("fading out".to_owned(), RunStatus::InOrder)
+                    ("fading out", RunStatus::InOrder)
                 }
-                FeedState::Running if events.intersects(Events::RAMPING) => {
-                    ("fading in".to_owned(), RunStatus::InOrder)
-                }
-                FeedState::Running => ("running".to_owned(), RunStatus::InOrder),
+                FeedState::Running if events.intersects(Events::RAMPING) => ("fading in", RunStatus::InOrder),
+                FeedState::Running => ("running", RunStatus::InOrder),
             },
-        }
+        };
+        State { words, status }
     }
 
-    /// What a person should know at this moment.
-    pub(super) fn warnings(&self, sample: &Sample) -> Vec<String> {
+    /// Returns the warnings of the moment, each once, the most urgent first.
+    pub(super) fn warnings(&self) -> Vec<String> {
         let mut said = Vec::new();
+        let mut known = Events::NONE;
         if let Source::Live { feed, .. } = &self.source {
             if feed.is_stale() {
                 said.push("Stale data: no ticks come; look at the terminal of `flotor run`".to_owned());
             }
-            if let FeedState::Lost(reason) = feed.state() {
-                said.push(reason);
+            match feed.state() {
+                // The reason says more than the event of the last tick.
+                FeedState::Ended(reason, _) if self.state().status == RunStatus::Failed => {
+                    said.push(reason);
+                    known = FATAL;
+                }
+                FeedState::Lost(reason) => said.push(reason),
+                FeedState::Ended(..) | FeedState::Running => {}
             }
         }
-        // What happens in a tick is over in a millisecond: it stays in sight a while.
-        let now_s = sample.time_s();
-        let several = self.devices.count() > 1;
-        for (name, history) in self.devices.all() {
-            let mut events = history.at(self.player.now_s).map_or(Events::NONE, |sample| sample.events);
-            if self.player.motion == Motion::Follow {
-                history.between(now_s - IN_SIGHT_S, now_s).for_each(|past| events.insert(past.events));
-            }
-            let of = if several { format!("{name}: ") } else { String::new() };
-            said.extend(readout::happened(events).map(|words| format!("{of}{words}")));
-        }
-        said.extend(readout::of_shapes(&self.facts).map(str::to_owned));
+        let without_known = |events: Events| Events::from_bits(events.bits() & !known.bits());
+        let events = self.recent_events().map(|(name, events)| (name, without_known(events)));
+        let events: Vec<(&str, Events)> = events.collect();
+        said.extend(readout::warnings(&events, &self.facts));
         said.extend(self.missing.iter().cloned());
         let notes = self.devices.history().notes().iter().filter(|note| note.severity == Severity::Error);
         said.extend(notes.map(|note| format!("{}: {}", note.source, note.text)));
@@ -78,9 +84,29 @@ impl Viewer {
         said
     }
 
-    /// That something was done, which is no warning.
-    pub(super) fn done(&self) -> Option<&str> {
+    /// Returns the events of each device by name: those of the moment, and while the run is followed those of the last second, because
+    /// an event of one tick is over in a millisecond.
+    fn recent_events(&self) -> impl Iterator<Item = (&str, Events)> {
+        let now_s = self.player.now_s;
+        self.devices.all().map(move |(name, history)| {
+            let mut events = history.at(now_s).map_or(Events::NONE, |sample| sample.events);
+            if self.player.motion == Motion::Follow {
+                history.between(now_s - IN_SIGHT_S, now_s).for_each(|past| events.insert(past.events));
+            }
+            (name, events)
+        })
+    }
+
+    /// Returns what was done last, or how the run ended in order: no warnings.
+    pub(super) fn done(&self) -> Option<String> {
         let done = self.done.as_ref().filter(|(_, since)| since.elapsed() < REMARK);
-        done.map(|(text, _)| text.as_str())
+        let end = || match &self.source {
+            Source::Live { feed, .. } => match feed.state() {
+                FeedState::Ended(reason, _) => Some(reason),
+                FeedState::Running | FeedState::Lost(_) => None,
+            },
+            Source::Waiting(_) | Source::Recording => None,
+        };
+        done.map(|(text, _)| text.clone()).or_else(end)
     }
 }

@@ -1,9 +1,12 @@
 //! The interface: parts that window, tests and headless pictures put together.
 
+pub mod device_row;
 pub mod force_position;
 pub mod help;
 pub mod legend;
 pub mod marks;
+pub mod messages;
+pub mod overlay;
 pub mod parameters;
 pub mod playback;
 pub mod plot_stack;
@@ -13,5 +16,4 @@ pub mod standing;
 pub mod style;
 pub mod top_bar;
 pub mod view3d;
-pub mod warnings;
 pub mod zoom;

@@ -6,6 +6,9 @@ use crate::player::{Motion, Player, SPEEDS};
 use crate::ui::style::SMALL_PT;
 use egui::{Align, ComboBox, Layout, RichText, Role, Slider, Ui, WidgetInfo};
 
+/// Narrower, the bar has the button, the clock and the slider only, points.
+const ROOM_FOR_ALL_PT: f32 = 480.0;
+
 /// Shows the bar of a recording or of a running host.
 pub fn playback(ui: &mut Ui, player: &mut Player, history: &History, is_live: bool, palette: &Palette) {
     let span_s = history.span_s();
@@ -25,7 +28,10 @@ pub fn playback(ui: &mut Ui, player: &mut Player, history: &History, is_live: bo
         let shown_s = history.seen_at(player.now_s).map_or(player.now_s, Sample::time_s);
         ui.monospace(format!("{shown_s:>8.3} s"));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if is_live {
+            let has_room = ui.available_width() >= ROOM_FOR_ALL_PT - 130.0;
+            if !has_room {
+                // The slider alone.
+            } else if is_live {
                 let text = if player.motion == Motion::Follow { "follows the run" } else { "stands still" };
                 ui.label(RichText::new(text).size(SMALL_PT).color(palette.faint));
             } else {
@@ -39,7 +45,9 @@ pub fn playback(ui: &mut Ui, player: &mut Player, history: &History, is_live: bo
                 });
                 speeds.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, "Speed"));
             }
-            ui.label(RichText::new(format!("{:.1} s", span_s[1])).size(SMALL_PT).color(palette.faint));
+            if has_room {
+                ui.label(RichText::new(format!("{:.1} s", span_s[1])).size(SMALL_PT).color(palette.faint));
+            }
             ui.spacing_mut().slider_width = ui.available_width() - 10.0;
             let mut now_s = player.now_s;
             let slider =

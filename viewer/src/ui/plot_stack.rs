@@ -9,13 +9,12 @@ use crate::quantity::{Quantity, Units};
 use crate::trace::Trace;
 use crate::ui::force_position::ForcePositionPlot;
 use crate::ui::marks::Marks;
+use crate::ui::overlay::width_pt;
 use crate::ui::plots::{Maximise, PlotView, plot};
 use crate::ui::style::SMALL_PT;
-use crate::ui::zoom::ZoomRequest;
+use crate::ui::zoom::{Wheel, ZoomRequest};
 use egui::containers::menu::{MenuButton, MenuConfig};
-use egui::{
-    Color32, ComboBox, PopupCloseBehavior, Rect, RichText, Role, ScrollArea, Ui, UiBuilder, WidgetInfo,
-};
+use egui::{Color32, ComboBox, FontId, PopupCloseBehavior, Rect, RichText, Role, Ui, UiBuilder, WidgetInfo};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -25,13 +24,24 @@ pub const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];
 /// The traces shown to who has not chosen others.
 pub const FIRST_TRACES: [Quantity; 2] = [Quantity::Force, Quantity::Position];
 
-/// Narrower, the choices take two rows, points.
-const ROOM_FOR_ONE_ROW_PT: f32 = 720.0;
-
 /// Lower, the choice of traces is a menu, points.
 const ROOM_FOR_TABS_PT: f32 = 230.0;
-/// No trace is lower than this, points: three marks of an axis are still apart. What finds no room is scrolled to.
+/// Width of the choices of time, units and export, points.
+const PRESENTATION_PT: f32 = 200.0;
+/// Height of the row of choices with the gap beneath, points.
+const CHOICES_PT: f32 = 30.0;
+/// No trace is lower than this, points: three marks of an axis are still apart. Traces without room are scrolled to.
 const LEAST_TRACE_PT: f32 = 48.0;
+/// Height of a trace for which the 3D view gives way, points.
+const GOOD_TRACE_PT: f32 = 60.0;
+/// Width of the number of traces that are out of sight, points.
+const MORE_PT: f32 = 130.0;
+/// Distance of headings and traces, points.
+const GAP_PT: f32 = 3.0;
+/// Turn of the wheel by which the next trace comes into sight, points.
+const SCROLL_PT: f32 = 30.0;
+/// Narrower, force over position has the room of the traces, points.
+const ROOM_BESIDE_PT: f32 = 560.0;
 /// No trace of a picture is lower than this, points: nobody can scroll there, and the marks of the axis need their numbers.
 const LEAST_TRACE_OF_PICTURE_PT: f32 = 58.0;
 /// Height of what stands above a trace, and of the times below the last one, points.
@@ -129,6 +139,12 @@ pub struct PlotStack {
     end_s: f64,
     /// Where the pointer was in the last picture, s.
     hover_s: Option<f64>,
+    /// Number of the first trace in sight, of those that have no room together.
+    first: usize,
+    /// How many traces are out of sight above and below.
+    out_of_sight: [usize; 2],
+    /// Turn of the wheel since the last trace came into sight, points.
+    turned_pt: f32,
 }
 
 impl PlotStack {
@@ -148,7 +164,22 @@ impl PlotStack {
             marks: Marks::default(),
             end_s: f64::INFINITY,
             hover_s: None,
+            first: 0,
+            out_of_sight: [0; 2],
+            turned_pt: 0.0,
         }
+    }
+
+    /// Returns the height with which all traces can be read well, with the choices above them, points.
+    #[must_use]
+    pub fn good_height_pt(&self) -> f32 {
+        CHOICES_PT + (HEADING_PT + GOOD_TRACE_PT) * self.in_sight().len().max(1) as f32 + TIMES_PT
+    }
+
+    /// Returns the height with which one trace can be read, with the choices above it, points.
+    #[must_use]
+    pub const fn least_height_of_one_pt() -> f32 {
+        CHOICES_PT + HEADING_PT + LEAST_TRACE_PT + TIMES_PT
     }
 
     /// Shows what a command line says.
@@ -192,6 +223,7 @@ impl PlotStack {
         }
         // The last time of an axis stands half beside it.
         let mut ui = ui.new_child(UiBuilder::new().max_rect(left.with_max_x(left.right() - 16.0)));
+        ui.spacing_mut().item_spacing.y = GAP_PT;
         let in_sight = self.in_sight();
         let count = in_sight.len().max(1) as f32;
         let height = (ui.available_height() - HEADING_AND_GAPS_PT * count - 16.0) / count;
@@ -206,6 +238,7 @@ impl PlotStack {
                 time_axis,
                 values: self.shown_values_of(*quantity),
                 maximise: Maximise::No,
+                wheel: Wheel::Zooms,
             };
             plot(&mut ui, history, &mut Trace::of(*quantity), view, palette);
         }
@@ -316,26 +349,27 @@ impl PlotStack {
     ) -> Vec<PlotRequest> {
         self.end_s = self.end_of_window(seen.0.span_s(), now_s, motion);
         let mut requests = Vec::new();
-        if ui.available_height() < ROOM_FOR_TABS_PT {
-            ui.horizontal(|ui| {
+        let more_pt = if self.out_of_sight == [0; 2] { 0.0 } else { MORE_PT };
+        let has_tabs = ui.available_height() >= ROOM_FOR_TABS_PT
+            && ui.available_width() >= tabs_pt(ui) + PRESENTATION_PT + more_pt;
+        ui.horizontal(|ui| {
+            if has_tabs {
+                self.quantities(ui, palette);
+            } else {
                 ui.menu_button(RichText::new("Traces").size(SMALL_PT + 0.5), |ui| {
                     ui.horizontal_wrapped(|ui| self.quantities(ui, palette));
                 });
-                self.presentation(ui, &mut requests);
-            });
-        } else if ui.available_width() < ROOM_FOR_ONE_ROW_PT {
-            ui.horizontal_wrapped(|ui| self.quantities(ui, palette));
-            ui.horizontal(|ui| self.presentation(ui, &mut requests));
-        } else {
-            ui.horizontal(|ui| {
-                self.quantities(ui, palette);
-                self.presentation(ui, &mut requests);
-            });
-        }
-        if self.force_position.axis.is_some() {
+            }
+            if ui.available_width() >= PRESENTATION_PT + more_pt {
+                self.more(ui, palette);
+            }
+            self.presentation(ui, &mut requests);
+        });
+        let (span_s, cursor_s) = (self.span_s(seen.0), self.hover_s.unwrap_or(now_s));
+        if self.force_position.axis.is_some() && ui.available_width() < ROOM_BESIDE_PT {
+            self.force_position.show(ui, (seen.0, cursor_s), span_s, self.units, palette);
+        } else if self.force_position.axis.is_some() {
             let (left, beside) = split_for_force_position(ui.available_rect_before_wrap(), 12.0);
-            let span_s = self.span_s(seen.0);
-            let cursor_s = self.hover_s.unwrap_or(now_s);
             let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
             self.force_position.show(&mut right, (seen.0, cursor_s), span_s, self.units, palette);
             let mut left = ui.new_child(UiBuilder::new().max_rect(left).id_salt("over time"));
@@ -346,7 +380,7 @@ impl PlotStack {
         requests
     }
 
-    /// The traces, in the room there is or scrolled.
+    /// Shows the traces: all of them, or as many as have room, with the number of the others.
     fn over_time(
         &mut self,
         ui: &mut Ui,
@@ -355,26 +389,59 @@ impl PlotStack {
         palette: &Palette,
         requests: &mut Vec<PlotRequest>,
     ) {
-        let count = self.in_sight().len().max(1) as f32;
-        let room = (ui.available_height() - HEADING_PT * count - TIMES_PT) / count;
-        let mut stack = |ui: &mut Ui| self.stack(ui, seen, now_s, room.max(LEAST_TRACE_PT), palette);
-        if room >= LEAST_TRACE_PT {
-            requests.extend(stack(ui));
-        } else {
-            requests.extend(ScrollArea::vertical().auto_shrink(false).show(ui, stack).inner);
+        let all = self.in_sight();
+        let room_for = |count: usize| {
+            let count = count.max(1) as f32;
+            (ui.available_height() - HEADING_PT * count - TIMES_PT) / count
+        };
+        let fits = |count: &usize| room_for(*count) >= LEAST_TRACE_PT;
+        let count = (1..=all.len()).rev().find(fits).unwrap_or(1);
+        let wheel = if count < all.len() { Wheel::Scrolls } else { Wheel::Zooms };
+        self.scroll(ui, all.len().saturating_sub(count));
+        let shown = all.get(self.first..self.first + count).unwrap_or(&all);
+        self.out_of_sight = [self.first, all.len().saturating_sub(self.first + count)];
+        let height_pt = room_for(count).max(LEAST_TRACE_PT);
+        requests.extend(self.stack(ui, seen, now_s, (shown, height_pt, wheel), palette));
+    }
+
+    /// Shows how many traces are out of sight.
+    fn more(&self, ui: &mut Ui, palette: &Palette) {
+        let counts = self.out_of_sight.into_iter().zip(["above", "below"]).filter(|(count, _)| *count > 0);
+        let more: Vec<String> = counts.map(|(count, place)| format!("{count} more {place}")).collect();
+        if !more.is_empty() {
+            ui.label(RichText::new(more.join(", ")).size(SMALL_PT).color(palette.faint))
+                .on_hover_text("The wheel scrolls the traces; with Alt it zooms values");
         }
     }
 
-    /// The traces of this height, one above the other.
+    /// Brings the next trace into sight, or the one before, when the wheel turns over the traces.
+    fn scroll(&mut self, ui: &Ui, last: usize) {
+        let is_over = ui.rect_contains_pointer(ui.available_rect_before_wrap());
+        let turned = |input: &egui::InputState| (input.smooth_scroll_delta().y, input.modifiers.alt);
+        let (turn_pt, zooms) = ui.input(turned);
+        if is_over && !zooms {
+            self.turned_pt -= turn_pt;
+        }
+        if last == 0 {
+            self.turned_pt = 0.0;
+        }
+        let steps = (self.turned_pt / SCROLL_PT).trunc();
+        self.turned_pt -= steps * SCROLL_PT;
+        #[allow(clippy::cast_possible_truncation)] // a handful
+        let first = self.first.saturating_add_signed(steps as isize);
+        self.first = first.min(last);
+    }
+
+    /// Shows traces of a height, one above the other.
     fn stack(
         &mut self,
         ui: &mut Ui,
         (history, device): (&History, Option<&str>),
         now_s: f64,
-        height: f32,
+        (shown, height_pt, wheel): (&[Quantity], f32, Wheel),
         palette: &Palette,
     ) -> Vec<PlotRequest> {
-        let (span_s, shown) = (self.span_s(history), self.in_sight());
+        let span_s = self.span_s(history);
         let cursor_s = self.hover_s.unwrap_or(now_s);
         let maximise = match (self.alone, self.shown.len()) {
             (Some(_), _) => Maximise::Done,
@@ -382,13 +449,23 @@ impl PlotStack {
             (None, _) => Maximise::Possible,
         };
         self.hover_s = None;
+        ui.spacing_mut().item_spacing.y = GAP_PT;
         let mut requests = Vec::new();
         for (index, quantity) in shown.iter().copied().enumerate() {
             let time_axis = index + 1 == shown.len();
-            let height = if time_axis { height + 14.0 } else { height };
+            let height = if time_axis { height_pt + 14.0 } else { height_pt };
             let values = self.shown_values_of(quantity);
-            let view =
-                PlotView { device, span_s, cursor_s, units: self.units, height, time_axis, values, maximise };
+            let view = PlotView {
+                device,
+                span_s,
+                cursor_s,
+                units: self.units,
+                height,
+                time_axis,
+                values,
+                maximise,
+                wheel,
+            };
             let trace = self.traces.entry(quantity).or_insert_with(|| Trace::of(quantity));
             let answer = plot(ui, history, trace, view, palette);
             if time_axis {
@@ -510,4 +587,13 @@ fn split_for_force_position(all: Rect, gap_pt: f32) -> (Rect, Rect) {
     const PART: f32 = 0.36;
     let beside = all.with_min_x(all.right() - (PART * all.width()).round());
     (all.with_max_x(beside.left() - gap_pt), beside)
+}
+
+/// Returns the width of the choice of quantities, points.
+fn tabs_pt(ui: &Ui) -> f32 {
+    let font = FontId::proportional(SMALL_PT + 0.5);
+    let names = Quantity::ALL.iter().map(|quantity| quantity.name()).chain(["F(x)"]);
+    let tab_pt =
+        |name| width_pt(ui.painter(), name, font.clone()) + 2.0 * ui.spacing().button_padding.x + 4.0;
+    names.map(tab_pt).sum()
 }

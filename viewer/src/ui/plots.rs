@@ -4,9 +4,10 @@ use crate::history::History;
 use crate::palette::Palette;
 use crate::quantity::{Quantity, Units};
 use crate::trace::Trace;
+use crate::ui::overlay::{shortened, width_pt};
 use crate::ui::style::quiet;
-use crate::ui::zoom::{ZoomRequest, requested};
-use egui::{Align, Layout, Stroke, Ui};
+use crate::ui::zoom::{Wheel, ZoomRequest, requested};
+use egui::{Align, Layout, Stroke, TextStyle, Ui, vec2};
 use egui_plot::{AxisHints, GridMark, HPlacement, Line, Plot, PlotPoints, VLine};
 
 /// How a plot is shown.
@@ -28,6 +29,8 @@ pub struct PlotView<'a> {
     pub values: Option<[f64; 2]>,
     /// Whether it can have the room of all.
     pub maximise: Maximise,
+    /// Effect of the wheel.
+    pub wheel: Wheel,
 }
 
 /// Whether a trace can have the room of all, and whether it has.
@@ -73,6 +76,9 @@ pub fn plot(
     let buckets = ui.available_width().max(50.0) as usize;
     let traces = trace.points(history, span_s, buckets, per_si);
 
+    // The mark at the end of the values has room for its number.
+    #[allow(clippy::cast_possible_truncation)] // a part
+    let margin = (1.3 * part_of_number(height) as f32).max(0.08);
     let y_axis = y_axis(52.0);
     let x_axis = AxisHints::new_x().formatter(|mark, _| format!("{} s", short(mark.value)));
     // Bounds once set stay with a plot: one that shows all values is another than one that is zoomed.
@@ -81,10 +87,10 @@ pub fn plot(
         .show_axes([time_axis, true])
         .custom_x_axes(vec![x_axis])
         .custom_y_axes(vec![y_axis])
-        .set_margin_fraction(egui::vec2(0.0, 0.08))
+        .set_margin_fraction(vec2(0.0, margin))
         .include_x(span_s[0])
         .include_x(span_s[1]);
-    let plot = plain(plot, palette);
+    let plot = plain(plot, palette).y_grid_spacer(move |grid| marks_inside(grid.bounds, height));
     // Zero is in sight unless somebody chose other values.
     let plot = if values.is_none() { plot.include_y(0.0) } else { plot };
     let shown = plot.show(ui, |plot| {
@@ -114,7 +120,7 @@ pub fn plot(
     PlotAnswer {
         seek_s: shown.inner.map(|at| at.x).filter(|_| pressed),
         hover_s,
-        zoom: requested(ui, &shown, palette),
+        zoom: requested(ui, &shown, view.wheel, palette),
         switches_maximised,
         frame: *shown.transform.frame(),
     }
@@ -134,6 +140,19 @@ pub(super) fn plain<'a>(plot: Plot<'a>, palette: &Palette) -> Plot<'a> {
         .label_formatter(|_| None)
 }
 
+/// Returns the marks of an axis so high, points, without those at its ends: their numbers would stand in the text beyond it.
+fn marks_inside(bounds: (f64, f64), height_pt: f32) -> Vec<GridMark> {
+    let margin = (bounds.1 - bounds.0) * part_of_number(height_pt);
+    let is_inside = |mark: &GridMark| mark.value >= bounds.0 + margin && mark.value <= bounds.1 - margin;
+    marks(bounds).into_iter().filter(is_inside).collect()
+}
+
+/// Returns half the height of a number as a part of an axis so high, points.
+fn part_of_number(height_pt: f32) -> f64 {
+    const HALF_PT: f64 = 6.0;
+    (HALF_PT / f64::from(height_pt)).min(0.2)
+}
+
 /// The axis of values, to the left, at least so wide.
 pub(super) fn y_axis<'a>(least_pt: f32) -> AxisHints<'a> {
     AxisHints::new_y()
@@ -143,7 +162,9 @@ pub(super) fn y_axis<'a>(least_pt: f32) -> AxisHints<'a> {
         .formatter(|mark, _| short(mark.value))
 }
 
-/// Name, unit and values at the cursor; whether the button for the room of all was pressed.
+/// Shows name, unit and values at the cursor; returns whether the button for the room of all was pressed.
+///
+/// In a narrow plot the values are left out first, then the names of the components; the name of the device is shortened.
 fn heading(
     ui: &mut Ui,
     history: &History,
@@ -151,34 +172,95 @@ fn heading(
     view: &PlotView<'_>,
     palette: &Palette,
 ) -> bool {
-    let (unit, per_si) = quantity.unit(view.units);
+    let (unit, _) = quantity.unit(view.units);
     let mut pressed = false;
-    ui.horizontal(|ui| {
-        ui.add_space(4.0);
-        if let Some(device) = view.device {
-            ui.weak(device);
-        }
-        ui.strong(quantity.name());
-        ui.weak(unit);
-        let sample = history.seen_at(view.cursor_s);
-        for (component, name) in quantity.components().iter().enumerate() {
-            ui.add_space(10.0);
-            ui.colored_label(palette.components[component % 3], *name);
-            let value = sample.map_or(f64::NAN, |sample| quantity.value(sample, component) * per_si);
-            if view.cursor_s.is_finite() {
-                ui.monospace(digits(value, view.units));
-            }
-        }
-        let (sign, help) = match view.maximise {
-            Maximise::No => return,
-            Maximise::Possible => ("🗖", format!("{} alone (M)", quantity.name())),
-            Maximise::Done => ("🗗", "All traces (M)".to_owned()),
-        };
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            pressed = quiet(ui, sign, &help).clicked();
-        });
-    });
+    ui.allocate_ui_with_layout(
+        vec2(ui.available_width(), HEADING_PT),
+        Layout::right_to_left(Align::Center),
+        |ui| {
+            let button = match view.maximise {
+                Maximise::No => None,
+                Maximise::Possible => Some(("🗖", format!("{} alone (M)", quantity.name()))),
+                Maximise::Done => Some(("🗗", "All traces (M)".to_owned())),
+            };
+            pressed = button.is_some_and(|(sign, help)| quiet(ui, sign, &help).clicked());
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.add_space(4.0);
+                let (values, values_pt) = values_with_room(ui, history, quantity, view);
+                if let Some(device) = view.device {
+                    let most_pt = ui.available_width() - values_pt - name_pt(ui, quantity, unit);
+                    shortened_label(ui, device, most_pt);
+                }
+                ui.strong(quantity.name());
+                ui.weak(unit);
+                for (component, name, value) in values {
+                    ui.add_space(COMPONENT_GAP_PT);
+                    ui.colored_label(palette.components[component % 3], name);
+                    if !value.is_empty() {
+                        ui.monospace(value);
+                    }
+                }
+            });
+        },
+    );
     pressed
+}
+
+/// Height of a heading, and additional distance between two components in it, points.
+const HEADING_PT: f32 = 22.0;
+const COMPONENT_GAP_PT: f32 = 10.0;
+/// A name of a device that is shortened to less says nothing, points.
+const LEAST_DEVICE_PT: f32 = 40.0;
+
+/// Returns number, name and value at the cursor of the components that have room beside the name of the quantity, and their width.
+fn values_with_room(
+    ui: &Ui,
+    history: &History,
+    quantity: Quantity,
+    view: &PlotView<'_>,
+) -> (Vec<(usize, &'static str, String)>, f32) {
+    let (unit, per_si) = quantity.unit(view.units);
+    let sample = history.seen_at(view.cursor_s);
+    let value = |component: usize| {
+        let value = sample.map_or(f64::NAN, |sample| quantity.value(sample, component) * per_si);
+        if view.cursor_s.is_finite() { digits(value, view.units) } else { String::new() }
+    };
+    let components = || quantity.components().iter().copied().enumerate();
+    let with_values = components().map(|(component, name)| (component, name, value(component)));
+    let names_only = components().map(|(component, name)| (component, name, String::new()));
+    let gap_pt = ui.spacing().item_spacing.x;
+    let room_pt = ui.available_width() - name_pt(ui, quantity, unit);
+    for parts in [with_values.collect::<Vec<_>>(), names_only.collect()] {
+        let part_pt = |(_, name, value): &(usize, &str, String)| {
+            let value_pt =
+                if value.is_empty() { 0.0 } else { gap_pt + text_pt(ui, value, TextStyle::Monospace) };
+            COMPONENT_GAP_PT + 2.0 * gap_pt + text_pt(ui, name, TextStyle::Body) + value_pt
+        };
+        let parts_pt = parts.iter().map(part_pt).sum::<f32>();
+        if parts_pt <= room_pt {
+            return (parts, parts_pt);
+        }
+    }
+    (Vec::new(), 0.0)
+}
+
+/// Width of the name of a quantity with its unit, points.
+fn name_pt(ui: &Ui, quantity: Quantity, unit: &str) -> f32 {
+    let gaps_pt = 3.0 * ui.spacing().item_spacing.x + 4.0;
+    text_pt(ui, quantity.name(), TextStyle::Body) + text_pt(ui, unit, TextStyle::Body) + gaps_pt
+}
+
+fn text_pt(ui: &Ui, text: &str, style: TextStyle) -> f32 {
+    width_pt(ui.painter(), text, style.resolve(ui.style()))
+}
+
+/// Shows a name, shortened to a width, points; nothing where nothing of it could be read.
+fn shortened_label(ui: &mut Ui, name: &str, most_pt: f32) {
+    if most_pt >= LEAST_DEVICE_PT {
+        let color = ui.visuals().weak_text_color();
+        let galley = shortened(ui.painter(), name, TextStyle::Body.resolve(ui.style()), color, most_pt);
+        ui.label(galley).on_hover_text(name);
+    }
 }
 
 /// A number as it is read in these units: of metres and joules the digits that matter are behind the third place.

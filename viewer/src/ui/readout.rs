@@ -1,24 +1,32 @@
-//! What stands in the corners of the 3D view: title, numbers of the moment, warnings.
+//! Texts of a moment: title, numbers, warnings.
 
 use crate::history::Sample;
 use crate::palette::Palette;
 use crate::quantity::{Quantity, Units};
 use crate::scene::SceneFacts;
+use crate::ui::overlay::{Corner, GAP_PT, MARGIN_PT, Overlay, shortened};
 use crate::ui::plots::digits;
 use crate::ui::style::{BODY_PT, SMALL_PT, TITLE_PT};
-use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, vec2};
+use egui::{Align2, Color32, FontId, vec2};
 use flotor_core::Clock;
 use flotor_core::trace::Events;
 use flotor_record::RunDescription;
 
-/// Distance of text from the edges, points.
-const MARGIN: f32 = 22.0;
-
-/// Narrower, the numbers would stand before the body: the time has to do, and those above the traces, points.
-const ROOM_FOR_NUMBERS_PT: f32 = 560.0;
+/// Part of the width of the view that rows of numbers may take: beyond it they would cover the body.
+const MOST_OF_WIDTH: f32 = 0.5;
+/// Height of a row of numbers, points.
+const ROW_PT: f32 = BODY_PT + 3.0;
+/// Width of the units at the end of the rows, with a gap, and of their names, points.
+const UNIT_PT: f32 = 42.0;
+const NAME_PT: f32 = 66.0;
+/// Characters of the name of a device in a warning, at most.
+const MOST_OF_NAME: usize = 20;
 
 /// The energy of models of which one does not give its own.
 const NOT_GIVEN: &str = "not given";
+
+/// Events of the loop: they concern all devices.
+const OF_THE_LOOP: Events = Events::MISSED;
 
 /// Title of a run and what it was made with.
 #[must_use]
@@ -40,67 +48,109 @@ pub fn subtitle_of(run: &RunDescription) -> String {
     parts.collect::<Vec<_>>().join("  ·  ")
 }
 
-/// Paints title and subtitle into the upper left.
-pub fn title(painter: &Painter, area: Rect, run: &RunDescription, palette: &Palette) {
-    let corner = area.left_top() + vec2(MARGIN, MARGIN - 4.0);
-    let text = |at: Pos2, text: String, size: f32, color: Color32| {
-        painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(size), color)
-    };
-    let first = text(corner, title_of(run), TITLE_PT, palette.text);
-    text(first.left_bottom() + vec2(0.0, 3.0), subtitle_of(run), SMALL_PT, palette.faint);
+/// Paints the title and the subtitle of a run, shortened, into the upper left.
+pub fn title(overlay: &mut Overlay, run: &RunDescription, palette: &Palette) {
+    line(overlay, &title_of(run), TITLE_PT, palette.text);
+    line(overlay, &subtitle_of(run), SMALL_PT, palette.faint);
 }
 
-/// Paints the numbers of a moment into the upper right, a line a quantity.
-pub fn numbers(painter: &Painter, area: Rect, sample: &Sample, units: Units, palette: &Palette) {
-    let right = area.right() - MARGIN;
-    let mut y = area.top() + MARGIN - 2.0;
-    let line = BODY_PT + 6.0;
-    let (large, mono) = (FontId::monospace(BODY_PT + 3.0), FontId::monospace(BODY_PT - 1.0));
-    let (small, name) = (FontId::proportional(SMALL_PT), FontId::proportional(SMALL_PT + 0.5));
-    let time = format!("{:.3} s", sample.time_s());
-    painter.text(Pos2::new(right, y), Align2::RIGHT_TOP, time, large, palette.text);
-    y += line + 6.0;
-    if area.width() < ROOM_FOR_NUMBERS_PT {
-        return;
+/// Returns the height of title, subtitle and so many warnings, points.
+#[must_use]
+pub fn heading_pt(warnings: usize) -> f32 {
+    /// Height of a line of text, part of its size.
+    const LINE: f32 = 1.4;
+    let lines_pt = TITLE_PT + SMALL_PT + warnings as f32 * BODY_PT;
+    2.0 * MARGIN_PT + LINE * lines_pt + GAP_PT * (1 + warnings) as f32
+}
+
+/// Paints warnings, shortened, beneath the title.
+pub fn paint_warnings(overlay: &mut Overlay, warnings: &[String], palette: &Palette) {
+    warnings.iter().for_each(|warning| line(overlay, &format!("⚠ {warning}"), BODY_PT, palette.warning));
+}
+
+/// Paints a line, shortened to the width of the view, into the upper left.
+fn line(overlay: &mut Overlay, text: &str, size_pt: f32, color: Color32) {
+    let width_pt = overlay.inside().width();
+    let galley = shortened(overlay.painter(), text, FontId::proportional(size_pt), color, width_pt);
+    if let Some(rect) = overlay.take(Corner::LeftTop, galley.size()) {
+        overlay.painter().galley(rect.min, galley, color);
     }
-    let column = match units {
-        Units::Handy => 60.0,
-        Units::Si => 76.0,
-    };
+}
+
+/// One row of numbers: up to three values of one unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NumberRow {
+    /// Name of the quantity.
+    pub name: &'static str,
+    /// Values, from the left, with their colours.
+    pub values: Vec<(String, Color32)>,
+    /// Unit of the values.
+    pub unit: &'static str,
+}
+
+/// Returns the rows of numbers of a sample, the most important first.
+#[must_use]
+pub fn rows(sample: &Sample, units: Units, palette: &Palette) -> Vec<NumberRow> {
     let shown = [Quantity::Force, Quantity::Torque, Quantity::Position, Quantity::Rotation, Quantity::Energy];
-    for quantity in shown {
-        // In a low view the last ones would stand before what is below it.
-        if y + line > area.bottom() {
-            return;
-        }
+    let row = |quantity: Quantity| {
         let (unit, per_si) = quantity.unit(units);
-        painter.text(Pos2::new(right - 34.0, y), Align2::LEFT_TOP, unit, small.clone(), palette.faint);
-        let mut x = right - 42.0;
-        for component in (0..quantity.components().len()).rev() {
+        let count = quantity.components().len();
+        let value = |component: usize| {
             let value = quantity.value(sample, component) * per_si;
-            let value = match quantity {
+            let text = match quantity {
                 Quantity::Energy if value.is_nan() => NOT_GIVEN.to_owned(),
                 _ => digits(value, units),
             };
-            let color =
-                if quantity.components().len() == 3 { palette.components[component] } else { palette.text };
-            painter.text(Pos2::new(x, y), Align2::RIGHT_TOP, value, mono.clone(), color);
-            x -= column;
+            (text, if count == 3 { palette.components[component] } else { palette.text })
+        };
+        NumberRow { name: quantity.name(), values: (0..count).map(value).collect(), unit }
+    };
+    shown.into_iter().map(row).collect()
+}
+
+/// Paints the time, s, and rows of numbers into the upper right, as far as there is room.
+pub fn numbers(overlay: &mut Overlay, time_s: f64, rows: &[NumberRow], units: Units, palette: &Palette) {
+    clock(overlay, time_s, palette);
+    let column_pt = match units {
+        Units::Handy => 60.0,
+        Units::Si => 76.0,
+    };
+    let size = vec2(UNIT_PT + 3.0 * column_pt + NAME_PT, ROW_PT);
+    if size.x > MOST_OF_WIDTH * overlay.inside().width() {
+        return;
+    }
+    let (mono, small) = (FontId::monospace(BODY_PT - 1.0), FontId::proportional(SMALL_PT));
+    for row in rows {
+        let Some(rect) = overlay.take(Corner::RightTop, size) else { return };
+        let text = |x: f32, align: Align2, text: &str, font: &FontId, color: Color32| {
+            overlay.painter().text(egui::pos2(x, rect.center().y), align, text, font.clone(), color);
+        };
+        let values_end = rect.right() - UNIT_PT;
+        text(values_end + 8.0, Align2::LEFT_CENTER, row.unit, &small, palette.faint);
+        for (column, (value, color)) in row.values.iter().rev().enumerate() {
+            text(values_end - column as f32 * column_pt, Align2::RIGHT_CENTER, value, &mono, *color);
         }
-        x = right - 42.0 - 3.0 * column;
-        painter.text(Pos2::new(x - 4.0, y), Align2::RIGHT_TOP, quantity.name(), name.clone(), palette.faint);
-        y += line;
+        text(values_end - 3.0 * column_pt - 4.0, Align2::RIGHT_CENTER, row.name, &small, palette.faint);
     }
 }
 
-/// What people should know about a moment, and what to do about it; most urgent first.
-#[must_use]
-pub fn warnings(sample: &Sample, facts: &SceneFacts) -> Vec<&'static str> {
-    happened(sample.events).chain(of_shapes(facts)).collect()
+fn clock(overlay: &mut Overlay, time_s: f64, palette: &Palette) {
+    let font = FontId::monospace(BODY_PT + 3.0);
+    let galley = overlay.painter().layout_no_wrap(format!("{time_s:.3} s"), font, palette.text);
+    if let Some(rect) = overlay.take(Corner::RightTop, galley.size()) {
+        overlay.painter().galley(rect.min, galley, palette.text);
+    }
 }
 
-/// What people should know about what happened to a device.
-pub fn happened(events: Events) -> impl Iterator<Item = &'static str> {
+/// Returns the warnings about events of devices by name and about their bodies, each once, the most urgent first.
+#[must_use]
+pub fn warnings(devices: &[(&str, Events)], facts: &SceneFacts) -> Vec<String> {
+    happened(devices).into_iter().chain(of_shapes(facts).map(str::to_owned)).collect()
+}
+
+/// Returns the warnings about events of devices by name, each once: with the names of its devices where there are several.
+#[must_use]
+pub fn happened(devices: &[(&str, Events)]) -> Vec<String> {
     const WORDS: [(Events, &str); 10] = [
         (Events::DEVICE_FAULT, "Device fault: force is off; see the log for what to do"),
         (Events::MODEL_FAULT, "A model failed: it gives no force any more; stop and look at the log"),
@@ -113,7 +163,26 @@ pub fn happened(events: Events) -> impl Iterator<Item = &'static str> {
         (Events::MISSED, "Late: ticks were missed; `flotor doctor` says how to keep time"),
         (Events::MODEL_DEGRADED, "The model left its domain: its answer is a safe continuation"),
     ];
-    WORDS.iter().filter(move |(event, _)| events.intersects(*event)).map(|(_, words)| *words)
+    let warning = |(event, words): &(Events, &str)| {
+        let concerned = devices.iter().filter(|(_, events)| events.intersects(*event));
+        let names: Vec<String> = concerned.map(|(name, _)| short_name(name)).collect();
+        match names.len() {
+            0 => None,
+            _ if devices.len() == 1 || event.intersects(OF_THE_LOOP) => Some((*words).to_owned()),
+            // The words first: a narrow window shortens the names.
+            count if count == devices.len() => Some(format!("{words} (all devices)")),
+            _ => Some(format!("{words} ({})", names.join(", "))),
+        }
+    };
+    WORDS.iter().filter_map(warning).collect()
+}
+
+/// Shortens a long name with "…".
+fn short_name(name: &str) -> String {
+    if name.chars().count() <= MOST_OF_NAME {
+        return name.to_owned();
+    }
+    name.chars().take(MOST_OF_NAME - 1).chain(['…']).collect()
 }
 
 /// What people should know about the bodies that are drawn.
@@ -126,12 +195,25 @@ pub fn of_shapes(facts: &SceneFacts) -> impl Iterator<Item = &'static str> {
     shape.into_iter().filter(|(is, _)| *is).map(|(_, words)| words)
 }
 
-/// Paints warnings beneath the title.
-pub fn paint_warnings(painter: &Painter, area: Rect, warnings: &[&str], palette: &Palette) {
-    let mut at = area.left_top() + vec2(MARGIN, MARGIN + TITLE_PT + SMALL_PT + 18.0);
-    for warning in warnings {
-        let text = format!("⚠ {warning}");
-        let shown = painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(BODY_PT), palette.warning);
-        at = shown.left_bottom() + vec2(0.0, 4.0);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_is_given_once_and_names_devices_unless_it_is_about_the_loop() {
+        let late = Events::MISSED;
+        let mut late_and_hard = late;
+        late_and_hard.insert(Events::FORCE_LIMITED);
+        let devices =
+            [("left", late_and_hard), ("right", late), ("a-name-of-more-than-twenty-letters", late_and_hard)];
+        let warnings = happened(&devices);
+        assert_eq!(warnings.len(), 2, "{warnings:?}");
+        assert!(warnings[0].starts_with("Excess force"), "{warnings:?}");
+        assert!(warnings[0].ends_with("(left, a-name-of-more-than…)"), "{warnings:?}");
+        let all = happened(&[("left", Events::FORCE_LIMITED), ("right", Events::FORCE_LIMITED)]);
+        assert!(all[0].ends_with("(all devices)"), "{all:?}");
+        assert!(warnings[1].starts_with("Late: ticks were missed"), "{warnings:?}");
+        assert!(happened(&devices[..1])[0].starts_with("Excess force"), "the only device needs no name");
+        assert!(happened(&[("left", Events::NONE)]).is_empty());
     }
 }

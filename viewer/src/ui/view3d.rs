@@ -6,7 +6,7 @@ use crate::palette::{Look, Palette};
 use crate::scene::{ArrowScale, SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2};
-use flotor_drawing::camera::Camera;
+use flotor_drawing::camera::{Camera, Extent};
 use flotor_hal::Pose;
 
 /// Turn for a drag over a point of the screen, rad.
@@ -35,8 +35,10 @@ pub struct Subject<'a> {
 pub struct View3d {
     /// From where.
     pub camera: Camera,
-    /// From where without anybody's turning: it stays where it was put when a body grows.
-    first: Camera,
+    /// Extent of the bodies when the view was reset last: the camera stays where it was put when a body grows.
+    extent: Extent,
+    /// Width of the view to its height.
+    aspect: f64,
     /// Whether force and torque are drawn.
     pub shows_arrows: bool,
     canvas: Canvas,
@@ -57,13 +59,14 @@ struct Look3d {
 }
 
 impl View3d {
-    /// The experimenter's view of a body so high.
+    /// The experimenter's view of bodies.
     #[must_use]
-    pub fn new(canvas: Canvas, height_mm: f64) -> Self {
-        let first = Camera::experimenter(height_mm);
+    pub fn new(canvas: Canvas, extent: Extent) -> Self {
+        const ASPECT: f64 = 2.0;
         Self {
-            camera: first,
-            first,
+            camera: Camera::fitting(extent, ASPECT),
+            extent,
+            aspect: ASPECT,
             shows_arrows: true,
             canvas,
             builder: SceneBuilder::default(),
@@ -71,16 +74,30 @@ impl View3d {
         }
     }
 
-    /// The experimenter's view of a body so high.
-    pub fn reset(&mut self, height_mm: f64) {
-        self.first = Camera::experimenter(height_mm);
-        self.camera = self.first;
+    /// Returns to the experimenter's view, of bodies of this extent.
+    pub fn reset(&mut self, extent: Extent) {
+        self.extent = extent;
+        self.camera = self.first();
     }
 
-    /// Whether the camera is elsewhere than where it was put last.
+    /// Returns whether the camera is elsewhere than where it was put last.
     #[must_use]
     pub fn is_turned(&self) -> bool {
-        self.camera != self.first
+        self.camera != self.first()
+    }
+
+    /// Returns the experimenter's view in the present shape of the view.
+    fn first(&self) -> Camera {
+        Camera::fitting(self.extent, self.aspect)
+    }
+
+    /// Follows a change of the shape of the view, with a camera that nobody has turned.
+    fn fit(&mut self, area: Rect) {
+        let is_turned = self.is_turned();
+        self.aspect = f64::from(area.width() / area.height().max(1.0));
+        if !is_turned {
+            self.camera = self.first();
+        }
     }
 
     /// Corners of triangles put together so far: none for a picture in which nothing has moved.
@@ -91,7 +108,8 @@ impl View3d {
 
     /// Shows the scene in a rectangle, follows the mouse, and says what is in the picture.
     pub fn show(&mut self, ui: &mut Ui, area: Rect, look: Look, subject: Subject<'_>) -> SceneFacts {
-        let height_mm = SceneBuilder::framing_mm(subject.shapes, subject.samples.len());
+        let extent = SceneBuilder::extent(subject.shapes, subject.samples.len());
+        self.fit(area);
         let response = ui.interact(area, ui.scope_id().with("3d view"), Sense::click_and_drag());
         if response.dragged_by(PointerButton::Primary) {
             let moved = response.drag_delta();
@@ -100,10 +118,10 @@ impl View3d {
         }
         if response.hovered() {
             let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
-            self.camera.zoom(ZOOM_PER_POINT.powf(f64::from(scroll)) * f64::from(pinch), height_mm);
+            self.camera.zoom(ZOOM_PER_POINT.powf(f64::from(scroll)) * f64::from(pinch), extent.height_mm);
         }
         if response.double_clicked() {
-            self.reset(height_mm);
+            self.reset(extent);
         }
         let (texture, facts) = self.picture(ui, area.size(), look, subject);
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
@@ -115,7 +133,7 @@ impl View3d {
     }
 
     /// Follows the keys that turn and zoom: W A S D, plus, minus, R for the experimenter's view.
-    pub fn keys(&mut self, ui: &Ui, height_mm: f64) {
+    pub fn keys(&mut self, ui: &Ui, extent: Extent) {
         ui.input(|input| {
             if input.modifiers.command || input.modifiers.alt {
                 return;
@@ -128,10 +146,10 @@ impl View3d {
                 self.camera.orbit(turn * ORBIT_RAD_PER_KEY, incline * INCLINE_RAD_PER_KEY);
             }
             if nearer != 0.0 {
-                self.camera.zoom(ZOOM_PER_KEY.powf(nearer), height_mm);
+                self.camera.zoom(ZOOM_PER_KEY.powf(nearer), extent.height_mm);
             }
             if input.key_pressed(Key::R) {
-                self.reset(height_mm);
+                self.reset(extent);
             }
         });
     }

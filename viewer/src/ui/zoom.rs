@@ -17,14 +17,28 @@ pub enum ZoomRequest {
     All,
 }
 
+/// Effect of the wheel over a trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wheel {
+    /// It zooms the values: all traces are in sight.
+    Zooms,
+    /// It scrolls the traces; with Alt it zooms the values.
+    Scrolls,
+}
+
 /// Zoom for a point of the wheel.
 const ZOOM_PER_POINT: f64 = 1.003;
 /// A box smaller than this in a direction leaves that direction as it is, points.
 const LEAST_BOX_PT: f32 = 6.0;
 
-/// What the mouse asks of a plot: the right button draws a box, the wheel zooms the values about the pointer, the wheel with Ctrl the
-/// time, the middle button shifts the time, and a double click shows all of it again.
-pub fn requested<R>(ui: &Ui, shown: &PlotResponse<R>, palette: &Palette) -> Option<ZoomRequest> {
+/// Returns the request of the mouse: the right button draws a box, the wheel zooms the values about the pointer unless it scrolls, the
+/// wheel with Ctrl the time, the middle button shifts the time, and a double click shows all of the trace again.
+pub fn requested<R>(
+    ui: &Ui,
+    shown: &PlotResponse<R>,
+    wheel: Wheel,
+    palette: &Palette,
+) -> Option<ZoomRequest> {
     let (response, transform) = (&shown.response, &shown.transform);
     if response.double_clicked() {
         return Some(ZoomRequest::All);
@@ -49,7 +63,7 @@ pub fn requested<R>(ui: &Ui, shown: &PlotResponse<R>, palette: &Palette) -> Opti
     if pinch != 1.0 {
         return Some(ZoomRequest::Time(about(at.x, time_s, pinch)));
     }
-    if scroll != 0.0 {
+    if scroll != 0.0 && (wheel == Wheel::Zooms || ui.input(|input| input.modifiers.alt)) {
         // What lies around the traces does not scroll as well.
         ui.input_mut(|input| input.smooth_scroll_delta = Vec2::ZERO);
         return Some(ZoomRequest::Values(about(at.y, values, ZOOM_PER_POINT.powf(f64::from(scroll)))));

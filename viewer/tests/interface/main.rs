@@ -9,5 +9,6 @@ mod recording;
 mod sitting;
 #[path = "../support/mod.rs"]
 mod support;
+mod texts;
 mod traces;
 mod window;

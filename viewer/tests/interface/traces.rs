@@ -52,9 +52,38 @@ fn five_traces_at_twice_the_scale_can_be_read() {
         window.key_press(Key::Escape);
         window.run_steps(2);
     }
-    for label in [FORCE, "Torque over time, mN·m", "Velocity over time, mm/s", "Energy over time, mJ"] {
-        assert!(area(&window, label).height() >= 48.0, "{label}: {:?}", area(&window, label));
+    // From the top, and with the wheel to the others: those in sight can be read, and the number of the others is said.
+    let all = [
+        FORCE,
+        "Torque over time, mN·m",
+        "Position over time, mm",
+        "Velocity over time, mm/s",
+        "Energy over time, mJ",
+    ];
+    let in_sight = |window: &Window<'_>| {
+        let shown: Vec<&str> =
+            all.into_iter().filter(|label| window.query_by_label(label).is_some()).collect();
+        shown.iter().for_each(|label| assert!(area(window, label).height() >= 46.0, "{label} is too low"));
+        shown
+    };
+    let first = in_sight(&window);
+    assert!(first.starts_with(&all[..1]) && first.len() < all.len(), "{first:?}");
+    window.get_by_label(&format!("{} more below", all.len() - first.len()));
+    for _ in 0..40 {
+        window.hover_at(area(&window, in_sight(&window)[0]).center());
+        let (unit, delta) = (egui::MouseWheelUnit::Point, vec2(0.0, -20.0));
+        let (modifiers, phase) = (egui::Modifiers::NONE, egui::TouchPhase::Move);
+        window.event(egui::Event::MouseWheel {
+            unit,
+            delta,
+            modifiers,
+            phase,
+            source: egui::MouseWheelSource::Unknown,
+        });
+        window.run_steps(2);
     }
+    assert!(in_sight(&window).ends_with(&all[4..]), "{:?}", in_sight(&window));
+    window.get_by_label_contains("more above");
 }
 
 #[test]

@@ -94,6 +94,21 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
     (run, panels)
 }
 
+/// A run of devices with these names, without a model.
+pub(crate) fn run_of_devices(title: &str, names: &[&str]) -> RunDescription {
+    let (mut run, _) = spring_run(&[]);
+    run.scene_toml = format!("title = \"{title}\"\n");
+    run.plugins.retain(|plugin| plugin.role == Role::Device);
+    let first = run.plugins.remove(0);
+    let device = |(device, name): (u16, &&str)| PluginDescription {
+        name: (*name).to_owned(),
+        device,
+        ..first.clone()
+    };
+    run.plugins = (0..).zip(names).map(device).collect();
+    run
+}
+
 /// A tick of a handle that goes up and down once a second.
 pub(crate) fn tick(number: u64, events: Events) -> TickRecord {
     let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
@@ -140,6 +155,26 @@ impl FakeHost {
             },
         };
         Self { directory, listener, greeting, run, stream: None, frames: Frames::default(), next_tick: 0 }
+    }
+
+    /// Listens in a folder of its own, for a run of these devices without a model.
+    pub(crate) fn of_devices(folder: &tempfile::TempDir, title: &str, names: &[&str]) -> Self {
+        let mut host = Self::new(folder, &[]);
+        host.run = run_of_devices(title, names);
+        title.clone_into(&mut host.greeting.title);
+        host
+    }
+
+    /// Sends the next so many ticks of so many devices.
+    pub(crate) fn run_ticks_of(&mut self, devices: u16, count: u64, events: Events) {
+        let numbers = self.next_tick..self.next_tick + count;
+        let of_device = |number, device| TickRecord { device, ..tick(number, events) };
+        let records: Vec<TickRecord> =
+            numbers.flat_map(|number| (0..devices).map(move |device| of_device(number, device))).collect();
+        self.next_tick += count;
+        for some in records.chunks(1000) {
+            self.send(Kind::Ticks, &ticks_to_payload(0, some.iter()));
+        }
     }
 
     /// Meets a client on a thread while `meet` makes one.

@@ -1,0 +1,138 @@
+//! The row of messages beneath the bar: warnings have a place of their own, and cover nothing.
+//!
+//! The row is always there, so a message moves nothing. It shows the warnings, the most urgent first; without warnings, what was done
+//! last or what the run is made of. When a run has failed the row grows: nothing moves any more, and the reason is read in full.
+
+use crate::palette::Palette;
+use crate::ui::overlay::{shortened, width_pt};
+use crate::ui::style::{BODY_PT, SMALL_PT};
+use egui::text::LayoutJob;
+use egui::{
+    Align, Color32, CornerRadius, FontId, Galley, Label, Layout, RichText, Role, Sense, Stroke, StrokeKind,
+    Ui, WidgetInfo, vec2,
+};
+use std::sync::Arc;
+
+/// Height of the row, points.
+pub const ROW_PT: f32 = 26.0;
+/// Height of the chip of a warning, points.
+const CHIP_PT: f32 = 22.0;
+/// Distance of a text from the border of its chip, and of a chip from the next, points.
+const PADDING_PT: f32 = 8.0;
+const GAP_PT: f32 = 8.0;
+/// Distance of the lines of a row that has grown, points.
+const LINE_GAP_PT: f32 = 4.0;
+
+/// How much room the row has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Extent {
+    /// One line, for a run that goes on.
+    Line,
+    /// As many lines as the messages need, up to a height, points.
+    Lines {
+        /// The greatest height.
+        most_pt: f32,
+    },
+}
+
+/// Messages of a moment.
+pub struct Messages<'a> {
+    /// Warnings, the most urgent first.
+    pub warnings: &'a [String],
+    /// Text without warnings.
+    pub otherwise: &'a str,
+    /// Room of the row.
+    pub extent: Extent,
+}
+
+impl Messages<'_> {
+    /// Returns the height of the row within a width, points.
+    #[must_use]
+    pub fn height_pt(&self, ui: &Ui, width_pt: f32) -> f32 {
+        match (self.extent, self.warnings) {
+            (Extent::Lines { most_pt }, [first, rest @ ..]) => {
+                let rest_pt = if rest.is_empty() { 0.0 } else { ROW_PT };
+                let first_pt = in_full(ui, first, [width_pt, most_pt], Color32::PLACEHOLDER).size().y;
+                (first_pt + LINE_GAP_PT).max(ROW_PT) + rest_pt
+            }
+            _ => ROW_PT,
+        }
+    }
+
+    /// Shows the row.
+    pub fn show(&self, ui: &mut Ui, palette: &Palette) {
+        match (self.extent, self.warnings) {
+            (_, []) => {
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    let text = RichText::new(self.otherwise).size(SMALL_PT).color(palette.faint);
+                    ui.add(Label::new(text).truncate());
+                });
+            }
+            (Extent::Lines { most_pt }, [first, rest @ ..]) => {
+                ui.spacing_mut().item_spacing.y = 0.0;
+                let galley = in_full(ui, first, [ui.available_width(), most_pt], palette.warning);
+                ui.label(galley).on_hover_text(first);
+                if !rest.is_empty() {
+                    line(ui, rest, palette);
+                }
+            }
+            (Extent::Line, warnings) => line(ui, warnings, palette),
+        }
+    }
+}
+
+/// Lays out a warning in as many lines as it needs within a width and a height, points; beyond them it is shortened.
+fn in_full(ui: &Ui, warning: &String, [width_pt, most_pt]: [f32; 2], color: Color32) -> Arc<Galley> {
+    let mut job = LayoutJob::simple(with_sign(warning), FontId::proportional(BODY_PT), color, width_pt);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a handful of lines
+    let rows = (most_pt / (BODY_PT + LINE_GAP_PT)) as usize;
+    job.wrap.max_rows = rows.max(1);
+    ui.painter().layout_job(job)
+}
+
+/// Shows as many warnings as one line has room for, and the number of the others. The first one is shortened rather than left out.
+fn line(ui: &mut Ui, warnings: &[String], palette: &Palette) {
+    let font = FontId::proportional(BODY_PT);
+    let more_pt = width_pt(ui.painter(), "+00 more", font.clone()) + GAP_PT;
+    let mut room_pt = ui.available_width();
+    let mut shown: Vec<(&String, f32)> = Vec::new();
+    for (index, warning) in warnings.iter().enumerate() {
+        let reserved_pt = if index + 1 < warnings.len() { more_pt } else { 0.0 };
+        let text_pt = width_pt(ui.painter(), &with_sign(warning), font.clone());
+        let most_pt = room_pt - reserved_pt - 2.0 * PADDING_PT;
+        if index > 0 && text_pt > most_pt {
+            break;
+        }
+        let text_pt = text_pt.min(most_pt);
+        shown.push((warning, text_pt));
+        room_pt -= text_pt + 2.0 * PADDING_PT + GAP_PT;
+    }
+    let rest = &warnings[shown.len()..];
+    ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+        ui.spacing_mut().item_spacing.x = GAP_PT;
+        shown.into_iter().for_each(|(warning, text_pt)| chip(ui, warning, text_pt, palette));
+        if !rest.is_empty() {
+            let count = RichText::new(format!("+{} more", rest.len())).size(BODY_PT).color(palette.warning);
+            let response = ui.label(count).on_hover_text(rest.join("\n"));
+            let all: Vec<String> = rest.iter().map(with_sign).collect();
+            response.widget_info(|| WidgetInfo::labeled(Role::Label, true, all.join("; ")));
+        }
+    });
+}
+
+fn chip(ui: &mut Ui, warning: &String, text_pt: f32, palette: &Palette) {
+    let font = FontId::proportional(BODY_PT);
+    // A hair more than measured: a text that fits is not shortened.
+    let galley = shortened(ui.painter(), &with_sign(warning), font, palette.warning, text_pt + 0.5);
+    let (area, response) = ui.allocate_exact_size(vec2(text_pt + 2.0 * PADDING_PT, CHIP_PT), Sense::hover());
+    let stroke = Stroke::new(1.0, palette.warning);
+    ui.painter().rect_stroke(area, CornerRadius::same(6), stroke, StrokeKind::Inside);
+    let at = area.center() - 0.5 * galley.size();
+    ui.painter().galley(at, galley, palette.warning);
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, with_sign(warning)));
+    response.on_hover_text(warning);
+}
+
+fn with_sign(warning: &String) -> String {
+    format!("⚠ {warning}")
+}
