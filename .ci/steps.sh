@@ -309,6 +309,28 @@ newcomer() {
     rm -rf "$root/tmp/newcomer"
 }
 
+# The workflows of `flotor new` and of the examples, unchanged, from the archive that the step before has made: on a bare Debian with
+# Rust, a C compiler and curl.
+workflow() {
+    local root=target/ci/workflow archive
+    has_bare_root || return 0
+    archive=$(ls -t target/archive/flotor-*-linux.tar.gz | head -n 1)
+    PACKAGES=gcc,libc6-dev,curl,ca-certificates RUST=1 .ci/bare-root "$root" "
+        rm -rf /tmp/forge && mkdir -p /tmp/forge/bin && cd /tmp/forge
+        export FLOTOR_ARCHIVE=file:///given/${archive##*/}
+        tar -xzf /given/${archive##*/} --strip-components 1 -C bin && flotor=\$PWD/bin/bin/flotor
+        mkdir repositories && cd repositories
+        \$flotor new model jelly && \$flotor new model honey --language c && \$flotor new device knob
+        cp -r /given/ci ci
+        for workflow in jelly/.github/workflows/haptics.yml honey/.github/workflows/haptics.yml knob/.github/workflows/haptics.yml \
+            ci/workflow.yml ci/device.yml; do
+            rm -rf \${workflow%%/*}/.cargo \${workflow%%/*}/flotor # as a checkout has it
+            echo \"[\$workflow]\"
+            (cd \${workflow%%/*} && /given/workflow \${workflow#*/})
+        done" tests/workflow examples/ci "$archive"
+    rm -rf "$root/tmp/forge"
+}
+
 # True if a bare Debian can be made here.
 has_bare_root() {
     if [ "$(id -u)" != 0 ]; then

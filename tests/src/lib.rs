@@ -2,6 +2,7 @@
 //!
 //! The documents whose Rust code is compiled and run as doctests are listed at the end of this file.
 
+pub mod commands;
 pub mod field_error;
 pub mod library;
 pub mod printed;

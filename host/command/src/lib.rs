@@ -8,7 +8,7 @@
 //! - [`PluginProcess`]: a process for the code of plugins, which ends with the command.
 //! - [`stopping`]: signals and keys that end a run.
 //! - [`separate`]: programs beside this one that carry out a command.
-//! - [`reference()`]: every command with its arguments, for the book.
+//! - [`reference()`]: every command with its arguments, for the book; [`whole_program`]: the same for man pages.
 //!
 //! Not real-time throughout.
 
@@ -33,6 +33,6 @@ pub use output::{
     report_line, write_json, write_text,
 };
 pub use progress::{Redrawn, progress_bar, while_preparing};
-pub use reference::reference;
+pub use reference::{reference, whole_program};
 pub use shell::{command_line, quoted};
 pub use supervision::supervised;

@@ -3,24 +3,37 @@
 use clap::{Arg, Command};
 use std::fmt::Write;
 
-/// Every command that the help of a program lists, as a chapter in Markdown. A command that one of the `separate` programs
-/// carries out is described as that program does. Not real-time.
+/// Returns a program with the arguments of the commands that `separate` programs carry out; the first line of their help stays that
+/// of the program. Not real-time.
 #[must_use]
-pub fn reference(mut program: Command, separate: &mut [Command]) -> String {
+pub fn whole_program(program: Command, separate: &[Command]) -> Command {
+    let described = |command: Command| match separate
+        .iter()
+        .find_map(|other| other.find_subcommand(command.get_name()))
+    {
+        Some(described) => described.clone().about(command.get_about().cloned().unwrap_or_default()),
+        None => command,
+    };
+    let mut program = without_help_command(program.mut_subcommands(described));
     program.build();
-    separate.iter_mut().for_each(Command::build);
+    program
+}
+
+/// Removes the command `help` on all levels: it repeats every other command.
+fn without_help_command(command: Command) -> Command {
+    command.disable_help_subcommand(true).mut_subcommands(without_help_command)
+}
+
+/// Returns a chapter in Markdown for each command that the help of a program lists. Not real-time.
+#[must_use]
+pub fn reference(program: &Command) -> String {
     let mut text = String::new();
-    for command in offered(&program) {
-        let elsewhere = separate.iter().find_map(|other| other.find_subcommand(command.get_name()));
-        let described =
-            elsewhere.unwrap_or(command).clone().about(command.get_about().cloned().unwrap_or_default());
-        chapter(&described, "flotor", 2, &mut text);
-    }
+    offered(program).for_each(|command| chapter(command, "flotor", 2, &mut text));
     text
 }
 
 fn offered(command: &Command) -> impl Iterator<Item = &Command> {
-    command.get_subcommands().filter(|command| !command.is_hide_set() && command.get_name() != "help")
+    command.get_subcommands().filter(|command| !command.is_hide_set())
 }
 
 /// One command and, below it, its own.

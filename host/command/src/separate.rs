@@ -45,20 +45,30 @@ impl SeparateProgram<'_> {
         if let Some(file) = [&beside].into_iter().chain(&own_build).find(|file| file.is_file()) {
             return Ok(Command::new(file));
         }
-        let built_without_release =
-            own_build.is_none() && beside.parent().is_some_and(|at| at.ends_with("debug"));
-        let file = own_build.unwrap_or(beside);
-        Err(CommandError::Usage(format!(
-            "`{}` does not exist; build it with `{}`",
-            file.display(),
-            if built_without_release { self.build.replace(" --release", "") } else { self.build.to_owned() }
-        )))
+        Err(CommandError::Usage(self.missing(&own)))
     }
 
-    /// Where it is looked for: beside this program, and where cargo puts it if this one lies where cargo has put it.
+    /// Returns the message for a program that is missing, with its remedy: a build in Flotor's sources, or a copy to an installation.
+    fn missing(&self, own: &Path) -> String {
+        let (beside, own_build) = self.places(own);
+        let build = match (&own_build, profile_of(own)) {
+            (None, Some("debug")) => self.build.replace(" --release", ""),
+            _ => self.build.to_owned(),
+        };
+        let file = own_build.unwrap_or(beside);
+        match profile_of(own) {
+            Some(_) => format!("`{}` does not exist; build it with `{build}`", file.display()),
+            None => format!(
+                "`{}` does not exist: this installation lacks it; build it in Flotor's sources with `{build}`, and copy it there",
+                file.display()
+            ),
+        }
+    }
+
+    /// Returns where the program may be: beside this one, and in cargo's target folder, if this one is there.
     fn places(&self, own: &Path) -> (PathBuf, Option<PathBuf>) {
         let name = format!("{}{}", self.program, std::env::consts::EXE_SUFFIX);
-        let target = own.parent().and_then(Path::parent);
+        let target = profile_of(own).and(own.parent()).and_then(Path::parent);
         let own_build = match (&self.built, target) {
             (Built::OwnWorkspace(folder), Some(target)) => {
                 Some(target.join(folder).join("release").join(&name))
@@ -84,6 +94,12 @@ impl SeparateProgram<'_> {
         let cause = become_program(self.command()?.args(arguments));
         Err(CommandError::file(self.program.as_ref(), "cannot be started", cause))
     }
+}
+
+/// Returns the profile with which cargo has built a program, if it lies where cargo puts programs.
+fn profile_of(program: &Path) -> Option<&'static str> {
+    let folder = program.parent()?;
+    ["debug", "release"].into_iter().find(|profile| folder.ends_with(profile))
 }
 
 /// A running separate program. Drop sends SIGTERM, so that it removes its socket, and waits for its end.
@@ -115,5 +131,21 @@ mod tests {
         }
         let viewer = SeparateProgram { program: "flotor-viewer", built: Built::WithThis, build: "" };
         assert_eq!(viewer.places(Path::new("/f/target/release/flotor")).1, None);
+    }
+
+    #[test]
+    fn an_installation_without_a_program_names_its_own_folder() {
+        let (built, build) =
+            (Built::OwnWorkspace("sweep"), "cargo build --manifest-path host/sweep/Cargo.toml");
+        let sweep = SeparateProgram { program: "flotor-sweep", built, build };
+        let name = format!("flotor-sweep{}", std::env::consts::EXE_SUFFIX);
+        let missing = sweep.missing(Path::new("/opt/flotor/bin/flotor"));
+        assert!(
+            missing.contains(&Path::new("/opt/flotor/bin").join(name).display().to_string()),
+            "{missing}"
+        );
+        assert!(missing.contains("installation lacks it") && missing.contains(build), "{missing}");
+        let missing = sweep.missing(Path::new("/f/target/debug/flotor"));
+        assert!(missing.contains("target/sweep/release") && !missing.contains("installation"), "{missing}");
     }
 }

@@ -56,10 +56,10 @@ impl Contract {
         }
     }
 
-    /// Options of `cargo build` on a forge, where a checkout of Flotor's sources is in `flotor/`.
+    /// Returns the options of `cargo build` on a forge, where an archive of Flotor is unpacked in `flotor/`.
     pub(super) fn option_on_a_forge(&self) -> &'static str {
         match self {
-            Self::Patched(_) => r#" --config "patch.crates-io.flotor-hal.path='flotor/hal'""#,
+            Self::Patched(_) => r#" --config "patch.crates-io.flotor-hal.path='flotor/share/flotor/hal'""#,
             Self::Published | Self::Vendored(_) => "",
         }
     }

@@ -5,6 +5,7 @@
 use flotor_hal::{Mutability, Parameter, ParameterKind};
 use flotor_session::registry::load_file;
 use flotor_session::scene::{SectionReference, reference};
+use flotor_tests::commands::whole_program;
 use flotor_tests::library::plugin_file;
 use flotor_tests::{crate_name_of, plugin_folders, workspace_root};
 use std::fmt::Write;
@@ -27,13 +28,7 @@ fn committed(chapter: &str, text: &str) {
 }
 
 fn all_commands() -> String {
-    let mut separate = [
-        flotor_lab::cli::command(),
-        flotor_study_program::command(),
-        flotor_calibration::cli::command(),
-        flotor_test::cli::command(),
-    ];
-    flotor_command::reference(flotor::cli::command(), &mut separate)
+    flotor_command::reference(&whole_program())
 }
 
 #[test]

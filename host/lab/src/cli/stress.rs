@@ -17,7 +17,7 @@ use std::time::Duration;
 #[command(after_help = "Ten measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity, \
     M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism, M9 search for the worst case; \
     with --symmetry also M10. Each measure runs in its own process, so a call that does not return fails only \
-    one measure. `score` is the share of measures that passed; docs/src/stress.md has the criterion of each.\n\n\
+    one measure. `score` is the share of measures that passed; the chapter \"Stability of a model\" of the book has the criterion of each.\n\n\
     Examples:\n  \
     flotor stress --model spring\n  \
     flotor stress --model spring --set variant=closed-form --json score.json --plot score.svg\n  \
