@@ -1,14 +1,16 @@
 //! Where an installed program finds its plugins, and which folders it does not trust.
 
 use flotor_tests::library::{build_folder, plugin_bytes, plugin_file};
+use flotor_tests::process::Owned;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::{crate_name_of, plugin_folders, workspace_root};
 use rustix::process::geteuid;
+use std::io::{BufRead, BufReader};
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 /// A user that owns nothing here.
 const NOBODY: u32 = 65534;
@@ -53,6 +55,26 @@ fn an_installed_program_finds_its_plugins_from_any_folder() {
     with_plugins(&scratch.path().join("lib/flotor/plugins"));
     let with = ran(demo(&program, &home));
     assert_eq!(with.status.code(), Some(exit_code::OK), "{with:?}");
+}
+
+#[test]
+fn an_installed_emulator_finds_its_flotor() {
+    let scratch = Scratch::default();
+    let program = scratch.folder("bin").join("flotor-maglev-emulator");
+    std::fs::copy(build_folder().join("flotor-maglev-emulator"), &program).expect("the program is built");
+    let emulator = || {
+        let mut command = Command::new(&program);
+        command.args(["--transport", "pty"]).env_remove("FLOTOR_PLUGIN_PATH");
+        command
+    };
+    let without = ran(emulator());
+    assert!(!without.status.success(), "{without:?}");
+    with_plugins(&scratch.path().join("lib/flotor/plugins"));
+    let mut emulated = Owned::start(emulator().stdout(Stdio::piped()));
+    let mut line = String::new();
+    let output = emulated.stdout.take().expect("it is piped");
+    BufReader::new(output).read_line(&mut line).expect("a line");
+    assert!(line.starts_with("listening"), "{line}");
 }
 
 #[test]

@@ -13,6 +13,9 @@ pub(crate) const SIMULATED: &str = "simulated";
 /// Time between two cycles unless a command says otherwise, ns.
 const PERIOD_NS: u64 = 1_000_000;
 
+/// Where plugins are, seen from the folder of a program: built by cargo, or installed.
+const PLUGIN_FOLDERS: [&str; 4] = ["deps", "", "plugins", "../lib/flotor/plugins"];
+
 /// Loads the plugin of a file, or the simulated flotor from the folders beside this program.
 pub(crate) fn load(file: Option<&Path>) -> Result<Plugin, Box<dyn Error>> {
     match file {
@@ -25,7 +28,7 @@ pub(crate) fn load(file: Option<&Path>) -> Result<Plugin, Box<dyn Error>> {
 pub(crate) fn load_device(id: &str) -> Result<Plugin, Box<dyn Error>> {
     let program = std::env::current_exe()?;
     let own = program.parent().unwrap_or(Path::new("."));
-    for folder in [own.join("deps"), own.to_path_buf(), own.join("plugins")] {
+    for folder in PLUGIN_FOLDERS.map(|folder| own.join(folder)) {
         let Ok(entries) = std::fs::read_dir(&folder) else { continue };
         let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
         files.retain(|file| file.extension().is_some_and(|ending| ending == std::env::consts::DLL_EXTENSION));
