@@ -3,6 +3,7 @@
 //! Every value enters the picture through [`Scale::forward`], which refuses what cannot be drawn. Behind it,
 //! all geometry is linear: a log axis is a linear axis of decimal logarithms.
 
+use super::quantity::Quantity;
 use super::{text, ticks};
 
 /// Larger magnitudes are treated like infinity, so that the difference of two values never overflows.
@@ -13,6 +14,9 @@ const NARROWEST_RELATIVE_SPAN: f64 = 1e-9;
 
 /// Room between the data and the ends of a padded axis, as a fraction of the data's span.
 const PADDING: f64 = 0.06;
+
+/// The least range of a logarithmic axis, in decades: what lies nearer together shows as equal.
+const LEAST_DECADES: f64 = 0.1;
 
 /// How far a tight axis reaches for a round end, as a fraction of the data's span.
 const ROUNDING_REACH: f64 = 0.015;
@@ -31,17 +35,33 @@ pub struct Axis {
     pub(super) scale: Scale,
     pub(super) fixed: Option<(f64, f64)>,
     pub(super) levels: Vec<f64>,
+    least: f64,
+    includes_zero: bool,
 }
 
 impl Axis {
     /// A linear axis; `unit` is empty for a pure number.
     pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self { label: label.into(), unit: unit.into(), scale: Scale::Linear, fixed: None, levels: Vec::new() }
+        Self {
+            label: label.into(),
+            unit: unit.into(),
+            scale: Scale::Linear,
+            fixed: None,
+            levels: Vec::new(),
+            least: 0.0,
+            includes_zero: false,
+        }
+    }
+
+    /// A linear axis in the unit of `quantity`, with its least range.
+    pub fn of(label: impl Into<String>, quantity: Quantity) -> Self {
+        let (unit, per_si) = quantity.unit();
+        Self::linear(label, unit).least_range(quantity.least_range_si() * per_si)
     }
 
     /// A decimal-logarithmic axis; `unit` is empty for a pure number.
     pub fn log(label: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self { scale: Scale::Log, ..Self::linear(label, unit) }
+        Self { scale: Scale::Log, least: LEAST_DECADES, ..Self::linear(label, unit) }
     }
 
     /// Fixes the range, in the unit of the axis; the order of the ends does not matter. A range that cannot
@@ -49,6 +69,23 @@ impl Axis {
     #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.fixed = Some((low.min(high), low.max(high)));
+        self
+    }
+
+    /// Widens an automatic range to at least `span`, in the unit of the axis: smaller differences are rounding and no signal. A
+    /// logarithmic axis has a least range of its own.
+    #[must_use]
+    pub fn least_range(mut self, span: f64) -> Self {
+        if self.scale == Scale::Linear && (0.0..LARGEST_DRAWABLE).contains(&span) {
+            self.least = span;
+        }
+        self
+    }
+
+    /// Lets an automatic range of a linear axis reach zero, so that lengths are in proportion to values.
+    #[must_use]
+    pub fn with_zero(mut self) -> Self {
+        self.includes_zero = true;
         self
     }
 
@@ -76,12 +113,15 @@ impl Axis {
     }
 
     /// The range the axis covers for data within `extent`.
-    pub(super) fn domain(&self, extent: Extent, fit: Fit) -> Domain {
+    pub(super) fn domain(&self, mut extent: Extent, fit: Fit) -> Domain {
+        if self.includes_zero && self.scale == Scale::Linear && !extent.is_empty() {
+            extent.include(0.0);
+        }
         let fixed = self.fixed.and_then(|(low, high)| {
             let ends = (self.scale.forward(low)?, self.scale.forward(high)?);
             (!is_narrow(ends.0, ends.1)).then_some(ends)
         });
-        let (low, high) = fixed.unwrap_or_else(|| fit.apply(self.scale, extent));
+        let (low, high) = fixed.unwrap_or_else(|| fit.apply(self.scale, extent, self.least));
         Domain { scale: self.scale, low, high }
     }
 }
@@ -149,7 +189,8 @@ pub(super) enum Fit {
 }
 
 impl Fit {
-    fn apply(self, scale: Scale, extent: Extent) -> (f64, f64) {
+    /// The range around the data, at least `least` wide.
+    fn apply(self, scale: Scale, extent: Extent, least: f64) -> (f64, f64) {
         let Extent { mut low, mut high } = extent;
         if extent.is_empty() {
             return (0.0, 1.0);
@@ -158,7 +199,10 @@ impl Fit {
             (low, high) = (low.min(0.0), high.max(0.0));
         }
         if is_narrow(low, high) {
-            return around_constant(scale, low, high);
+            return around_constant(scale, low, high, least);
+        }
+        if high - low < least {
+            (low, high) = widened(self, scale, [low, high], least);
         }
         let room = PADDING * (high - low);
         let (padded_low, padded_high) = (low - room, high + room);
@@ -191,14 +235,23 @@ fn is_narrow(low: f64, high: f64) -> bool {
     high - low <= NARROWEST_RELATIVE_SPAN * low.abs().max(high.abs()) || high - low < 1.0 / LARGEST_DRAWABLE
 }
 
-/// A range with a constant in its middle: a tenth of its magnitude to either side, one unit around zero, a
-/// third of a decade on a log axis.
-fn around_constant(scale: Scale, low: f64, high: f64) -> (f64, f64) {
+/// The ends moved apart to a span of `least`: upwards where the range stands on zero.
+fn widened(fit: Fit, scale: Scale, [low, high]: [f64; 2], least: f64) -> (f64, f64) {
+    if fit == Fit::OnZero && scale == Scale::Linear {
+        return if high > 0.0 { (low, low + least) } else { (high - least, high) };
+    }
+    let middle = 0.5 * low + 0.5 * high;
+    (middle - 0.5 * least, middle + 0.5 * least)
+}
+
+/// A range with a constant in its middle: a tenth of its magnitude to either side and at least half of `least`; around zero
+/// without a least range one unit, a third of a decade on a log axis.
+fn around_constant(scale: Scale, low: f64, high: f64, least: f64) -> (f64, f64) {
     let middle = 0.5 * low + 0.5 * high;
     let room = match scale {
         Scale::Log => 1.0 / 3.0,
-        Scale::Linear if middle.abs() < 1.0 / LARGEST_DRAWABLE => 1.0,
-        Scale::Linear => 0.1 * middle.abs(),
+        Scale::Linear if middle.abs() < 1.0 / LARGEST_DRAWABLE && least == 0.0 => 1.0,
+        Scale::Linear => (0.1 * middle.abs()).max(0.5 * least),
     };
     (middle - room, middle + room)
 }

@@ -86,7 +86,7 @@ impl LegendEntry<'_> {
     pub(super) fn swatch_px(&self) -> f64 {
         match self.series.shape {
             Shape::Line(_) | Shape::Steps(_) => SWATCH_PX,
-            Shape::Points(_) | Shape::Histogram(_) => SHORT_SWATCH_PX,
+            Shape::Points(_) | Shape::Histogram(_) | Shape::Errors(_) => SHORT_SWATCH_PX,
         }
     }
 

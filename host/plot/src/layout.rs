@@ -61,7 +61,8 @@ pub(super) fn arrange(figure: &Figure) -> Layout<'_> {
     let inner_px = figure.width_px - 2.0 * MARGIN_PX;
     // Semi-bold runs about a tenth wider than regular.
     let title = text::wrap(&figure.title, inner_px / 1.1, font_px::TITLE);
-    let subtitle = text::wrap(&figure.subtitle, inner_px, font_px::SUBTITLE);
+    let mut subtitle = text::wrap(&figure.subtitle, inner_px, font_px::SUBTITLE);
+    subtitle.extend(text::wrap(&figure.note(), inner_px, font_px::SUBTITLE));
     let mut y = MARGIN_PX + TITLE_LINE_PX * title.len() as f64 + SUBTITLE_LINE_PX * subtitle.len() as f64;
 
     let mut drafts = drafts(figure);

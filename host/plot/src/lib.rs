@@ -4,26 +4,28 @@
 //! lines). [`Figure::to_svg`] lays them out and writes one SVG document that needs no other
 //! file, reads on light and dark pages, scales with the page and says in words what it shows.
 //!
-//! Three promises shape the code:
+//! Five promises shape the code:
 //! - **No peak is lost, no file is large.** Lines are reduced to at most four samples per pixel column
 //!   (`decimate`, after Jugel et al., "M4", VLDB 2014), so ten minutes at 1 kHz cost what a second costs. A [`Trace`]
 //!   reduces them while they arrive: its memory does not grow with the run.
+//! - **Rounding is no signal.** An axis covers at least the range below which differences of its [`Quantity`] are rounding.
+//! - **Every series is seen.** A line that later ones cover is wider and paler than they are (`cover`).
 //! - **Bad samples stay local.** NaN, infinity, and anything not positive on a log axis break the line there
 //!   and touch neither the axis range nor the rest of the curve.
 //! - **Same input, same bytes.** Coordinates are rounded to a tenth of a pixel; nothing depends on time,
 //!   locale or installed fonts.
 //!
-//! Data flows one way: the model (this file, `series`, `mark`) -> `axis` and `ticks` (ranges) -> `layout` and
+//! Data flows one way: the model (this file, `series`, `mark`, `spans`) -> `axis` and `ticks` (ranges) -> `layout` and
 //! `labels` (places) -> `path` and `svg` (text). `theme` holds all that is a matter of taste.
 //!
 //! Not real-time: every function here allocates.
 //!
 //! ```
-//! # use flotor_plot::{Axis, Figure, Mark, Panel, Series};
+//! # use flotor_plot::{Axis, Figure, Mark, Panel, Quantity, Series};
 //! let force_n = (0..10_000).map(|tick| f64::from(tick) * 1e-3).map(|time_s| (time_s, time_s.sin()));
 //! let svg = Figure::new("Run", Axis::linear("Time", "s"))
 //!     .panel(
-//!         Panel::new(Axis::linear("Force on the hand", "N"))
+//!         Panel::new(Axis::of("Force on the hand", Quantity::Force))
 //!             .series(Series::line("z", force_n))
 //!             .mark(Mark::at_y(0.8, "limit 0.8 N")),
 //!     )
@@ -33,26 +35,33 @@
 
 mod axis;
 mod clip;
+mod cover;
 mod decimate;
 mod labels;
 mod layout;
 mod mark;
 mod path;
+mod quantity;
 mod series;
+mod spans;
 mod svg;
 mod text;
 mod theme;
 mod ticks;
 mod trace;
+mod vector;
 
 #[cfg(test)]
 mod tests;
 
 pub use axis::Axis;
 pub use mark::Mark;
-pub use series::{Bin, Series};
-pub use theme::AXIS_COLORS;
+pub use quantity::Quantity;
+pub use series::{Bin, ErrorBar, Series};
+pub use spans::Spans;
+pub use theme::{AXIS_COLORS, FAULT_COLORS, LIMIT_COLORS};
 pub use trace::Trace;
+pub use vector::VectorTrace;
 
 /// Width of a figure: fits the text column of the book and a laptop screen at full size.
 const WIDTH_PX: f64 = 960.0;
@@ -78,6 +87,7 @@ pub struct Figure {
     paper: Paper,
     scale: f64,
     panels: Vec<Panel>,
+    left_out: Vec<String>,
 }
 
 impl Figure {
@@ -95,6 +105,7 @@ impl Figure {
             paper: Paper::OfReader,
             scale: 1.0,
             panels: Vec::new(),
+            left_out: Vec::new(),
         }
     }
 
@@ -160,6 +171,25 @@ impl Figure {
         self
     }
 
+    /// Adds a panel, or names under the subtitle what has none and why.
+    #[must_use]
+    pub fn panel_or_note(mut self, panel: Result<Panel, String>) -> Self {
+        match panel {
+            Ok(panel) => self.panels.push(panel),
+            Err(left_out) => self.left_out.push(left_out),
+        }
+        self
+    }
+
+    /// The line that names what has no panel; empty if nothing was left out.
+    fn note(&self) -> String {
+        if self.left_out.is_empty() {
+            String::new()
+        } else {
+            format!("Not drawn: {}.", self.left_out.join(", "))
+        }
+    }
+
     /// The picture as one SVG document. Never fails: a figure without data says so in its place.
     #[must_use]
     pub fn to_svg(&self) -> String {
@@ -191,13 +221,21 @@ pub struct Panel {
     y: Axis,
     series: Vec<Series>,
     marks: Vec<Mark>,
+    limited: Vec<Spans>,
 }
 
 impl Panel {
     /// An empty panel on the figure's x axis. The y axis' label is the panel's heading.
     #[must_use]
     pub fn new(y: Axis) -> Self {
-        Self { title: String::new(), own_x: None, y, series: Vec::new(), marks: Vec::new() }
+        Self {
+            title: String::new(),
+            own_x: None,
+            y,
+            series: Vec::new(),
+            marks: Vec::new(),
+            limited: Vec::new(),
+        }
     }
 
     /// An empty panel with an x axis of its own.
@@ -224,6 +262,13 @@ impl Panel {
     #[must_use]
     pub fn mark(mut self, mark: Mark) -> Self {
         self.marks.push(mark);
+        self
+    }
+
+    /// Marks the stretches of x in which a limit acted, as a bar along the foot of the panel.
+    #[must_use]
+    pub fn limited(mut self, spans: Spans) -> Self {
+        self.limited.push(spans);
         self
     }
 }

@@ -1,14 +1,24 @@
-//! Marks: reference lines under the data.
+//! Marks: reference lines under the data, and faults.
 
 use super::axis::{Domain, Extent, Scale};
 
-/// A reference line under the data, with a label outside the plotting area. A mark widens an automatic range so that
+/// A reference line under the data, or a fault, with a label outside the plotting area. A mark widens an automatic range so that
 /// it is seen; outside a fixed range it is left out.
 #[derive(Debug, Clone)]
 pub struct Mark {
     pub(super) direction: Direction,
     pub(super) label: String,
+    pub(super) look: MarkLook,
     at: f64,
+}
+
+/// How a mark is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum MarkLook {
+    /// A thin dashed line.
+    Reference,
+    /// A solid line with a cross at its top, in the colour of faults.
+    Fault,
 }
 
 /// The axis on which a mark's value lies.
@@ -21,12 +31,17 @@ pub(super) enum Direction {
 impl Mark {
     /// A vertical line at `x`, in the unit of the x axis.
     pub fn at_x(x: f64, label: impl Into<String>) -> Self {
-        Self { direction: Direction::X, label: label.into(), at: x }
+        Self { direction: Direction::X, label: label.into(), look: MarkLook::Reference, at: x }
+    }
+
+    /// A fault at `x`, in the unit of the x axis: a line over the whole height with a cross.
+    pub fn fault_at_x(x: f64, label: impl Into<String>) -> Self {
+        Self { look: MarkLook::Fault, ..Self::at_x(x, label) }
     }
 
     /// A horizontal line at `y`, in the unit of the y axis.
     pub fn at_y(y: f64, label: impl Into<String>) -> Self {
-        Self { direction: Direction::Y, label: label.into(), at: y }
+        Self { direction: Direction::Y, ..Self::at_x(y, label) }
     }
 
     /// The coordinate of the mark in `domain`. Nothing when it lies outside or has no place (NaN, infinity).

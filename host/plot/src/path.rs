@@ -7,8 +7,9 @@ use std::collections::BTreeSet;
 
 use super::axis::Domain;
 use super::clip::clipped;
+use super::cover::Course;
 use super::decimate::{Point, decimate};
-use super::series::{Bin, Series, Shape};
+use super::series::{Bin, ErrorBar, Series, Shape};
 use super::text;
 use super::theme::Slot;
 
@@ -21,6 +22,9 @@ const MARKER_CELL_PX: f64 = 1.0;
 /// Coordinates are held within this many sizes of the plotting area around it. Far outside, a point only
 /// gives the direction of the line that leaves.
 const FARTHEST_FRACTION: f64 = 1000.0;
+
+/// Half the width of the end of an error bar.
+const ERROR_CAP_PX: f64 = 5.0;
 
 /// A point this near to the frame lies on its edge: half of what coordinates are rounded to.
 const EDGE_PX: f64 = 0.05;
@@ -166,7 +170,12 @@ impl Path {
 
     /// A closed outline through offsets from (x, y).
     pub(super) fn polygon(&mut self, x: f64, y: f64, offsets: &[Point]) {
-        self.polyline(offsets.iter().map(|&(dx, dy)| (x + dx, y + dy)));
+        self.outline(offsets.iter().map(|&(dx, dy)| (x + dx, y + dy)));
+    }
+
+    /// A closed outline through points.
+    pub(super) fn outline(&mut self, points: impl IntoIterator<Item = Point>) {
+        self.polyline(points);
         self.close();
     }
 
@@ -178,6 +187,11 @@ impl Path {
     pub(super) fn ring(&mut self, x: f64, y: f64, outer: f64, inner: f64) {
         self.arcs(x, y, outer, 1);
         self.arcs(x, y, inner, 0);
+    }
+
+    /// The end of an error bar.
+    pub(super) fn error_cap(&mut self, x: f64, y: f64) {
+        self.polyline([(x - ERROR_CAP_PX, y), (x + ERROR_CAP_PX, y)]);
     }
 
     fn arcs(&mut self, x: f64, y: f64, radius: f64, sweep: u8) {
@@ -231,12 +245,14 @@ fn bounded(fraction: f64) -> f64 {
 #[derive(Debug)]
 pub(super) enum Drawing {
     /// A line, and the samples that stand alone between gaps (dashes would swallow them); `busy` when it goes
-    /// up and down so much that dashes would hide parts of it.
-    Line { path: Path, dots: Path, busy: bool },
+    /// up and down so much that dashes would hide parts of it. `covers` later lines lie over it.
+    Line { path: Path, dots: Path, busy: bool, course: Course, covers: usize },
     /// Filled marker outlines.
     Markers(Path),
     /// A filled outline standing on the axis.
     Bars(Path),
+    /// Upright strokes with caps.
+    Errors(Path),
 }
 
 /// The drawing of `series`, or nothing when no sample can be drawn.
@@ -250,10 +266,11 @@ pub(super) fn draw(series: &Series, slot: Slot, projection: &Projection) -> Opti
         }
         Shape::Points(samples) => markers(samples, slot, projection),
         Shape::Histogram(bins) => bars(bins, projection),
+        Shape::Errors(bars) => errors(bars, projection),
     };
     let is_empty = match &drawing {
         Drawing::Line { path, dots, .. } => path.is_empty() && dots.is_empty(),
-        Drawing::Markers(path) | Drawing::Bars(path) => path.is_empty(),
+        Drawing::Markers(path) | Drawing::Bars(path) | Drawing::Errors(path) => path.is_empty(),
     };
     (!is_empty).then_some(drawing)
 }
@@ -271,12 +288,14 @@ fn line(samples: impl Iterator<Item = Option<Point>>, slot: Slot, projection: &P
         slot.add_marker(&mut path, *x, *y);
         return Drawing::Markers(path);
     }
+    // One of many neither covers nor is covered.
+    let course = if slot.is_faint() { Course::default() } else { Course::of(&runs, &projection.frame) };
     let busy = is_busy(&runs);
     for run in runs {
         let target = if run.len() == 1 { &mut dots } else { &mut path };
         target.polyline(run);
     }
-    Drawing::Line { path, dots, busy }
+    Drawing::Line { path, dots, busy, course, covers: 0 }
 }
 
 /// Whether the lines are much longer than the width they cover.
@@ -313,6 +332,20 @@ fn markers(samples: &[(f64, f64)], slot: Slot, projection: &Projection) -> Drawi
         }
     }
     Drawing::Markers(path)
+}
+
+/// Strokes from the lower to the upper ends, cut at the frame; a cap where the end is within it.
+fn errors(bars: &[ErrorBar], projection: &Projection) -> Drawing {
+    let mut path = Path::default();
+    let frame = projection.frame.grown(EDGE_PX);
+    for ends in bars.iter().filter_map(|bar| bar.ends(projection.x.scale, projection.y.scale)) {
+        let ends = ends.map(|end| projection.point_px(end));
+        clipped(&ends, &frame).into_iter().for_each(|stroke| path.polyline(stroke));
+        for (x, y) in ends.into_iter().filter(|end| frame.contains(*end)) {
+            path.error_cap(x, y);
+        }
+    }
+    Drawing::Errors(path)
 }
 
 /// One closed outline per block of bins that touch.

@@ -1,7 +1,7 @@
 //! Series: the samples of one curve, how they are drawn, and the range they cover.
 
 use super::axis::{Domain, Extent, Scale};
-use super::theme::Slot;
+use super::theme::{Slot, Weight};
 use super::trace::Trace;
 
 /// A bin that starts at zero has no left edge on a log axis; it is drawn this wide.
@@ -13,6 +13,7 @@ const OPEN_BIN_DECADES: f64 = 0.5;
 pub struct Series {
     pub(super) label: String,
     slot: Option<Look>,
+    weight: Weight,
     pub(super) shape: Shape,
     /// Number of samples or bins given, drawable or not.
     pub(super) given: usize,
@@ -32,6 +33,32 @@ pub(super) enum Shape {
     Steps(Vec<(f64, f64)>),
     Points(Vec<(f64, f64)>),
     Histogram(Vec<Bin>),
+    Errors(Vec<ErrorBar>),
+}
+
+/// A bar from `low` to `high` at `x`, in the units of the panel's axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorBar {
+    /// Place, unit of the x axis.
+    pub x: f64,
+    /// Lower end, unit of the y axis.
+    pub low: f64,
+    /// Upper end, unit of the y axis.
+    pub high: f64,
+}
+
+impl ErrorBar {
+    /// A bar of `error` to each side of `value`.
+    #[must_use]
+    pub fn around(x: f64, value: f64, error: f64) -> Self {
+        Self { x, low: value - error, high: value + error }
+    }
+
+    /// Both ends in the coordinates of the scales, or nothing when one cannot be drawn.
+    pub(super) fn ends(&self, x: Scale, y: Scale) -> Option<[(f64, f64); 2]> {
+        let x = x.forward(self.x)?;
+        Some([(x, y.forward(self.low)?), (x, y.forward(self.high)?)])
+    }
 }
 
 /// One bar of a histogram: `height` over `from..to`, in the units of the panel's axes.
@@ -111,12 +138,18 @@ impl Series {
         Self::new(label, Shape::Histogram(bins.into_iter().collect()))
     }
 
+    /// Bars with caps at both ends: standard errors, or intervals. Draw them after what they belong to.
+    pub fn errors(label: impl Into<String>, bars: impl IntoIterator<Item = ErrorBar>) -> Self {
+        Self::new(label, Shape::Errors(bars.into_iter().collect()))
+    }
+
     fn new(label: impl Into<String>, shape: Shape) -> Self {
         let given = match &shape {
             Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => samples.len(),
             Shape::Histogram(bins) => bins.len(),
+            Shape::Errors(bars) => bars.len(),
         };
-        Self { label: label.into(), slot: None, shape, given }
+        Self { label: label.into(), slot: None, weight: Weight::Full, shape, given }
     }
 
     /// Draws with the palette entry `slot` (counted from 0), so that the same thing looks the same in every
@@ -127,20 +160,28 @@ impl Series {
         self
     }
 
-    /// Draws as the component 0, 1 or 2 of a vector, x, y or z: in the same colour and dash in every panel and picture.
+    /// Draws as the component 0, 1 or 2 of a vector, x, y or z: a solid line in the same colour in every panel and picture.
     #[must_use]
     pub fn axis(mut self, component: usize) -> Self {
         self.slot = Some(Look::Axis(component));
         self
     }
 
+    /// Draws a line thin, solid and pale, as one of many of its kind.
+    #[must_use]
+    pub fn faint(mut self) -> Self {
+        self.weight = Weight::Faint;
+        self
+    }
+
     /// Colour, dash and marker of the series when it is number `index` of its panel.
     pub(super) fn look(&self, index: usize) -> Slot {
-        match self.slot {
+        let slot = match self.slot {
             None => Slot::new(index),
             Some(Look::Slot(slot)) => Slot::new(slot),
             Some(Look::Axis(component)) => Slot::of_axis(component),
-        }
+        };
+        slot.with_weight(self.weight)
     }
 
     /// The x range of what can be drawn, in the coordinates of the x scale.
@@ -158,6 +199,11 @@ impl Series {
                 for (left, right) in bins.iter().filter_map(|bin| bin.edges(x_scale)) {
                     extent.include(left);
                     extent.include(right);
+                }
+            }
+            Shape::Errors(bars) => {
+                for [(x, _), _] in bars.iter().filter_map(|bar| bar.ends(x_scale, y_scale)) {
+                    extent.include(x);
                 }
             }
         }
@@ -184,6 +230,13 @@ impl Series {
                         && right > x_domain.low
                         && left < x_domain.high
                     {
+                        extent.include(y);
+                    }
+                }
+            }
+            Shape::Errors(bars) => {
+                for (x, y) in bars.iter().filter_map(|bar| bar.ends(x_domain.scale, y_scale)).flatten() {
+                    if (x_domain.low..=x_domain.high).contains(&x) {
                         extent.include(y);
                     }
                 }

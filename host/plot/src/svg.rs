@@ -6,6 +6,7 @@
 
 use super::Figure;
 use super::axis::{Domain, Scale};
+use super::cover::count_covers;
 use super::labels::{
     HEADING_ROW_PX, LEGEND_ROW_PX, Legend, LegendEntry, MARK_ROW_PX, SIDE_LABEL_GAP_PX, baseline, side_labels,
 };
@@ -13,11 +14,20 @@ use super::layout::{
     Cell, FRAME_TO_X_LABEL_PX, FRAME_TO_X_NAME_PX, FRAME_TO_Y_LABEL_PX, Layout, MARGIN_PX, SUBTITLE_LINE_PX,
     TITLE_LINE_PX,
 };
-use super::mark::Direction;
+use super::mark::{Direction, MarkLook};
 use super::path::{Drawing, Path, Projection, draw};
 use super::series::Shape;
+use super::spans::Spans;
 use super::text::{self, escape, px};
 use super::theme::{Slot, font_px, style_sheet};
+
+/// Half the size of the cross of a fault, and how far its middle lies below the top of the frame.
+const FAULT_CROSS_PX: f64 = 4.5;
+const FAULT_CROSS_DEPTH_PX: f64 = 8.0;
+
+/// Height of the bar that marks where a limit acted, and the least width of a stretch.
+const LIMITED_BAR_PX: f64 = 5.0;
+const LEAST_STRETCH_PX: f64 = 1.5;
 
 const MAJOR_TICK_PX: f64 = 5.0;
 const MINOR_TICK_PX: f64 = 3.0;
@@ -57,7 +67,7 @@ pub(super) fn document(figure: &Figure, layout: &Layout<'_>) -> String {
 
 /// What the picture shows, for those who do not see it.
 fn description(figure: &Figure, layout: &Layout<'_>) -> String {
-    let mut description = figure.subtitle.clone();
+    let mut description = format!("{} {}", figure.subtitle, figure.note()).trim().to_owned();
     for cell in &layout.cells {
         let panel = cell.draft.panel;
         let sentence = format!(
@@ -150,12 +160,15 @@ impl Writer {
 
     fn cell(&mut self, cell: &Cell<'_>) {
         let series = cell.draft.panel.series.iter().enumerate();
-        let drawings: Vec<Option<Drawing>> =
+        let mut drawings: Vec<Option<Drawing>> =
             series.map(|(index, series)| draw(series, series.look(index), &cell.projection)).collect();
+        count_covers(&mut drawings);
         self.raw("<g>\n");
         self.grid(cell);
         self.reference_lines(cell);
+        self.limited(cell);
         self.data(cell, &drawings);
+        self.faults(cell);
         if cell.draft.has_x_labels {
             self.x_axis(cell);
         }
@@ -168,7 +181,7 @@ impl Writer {
     fn reference_lines(&mut self, cell: &Cell<'_>) {
         let projection @ Projection { x, y, frame } = &cell.projection;
         let mut path = Path::default();
-        for mark in &cell.draft.panel.marks {
+        for mark in cell.draft.panel.marks.iter().filter(|mark| mark.look == MarkLook::Reference) {
             let line = match mark.direction {
                 Direction::X => mark.visible(x).map(|at| frame.upright(projection.x_px(at))),
                 Direction::Y => mark.visible(y).map(|at| frame.level(projection.y_px(at))),
@@ -176,6 +189,41 @@ impl Writer {
             line.into_iter().for_each(|line| path.polyline(line));
         }
         self.path("reference", &path);
+    }
+
+    /// A line with a cross for each fault, over the data.
+    fn faults(&mut self, cell: &Cell<'_>) {
+        let projection @ Projection { x, frame, .. } = &cell.projection;
+        let mut path = Path::default();
+        let faults = cell.draft.panel.marks.iter().filter(|mark| mark.look == MarkLook::Fault);
+        for at in faults.filter_map(|mark| mark.visible(x)) {
+            let (x, y) = (projection.x_px(at), frame.top + FAULT_CROSS_DEPTH_PX);
+            path.polyline(frame.upright(x));
+            for sign in [-1.0, 1.0] {
+                let (dx, dy) = (FAULT_CROSS_PX, sign * FAULT_CROSS_PX);
+                path.polyline([(x - dx, y - dy), (x + dx, y + dy)]);
+            }
+        }
+        self.path("fault", &path);
+    }
+
+    /// A bar along the foot where a limit acted.
+    fn limited(&mut self, cell: &Cell<'_>) {
+        let projection @ Projection { x, frame, .. } = &cell.projection;
+        let mut path = Path::default();
+        let mut reached = f64::NEG_INFINITY;
+        for stretch in cell.draft.panel.limited.iter().flat_map(Spans::stretches) {
+            let ends = stretch.map(|at| x.scale.forward(at).map(|at| projection.x_px(at)));
+            let [Some(from), Some(to)] = ends else { continue };
+            let to = to.max(from + LEAST_STRETCH_PX).min(frame.right());
+            let from = from.max(frame.left).max(reached);
+            if from < to {
+                let (bottom, top) = (frame.bottom(), frame.bottom() - LIMITED_BAR_PX);
+                path.outline([(from, bottom), (from, top), (to, top), (to, bottom)]);
+                reached = to;
+            }
+        }
+        self.path("limited", &path);
     }
 
     fn grid(&mut self, cell: &Cell<'_>) {
@@ -228,16 +276,18 @@ impl Writer {
     fn drawing(&mut self, drawing: &Drawing, slot: Slot) {
         let (stroke, fill) = (slot.stroke_class(), slot.fill_class());
         match drawing {
-            Drawing::Line { path, dots, busy } => {
-                match (busy, slot.dash()) {
-                    (true, _) => self.path(&format!("line busy round {stroke}"), path),
-                    (false, "") => self.path(&format!("line round {stroke}"), path),
-                    (false, dash) => self.dashed_path(&format!("line {stroke}"), dash, path),
+            Drawing::Line { path, dots, busy, covers, .. } => {
+                match (covers, busy, slot.dash()) {
+                    (1.., ..) => self.path(&format!("line round {} {stroke}", under(*covers)), path),
+                    (0, true, _) => self.path(&format!("line busy round {stroke}"), path),
+                    (0, false, "") => self.path(&format!("line round {stroke}"), path),
+                    (0, false, dash) => self.dashed_path(&format!("line {stroke}"), dash, path),
                 }
                 self.path(&format!("line round {stroke}"), dots);
             }
             Drawing::Markers(path) => self.path(&format!("points {fill}"), path),
             Drawing::Bars(path) => self.path(&format!("bars {fill} {stroke}"), path),
+            Drawing::Errors(path) => self.path(&format!("errors {stroke}"), path),
         }
     }
 
@@ -309,10 +359,17 @@ impl Writer {
                 path.polygon(center, middle, &[(-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)]);
                 self.drawing(&Drawing::Bars(path), slot);
             }
-            Some(Drawing::Line { busy, .. }) => {
+            Some(Drawing::Errors(_)) => {
+                path.polyline([(center, middle - 5.0), (center, middle + 5.0)]);
+                path.error_cap(center, middle - 5.0);
+                path.error_cap(center, middle + 5.0);
+                self.drawing(&Drawing::Errors(path), slot);
+            }
+            Some(Drawing::Line { busy, covers, .. }) => {
                 path.polyline([(left, middle), (right, middle)]);
-                let dash = if *busy { "" } else { slot.dash() };
-                self.dashed_path(&format!("line {}", slot.stroke_class()), dash, &path);
+                let dash = if *busy || *covers > 0 { "" } else { slot.dash() };
+                let class = format!("line {} {}", under(*covers), slot.stroke_class()).replace("  ", " ");
+                self.dashed_path(&class, dash, &path);
             }
             // Nothing is drawn, so there is nothing to show a sample of.
             None => {}
@@ -335,6 +392,11 @@ impl Writer {
         }
         self.path("hair axis", &leaders);
     }
+}
+
+/// The style class of a line under so many others; none for one that is not covered.
+fn under(covers: usize) -> String {
+    if covers == 0 { String::new() } else { format!("under{covers}") }
 }
 
 /// Whether a log axis gets thin lines between its labelled ones: they show that it is one.

@@ -24,6 +24,12 @@ const PALETTE: [(&str, &str); 8] = [
 pub const AXIS_COLORS: [(&str, &str); 3] =
     [("#d55e00", "#e69f00"), ("#008c69", "#009e76"), ("#144a9b", "#96d0ff")];
 
+/// Colours of faults on a light and a dark page, the same as in the viewer's window.
+pub const FAULT_COLORS: (&str, &str) = ("#c4003c", "#ff6082");
+
+/// Colours of limits on a light and a dark page, the same as in the viewer's window.
+pub const LIMIT_COLORS: (&str, &str) = ("#603400", "#ffe86e");
+
 /// Dash patterns in pixels, drawn and left out in turn; the first is solid.
 const DASHES: [&str; 8] = ["", "8 3", "3 2", "9 3 2 3", "15 4", "6 2 1.5 2 1.5 2", "1.5 2", "11 3 4 3"];
 
@@ -32,6 +38,16 @@ const DASHES: [&str; 8] = ["", "8 3", "3 2", "9 3 2 3", "15 4", "6 2 1.5 2 1.5 2
 pub(super) struct Slot {
     color: usize,
     cue: usize,
+    weight: Weight,
+}
+
+/// How strongly a line is drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum Weight {
+    #[default]
+    Full,
+    /// Thin, solid and pale: one of many.
+    Faint,
 }
 
 impl Slot {
@@ -39,18 +55,30 @@ impl Slot {
     /// that 64 series differ.
     pub(super) fn new(index: usize) -> Self {
         let color = index % PALETTE.len();
-        Self { color, cue: (color + index / PALETTE.len()) % DASHES.len() }
+        Self { color, cue: (color + index / PALETTE.len()) % DASHES.len(), weight: Weight::Full }
     }
 
     /// The look of a component, x, y or z: the same in every panel.
     pub(super) fn of_axis(component: usize) -> Self {
         let component = component % AXIS_COLORS.len();
-        Self { color: PALETTE.len() + component, cue: component }
+        Self { color: PALETTE.len() + component, cue: component, weight: Weight::Full }
     }
 
-    /// The style class for a stroke in the colour.
+    /// The look with another weight.
+    pub(super) fn with_weight(self, weight: Weight) -> Self {
+        Self { weight, ..self }
+    }
+
+    pub(super) fn is_faint(self) -> bool {
+        self.weight == Weight::Faint
+    }
+
+    /// The style classes for a stroke in the colour.
     pub(super) fn stroke_class(self) -> String {
-        format!("s{}", self.color)
+        match self.weight {
+            Weight::Full => format!("s{}", self.color),
+            Weight::Faint => format!("faint s{}", self.color),
+        }
     }
 
     /// The style class for an area in the colour.
@@ -58,8 +86,11 @@ impl Slot {
         format!("f{}", self.color)
     }
 
-    /// The dash pattern; empty for a solid line.
+    /// The dash pattern; empty for a solid line. Components are solid, as in the viewer's window.
     pub(super) fn dash(self) -> &'static str {
+        if self.color >= PALETTE.len() || self.is_faint() {
+            return "";
+        }
         DASHES.get(self.cue).copied().unwrap_or_default()
     }
 
@@ -73,7 +104,8 @@ impl Slot {
             4 => path.polygon(x, y, &[(0.0, 3.8), (3.7, -2.8), (-3.7, -2.8)]),
             5 => path.polygon(x, y, &plus_outline(3.6, 1.1)),
             6 => path.polygon(x, y, &cross_outline(3.3, 1.2)),
-            _ => path.ring(x, y, 3.7, 2.2),
+            // Wide enough to surround another marker.
+            _ => path.ring(x, y, 5.2, 4.1),
         }
     }
 }
@@ -110,7 +142,7 @@ pub(super) fn style_sheet(paper: Paper) -> String {
     let (light, dark) = (light.rules(|(light, _)| light), dark.rules(|(_, dark)| dark));
     format!(
         ".plot{{font-family:system-ui,-apple-system,'Segoe UI',Roboto,\
-         'Helvetica Neue',sans-serif;font-variant-numeric:tabular-nums}}\n\
+         'Helvetica Neue','Noto Sans','DejaVu Sans',sans-serif;font-variant-numeric:tabular-nums}}\n\
          .plot text{{font-size:{tick}px}}\n\
          .plot .title{{font-size:{title}px;font-weight:600}}\n\
          .plot .subtitle{{font-size:{subtitle}px}}\n\
@@ -126,6 +158,12 @@ pub(super) fn style_sheet(paper: Paper) -> String {
          .plot .line{{fill:none;stroke-width:1.6;stroke-linejoin:round}}\n\
          .plot .busy{{stroke-width:1}}\n\
          .plot .round{{stroke-linecap:round}}\n\
+         .plot .faint{{stroke-width:1;stroke-opacity:.55}}\n\
+         .plot .under1{{stroke-width:5;stroke-opacity:.45}}\n\
+         .plot .under2{{stroke-width:8.4;stroke-opacity:.45}}\n\
+         .plot .under3{{stroke-width:11.8;stroke-opacity:.45}}\n\
+         .plot .errors{{fill:none;stroke-width:1.8}}\n\
+         .plot .fault{{fill:none;stroke-width:1.6}}\n\
          .plot .points{{fill-opacity:.85}}\n\
          .plot .bars{{fill-opacity:.16;stroke-width:1.2}}\n\
          {}",
@@ -161,7 +199,11 @@ impl Page {
              .plot .muted{{fill:{muted}}}\n\
              .plot .grid{{stroke:{grid}}}\n\
              .plot .axis{{stroke:{axis}}}\n\
-             .plot .reference{{stroke:{muted}}}\n"
+             .plot .reference{{stroke:{muted}}}\n\
+             .plot .fault{{stroke:{fault}}}\n\
+             .plot .limited{{fill:{limit}}}\n",
+            fault = series_color(FAULT_COLORS),
+            limit = series_color(LIMIT_COLORS),
         );
         for (index, colors) in PALETTE.into_iter().chain(AXIS_COLORS).enumerate() {
             let color = series_color(colors);

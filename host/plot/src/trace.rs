@@ -35,7 +35,13 @@ impl Trace {
     /// True if any sample can be drawn.
     #[must_use]
     pub fn has_data(&self) -> bool {
-        self.samples.iter().any(|(_, y)| y.is_finite())
+        self.largest().is_some()
+    }
+
+    /// The largest magnitude of a sample that can be drawn, if there is one.
+    #[must_use]
+    pub fn largest(&self) -> Option<f64> {
+        self.samples.iter().map(|(_, y)| y.abs()).filter(|size| size.is_finite()).reduce(f64::max)
     }
 
     /// The kept samples, and the number of samples that were added.

@@ -4,7 +4,7 @@ use super::super::axis::Extent;
 use super::super::labels::{side_labels, top_labels};
 use super::super::path::{Drawing, Projection, Rect, draw};
 use super::super::theme::Slot;
-use super::super::{Axis, Bin, Figure, Mark, Panel, Series, text};
+use super::super::{Axis, Bin, ErrorBar, Figure, Mark, Panel, Quantity, Series, Spans, text};
 use super::{Domain, Point, Scale, linear, ten_minutes};
 
 const FRAME: Rect = Rect { left: 80.0, top: 50.0, width: 800.0, height: 120.0 };
@@ -41,7 +41,7 @@ fn subpaths(data: &str) -> Vec<Vec<Point>> {
 
 fn line_of(series: &Series, projection: &Projection) -> (Vec<Vec<Point>>, Vec<Vec<Point>>, bool) {
     match draw(series, Slot::new(0), projection) {
-        Some(Drawing::Line { path, dots, busy }) => (subpaths(path.data()), subpaths(dots.data()), busy),
+        Some(Drawing::Line { path, dots, busy, .. }) => (subpaths(path.data()), subpaths(dots.data()), busy),
         other => panic!("not a line: {other:?}"),
     }
 }
@@ -272,6 +272,115 @@ fn any_input_makes_a_well_formed_document() {
     }
 }
 
+/// The label of each tick of the only panel's y axis.
+fn y_labels(svg: &str) -> Vec<String> {
+    let texts = svg.split("<text class=\"muted end\"").skip(1);
+    texts.filter_map(|text| Some(text.split_once('>')?.1.split_once('<')?.0.to_owned())).collect()
+}
+
+/// A hand that does not turn has rotations of rounding errors.
+#[test]
+fn rounding_errors_lie_flat_on_an_axis_with_a_least_range() {
+    let noise = |unit: f64| (0..1000_u32).map(move |i| (f64::from(i), unit * f64::from(i % 7) - 3.0 * unit));
+    let picture = |axis: Axis, unit: f64| {
+        let panel = Panel::new(axis).series(Series::line("", noise(unit)));
+        Figure::new("", Axis::linear("Time", "s")).panel(panel).to_svg()
+    };
+    for (quantity, noise) in [
+        (Quantity::Angle, 1.0e-18),
+        (Quantity::Length, 1.0e-12),
+        (Quantity::Force, 1.0e-13),
+        (Quantity::Torque, 1.0e-15),
+        (Quantity::Energy, 1.0e-15),
+    ] {
+        let svg = picture(Axis::of("Noise", quantity), noise);
+        let heights: Vec<f64> = drawn(&svg, "line").iter().map(|(_, y)| *y).collect();
+        let (low, high) = heights.iter().fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(*y), h.max(*y)));
+        assert!(heights.len() > 1 && high - low < 0.11, "{quantity:?}: {low} to {high}");
+        let signal = picture(Axis::of("Noise", quantity), quantity.least_range_si() * quantity.unit().1);
+        assert!(drawn(&signal, "line").len() > 100, "{quantity:?}: a signal is drawn as one");
+    }
+    let constant =
+        Panel::new(Axis::of("Force", Quantity::Force)).series(Series::line("", [(0.0, 0.0), (1.0, 0.0)]));
+    let svg = Figure::new("", Axis::linear("Time", "s")).panel(constant).to_svg();
+    assert!(y_labels(&svg).iter().all(|label| !label.contains("1.0")), "{:?}", y_labels(&svg));
+}
+
+#[test]
+fn bars_with_a_least_range_stand_on_zero() {
+    let bins = [Bin { from: 0.0, to: 1.0, height: 1.0e-9 }];
+    let panel = Panel::new(Axis::of("Force", Quantity::Force)).series(Series::histogram("", bins));
+    let svg = Figure::new("", Axis::linear("", "")).panel(panel).to_svg();
+    assert_eq!(y_labels(&svg).first().map(String::as_str), Some("0.0"), "{:?}", y_labels(&svg));
+    let log = Panel::new(Axis::log("Time", "ns")).series(Series::line("", [(0.0, 100.0), (1.0, 100.001)]));
+    let svg = Figure::new("", Axis::linear("", "")).panel(log).to_svg();
+    let heights: Vec<f64> = drawn(&svg, "line").iter().map(|(_, y)| *y).collect();
+    assert!(heights.iter().all(|y| (y - heights[0]).abs() < 0.2), "{heights:?}");
+}
+
+/// Four lines in one place, as a fitted spring, its knots and the curve itself.
+#[test]
+fn lines_over_one_another_have_widths_of_their_own() {
+    let line = |count: u32| {
+        (0..=count).map(move |i| (f64::from(i) / f64::from(count), f64::from(i) / f64::from(count)))
+    };
+    let figure = |panel: Panel| Figure::new("", Axis::linear("", "")).panel(panel).to_svg();
+    let svg = figure([1, 7, 100, 3000].into_iter().fold(Panel::new(Axis::linear("", "")), |panel, count| {
+        panel.series(Series::line(count.to_string(), line(count)))
+    }));
+    for (class, slot) in [("under3", "s0"), ("under2", "s1"), ("under1", "s2")] {
+        let found = svg.matches(&format!("{class} {slot}\"")).count();
+        assert_eq!(found, 2, "{class}: the line and its sample in the legend");
+    }
+    let apart = figure(
+        Panel::new(Axis::linear("", ""))
+            .series(Series::line("up", [(0.0, 0.0), (1.0, 1.0)]))
+            .series(Series::line("down", [(0.0, 1.0), (1.0, 0.0)])),
+    );
+    assert!(!apart.split("</style>").nth(1).expect("a body").contains("under"), "nothing is covered");
+}
+
+#[test]
+fn a_fault_has_a_cross_and_a_limit_a_bar_at_the_foot() {
+    let mut limited = Spans::default();
+    [0.2, 0.3, 0.4].into_iter().for_each(|x| limited.extend(x));
+    limited.interrupt();
+    limited.extend(0.9);
+    let panel = Panel::new(Axis::linear("Force", "N"))
+        .series(Series::line("z", [(0.0, 0.0), (1.0, 1.0)]).axis(2))
+        .mark(Mark::fault_at_x(0.5, "device fault"))
+        .limited(limited);
+    let svg = Figure::new("", Axis::linear("Time", "s")).panel(panel).to_svg();
+    well_formed(&svg);
+    let data = svg.split("<path class=\"fault\" d=\"").nth(1).and_then(|rest| rest.split('"').next());
+    let strokes = subpaths(data.expect("a fault is drawn"));
+    assert_eq!(strokes.len(), 3, "a line and a cross: {strokes:?}");
+    let height = (strokes[0][0].1 - strokes[0][1].1).abs();
+    assert!((height - 120.0).abs() < 0.2, "over the whole height: {height}");
+    let bars = subpaths(
+        svg.split("<path class=\"limited\" d=\"")
+            .nth(1)
+            .and_then(|rest| rest.split('"').next())
+            .expect("a bar"),
+    );
+    assert_eq!(bars.len(), 2, "{bars:?}");
+    assert!(bars[1][2].0 - bars[1][0].0 >= 1.4, "one tick is seen: {bars:?}");
+    assert!(svg.contains(">device fault<"));
+}
+
+#[test]
+fn error_bars_have_caps_and_widen_the_axis() {
+    let bars = [ErrorBar::around(1.0, 5.0, 2.0), ErrorBar::around(2.0, 5.0, f64::NAN)];
+    let panel =
+        Panel::new(Axis::linear("", "").with_zero()).series(Series::errors("one error", bars).slot(6));
+    let svg = Figure::new("", Axis::linear("", "").range(0.0, 3.0)).panel(panel).to_svg();
+    let body = svg.split("</style>").nth(1).expect("a body");
+    let data = body.split("<path class=\"errors s6\" d=\"").nth(1).and_then(|rest| rest.split('"').next());
+    let strokes = subpaths(data.expect("the bar"));
+    assert_eq!(strokes.len(), 3, "a stem and two caps: {strokes:?}");
+    assert_eq!(y_labels(&svg).first().map(String::as_str), Some("0"), "{:?}", y_labels(&svg));
+}
+
 /// The elements that CairoSVG, svglib, Inkscape, librsvg and browsers all draw as they are meant.
 const DRAWN_EVERYWHERE: [&str; 9] = ["svg", "title", "desc", "style", "rect", "g", "path", "text", "tspan"];
 
@@ -279,11 +388,17 @@ const DRAWN_EVERYWHERE: [&str; 9] = ["svg", "title", "desc", "style", "rect", "g
 fn a_picture_uses_only_what_every_program_draws() {
     let samples = || (0..100).map(|index| (f64::from(index), f64::from(index % 7)));
     let bins = [Bin { from: 0.0, to: 50.0, height: 3.0 }, Bin { from: 50.0, to: 90.0, height: 9.0 }];
+    let mut limited = Spans::default();
+    limited.extend(10.0);
     let panel = Panel::new(Axis::linear("Force", "N").range(1.0, 5.0))
         .series(Series::line("x", samples()).axis(0))
         .series(Series::steps("held", samples()))
         .series(Series::points("seen", samples()))
         .series(Series::histogram("counts", bins))
+        .series(Series::errors("errors", [ErrorBar::around(20.0, 3.0, 1.0)]))
+        .series(Series::line("the same", samples()))
+        .limited(limited)
+        .mark(Mark::fault_at_x(40.0, "device fault"))
         .mark(Mark::at_x(30.0, "fault"))
         .mark(Mark::at_y(4.0, "limit"));
     for paper in [crate::Paper::OfReader, crate::Paper::Light, crate::Paper::Dark] {
@@ -389,5 +504,5 @@ fn a_picture_has_the_size_and_the_paper_it_was_given() {
     assert!(!svg.contains("prefers-color-scheme") && svg.contains("#144a9b") && !svg.contains("#96d0ff"));
     let dark = figure.clone().paper(crate::Paper::Dark).to_svg();
     assert!(dark.contains("#96d0ff") && !dark.contains("#144a9b"));
-    assert_eq!(figure.to_svg().matches("class=\"line s10").count(), 4, "z is z in both panels and legends");
+    assert_eq!(figure.to_svg().matches(" s10\"").count(), 4, "z is z in both panels and legends");
 }

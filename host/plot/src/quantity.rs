@@ -1,0 +1,72 @@
+//! Measured quantities: the units of their axes, and the least range that an axis of each covers.
+//!
+//! Below the least range differences come from rounding, and an axis that followed them would draw noise as a signal.
+
+/// A quantity that a run or an experiment measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// A position or a length.
+    Length,
+    /// An angle or a rotation.
+    Angle,
+    /// A linear velocity.
+    Velocity,
+    /// An angular velocity.
+    AngularVelocity,
+    /// A linear acceleration.
+    Acceleration,
+    /// A force.
+    Force,
+    /// A torque.
+    Torque,
+    /// An energy.
+    Energy,
+    /// A stiffness.
+    Stiffness,
+    /// The lateness or the duration of a tick.
+    Lateness,
+    /// A ratio in per cent.
+    Percent,
+}
+
+impl Quantity {
+    /// The unit of an axis, and how many of it make one SI unit.
+    #[must_use]
+    pub const fn unit(self) -> (&'static str, f64) {
+        let (symbol, per_si, _) = self.entry();
+        (symbol, per_si)
+    }
+
+    /// A value in the unit of an axis, as text.
+    pub(super) fn text(self, value: f64) -> String {
+        match self {
+            Self::Angle | Self::AngularVelocity => format!("{value}{}", self.unit().0),
+            _ => format!("{value} {}", self.unit().0),
+        }
+    }
+
+    /// The least range of an axis, in SI units.
+    #[must_use]
+    pub const fn least_range_si(self) -> f64 {
+        self.entry().2
+    }
+
+    /// Unit, units in one SI unit, least range in SI units. The ranges lie far below what a hand feels or a device resolves, and
+    /// far above rounding errors.
+    const fn entry(self) -> (&'static str, f64, f64) {
+        const DEGREE: f64 = std::f64::consts::PI / 180.0;
+        match self {
+            Self::Length => ("mm", 1.0e3, 1.0e-6),
+            Self::Angle => ("°", 1.0 / DEGREE, 0.01 * DEGREE),
+            Self::Velocity => ("mm/s", 1.0e3, 1.0e-4),
+            Self::AngularVelocity => ("°/s", 1.0 / DEGREE, 0.1 * DEGREE),
+            Self::Acceleration => ("m/s²", 1.0, 1.0e-3),
+            Self::Force => ("N", 1.0, 1.0e-3),
+            Self::Torque => ("mN·m", 1.0e3, 1.0e-5),
+            Self::Energy => ("mJ", 1.0e3, 1.0e-6),
+            Self::Stiffness => ("N/mm", 1.0e-3, 1.0),
+            Self::Lateness => ("µs", 1.0e6, 1.0e-7),
+            Self::Percent => ("%", 1.0e2, 1.0e-3),
+        }
+    }
+}

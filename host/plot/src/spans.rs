@@ -1,0 +1,94 @@
+//! The stretches of an axis in which a condition held, while they arrive, in bounded memory.
+
+use super::axis::LARGEST_DRAWABLE;
+
+/// Most stretches kept: about one for each pixel column of a figure.
+const CAPACITY: usize = 1024;
+
+/// Stretches that remain apart after a reduction, at most.
+const REDUCED: f64 = 512.0;
+
+/// Stretches of growing x. Past 1 024 of them, neighbours nearer than a 512th of the whole are joined: about two pixels.
+///
+/// Not real-time: adding a stretch may allocate, at most 16 KiB.
+#[derive(Debug, Clone, Default)]
+pub struct Spans {
+    stretches: Vec<[f64; 2]>,
+    is_open: bool,
+}
+
+impl Spans {
+    /// Extends the stretch to `x`, or begins one there. An x that is not finite changes nothing.
+    pub fn extend(&mut self, x: f64) {
+        if x.abs() > LARGEST_DRAWABLE || x.is_nan() {
+            return;
+        }
+        match self.stretches.last_mut().filter(|_| self.is_open) {
+            Some(last) => last[1] = last[1].max(x),
+            None => {
+                if self.stretches.len() >= CAPACITY {
+                    self.reduce();
+                }
+                self.stretches.push([x, x]);
+            }
+        }
+        self.is_open = true;
+    }
+
+    /// Ends the stretch.
+    pub fn interrupt(&mut self) {
+        self.is_open = false;
+    }
+
+    /// Where each stretch begins and ends, in order.
+    pub(super) fn stretches(&self) -> &[[f64; 2]] {
+        &self.stretches
+    }
+
+    fn reduce(&mut self) {
+        let Some(([first, _], [_, last])) = self.stretches.first().zip(self.stretches.last()) else { return };
+        let near = (last - first) / REDUCED;
+        let mut joined: Vec<[f64; 2]> = Vec::with_capacity(CAPACITY);
+        for [from, to] in self.stretches.drain(..) {
+            match joined.last_mut().filter(|before| from - before[1] <= near) {
+                Some(before) => before[1] = to,
+                None => joined.push([from, to]),
+            }
+        }
+        self.stretches = joined;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_begin_and_end_where_the_condition_did() {
+        let mut spans = Spans::default();
+        for tick in 0..100 {
+            match tick {
+                10..20 | 50 => spans.extend(f64::from(tick)),
+                _ => spans.interrupt(),
+            }
+        }
+        spans.extend(f64::NAN);
+        assert_eq!(spans.stretches(), [[10.0, 19.0], [50.0, 50.0]]);
+    }
+
+    #[test]
+    fn memory_is_bounded_and_no_stretch_is_lost() {
+        let mut spans = Spans::default();
+        for tick in 0..1_000_000 {
+            if tick % 3 == 0 && !(400_000..600_000).contains(&tick) {
+                spans.extend(f64::from(tick));
+            } else {
+                spans.interrupt();
+            }
+        }
+        assert!(spans.stretches().len() <= CAPACITY && spans.stretches.capacity() <= CAPACITY);
+        let covered = |x: f64| spans.stretches().iter().any(|[from, to]| *from <= x && x <= *to);
+        assert!([0.0, 3.0, 300_000.0, 399_999.0, 600_000.0, 999_999.0].into_iter().all(covered));
+        assert!(!covered(500_000.0), "the long gap remains");
+    }
+}
