@@ -1,9 +1,11 @@
 //! A run as a picture: pose, force and torque, stored energy and, in real time, the timing.
 
+use crate::peak_bounds::{BoundedPeaks, PeakBound};
 use crate::timing_picture::panels;
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::{DVec3, Demand, rotation_vector};
-use flotor_plot::{Axis, Figure, Mark, Panel, Series, Trace};
+use flotor_core::{Change, ChangeOutcome};
+use flotor_hal::{Demand, rotation_vector};
+use flotor_plot::{Axis, Figure, Mark, Panel, Quantity, Series, Spans, Trace, VectorTrace};
 use flotor_servo::Timing;
 use flotor_session::Observer;
 
@@ -11,52 +13,77 @@ use flotor_session::Observer;
 pub struct RunPicture {
     title: String,
     devices: Vec<DeviceTraces>,
+    changes: Changes,
+    peaks: BoundedPeaks,
     lateness_us: Trace,
     is_real_time: bool,
 }
 
-/// The traces of one device.
+/// The traces and events of one device.
 struct DeviceTraces {
     name: String,
-    position_mm: [Trace; 3],
-    rotation_deg: [Trace; 3],
-    force_n: [Trace; 3],
-    torque_mnm: [Trace; 3],
-    energy_mj: Trace,
-    /// Time of the first tick with each of [`MARKED`], s.
-    first_s: [Option<f64>; MARKED.len()],
+    position: VectorTrace,
+    rotation: VectorTrace,
+    force: VectorTrace,
+    torque: VectorTrace,
+    energy: Trace,
+    events: EventTimes,
 }
 
-/// Events whose first tick is marked, and their names.
-const MARKED: [(Events, &str); 6] = [
-    (Events::BOUNDARY, "boundary"),
-    (Events::MODEL_FAULT, "model fault"),
-    (Events::NOT_FINITE, "not finite"),
-    (Events::DEVICE_FAULT, "device fault"),
-    (Events::FORCE_LIMITED, "force limited"),
-    (Events::TORQUE_LIMITED, "torque limited"),
-];
+/// When events happened.
+#[derive(Default)]
+struct EventTimes {
+    /// The time of the first tick with each fault and each limit, s.
+    first: Vec<(Events, f64)>,
+    /// The events of `first`.
+    seen: Events,
+    /// Where any limit acted, s.
+    limited: Spans,
+}
+
+/// Changes of parameters while the run lasted.
+#[derive(Default)]
+struct Changes {
+    /// The first ones: time, s, and text.
+    marked: Vec<(f64, String)>,
+    /// Number of changes without a mark.
+    further: usize,
+}
+
+/// Most changes that are marked: more would cover the traces.
+const MOST_CHANGES: usize = 12;
 
 impl RunPicture {
-    /// An empty picture of a run with these devices.
+    /// An empty picture of a run with these devices, and the bounds that are drawn.
     #[must_use]
-    pub fn new(title: &str, devices: Vec<String>) -> Self {
-        let devices = devices.into_iter().map(DeviceTraces::new).collect();
-        Self { title: title.to_owned(), devices, lateness_us: Trace::default(), is_real_time: false }
+    pub fn new(title: &str, devices: Vec<String>, bounds: &[PeakBound]) -> Self {
+        Self {
+            title: title.to_owned(),
+            devices: devices.into_iter().map(DeviceTraces::new).collect(),
+            changes: Changes::default(),
+            peaks: BoundedPeaks::new(bounds),
+            lateness_us: Trace::default(),
+            is_real_time: false,
+        }
     }
 
     /// Draws the traces. Not real-time.
     #[must_use]
     pub fn into_svg(self, subtitle: &str, timing: &Timing) -> String {
-        let figure = Figure::new(self.title, Axis::linear("Time", "s")).subtitle(subtitle);
         let is_only_one = self.devices.len() == 1;
+        let subtitle = match self.changes.further {
+            0 => subtitle.to_owned(),
+            further => format!("{subtitle}; {further} further changes are not marked"),
+        };
+        let figure = Figure::new(self.title, Axis::linear("Time", "s")).subtitle(subtitle);
         let panels_of_devices = self.devices.into_iter().flat_map(|device| match is_only_one {
-            true => device.all_panels(),
-            false => device.main_panels(),
+            true => device.all_panels(&self.changes),
+            false => device.main_panels(&self.changes),
         });
-        let mut figure = panels_of_devices.fold(figure, Figure::panel);
+        let figure = panels_of_devices.fold(figure, Figure::panel_or_note);
+        let mut figure = self.peaks.into_panels().fold(figure, Figure::panel);
         if self.is_real_time {
-            let lateness = Panel::new(Axis::linear("Lateness", "µs"));
+            let lateness = Panel::new(Axis::of("Lateness", Quantity::Lateness));
             figure = figure.panel(lateness.series(Series::trace("", self.lateness_us)));
             figure = panels(timing).into_iter().fold(figure, Figure::panel);
         }
@@ -65,6 +92,12 @@ impl RunPicture {
 }
 
 impl Observer for RunPicture {
+    fn change(&mut self, change: &Change) {
+        if change.outcome == ChangeOutcome::Applied {
+            self.changes.add(change);
+        }
+    }
+
     /// The energy that is drawn.
     fn demand(&self) -> Demand {
         Demand::ENERGY.with(Demand::FORCE)
@@ -72,89 +105,146 @@ impl Observer for RunPicture {
 
     fn observe(&mut self, record: &TickRecord) {
         if record.device == 0 {
-            self.lateness_us.add(seconds(record), record.lateness_ns as f64 * 1.0e-3);
+            self.lateness_us.add(seconds(record.time_ns), record.lateness_ns as f64 * 1.0e-3);
         }
         self.is_real_time |= record.lateness_ns > 0;
+        self.peaks.add(record);
         if let Some(device) = self.devices.get_mut(usize::from(record.device)) {
             device.add(record);
         }
     }
 }
 
+impl Changes {
+    fn add(&mut self, change: &Change) {
+        if self.marked.len() < MOST_CHANGES {
+            let text = format!("{}.{} = {}", change.plugin, change.parameter, change.value);
+            self.marked.push((seconds(change.time_ns), text));
+        } else {
+            self.further += 1;
+        }
+    }
+}
+
+impl EventTimes {
+    fn add(&mut self, time_s: f64, events: Events) {
+        let marked = Events::FAULTS.with(Events::LIMITS);
+        let new = Events::from_bits(events.bits() & marked.bits() & !self.seen.bits());
+        if new != Events::NONE {
+            self.first.extend(new.named().map(|(event, _)| (event, time_s)));
+            self.seen.insert(new);
+        }
+        if events.intersects(Events::LIMITS) {
+            self.limited.extend(time_s);
+        } else {
+            self.limited.interrupt();
+        }
+    }
+
+    /// Adds the events to a panel: the first tick of each fault and limit, and the stretches of limits.
+    fn mark(&self, panel: Panel, names: Names) -> Panel {
+        let marked = self.first.iter().fold(panel, |panel, (event, time_s)| {
+            let name = match names {
+                Names::Written => event.named().map(|(_, name)| name).collect(),
+                Names::LeftOut => String::new(),
+            };
+            panel.mark(match Events::FAULTS.intersects(*event) {
+                true => Mark::fault_at_x(*time_s, name),
+                false => Mark::at_x(*time_s, name),
+            })
+        });
+        marked.limited(self.limited.clone())
+    }
+}
+
+/// Whether the marks of a panel have their names: those below the first of a device stand under it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Names {
+    Written,
+    LeftOut,
+}
+
 impl DeviceTraces {
     fn new(name: String) -> Self {
         Self {
             name,
-            position_mm: Default::default(),
-            rotation_deg: Default::default(),
-            force_n: Default::default(),
-            torque_mnm: Default::default(),
-            energy_mj: Trace::default(),
-            first_s: [None; MARKED.len()],
+            position: VectorTrace::new(Quantity::Length),
+            rotation: VectorTrace::new(Quantity::Angle),
+            force: VectorTrace::new(Quantity::Force),
+            torque: VectorTrace::new(Quantity::Torque),
+            energy: Trace::default(),
+            events: EventTimes::default(),
         }
     }
 
     fn add(&mut self, record: &TickRecord) {
-        let time_s = seconds(record);
-        let rotation_deg = rotation_vector(record.pose.orientation()) * 1.0_f64.to_degrees();
-        add_components(&mut self.position_mm, time_s, record.pose.position() * 1.0e3);
-        add_components(&mut self.rotation_deg, time_s, rotation_deg);
-        add_components(&mut self.force_n, time_s, record.commanded.force());
-        add_components(&mut self.torque_mnm, time_s, record.commanded.torque() * 1.0e3);
-        self.energy_mj.add(time_s, record.model.energy_j().map_or(f64::NAN, |joule| joule * 1.0e3));
-        for (first_s, (event, _)) in self.first_s.iter_mut().zip(MARKED) {
-            if first_s.is_none() && record.events.intersects(event) {
-                *first_s = Some(time_s);
-            }
-        }
+        let time_s = seconds(record.time_ns);
+        self.position.add(time_s, record.pose.position().to_array());
+        self.rotation.add(time_s, rotation_vector(record.pose.orientation()).to_array());
+        self.force.add(time_s, record.commanded.force().to_array());
+        self.torque.add(time_s, record.commanded.torque().to_array());
+        let (_, per_si) = Quantity::Energy.unit();
+        self.energy.add(time_s, record.model.energy_j().map_or(f64::NAN, |joule| joule * per_si));
+        self.events.add(time_s, record.events);
     }
 
     /// The panels of the only device of a run.
-    fn all_panels(self) -> Vec<Panel> {
-        let first_s = self.first_s;
-        let vector = |label: &str, unit: &str, traces: [Trace; 3]| vector_panel(label, unit, traces, first_s);
-        let vectors = [
-            vector("Position", "mm", self.position_mm),
-            vector("Rotation", "°", self.rotation_deg),
-            vector("Force", "N", self.force_n),
-            vector("Torque", "mN·m", self.torque_mnm),
+    fn all_panels(self, changes: &Changes) -> Vec<Result<Panel, String>> {
+        let panels = vec![
+            self.position.panel("position"),
+            self.rotation.panel("rotation"),
+            self.force.panel("force"),
+            self.torque.panel("torque"),
+            energy_panel("stored energy", self.energy),
         ];
-        vectors.into_iter().chain(energy_panel("Stored energy", self.energy_mj)).collect()
+        with_events(panels, &self.events, changes)
     }
 
     /// The panels of one device of several: motion, force and energy. The recording has the rest.
-    fn main_panels(self) -> Vec<Panel> {
-        let label = |quantity: &str| format!("{quantity}, {}", self.name);
-        let vectors = [
-            vector_panel(&label("Position"), "mm", self.position_mm, self.first_s),
-            vector_panel(&label("Force"), "N", self.force_n, self.first_s),
+    fn main_panels(self, changes: &Changes) -> Vec<Result<Panel, String>> {
+        let name = |quantity: &str| format!("{quantity}, {}", self.name);
+        let panels = vec![
+            self.position.panel(&name("position")),
+            self.force.panel(&name("force")),
+            energy_panel(&name("stored energy"), self.energy),
         ];
-        vectors.into_iter().chain(energy_panel(&label("Stored energy"), self.energy_mj)).collect()
+        with_events(panels, &self.events, changes)
     }
 }
 
-fn add_components(traces: &mut [Trace; 3], time_s: f64, vector: DVec3) {
-    for (trace, component) in traces.iter_mut().zip(vector.to_array()) {
-        trace.add(time_s, component);
+/// Marks events and changes in each panel, with their names in the first.
+fn with_events(
+    panels: Vec<Result<Panel, String>>,
+    events: &EventTimes,
+    changes: &Changes,
+) -> Vec<Result<Panel, String>> {
+    let mut names = Names::Written;
+    let marked = |panel: Result<Panel, String>| {
+        let panel = changes.mark(events.mark(panel?, names), names);
+        names = Names::LeftOut;
+        Ok(panel)
+    };
+    panels.into_iter().map(marked).collect()
+}
+
+/// The stored energy over time.
+fn energy_panel(name: &str, trace: Trace) -> Result<Panel, String> {
+    if !trace.has_data() {
+        return Err(format!("{name} (not given by the models)"));
+    }
+    let heading = name.replacen("stored", "Stored", 1);
+    Ok(Panel::new(Axis::of(heading, Quantity::Energy)).series(Series::trace("", trace)))
+}
+
+impl Changes {
+    /// Adds a line for each change to a panel.
+    fn mark(&self, panel: Panel, names: Names) -> Panel {
+        self.marked.iter().fold(panel, |panel, (time_s, text)| {
+            panel.mark(Mark::at_x(*time_s, if names == Names::Written { text.as_str() } else { "" }))
+        })
     }
 }
 
-/// Three components over time; the first tick with each marked event is named.
-fn vector_panel(label: &str, unit: &str, traces: [Trace; 3], first_s: [Option<f64>; MARKED.len()]) -> Panel {
-    let named = ["x", "y", "z"].into_iter().zip(traces).enumerate();
-    let panel = named.fold(Panel::new(Axis::linear(label, unit)), |panel, (axis, (name, trace))| {
-        panel.series(Series::trace(name, trace).axis(axis))
-    });
-    let marks =
-        first_s.into_iter().zip(MARKED).filter_map(|(time_s, (_, name))| Some(Mark::at_x(time_s?, name)));
-    marks.fold(panel, Panel::mark)
-}
-
-/// The stored energy over time; none if no model gives it.
-fn energy_panel(label: &str, trace: Trace) -> Option<Panel> {
-    trace.has_data().then(|| Panel::new(Axis::linear(label, "mJ")).series(Series::trace("", trace)))
-}
-
-fn seconds(record: &TickRecord) -> f64 {
-    record.time_ns as f64 * 1.0e-9
+fn seconds(time_ns: u64) -> f64 {
+    time_ns as f64 * 1.0e-9
 }

@@ -19,7 +19,7 @@ pub fn panels(timing: &Timing) -> [Panel; 2] {
 }
 
 fn histogram() -> Panel {
-    Panel::with_x(Axis::log("Time", "µs"), Axis::log("Ticks", "1"))
+    Panel::with_x(Axis::log("Time", "µs"), Axis::log("Ticks", ""))
 }
 
 /// Ticks by their time, µs; what is shorter than 10 ns takes no time.

@@ -4,7 +4,7 @@ use super::fit::Fit;
 use super::procedure::Reading;
 use super::verify::ErrorCurve;
 use flotor_hal::VerticalCalibration;
-use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_plot::{Axis, Figure, Panel, Quantity, Series};
 
 const MM_PER_M: f64 = 1.0e3;
 /// Readings of different forces at one height stand side by side, this far apart, mm.
@@ -25,14 +25,14 @@ pub fn to_svg(
         "delivered over commanded force; degree {} by cross-validation; residual {:.3} N; 95 % band ±{:.3} %; weight {:.2} ± {:.2} N",
         fit.degree, fit.residual_n, fit.band_95_percent, fit.weight_n[0], fit.weight_n[1]
     );
-    let mut errors = Panel::new(Axis::linear("Delivered over commanded", "%"));
+    let mut errors = Panel::new(Axis::of("Delivered over commanded", Quantity::Percent));
     // In the order of the corrections: none, the two of the thesis, the fit.
     for ((name, curve), slot) in curves.iter().zip([0, 1, REPORT, FIT]) {
         let samples = curve.ratios.iter().map(|(height_m, ratio)| (height_m * MM_PER_M, ratio * 100.0));
         let label = format!("{name}: {:.2} %", curve.error_percent());
         errors = errors.series(Series::line(label, samples).slot(slot));
     }
-    Figure::new("Vertical calibration", Axis::linear("Height", "mm"))
+    Figure::new("Vertical calibration", Axis::of("Height", Quantity::Length))
         .subtitle(subtitle)
         .panel_height_px(180.0)
         .panel(shares(readings, fit, thesis))
@@ -50,7 +50,7 @@ fn shares(readings: &[Reading], fit: &Fit, thesis: &VerticalCalibration) -> Pane
             (height_m * MM_PER_M, calibration.share(height_m) * 100.0)
         })
     };
-    let mut panel = Panel::new(Axis::linear("Share that arrives", "%"));
+    let mut panel = Panel::new(Axis::of("Share that arrives", Quantity::Percent));
     for (shift_mm, (force_n, readings)) in side_by_side(by_force(readings)) {
         let share = readings.iter().map(|(_, reading)| {
             (
@@ -66,7 +66,7 @@ fn shares(readings: &[Reading], fit: &Fit, thesis: &VerticalCalibration) -> Pane
 }
 
 fn residuals(readings: &[Reading], fit: &Fit) -> Panel {
-    let mut panel = Panel::new(Axis::linear("Residual", "mN"));
+    let mut panel = Panel::new(Axis::linear("Residual", "mN").least_range(1.0));
     for (shift_mm, (force_n, readings)) in side_by_side(by_force(readings)) {
         let samples = readings.iter().map(|(index, reading)| {
             let residual_n = fit.residuals_n.get(*index).copied().unwrap_or(f64::NAN);

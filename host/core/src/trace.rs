@@ -67,6 +67,22 @@ impl Events {
     /// The force swung between its limits: only a part of it was let through.
     pub const OSCILLATION_DAMPED: Events = Events { bits: 1 << 24 };
 
+    /// Faults: each ends or disables a part of the run.
+    pub const FAULTS: Events =
+        Self::EMERGENCY_STOP.with(Self::DEVICE_FAULT).with(Self::MODEL_FAULT).with(Self::OSCILLATION_DAMPED);
+
+    /// Limits and other restrictions of a tick.
+    pub const LIMITS: Events = Self::FORCE_LIMITED
+        .with(Self::TORQUE_LIMITED)
+        .with(Self::BOUNDARY)
+        .with(Self::MISSED)
+        .with(Self::HOLDING)
+        .with(Self::VELOCITY_LIMITED)
+        .with(Self::NOT_FINITE)
+        .with(Self::IMPLAUSIBLE_SAMPLE)
+        .with(Self::MODEL_DEGRADED)
+        .with(Self::PARTNER_SILENT);
+
     /// Names of the bits, lowest first: for reports and recordings.
     pub const NAMES: [&'static str; 25] = [
         "stale_sample",
@@ -95,6 +111,20 @@ impl Events {
         "partner_limited",
         "oscillation_damped",
     ];
+
+    /// Both sets in one. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub const fn with(self, other: Events) -> Self {
+        Self { bits: self.bits | other.bits }
+    }
+
+    /// Each event of the set with its name, as people read it. Not real-time.
+    pub fn named(self) -> impl Iterator<Item = (Events, String)> {
+        let each = (0..).zip(Self::NAMES).map(|(bit, name)| (Self::from_bits(1 << bit), name));
+        each.filter(move |(event, _)| self.intersects(*event))
+            .map(|(event, name)| (event, name.replace('_', " ")))
+    }
 
     /// Adds events. Real-time: bounded, no allocation.
     #[inline]

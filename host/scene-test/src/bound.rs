@@ -61,6 +61,16 @@ impl Bound {
         }
     }
 
+    /// The numbers at which it ends, from the least.
+    pub(crate) fn ends(&self) -> Vec<f64> {
+        match self {
+            Self::Range { min, max } => [min, max].into_iter().filter_map(|end| *end).collect(),
+            Self::Near { value, within } => vec![value - within, value + within],
+            Self::Number(exact) => vec![*exact],
+            Self::Word(_) | Self::Flag(_) => Vec::new(),
+        }
+    }
+
     /// Whether a value of this kind could meet it.
     pub(crate) fn fits(&self, value: &Value) -> bool {
         match (self, value) {
@@ -103,6 +113,14 @@ mod tests {
     fn bound(text: &str) -> Result<Option<Bound>, String> {
         let table: toml::Table = format!("b = {text}").parse().unwrap();
         Bound::read(&table["b"])
+    }
+
+    #[test]
+    fn a_bound_ends_at_its_numbers() {
+        let ends = |text: &str| bound(text).unwrap().unwrap().ends();
+        assert_eq!(ends("{ min = -1, max = 2 }"), [-1.0, 2.0]);
+        assert_eq!((ends("{ max = 2 }"), ends("{ value = 2, within = 0.5 }")), (vec![2.0], vec![1.5, 2.5]));
+        assert_eq!((ends("3"), ends("true")), (vec![3.0], Vec::new()));
     }
 
     #[test]

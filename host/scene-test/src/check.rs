@@ -3,7 +3,7 @@
 use crate::bound::Bound;
 use crate::case::{Case, Check, combinations};
 use crate::curve::POSE;
-use crate::file::{MeasureDemand, TestFile, Validate};
+use crate::file::{Expectation, MeasureDemand, TestFile, Validate};
 use crate::minimise::shortest;
 use crate::numbers::at;
 use crate::process::{Flotor, Ran};
@@ -117,6 +117,19 @@ pub(crate) fn run_arguments(
     arguments
 }
 
+/// The bounds that a picture of the run shows: those of numbers that are largest at one instant.
+fn drawn_bounds(file: &TestFile) -> impl Iterator<Item = String> {
+    let drawn = file
+        .expect
+        .iter()
+        .filter(|expected| ["peak_force_n", "peak_torque_nm"].contains(&expected.path.as_str()));
+    let of = |expected: &Expectation| {
+        let path = expected.path.clone();
+        expected.bound.ends().into_iter().map(move |end| ["--plot-bound".to_owned(), format!("{path}={end}")])
+    };
+    drawn.flat_map(of).flatten()
+}
+
 /// Carries out a case. `models` are those of its scene, or why they are not known.
 pub(crate) fn check(
     flotor: &Flotor,
@@ -145,7 +158,8 @@ pub(crate) fn check(
     match (&case.check, models) {
         (Check::Run { seed, set }, _) => {
             let judged = run(flotor, case, *seed, set, case.file.duration.as_deref());
-            let arguments = run_arguments(case.file, *seed, set, case.file.duration.as_deref());
+            let mut arguments = run_arguments(case.file, *seed, set, case.file.duration.as_deref());
+            arguments.extend(drawn_bounds(case.file));
             if let Some(first) = judged.failures.first() {
                 let shortest = shortest(flotor, case, first, judged.json.as_ref());
                 outcome.detail = shortest.as_deref().map(command_line);

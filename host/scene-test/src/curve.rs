@@ -1,7 +1,7 @@
 //! A force-position curve: a CSV with poses and the wrench expected at each.
 
 use flotor_hal::{HashLines, Table, TextProblem, read_text};
-use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_plot::{Axis, Figure, Panel, Quantity, Series};
 use std::path::Path;
 
 /// Columns of a pose, as `flotor eval` reads them.
@@ -126,33 +126,35 @@ impl Points {
     ) -> Result<String, String> {
         let answers = self.answers(answers)?;
         let along = self.coordinate_that_changes();
-        let (name, unit, scale) = COORDINATES[along];
+        let (name, quantity) = COORDINATES[along];
+        let (_, per_si) = quantity.unit();
         let panel = |figure: Figure, index: usize| {
-            let (quantity, unit, scale_y) = COLUMNS[index];
+            let (column, measured) = COLUMNS[index];
+            let (_, per_si_y) = measured.unit();
             let at = |value: &dyn Fn(usize) -> f64| {
                 let mut samples: Vec<(f64, f64)> = (0..self.rows.len())
-                    .map(|row| (self.rows[row].0[along] * scale, value(row) * scale_y))
+                    .map(|row| (self.rows[row].0[along] * per_si, value(row) * per_si_y))
                     .collect();
                 samples.sort_by(|one, other| one.0.total_cmp(&other.0));
                 samples
             };
             let expected = |row: usize| self.rows[row].1[index];
             let within = tolerance(index);
-            let panel = Panel::new(Axis::linear(quantity, unit))
+            let panel = Panel::new(Axis::of(column, measured))
                 .series(Series::line("expected", at(&expected)).slot(0))
                 .series(Series::line("least", at(&|row| expected(row) - within)).slot(7))
                 .series(Series::line("most", at(&|row| expected(row) + within)).slot(7))
                 .series(Series::points("got", at(&|row| answers[row].wrench[index])).slot(1));
             figure.panel(panel)
         };
-        let figure = Figure::new(title, Axis::linear(name, unit)).panel_height_px(220.0);
+        let figure = Figure::new(title, Axis::of(name, quantity)).panel_height_px(220.0);
         Ok(self.compared.iter().copied().fold(figure, panel).to_svg())
     }
 
     /// Number of the coordinate with the widest range, in millimetres and degrees.
     fn coordinate_that_changes(&self) -> usize {
         let range = |index: usize| {
-            let numbers = self.rows.iter().map(|(pose, _)| pose[index] * COORDINATES[index].2);
+            let numbers = self.rows.iter().map(|(pose, _)| pose[index] * COORDINATES[index].1.unit().1);
             let (low, high) =
                 numbers.fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
             high - low
@@ -167,27 +169,25 @@ struct Answer {
     status: String,
 }
 
-/// Name, unit and units a metre or radian of each coordinate of a pose.
-const COORDINATES: [(&str, &str, f64); 6] = [
-    ("x", "mm", 1.0e3),
-    ("y", "mm", 1.0e3),
-    ("z", "mm", 1.0e3),
-    ("Rotation, x", "°", DEGREES),
-    ("Rotation, y", "°", DEGREES),
-    ("Rotation, z", "°", DEGREES),
+/// Name and quantity of each coordinate of a pose.
+const COORDINATES: [(&str, Quantity); 6] = [
+    ("x", Quantity::Length),
+    ("y", Quantity::Length),
+    ("z", Quantity::Length),
+    ("Rotation, x", Quantity::Angle),
+    ("Rotation, y", Quantity::Angle),
+    ("Rotation, z", Quantity::Angle),
 ];
 
-/// Name, unit and units a newton or newton metre of each column of a wrench.
-const COLUMNS: [(&str, &str, f64); 6] = [
-    ("Force, x", "N", 1.0),
-    ("Force, y", "N", 1.0),
-    ("Force, z", "N", 1.0),
-    ("Torque, x", "mN·m", 1.0e3),
-    ("Torque, y", "mN·m", 1.0e3),
-    ("Torque, z", "mN·m", 1.0e3),
+/// Name and quantity of each column of a wrench.
+const COLUMNS: [(&str, Quantity); 6] = [
+    ("Force, x", Quantity::Force),
+    ("Force, y", Quantity::Force),
+    ("Force, z", Quantity::Force),
+    ("Torque, x", Quantity::Torque),
+    ("Torque, y", Quantity::Torque),
+    ("Torque, z", Quantity::Torque),
 ];
-
-const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// A point that is too far from the curve.
 #[derive(Debug, PartialEq)]

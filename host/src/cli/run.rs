@@ -1,5 +1,6 @@
 //! `flotor run`: a scene in the servo loop, with its observers.
 
+use crate::peak_bounds::PeakBound;
 use crate::platform::most_open_files;
 use crate::run_picture::RunPicture;
 use clap::{Args, ValueEnum};
@@ -62,6 +63,9 @@ pub(crate) struct RunArguments {
     /// Plot the run
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
+    /// Draw a bound of the largest force or torque, peak_force_n=3.2 (repeatable)
+    #[arg(long, hide = true, requires = "plot", value_name = "NUMBER=VALUE")]
+    plot_bound: Vec<PeakBound>,
     #[command(flatten)]
     json: JsonOption,
     /// Compute an output of the models although neither the hand nor an observer needs it (repeatable)
@@ -155,7 +159,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
             arguments.record.as_deref().map(|path| Recorder::create(path, &description)).transpose()?,
         ),
         plot: arguments.plot.as_ref().map(|_| {
-            RunPicture::new(&scene.title, scene.devices.iter().map(|device| device.name.clone()).collect())
+            let devices = scene.devices.iter().map(|device| device.name.clone()).collect();
+            RunPicture::new(&scene.title, devices, &arguments.plot_bound)
         }),
         compute: arguments.compute.iter().fold(Demand::FORCE, |all, output| all.with(output.demand())),
         progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
@@ -397,6 +402,9 @@ const PROGRESS_TICKS: u64 = 33;
 impl Observer for Watchers {
     fn change(&mut self, change: &Change) {
         self.recording.change(change);
+        if let Some(plot) = &mut self.plot {
+            plot.change(change);
+        }
     }
 
     fn demand(&self) -> Demand {

@@ -280,9 +280,12 @@ impl BenchReport {
                 },
             )
         };
+        let cases = self.rows.len() as f64;
         Figure::new(
             format!("Time of {} {}", self.model, self.version),
-            Axis::linear("Case, in the order of the table", ""),
+            Axis::linear("Case, in the order of the table", "")
+                .range(0.0, cases + 1.0)
+                .levels((1_u32..).zip(&self.rows).map(|(case, _)| f64::from(case))),
         )
         .subtitle(format!(
             "A tick with force and torque; {} ticks of a smooth path of 1 to 3 Hz at 1 kHz; no errors: no --reference; a tick has \

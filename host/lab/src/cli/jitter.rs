@@ -90,7 +90,7 @@ fn of_time(bins: &[(u64, u64)]) -> Vec<Bin> {
 }
 
 fn picture(report: &JitterReport) -> String {
-    let mut panel = Panel::new(Axis::log("Ticks", "1"));
+    let mut panel = Panel::new(Axis::log("Ticks", ""));
     for (name, bins) in ["servo", "bare loop"].iter().zip(&report.bins) {
         panel = panel.series(Series::histogram(*name, of_time(bins)));
     }

@@ -4,6 +4,7 @@ mod bench;
 mod eval;
 mod jitter;
 mod replay;
+mod replay_picture;
 mod stability;
 mod stress;
 mod validate;

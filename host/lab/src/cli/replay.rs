@@ -1,13 +1,10 @@
 //! `flotor replay`: the models of a recording re-evaluated, unchanged or changed.
 
+use super::replay_picture::ReplayPicture;
 use crate::replay::{Compared, Coverage, Difference, DivergenceCause, Replay};
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, PluginKeyValue, PluginPathOption, svg_file};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
-use flotor_core::ModelOutputs;
-use flotor_core::trace::TickRecord;
-use flotor_hal::DVec3;
-use flotor_plot::{Axis, Figure, Panel, Series, Trace};
 use flotor_record::Ending;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -47,6 +44,19 @@ impl ReplayArguments {
     fn changes_anything(&self) -> bool {
         !(self.sets.is_empty() && self.models.is_empty())
     }
+
+    /// The recording and what is changed, as on the command line.
+    fn text(&self) -> String {
+        let file = self.recording.file_name().unwrap_or_default().to_string_lossy();
+        let sets = self.sets.iter().map(|set| format!("--set {set}"));
+        let models = self.models.iter().map(|model| format!("--model {model}"));
+        let changes: Vec<String> = sets.chain(models).collect();
+        if changes.is_empty() {
+            format!("{file}, unchanged")
+        } else {
+            format!("{file}, {}", changes.join(" "))
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -74,7 +84,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let progress = progress_bar((replay.run().duration_s * 1.0e3) as u64, "{percent:>3} %  replaying");
     let started = Instant::now();
-    let mut picture = arguments.plot.as_ref().map(|_| Picture::default());
+    let mut picture = arguments.plot.as_ref().map(|_| ReplayPicture::new());
     let mut end_ns = 0;
     let Compared { difference, coverage, why, ending, implausible, health } =
         replay.compare(|record, outputs| {
@@ -100,7 +110,9 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
         wall_s: started.elapsed().as_secs_f64(),
     };
     print_result(arguments.json.file(), &report, || to_text(arguments, &report))?;
-    write_text(arguments.plot.as_deref(), || picture.map_or_else(String::new, Picture::into_svg))?;
+    write_text(arguments.plot.as_deref(), || {
+        picture.map_or_else(String::new, |picture| picture.into_svg(&arguments.text()))
+    })?;
     if let Some((_, words)) = health.iter().find(|(health, _)| health.panicked_at.is_some()) {
         return Err(CommandError::PluginRefused(format!("a model of the recording failed: {words}")));
     }
@@ -172,47 +184,4 @@ fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
     implausible.for_each(|found| row("note", found));
     report.gaps().into_iter().for_each(|gap| row("note", gap));
     lines.join("\n")
-}
-
-/// Recorded and replayed force, and the differences along every axis, as they arrive.
-#[derive(Default)]
-struct Picture {
-    recorded: Trace,
-    replayed: Trace,
-    force: [Trace; 3],
-    torque: [Trace; 3],
-}
-
-impl Picture {
-    fn add(&mut self, record: &TickRecord, now: &ModelOutputs) {
-        let (then, time_s) = (&record.model, record.time_ns as f64 * 1.0e-9);
-        self.recorded.add(time_s, then.force().z);
-        self.replayed.add(time_s, now.force().z);
-        // NaN, which leaves a gap, where the recording holds no torque.
-        let torque = now.torque().zip(then.torque()).map_or(DVec3::NAN, |(now, then)| now - then);
-        let force = now.force() - then.force();
-        for axis in 0..3 {
-            self.force[axis].add(time_s, force[axis]);
-            self.torque[axis].add(time_s, torque[axis] * 1.0e3);
-        }
-    }
-
-    fn into_svg(self) -> String {
-        let axes = |label: &str, unit: &str, traces: [Trace; 3]| {
-            let named = ["x", "y", "z"].into_iter().zip(traces).enumerate();
-            named.fold(Panel::new(Axis::linear(label, unit)), |panel, (axis, (name, trace))| {
-                panel.series(Series::trace(name, trace).slot(axis))
-            })
-        };
-        Figure::new("Recorded and replayed", Axis::linear("Time", "s"))
-            .panel(
-                Panel::new(Axis::linear("Force, z", "N"))
-                    .series(Series::trace("recorded", self.recorded))
-                    .series(Series::trace("replayed", self.replayed)),
-            )
-            .panel(axes("Difference of force", "N", self.force))
-            .panel(axes("Difference of torque", "mN·m", self.torque))
-            .panel_height_px(180.0)
-            .to_svg()
-    }
 }

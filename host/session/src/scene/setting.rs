@@ -1,6 +1,7 @@
 //! Settings on top of a scene, as people write them: `spring.variant=energy`.
 
 use super::{DeviceUse, Location, ModelUse, ParameterText, Scene, did_you_mean, is_named, without_device};
+use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -21,6 +22,12 @@ impl FromStr for KeyValue {
             }
             _ => Err(format!("`{text}` is not KEY=VALUE")),
         }
+    }
+}
+
+impl fmt::Display for KeyValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.key, self.value)
     }
 }
 
@@ -66,6 +73,12 @@ impl FromStr for PluginKeyValue {
         }
         let setting = KeyValue { key: key.to_owned(), value: value.to_owned() };
         Ok(Self { plugin: plugin.to_owned(), setting })
+    }
+}
+
+impl fmt::Display for PluginKeyValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.plugin, self.setting)
     }
 }
 

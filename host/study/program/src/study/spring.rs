@@ -6,7 +6,7 @@ use clap::Args;
 use flotor_command::options::{JsonOption, new_file, number, svg_file};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::{TextProblem, read_text};
-use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_plot::{Axis, Figure, Panel, Quantity, Series};
 use flotor_session::registry::is_same_file;
 use std::path::{Path, PathBuf};
 
@@ -114,14 +114,14 @@ fn picture(curve: &MeasuredCurve, fit: &SpringFit, served: &ServedCurve) -> Stri
         let x_mm = share * deepest_mm;
         (x_mm, fit.stiffness_n_per_m * (x_mm * 1.0e-3 - fit.offset_m))
     };
-    let panel = Panel::new(Axis::linear("Force", "N"))
+    let panel = Panel::new(Axis::of("Force", Quantity::Force))
         .series(Series::points("measured", points()).slot(0))
         .series(Series::line("fitted spring", [0.0, 1.0].map(line)).slot(1))
         .series(Series::line("fitted here", FITTED.map(line)).slot(2))
         .series(
             Series::line("served as measured", served.knots.iter().map(|(x_m, n)| (x_m * 1.0e3, *n))).slot(3),
         );
-    Figure::new("A real spring", Axis::linear("Compression", "mm"))
+    Figure::new("A real spring", Axis::of("Compression", Quantity::Length))
         .subtitle(format!(
             "{:.4} N/mm{}, R² {:.5}",
             fit.stiffness_n_per_m * 1.0e-3,
