@@ -10,7 +10,8 @@ use crate::ui::plot_stack::{ExportFormat, PlotStack, TooLow};
 use crate::ui::readout::{subtitle_of, title_of};
 use crate::ui::view3d::pixels;
 use egui::{UiBuilder, vec2};
-use flotor_plot::{Axis, Figure, Panel, Paper, Series};
+use flotor_core::trace::Events;
+use flotor_plot::{Axis, Figure, Mark, Panel, Paper, Series, Spans};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -165,20 +166,18 @@ pub fn svg(history: &History, device: Option<&str>, plots: &PlotStack) -> String
     let [from_s, to_s] = plots.span_s(history);
     let panel = |quantity: &Quantity| {
         let (unit, per_si) = quantity.unit(plots.units);
-        let count = quantity.components().len();
         let line = |(component, name): (usize, &&str)| {
             let samples = history.between(from_s, to_s);
-            let line =
-                Series::line(*name, samples.map(|s| (s.time_s(), quantity.value(s, component) * per_si)));
-            if count == 3 { line.axis(component) } else { line }
+            Series::line(*name, samples.map(|s| (s.time_s(), quantity.value(s, component) * per_si)))
+                .axis(component)
         };
-        let axis = Axis::linear(quantity.name(), unit);
+        let axis = Axis::linear(quantity.name(), unit).least_range(quantity.least_range(plots.units));
         let axis = match plots.values_of(*quantity) {
             Some([low, high]) => axis.range(low * per_si, high * per_si),
             None => axis,
         };
         let lines = quantity.components().iter().enumerate().map(line);
-        lines.fold(Panel::new(axis), Panel::series)
+        with_events(history, [from_s, to_s], lines.fold(Panel::new(axis), Panel::series))
     };
     let paper = match plots.export.look {
         Look::Light => Paper::Light,
@@ -198,6 +197,26 @@ pub fn svg(history: &History, device: Option<&str>, plots: &PlotStack) -> String
     .to_svg()
 }
 
+/// Adds faults and limits of the time shown to a panel.
+fn with_events(history: &History, [from_s, to_s]: [f64; 2], panel: Panel) -> Panel {
+    let (mut limited, mut faults) = (Spans::default(), Events::NONE);
+    let mut panel = panel;
+    for sample in history.between(from_s, to_s) {
+        for (fault, name) in sample.events.named().filter(|(event, _)| Events::FAULTS.intersects(*event)) {
+            if !faults.intersects(fault) {
+                panel = panel.mark(Mark::fault_at_x(sample.time_s(), name));
+            }
+        }
+        // A fault is marked where it begins.
+        faults = sample.events;
+        match sample.events.intersects(Events::LIMITS) {
+            true => limited.extend(sample.time_s()),
+            false => limited.interrupt(),
+        }
+    }
+    panel.limited(limited)
+}
+
 /// Force over position along an axis, with slope and area.
 fn force_position(history: &History, plots: &PlotStack, axis: usize) -> Panel {
     let [from_s, to_s] = plots.span_s(history);
@@ -205,7 +224,9 @@ fn force_position(history: &History, plots: &PlotStack, axis: usize) -> Panel {
     let (unit, per_m) = Quantity::Position.unit(plots.units);
     let name = Quantity::Position.components().get(axis).copied().unwrap_or_default();
     let points = curve.points.iter().map(|[x, force]| (x * per_m, *force));
-    Panel::with_x(Axis::linear(format!("Position {name}"), unit), Axis::linear("Force on the hand", "N"))
+    let position = Axis::linear(format!("Position {name}"), unit)
+        .least_range(Quantity::Position.least_range(plots.units));
+    Panel::with_x(position, Axis::of("Force on the hand", flotor_plot::Quantity::Force))
         .title(said(&curve, plots.units))
         .series(Series::line("", points).axis(axis))
 }

@@ -52,7 +52,7 @@ pub struct Palette {
     pub torque: Color,
     /// Where turns of a coil touch.
     pub contact: Color,
-    /// Something is wrong.
+    /// Warnings, and limits on the time axis.
     pub warning: Color32,
     /// A fault, or an emergency stop.
     pub fault: Color32,
@@ -96,8 +96,8 @@ impl Palette {
                 force: [250, 224, 92, 255],
                 torque: [222, 142, 190, 255],
                 contact: [255, 84, 96, 255],
-                warning: Color32::from_rgb(255, 138, 96),
-                fault: Color32::from_rgb(255, 92, 92),
+                warning: Color32::from_rgb(255, 232, 110),
+                fault: Color32::from_rgb(255, 96, 130),
                 well: Color32::from_rgb(0, 190, 140),
                 shadow: 0.62,
             },
@@ -119,8 +119,8 @@ impl Palette {
                 force: [236, 174, 16, 255],
                 torque: [196, 96, 158, 255],
                 contact: [226, 42, 62, 255],
-                warning: Color32::from_rgb(176, 54, 10),
-                fault: Color32::from_rgb(184, 16, 24),
+                warning: Color32::from_rgb(96, 52, 0),
+                fault: Color32::from_rgb(196, 0, 60),
                 well: Color32::from_rgb(0, 134, 100),
                 shadow: 0.34,
             },
@@ -279,10 +279,95 @@ mod tests {
         assert!(lightness.is_sorted_by(|a, b| a < b), "{lightness:?}");
     }
 
-    /// A component has one colour in the window, in pictures of the command line and in the book.
+    /// Colour difference by CIEDE2000 (CIE 142-2001; Sharma, Wu and Dalal, 2005).
+    fn ciede2000(one: DVec3, other: DVec3) -> f64 {
+        let chroma_of = |color: DVec3| color.y.hypot(color.z);
+        let seventh = |chroma: f64| (chroma.powi(7) / (chroma.powi(7) + 25.0_f64.powi(7))).sqrt();
+        let stretch = 1.5 - 0.5 * seventh(0.5 * (chroma_of(one) + chroma_of(other)));
+        let [one, other] = [one, other].map(|color| DVec3::new(color.x, stretch * color.y, color.z));
+        let [chroma, other_chroma] = [one, other].map(chroma_of);
+        let hue = |color: DVec3| color.z.atan2(color.y).to_degrees().rem_euclid(360.0);
+        let is_grey = chroma * other_chroma == 0.0;
+        // The shorter way around the circle of hues, and its middle.
+        let turn = if is_grey { 0.0 } else { (hue(other) - hue(one) + 180.0).rem_euclid(360.0) - 180.0 };
+        let mean_hue = if is_grey { hue(one) + hue(other) } else { hue(one) + 0.5 * turn };
+        let (lightness, mean_chroma) = (0.5 * (one.x + other.x), 0.5 * (chroma + other_chroma));
+        let cos = |degrees: f64| degrees.to_radians().cos();
+        let weight =
+            1.0 - 0.17 * cos(mean_hue - 30.0) + 0.24 * cos(2.0 * mean_hue) + 0.32 * cos(3.0 * mean_hue + 6.0)
+                - 0.2 * cos(4.0 * mean_hue - 63.0);
+        let bright = (lightness - 50.0).powi(2);
+        let lightness = (other.x - one.x) / (1.0 + 0.015 * bright / (20.0 + bright).sqrt());
+        let chromatic = (other_chroma - chroma) / (1.0 + 0.045 * mean_chroma);
+        let hue_part = 2.0 * (chroma * other_chroma).sqrt() * (0.5 * turn).to_radians().sin()
+            / (1.0 + 0.015 * mean_chroma * weight);
+        let blue = (-((mean_hue.rem_euclid(360.0) - 275.0) / 25.0).powi(2)).exp();
+        let rotation = -(60.0 * blue).to_radians().sin() * 2.0 * seventh(mean_chroma);
+        (lightness.powi(2) + chromatic.powi(2) + hue_part.powi(2) + rotation * chromatic * hue_part).sqrt()
+    }
+
+    /// Pairs of Sharma, Wu and Dalal, "The CIEDE2000 color-difference formula" (2005), table 1, printed to four decimals.
     #[test]
-    fn components_have_the_colours_of_pictures() {
+    fn colour_differences_are_those_of_the_published_table() {
+        for (one, other, expected) in [
+            ([50.0, 2.6772, -79.7751], [50.0, 0.0, -82.7485], 2.0425),
+            ([50.0, -1.0, 2.0], [50.0, 0.0, 0.0], 2.3669),
+            ([50.0, 2.49, -0.001], [50.0, -2.49, 0.0009], 7.1792),
+            ([50.0, 2.5, 0.0], [61.0, -5.0, 29.0], 22.8977),
+            ([2.0776, 0.0795, -1.135], [0.9033, -0.0636, -0.5514], 0.9082),
+        ] {
+            let found = ciede2000(DVec3::from(one), DVec3::from(other));
+            assert!((found - expected).abs() <= 0.5e-4, "{one:?} {other:?}: {found}");
+        }
+    }
+
+    /// Every pair of what is drawn over traces, for who has all cones, no red and no green ones. A limit has the colour of warnings.
+    #[test]
+    fn warnings_faults_the_cursor_and_the_traces_differ_to_every_eye() {
+        const LEAST: f64 = 10.0;
+        let mut compared = 0;
+        for look in [Look::Dark, Look::Light] {
+            let palette = Palette::of(look);
+            let [x, y, z] = palette.components;
+            let colors = [
+                ("warning", palette.warning),
+                ("fault", palette.fault),
+                ("cursor", palette.cursor),
+                ("x", x),
+                ("y", y),
+                ("z", z),
+            ];
+            for (vision, rows) in VISIONS.into_iter().filter(|(vision, _)| *vision != "no blue") {
+                let matrix = DMat3::from_cols_array_2d(&rows).transpose();
+                let seen = |color: Color32| lab((matrix * linear(rgb(color))).clamp(DVec3::ZERO, DVec3::ONE));
+                for (index, (name, color)) in colors.iter().enumerate() {
+                    for (other_name, other) in &colors[..index] {
+                        let difference = ciede2000(seen(*color), seen(*other));
+                        assert!(
+                            difference >= LEAST,
+                            "{look:?}, {vision}: {name}, {other_name}: {difference}"
+                        );
+                        compared += 1;
+                    }
+                }
+            }
+        }
+        assert_eq!(compared, 2 * 3 * 15);
+    }
+
+    /// A component, a fault and a limit have one colour in the window, in pictures of the command line and in the book.
+    #[test]
+    fn components_faults_and_limits_have_the_colours_of_pictures() {
         let written = |color: Color32| format!("#{:02x}{:02x}{:02x}", color.r(), color.g(), color.b());
+        for (color, of) in [
+            (flotor_plot::FAULT_COLORS, (|palette: Palette| palette.fault) as fn(Palette) -> Color32),
+            (flotor_plot::LIMIT_COLORS, |palette| palette.warning),
+        ] {
+            assert_eq!(
+                (written(of(Palette::of(Look::Light))), written(of(Palette::of(Look::Dark)))),
+                (color.0.to_owned(), color.1.to_owned())
+            );
+        }
         for (axis, (light, dark)) in flotor_plot::AXIS_COLORS.into_iter().enumerate() {
             assert_eq!(written(Palette::of(Look::Light).components[axis]), light);
             assert_eq!(written(Palette::of(Look::Dark).components[axis]), dark);

@@ -75,6 +75,29 @@ impl Quantity {
         }
     }
 
+    /// The quantity as pictures know it: it has the least range of an axis.
+    #[must_use]
+    pub const fn measured(self) -> flotor_plot::Quantity {
+        use flotor_plot::Quantity as Measured;
+        match self {
+            Self::Force => Measured::Force,
+            Self::Torque => Measured::Torque,
+            Self::Position => Measured::Length,
+            Self::Rotation => Measured::Angle,
+            Self::Velocity => Measured::Velocity,
+            Self::AngularVelocity => Measured::AngularVelocity,
+            Self::Energy => Measured::Energy,
+            Self::Stiffness => Measured::Stiffness,
+            Self::Lateness => Measured::Lateness,
+        }
+    }
+
+    /// The least range of an axis, in these units.
+    #[must_use]
+    pub fn least_range(self, units: Units) -> f64 {
+        self.measured().least_range_si() * self.unit(units).1
+    }
+
     /// Name, names of components, SI unit, and the unit people read with how many of it one SI unit is.
     const fn entry(self) -> (&'static str, &'static [&'static str], &'static str, (&'static str, f64)) {
         const DEGREES_PER_RAD: f64 = 180.0 / std::f64::consts::PI;

@@ -1,32 +1,22 @@
-//! What happened, as marks along the time: where a limit cut the force, where ticks were missed, where a parameter changed.
+//! Events as marks over the time: bars at its foot where a limit acted, ticks were missed or a parameter changed, and a line with a
+//! cross over the traces for each fault.
 
 use crate::decimate::bucket_width_s;
 use crate::history::History;
 use crate::palette::Palette;
-use egui::{Color32, CornerRadius, Rect, Sense, Ui, WidgetInfo};
+use egui::{Color32, CornerRadius, Rect, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use flotor_core::trace::Events;
 use std::collections::VecDeque;
 
 /// Number of intervals, at most, into which the time shown is divided.
 const INTERVALS: usize = 400;
 
-/// How bad what happened is, from the worst; each has its colour.
-const RANKS: [&[Events]; 3] = [
-    &[Events::EMERGENCY_STOP, Events::DEVICE_FAULT, Events::MODEL_FAULT, Events::OSCILLATION_DAMPED],
-    &[
-        Events::FORCE_LIMITED,
-        Events::TORQUE_LIMITED,
-        Events::BOUNDARY,
-        Events::MISSED,
-        Events::HOLDING,
-        Events::VELOCITY_LIMITED,
-        Events::NOT_FINITE,
-        Events::IMPLAUSIBLE_SAMPLE,
-        Events::MODEL_DEGRADED,
-        Events::PARTNER_SILENT,
-    ],
-    &[Events::PARAMETER_CHANGED],
-];
+/// Classes of events, the gravest first; each has its colour.
+const RANKS: [Events; 3] = [Events::FAULTS, Events::LIMITS, Events::PARAMETER_CHANGED];
+
+/// Half the size of the cross of a fault, and how far its middle lies below the top of a trace, points.
+const CROSS_PT: f32 = 4.5;
+const CROSS_DEPTH_PT: f32 = 8.0;
 
 /// Events of the time shown, kept from picture to picture as the traces are.
 #[derive(Clone, Debug, Default)]
@@ -59,12 +49,39 @@ impl Marks {
         }
     }
 
+    /// Paints a line with a cross over a trace wherever a fault begins.
+    pub fn show_faults(
+        &mut self,
+        ui: &Ui,
+        history: &History,
+        span_s: [f64; 2],
+        frame: Rect,
+        palette: &Palette,
+    ) {
+        self.look(history, span_s);
+        let (painter, stroke) = (ui.painter_at(frame), Stroke::new(1.6, palette.fault));
+        let mut before = Events::NONE;
+        for (number, events) in &self.kept {
+            let is_new = events
+                .named()
+                .any(|(event, _)| Events::FAULTS.intersects(event) && !before.intersects(event));
+            before = *events;
+            if !is_new {
+                continue;
+            }
+            let x = place(number * self.width_s, span_s, frame);
+            painter.line_segment([pos2(x, frame.top()), pos2(x, frame.bottom())], stroke);
+            for dy in [-CROSS_PT, CROSS_PT] {
+                let middle = pos2(x, frame.top() + CROSS_DEPTH_PT);
+                painter.line_segment([middle - vec2(CROSS_PT, dy), middle + vec2(CROSS_PT, dy)], stroke);
+            }
+        }
+    }
+
     /// Paints the marks at the foot of the traces; what they are is said to who points at one.
     pub fn show(&mut self, ui: &mut Ui, history: &History, span_s: [f64; 2], frame: Rect, palette: &Palette) {
         self.look(history, span_s);
-        let per_s = f64::from(frame.width()) / (span_s[1] - span_s[0]);
-        #[allow(clippy::cast_possible_truncation)] // points
-        let x = |time_s: f64| frame.left() + ((time_s - span_s[0]) * per_s) as f32;
+        let x = |time_s: f64| place(time_s, span_s, frame);
         let strip = Rect::from_min_max(egui::pos2(frame.left(), frame.bottom() - 7.0), frame.max);
         let response = ui.interact(strip, ui.scope_id().with("marks"), Sense::hover());
         let pointed = response.hover_pos().map(|at| at.x);
@@ -90,8 +107,16 @@ impl Marks {
     }
 }
 
+/// Where a time lies in a frame, points.
+fn place(time_s: f64, span_s: [f64; 2], frame: Rect) -> f32 {
+    let per_s = f64::from(frame.width()) / (span_s[1] - span_s[0]);
+    #[allow(clippy::cast_possible_truncation)] // points
+    let beside = ((time_s - span_s[0]) * per_s) as f32;
+    frame.left() + beside
+}
+
 fn rank(events: Events) -> Option<usize> {
-    RANKS.iter().position(|rank| rank.iter().any(|event| events.intersects(*event)))
+    RANKS.iter().position(|rank| events.intersects(*rank))
 }
 
 fn color(rank: usize, palette: &Palette) -> Color32 {
@@ -102,14 +127,9 @@ fn color(rank: usize, palette: &Palette) -> Color32 {
     }
 }
 
-/// Names of what is marked.
+/// Names of the events that are marked.
 fn names(events: Events) -> Vec<String> {
-    let marked = |bit: u32| {
-        let event = Events::from_bits(1 << bit);
-        events.intersects(event) && rank(event).is_some()
-    };
-    let bits = (0..).zip(Events::NAMES).filter(|(bit, _)| marked(*bit));
-    bits.map(|(_, name)| name.replace('_', " ")).collect()
+    events.named().filter(|(event, _)| rank(*event).is_some()).map(|(_, name)| name).collect()
 }
 
 #[cfg(test)]

@@ -240,7 +240,11 @@ impl PlotStack {
                 maximise: Maximise::No,
                 wheel: Wheel::Zooms,
             };
-            plot(&mut ui, history, &mut Trace::of(*quantity), view, palette);
+            let drawn = plot(&mut ui, history, &mut Trace::of(*quantity), view, palette);
+            self.marks.show_faults(&ui, history, span_s, drawn.frame, palette);
+            if time_axis {
+                self.marks.show(&mut ui, history, span_s, drawn.frame, palette);
+            }
         }
     }
 
@@ -468,6 +472,7 @@ impl PlotStack {
             };
             let trace = self.traces.entry(quantity).or_insert_with(|| Trace::of(quantity));
             let answer = plot(ui, history, trace, view, palette);
+            self.marks.show_faults(ui, history, span_s, answer.frame, palette);
             if time_axis {
                 self.marks.show(ui, history, span_s, answer.frame, palette);
             }

@@ -92,7 +92,9 @@ pub fn plot(
         .include_x(span_s[1]);
     let plot = plain(plot, palette).y_grid_spacer(move |grid| marks_inside(grid.bounds, height));
     // Zero is in sight unless somebody chose other values.
-    let plot = if values.is_none() { plot.include_y(0.0) } else { plot };
+    // Smaller differences than the least range are rounding.
+    let least = 0.5 * quantity.least_range(units);
+    let plot = if values.is_none() { plot.include_y(-least).include_y(least) } else { plot };
     let shown = plot.show(ui, |plot| {
         plot.set_plot_bounds_x(span_s[0]..=span_s[1]);
         if let Some([low, high]) = values {
