@@ -5,7 +5,7 @@
 
 use super::{AnalysisError, AnalysisOptions, SubjectRecord, conditions, within_factors};
 use flotor_statistics::anova::{Design, Effect, analyse};
-use flotor_statistics::describe::mean;
+use flotor_statistics::describe::{deviation, mean};
 use flotor_study::kinematics::StimulusKinematics;
 use flotor_study::log::TrialEvent;
 use flotor_study::trial::{Position, Presented};
@@ -30,6 +30,8 @@ pub struct KinematicMeasure {
     pub anova: Vec<Effect>,
     /// Mean over subjects and modalities at each level of the stimulus, in order.
     pub means: Vec<f64>,
+    /// Standard error of each mean over subjects.
+    pub standard_errors: Vec<f64>,
 }
 
 /// Analyses movements over the levels of the stimulus (bases, or stimuli rated). Nothing where some were not measured.
@@ -49,9 +51,20 @@ pub(super) fn measures(
             let both = rows.iter().flat_map(|row| row.iter().skip(level).step_by(levels.len()));
             mean(&both.copied().collect::<Vec<_>>())
         };
-        found.push(KinematicMeasure { measure, anova, means: (0..levels.len()).map(at).collect() });
+        let means = (0..levels.len()).map(at).collect();
+        let standard_errors =
+            (0..levels.len()).map(|level| standard_error(&rows, level, levels.len())).collect();
+        found.push(KinematicMeasure { measure, anova, means, standard_errors });
     }
     Ok(found)
+}
+
+/// Standard error over subjects of the mean of both modalities at a level; NaN for one subject.
+fn standard_error(rows: &[Vec<f64>], level: usize, levels: usize) -> f64 {
+    let of_subject =
+        |row: &Vec<f64>| mean(&row.iter().skip(level).step_by(levels).copied().collect::<Vec<_>>());
+    let means: Vec<f64> = rows.iter().map(of_subject).collect();
+    deviation(&means) / (means.len() as f64).sqrt()
 }
 
 /// Means of one subject, modality by level; none if one of them was never measured.

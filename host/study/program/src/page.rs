@@ -17,7 +17,7 @@ use flotor_statistics::describe::MeanInterval;
 use flotor_statistics::effect_size::{EffectSize, Reach, partial_eta_squared};
 use flotor_study::exclusion::{Exclusion, ExclusionRules};
 use flotor_study::log::Begin;
-use flotor_study::protocol::Stimulus;
+use flotor_study::protocol::{Protocol, Stimulus};
 use flotor_study::trial::Modality;
 use std::fmt::Write;
 
@@ -36,7 +36,7 @@ pub(crate) fn html(begin: &Begin, report: &Report<'_>, applied: &Applied) -> Str
     }
     let title = match report.analysis {
         Analysis::Jnd(jnd) => {
-            jnd_page(&mut page, jnd, &applied.kept, stimulus, levels);
+            jnd_page(&mut page, jnd, (&begin.protocol, &applied.kept), stimulus, levels);
             format!("Just noticeable difference of {stimulus}")
         }
         Analysis::Magnitude(magnitude) => {
@@ -92,7 +92,7 @@ fn exclusions(page: &mut Page, rules: &ExclusionRules, applied: &Applied) {
 fn jnd_page(
     page: &mut Page,
     analysis: &JndAnalysis,
-    subjects: &[SubjectRecord],
+    (protocol, subjects): (&Protocol, &[SubjectRecord]),
     stimulus: &Stimulus,
     levels: &[f64],
 ) {
@@ -167,14 +167,35 @@ fn jnd_page(
         figures::subjects(analysis),
         "Each subject's Weber fraction without vision against that with it.",
     );
-    if let Some(first) = subjects.first() {
-        page.figure(figures::tracks(first), "The adaptive tracks of one subject.");
+    if let Protocol::Jnd(jnd) = protocol {
+        page.figure(
+            figures::psychometric(jnd, subjects),
+            "Right answers over the difference, and the function of each subject.",
+        );
     }
+    tracks(page, subjects, stimulus);
     movements(page, (analysis.task, analysis.beside), &analysis.kinematics, levels, stimulus);
     if analysis.unfinished_tracks > 0 {
         let count = analysis.unfinished_tracks;
         page.paragraph(&format!("{count} tracks did not reach a threshold and are omitted."));
     }
+}
+
+/// The tracks of the first subject, and folded those of all others.
+fn tracks(page: &mut Page, subjects: &[SubjectRecord], stimulus: &Stimulus) {
+    let Some((first, others)) = subjects.split_first() else { return };
+    page.figure(figures::tracks(first, stimulus), "The adaptive tracks of the first subject.");
+    if others.is_empty() {
+        return;
+    }
+    page.folded(&format!("Tracks of the other {} subjects", others.len()), |page| {
+        for record in others {
+            page.figure(
+                figures::tracks(record, stimulus),
+                &format!("The adaptive tracks of {}.", record.subject),
+            );
+        }
+    });
 }
 
 fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stimulus, levels: &[f64]) {
@@ -293,6 +314,13 @@ impl Page {
     fn figure(&mut self, figure: Figure, caption: &str) {
         let svg = figure.watermark(self.watermark).to_svg();
         let _ = writeln!(self.text, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
+    }
+
+    /// Adds what `fill` adds, hidden until a reader unfolds it.
+    fn folded(&mut self, summary: &str, fill: impl FnOnce(&mut Self)) {
+        let _ = writeln!(self.text, "<details><summary>{}</summary>", escaped(summary));
+        fill(self);
+        self.text.push_str("</details>\n");
     }
 
     fn table(&mut self, head: &[&str], fill: impl FnOnce(&mut Rows<'_>)) {

@@ -1,18 +1,26 @@
-//! The figures of a study: 17 and 18 of CMU-RI-TR-07-21 with this study's data, what lies behind them, and how people
-//! moved.
+//! The figures of a study: 17 and 18 of CMU-RI-TR-07-21 with this study's data, the subjects behind them, and how people moved.
+//! `tracks` and `psychometric` have the answers of a difference experiment.
 
-use flotor_analysis::{
-    JndAnalysis, KinematicMeasure, MagnitudeAnalysis, SubjectRecord, ThresholdCell, published,
-};
-use flotor_plot::{Axis, Bin, Figure, Panel, Series};
+mod psychometric;
+mod tracks;
+
+use flotor_analysis::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, ThresholdCell, published};
+use flotor_plot::{Axis, Bin, ErrorBar, Figure, Panel, Quantity, Series};
 use flotor_statistics::describe::MeanInterval;
-use flotor_study::log::TrialEvent;
 use flotor_study::protocol::Stimulus;
-use flotor_study::sitting::Verdict;
-use flotor_study::trial::{Modality, Presented};
+use flotor_study::trial::Modality;
+
+pub(super) use psychometric::psychometric;
+pub(super) use tracks::tracks;
 
 /// Height of a figure of one panel, px.
 const HEIGHT_PX: f64 = 340.0;
+
+/// The look of error bars over filled bars: the colour of text.
+const INK: usize = 6;
+
+/// What an error bar shows.
+const ONE_ERROR: &str = "± 1 standard error";
 
 /// The modalities with the words of the legends, in the colours they have everywhere.
 const MODALITIES: [(Modality, &str); 2] =
@@ -40,8 +48,9 @@ pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> Figure 
         panel = panel.series(Series::histogram(name, cells(modality).map(bar)).slot(slot));
     }
     for (slot, (modality, _)) in MODALITIES.into_iter().enumerate() {
-        let errors = cells(modality).flat_map(|cell| error_bar(centre(slot, cell.base), &cell.threshold));
-        panel = panel.series(Series::line("", errors).slot(3));
+        let errors = cells(modality).map(|cell| error_bar(centre(slot, cell.base), &cell.threshold));
+        let name = if slot == 0 { ONE_ERROR } else { "" };
+        panel = panel.series(Series::errors(name, errors).slot(INK));
     }
     if let Some(weber) = analysis.beside.weber() {
         let of = |(slot, weber): (usize, f64)| {
@@ -51,7 +60,7 @@ pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> Figure 
         panel = panel.series(Series::points("thesis: its Weber fraction times the base", thesis).slot(2));
     }
     Figure::new("Thresholds", Axis::linear(format!("Base {name}"), unit).levels(bases))
-        .subtitle("Mean over subjects; strokes: one standard error each way")
+        .subtitle("Mean over subjects")
         .panel_height_px(HEIGHT_PX)
         .panel(panel)
 }
@@ -83,30 +92,6 @@ pub(super) fn subjects(analysis: &JndAnalysis) -> Figure {
         .panel(panel)
 }
 
-/// The tracks of the first subject.
-pub(super) fn tracks(record: &SubjectRecord) -> Figure {
-    let mut figure = Figure::new("Adaptive tracks", Axis::linear("Trial of the track", ""))
-        .subtitle(format!("{}: difference presented, one line per track", record.subject))
-        .columns(2)
-        .panel_height_px(200.0);
-    let difference = |event: &&TrialEvent| match (event.trial.presented, event.verdict) {
-        (Presented::Pair(pair), Verdict::Judged { .. }) => Some(pair.delta * 100.0),
-        _ => None,
-    };
-    let largest = record.counted().filter_map(|event| difference(&event)).fold(1.0, f64::max);
-    for (slot, (modality, name)) in MODALITIES.into_iter().enumerate() {
-        let y = Axis::linear("Difference", "% of the base").range(0.0, 1.05 * largest);
-        let mut panel = Panel::new(y).title(name);
-        for track in record.tracks.iter().filter(|track| track.modality == modality) {
-            let here = record.counted().filter(|event| event.trial.track == track.track);
-            let samples = (1_u32..).map(f64::from).zip(here.filter_map(|event| difference(&event)));
-            panel = panel.series(Series::steps("", samples).slot(slot));
-        }
-        figure = figure.panel(panel);
-    }
-    figure
-}
-
 /// Figure 17: mean ratings over the stimulus, with standard errors and the linear trend.
 pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Figure {
     let cells = |modality| analysis.ratings.iter().filter(move |cell| cell.modality == modality);
@@ -117,8 +102,9 @@ pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Figu
     let beside = |slot: usize, x: f64| x + if slot == 0 { -0.004 * span } else { 0.004 * span };
     let mut panel = Panel::new(Axis::linear("Rating, scaled", ""));
     for (slot, (modality, name)) in MODALITIES.into_iter().enumerate() {
-        let errors = cells(modality).flat_map(|cell| error_bar(beside(slot, cell.stimulus), &cell.rating));
-        panel = panel.series(Series::line("", errors).slot(slot));
+        let errors = cells(modality).map(|cell| error_bar(beside(slot, cell.stimulus), &cell.rating));
+        let label = if slot == 0 { ONE_ERROR } else { "" };
+        panel = panel.series(Series::errors(label, errors).slot(slot));
         let points = cells(modality).map(|cell| (beside(slot, cell.stimulus), cell.rating.mean));
         panel = panel.series(Series::points(name, points).slot(slot));
     }
@@ -129,7 +115,7 @@ pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Figu
     panel = panel.series(Series::line(label, line).slot(2));
     let (name, unit) = stimulus.name_and_unit();
     Figure::new("Perceived against real", Axis::linear(name, unit))
-        .subtitle("Mean over subjects; strokes: one standard error each way")
+        .subtitle("Mean over subjects")
         .panel_height_px(HEIGHT_PX)
         .panel(panel)
 }
@@ -145,26 +131,35 @@ pub(super) fn movements(
     }
     let (name, unit) = stimulus.name_and_unit();
     let mut figure = Figure::new("Exploration", Axis::linear(name, unit))
-        .subtitle("Along the vertical; mean over subjects and modalities")
+        .subtitle(
+            "Along the vertical; mean over subjects and modalities, bars: ± 1 standard error over subjects",
+        )
         .columns(3)
         .panel_height_px(170.0);
     for measure in measures {
-        let (name, unit) = match measure.measure {
-            "mean speed" => ("Mean speed", "m/s"),
-            "mean acceleration" => ("Mean acceleration", "m/s²"),
-            _ => ("Mean force", "N"),
+        let (name, quantity) = match measure.measure {
+            "mean speed" => ("Mean speed", Quantity::Velocity),
+            "mean acceleration" => ("Mean acceleration", Quantity::Acceleration),
+            _ => ("Mean force", Quantity::Force),
         };
-        let mut points: Vec<(f64, f64)> = levels.iter().copied().zip(measure.means.iter().copied()).collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let panel = Panel::new(Axis::linear(name, unit))
-            .series(Series::line("", points.clone()).slot(0))
-            .series(Series::points("", points).slot(0));
+        let (_, per_si) = quantity.unit();
+        let mut cells: Vec<(f64, f64, f64)> =
+            (levels.iter().zip(&measure.means).zip(&measure.standard_errors))
+                .map(|((level, mean), error)| (*level, mean * per_si, error * per_si))
+                .collect();
+        cells.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let points = || cells.iter().map(|(level, mean, _)| (*level, *mean));
+        let errors = cells.iter().map(|(level, mean, error)| ErrorBar::around(*level, *mean, *error));
+        let panel = Panel::new(Axis::of(name, quantity).with_zero())
+            .series(Series::line("", points()).slot(0))
+            .series(Series::points("", points()).slot(0))
+            .series(Series::errors("", errors).slot(INK));
         figure = figure.panel(panel);
     }
     Some(figure)
 }
 
-/// A vertical stroke of one standard error each way, and a break behind it.
-fn error_bar(x: f64, value: &MeanInterval) -> [(f64, f64); 3] {
-    [(x, value.mean - value.se), (x, value.mean + value.se), (x, f64::NAN)]
+/// A bar of one standard error each way.
+fn error_bar(x: f64, value: &MeanInterval) -> ErrorBar {
+    ErrorBar::around(x, value.mean, value.se)
 }

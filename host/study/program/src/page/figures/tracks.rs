@@ -1,0 +1,90 @@
+//! The adaptive tracks of a subject, a panel each: differences presented, what was answered, and where the direction turned.
+
+use super::MODALITIES;
+use flotor_analysis::SubjectRecord;
+use flotor_plot::{Axis, Figure, Mark, Panel, Series};
+use flotor_study::log::TrialEvent;
+use flotor_study::protocol::Stimulus;
+use flotor_study::sitting::{TrackResult, Verdict};
+use flotor_study::trial::{Judgement, Presented};
+
+/// Looks of answers that are not right, and of reversals.
+const WRONG: usize = 6;
+const UNSURE: usize = 4;
+const REVERSAL: usize = 7;
+
+/// An answer of a track.
+struct Answer {
+    /// Number in the track, from 1.
+    trial: f64,
+    difference_percent: f64,
+    judgement: Judgement,
+    is_reversal: bool,
+}
+
+/// Draws the tracks of a subject.
+pub(in super::super) fn tracks(record: &SubjectRecord, stimulus: &Stimulus) -> Figure {
+    let answers: Vec<(&TrackResult, Vec<Answer>)> =
+        record.tracks.iter().map(|track| (track, answers(record, track))).collect();
+    let largest = answers
+        .iter()
+        .flat_map(|(_, answers)| answers)
+        .map(|answer| answer.difference_percent)
+        .fold(1.0, f64::max);
+    let figure = Figure::new(format!("Adaptive tracks of {}", record.subject), Axis::linear("Trial of the track", ""))
+        .subtitle(
+            "Filled in colour: right; cross: wrong; orange triangle: \"I don't know\"; ring: reversal; dashed: threshold. Thresholds \
+             of the procedure",
+        )
+        .columns(3)
+        .panel_height_px(110.0);
+    let (_, unit) = stimulus.name_and_unit();
+    let mut panels: Vec<_> = answers.iter().collect();
+    panels.sort_by(|(one, _), (other, _)| one.base.total_cmp(&other.base));
+    panels
+        .into_iter()
+        .fold(figure, |figure, (track, answers)| figure.panel(panel(track, answers, unit, largest)))
+}
+
+/// The judged answers of a track, in order.
+fn answers(record: &SubjectRecord, track: &TrackResult) -> Vec<Answer> {
+    let judged = |event: &TrialEvent| match (event.trial.presented, event.verdict) {
+        (Presented::Pair(pair), Verdict::Judged { judgement, reversal }) => {
+            Some((pair.delta, judgement, reversal))
+        }
+        _ => None,
+    };
+    let here = record.counted().filter(|event| event.trial.track == track.track).filter_map(judged);
+    (1_u32..)
+        .zip(here)
+        .map(|(trial, (delta, judgement, is_reversal))| Answer {
+            trial: f64::from(trial),
+            difference_percent: delta * 100.0,
+            judgement,
+            is_reversal,
+        })
+        .collect()
+}
+
+fn panel(track: &TrackResult, answers: &[Answer], unit: &str, largest: f64) -> Panel {
+    let (slot, name) = MODALITIES
+        .into_iter()
+        .enumerate()
+        .find(|(_, (modality, _))| *modality == track.modality)
+        .map_or((0, ""), |(slot, (_, name))| (slot, name));
+    let place = |answer: &Answer| (answer.trial, answer.difference_percent);
+    let of =
+        |judgement: Judgement| answers.iter().filter(move |answer| answer.judgement == judgement).map(place);
+    let reversals = answers.iter().filter(|answer| answer.is_reversal).map(place);
+    let panel = Panel::new(Axis::linear("", "%").range(0.0, 1.08 * largest))
+        .title(format!("{} {unit}, {name}, track {}", track.base, track.track))
+        .series(Series::line("", answers.iter().map(place)).slot(slot).faint())
+        .series(Series::points("", of(Judgement::Correct)).slot(slot))
+        .series(Series::points("", of(Judgement::Wrong)).slot(WRONG))
+        .series(Series::points("", of(Judgement::Unsure)).slot(UNSURE))
+        .series(Series::points("", reversals).slot(REVERSAL));
+    match track.threshold {
+        Some(threshold) => panel.mark(Mark::at_y(threshold * 100.0, format!("{:.1} %", threshold * 100.0))),
+        None => panel,
+    }
+}
