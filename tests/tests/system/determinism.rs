@@ -67,7 +67,8 @@ fn a_recording_replays_bit_for_bit_and_a_changed_one_does_not() {
     let report: Value = serde_json::from_str(&other.stdout).expect("the summary is JSON");
     assert!(report["differing_ticks"].as_u64().is_some_and(|ticks| ticks > 1000), "{report}");
     let picture = std::fs::read_to_string(plot).expect("the picture is there");
-    assert!(picture.starts_with("<svg") && picture.contains("Difference of torque"));
+    assert!(picture.starts_with("<svg") && picture.contains("Difference of force"));
+    assert!(picture.contains("difference of torque (0 throughout)"), "neither model has a torque");
     let unknown = Flotor::with(["replay", &recording, "--model", "sprng=wall"]).run();
     assert_eq!(unknown.code, Some(exit_code::CONFIGURATION), "{unknown:?}");
 }

@@ -1,4 +1,4 @@
-//! Pictures: memory while they are made, and what programs that draw SVG have to know.
+//! Pictures: what they show of a run, memory while they are made, and what programs that draw SVG have to know.
 
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -68,4 +68,62 @@ fn every_picture_of_the_book_is_drawn_by_every_program() {
             assert!(!svg.contains(unknown), "{}: {unknown}", picture.display());
         }
     }
+}
+
+/// Runs a command that draws, and returns its picture without the style sheet.
+fn body_of(arguments: &[&str], folder: &Path) -> String {
+    let ran = Flotor::with(arguments).inside(folder).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    let picture = arguments.last().expect("a picture is asked for");
+    let svg = std::fs::read_to_string(folder.join(picture)).expect("the picture is there");
+    svg.split_once("</style>").expect("a style sheet").1.to_owned()
+}
+
+/// The hand of the membrane does not turn: rotations of 1e-18 degrees filled a panel.
+#[test]
+fn rounding_errors_and_what_is_zero_have_no_panel() {
+    let scratch = Scratch::default();
+    let run =
+        ["run", "membrane", "--clock", "virtual", "--seed", "1", "--duration", "500ms", "--plot", "m.svg"];
+    let body = body_of(&run, scratch.path());
+    assert!(body.contains(">Not drawn: rotation ("), "{body}");
+    assert!(body.contains(">Position <") && body.contains(">Force <"), "{body}");
+    for absent in [">Rotation <", ">Torque <", "10⁻¹"] {
+        assert!(!body.contains(absent), "{absent}");
+    }
+}
+
+#[test]
+fn limits_and_changed_parameters_are_marked() {
+    let scratch = Scratch::default();
+    let scene = "title = \"A wall\"\n[device]\nplugin = \"simulated\"\n[[model]]\nplugin = \"wall\"\n\
+                 [limits]\nforce_n = 0.5\n[[change]]\nat_s = 0.25\nset = \"wall.stiffness_n_per_m=900\"\n";
+    let _ = scratch.file("wall.toml", scene);
+    let run = ["run", "wall.toml", "--clock", "virtual", "--duration", "2s", "--plot", "run.svg"];
+    let body = body_of(&run, scratch.path());
+    assert_eq!(body.matches(">wall.stiffness_n_per_m = 900<").count(), 1, "named in the first panel: {body}");
+    assert_eq!(body.matches(">force limited<").count(), 1, "{body}");
+    assert!(body.contains("<path class=\"limited\""), "{body}");
+    assert!(!body.contains("<path class=\"fault\""), "nothing failed");
+}
+
+#[test]
+fn a_picture_of_a_replay_says_what_was_replayed_in_the_colours_of_the_axes() {
+    let scratch = Scratch::default();
+    let record = ["run", "wall", "--clock", "virtual", "--duration", "2s", "--record", "wall.mcap"];
+    assert_eq!(Flotor::with(record).inside(scratch.path()).run().code, Some(exit_code::OK));
+    let set = "wall.stiffness_n_per_m=900";
+    let body = body_of(&["replay", "wall.mcap", "--set", set, "--plot", "changed.svg"], scratch.path());
+    let subtitle = format!(">wall.mcap, --set {set}; difference: replayed − recorded<");
+    assert!(body.contains(&subtitle), "{body}");
+    // s8, s9 and s10 are x, y and z in every picture; s7 is grey.
+    for (class, what) in [("s10", "z"), ("s7", "what was recorded")] {
+        assert!(body.contains(&format!(" {class}\"")), "{what}: {body}");
+    }
+    let blue_or_orange = [" s0\"", " s1\"", " s2\""].into_iter().find(|class| body.contains(class));
+    assert_eq!(blue_or_orange, None, "colours of the axes only");
+
+    let body = body_of(&["replay", "wall.mcap", "--plot", "same.svg"], scratch.path());
+    assert!(body.contains("difference of force (0 throughout)"), "{body}");
+    assert!(body.contains("under1 s7"), "the recorded force is seen under the replayed one: {body}");
 }

@@ -15,7 +15,8 @@ impl StressReport {
             .iter()
             .map(|measure| format!("{} {}", measure.id, measure.verdict.word()))
             .collect();
-        let title = format!("Stability score of {} {}: {:.2}", self.model, self.settings_text(), self.score);
+        let subject = format!("{} {}", self.model, self.settings_text());
+        let title = format!("Stability score of {}: {:.2}", subject.trim_end(), self.score);
         Figure::new(title, Axis::log("Length of a piece", "mm"))
             .subtitle(format!("{}, seed {}; {}", self.size.word(), self.seed, verdicts.join(", ")))
             .columns(2)
