@@ -128,6 +128,19 @@ pub fn student_two_sided_quantile(probability: f64, df: f64) -> f64 {
     0.5 * (low + high)
 }
 
+/// Probability of so many successes or more among independent trials of this probability: the one-sided p-value.
+#[must_use]
+pub fn binomial_at_least(successes: usize, trials: usize, probability: f64) -> f64 {
+    if successes == 0 {
+        return 1.0;
+    }
+    if successes > trials {
+        return 0.0;
+    }
+    let (k, n) = (crate::count(successes), crate::count(trials));
+    regularised_beta(k, n - k + 1.0, probability, 1.0 - probability)
+}
+
 /// Probability of a larger F with `df` and `error_df` degrees of freedom, which need not be whole: the p-value.
 #[must_use]
 pub fn fisher_above(f: f64, df: f64, error_df: f64) -> f64 {
@@ -168,6 +181,14 @@ mod tests {
                 near(student_two_sided_quantile(probability, df), t, 1.0e-11);
             }
         }
+    }
+
+    #[test]
+    fn binomial_tails_are_sums() {
+        near(binomial_at_least(3, 4, 0.5), 5.0 / 16.0, 1.0e-13);
+        near(binomial_at_least(48, 48, 0.5), libm::exp2(-48.0), 1.0e-12);
+        near(binomial_at_least(1, 3, 0.2), 1.0 - 0.8 * 0.8 * 0.8, 1.0e-13);
+        assert_eq!((binomial_at_least(0, 3, 0.2), binomial_at_least(4, 3, 0.2)), (1.0, 0.0));
     }
 
     #[test]

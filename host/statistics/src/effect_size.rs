@@ -1,7 +1,7 @@
-//! How large an effect is, with a confidence interval: by inverting the noncentral t and F (Steiger and Fouladi 1997).
+//! Effect sizes with confidence intervals, by inverting the noncentral t and F (Steiger and Fouladi 1997).
 
-use crate::distribution::{normal_below, student_two_sided};
-use crate::special::regularised_beta;
+use crate::distribution::normal_below;
+use crate::special::{beta_step, regularised_beta};
 use crate::t_test::TTest;
 use serde::Serialize;
 
@@ -10,127 +10,167 @@ use serde::Serialize;
 pub struct EffectSize {
     /// The estimate.
     pub value: f64,
-    /// Lower and upper end.
+    /// Lower and upper end. An end beyond a noncentrality of 1000 (t) or 10^6 (F) is infinite for Cohen's d and 1 for a share; the
+    /// other end is then at least as wide as the true one.
     pub interval: [f64; 2],
-    /// How far the interval was searched for.
-    #[serde(skip_serializing_if = "Reach::is_whole")]
-    pub reach: Reach,
 }
 
-/// Whether both ends of an interval were found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Reach {
-    /// They were.
-    Whole,
-    /// An end is where the search ends ([`MOST_OF_T`], [`MOST_OF_F`]), and the true one lies farther out.
-    OrWider,
-}
-
-impl Reach {
-    fn of(ends: [f64; 2], most: f64) -> Self {
-        // A bisection ends within an ulp.
-        if ends.iter().any(|end| end.abs() > most * (1.0 - 1.0e-12)) { Self::OrWider } else { Self::Whole }
-    }
-
-    #[allow(clippy::trivially_copy_pass_by_ref)] // as serde asks
-    fn is_whole(&self) -> bool {
-        *self == Self::Whole
-    }
-}
-
-/// Largest noncentrality of a t that is searched: beyond, the series underflows in doubles.
-pub const MOST_OF_T: f64 = 37.0;
-/// Largest noncentrality of an F that is searched, for the same reason.
-pub const MOST_OF_F: f64 = 1400.0;
-
+/// Largest noncentrality of a t that is searched.
+const MOST_OF_T: f64 = 1.0e3;
+/// Largest noncentrality of an F that is searched.
+const MOST_OF_F: f64 = 1.0e6;
 /// Tail of each side of an interval.
 const TAIL: f64 = 0.025;
-/// Halvings of a bisection: to the last bit of a double.
-const HALVINGS: usize = 200;
-/// Terms of a series: the noncentralities of experiments need hundreds.
-const TERMS: u32 = 5000;
+/// Steps of a search for a root; ten to twenty are usual.
+const STEPS_MOST: usize = 200;
+/// Relative width at which a root is found.
+const WIDTH: f64 = 1.0e-13;
 
 /// Cohen's d of pairs: the mean difference in standard deviations of the differences.
 #[must_use]
 pub fn of_pairs(t: &TTest) -> EffectSize {
     let root_n = (t.df + 1.0).sqrt();
-    let ends = [1.0 - TAIL, TAIL].map(|below| noncentrality_of_t(t.value, t.df, below));
-    let reach = Reach::of(ends, MOST_OF_T);
-    EffectSize { value: t.value / root_n, interval: ends.map(|end| end / root_n), reach }
+    let [low, high] = [1.0 - TAIL, TAIL].map(|below| noncentrality_of_t(t.value, t.df, below));
+    let ends = [low.min(MOST_OF_T), high.max(-MOST_OF_T)];
+    EffectSize { value: t.value / root_n, interval: ends.map(|end| end / root_n) }
 }
 
-/// Partial eta squared of an F.
+/// Partial omega squared of an F: the share of the population's variation that the effect explains.
+///
+/// The mean of F is that of an effect with the noncentrality `df (F - 1)`, to which the interval is converted by the same
+/// formula. Eta squared is larger in the mean, and may lie outside this interval. An F below 1 gives 0.
 #[must_use]
-pub fn partial_eta_squared(f: f64, df: f64, error_df: f64) -> EffectSize {
-    let share = |noncentrality: f64| noncentrality / (noncentrality + df + error_df + 1.0);
-    let ends = [1.0 - TAIL, TAIL].map(|below| noncentrality_of_f(f, df, error_df, below));
-    let reach = Reach::of(ends, MOST_OF_F);
-    EffectSize { value: f * df / (f * df + error_df), interval: ends.map(share), reach }
+pub fn partial_omega_squared(f: f64, df: f64, error_df: f64) -> EffectSize {
+    let share = |noncentrality: f64| {
+        if noncentrality.is_finite() { noncentrality / (noncentrality + df + error_df + 1.0) } else { 1.0 }
+    };
+    let [low, high] = [1.0 - TAIL, TAIL].map(|below| noncentrality_of_f(f, df, error_df, below));
+    EffectSize { value: share((df * (f - 1.0)).max(0.0)), interval: [low.min(MOST_OF_F), high].map(share) }
 }
 
-/// The noncentrality at which a t is as small as this with a probability.
+/// The noncentrality at which a t is as small as this with a probability; infinite beyond the search.
 fn noncentrality_of_t(t: f64, df: f64, below: f64) -> f64 {
     // The distribution moves up with the noncentrality.
-    bisect([-MOST_OF_T, MOST_OF_T], |delta| noncentral_t_below(t, df, delta) > below)
+    let of = |delta: f64| noncentral_t_below(t, df, delta) - below;
+    let (mut low, mut high) = (t - 1.0, t + 1.0);
+    let mut width = 2.0;
+    while of(low) < 0.0 {
+        if low <= -MOST_OF_T {
+            return f64::NEG_INFINITY;
+        }
+        width *= 2.0;
+        (high, low) = (low, (low - width).max(-MOST_OF_T));
+    }
+    while of(high) > 0.0 {
+        if high >= MOST_OF_T {
+            return f64::INFINITY;
+        }
+        width *= 2.0;
+        (low, high) = (high, (high + width).min(MOST_OF_T));
+    }
+    falling_root(of, low, high)
 }
 
-/// The noncentrality at which an F is as small as this with a probability; 0 if it is never that large.
+/// The noncentrality at which an F is as small as this with a probability; 0 if it is never that large, infinite beyond the search.
 fn noncentrality_of_f(f: f64, df: f64, error_df: f64, below: f64) -> f64 {
-    if noncentral_f_below(f, df, error_df, 0.0) <= below {
+    let of = |lambda: f64| noncentral_f_below(f, df, error_df, lambda) - below;
+    let (mut low, mut high) = (0.0, 1.0_f64.max(f * df).min(MOST_OF_F));
+    if of(low) <= 0.0 {
         return 0.0;
     }
-    bisect([0.0, MOST_OF_F], |lambda| noncentral_f_below(f, df, error_df, lambda) > below)
-}
-
-/// Where a condition that holds at the lower end begins to fail.
-fn bisect([mut low, mut high]: [f64; 2], holds: impl Fn(f64) -> bool) -> f64 {
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if holds(middle) { low = middle } else { high = middle }
+    while of(high) > 0.0 {
+        if high >= MOST_OF_F {
+            return f64::INFINITY;
+        }
+        (low, high) = (high, (2.0 * high).min(MOST_OF_F));
     }
-    0.5 * (low + high)
+    falling_root(of, low, high)
 }
 
-/// Probability of a noncentral F below a value: central ones, weighted by Poisson.
-fn noncentral_f_below(f: f64, df: f64, error_df: f64, lambda: f64) -> f64 {
-    let (x, y) = (df * f / (df * f + error_df), error_df / (df * f + error_df));
-    let (half, mut sum) = (0.5 * lambda, 0.0);
-    let mut weight = libm::exp(-half);
-    for term in 0..TERMS {
-        let term = f64::from(term);
-        sum += weight * regularised_beta(0.5 * df + term, 0.5 * error_df, x, y);
-        weight *= half / (term + 1.0);
-        if term > half && weight < 1.0e-17 {
+/// Returns the root of a falling function between two ends (Dowell and Jarratt 1971, the Illinois rule).
+fn falling_root(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let (mut at_low, mut at_high) = (of(low), of(high));
+    let mut last_raised_low = None;
+    let mut root = low;
+    for _ in 0..STEPS_MOST {
+        let next = low + (high - low) * at_low / (at_low - at_high);
+        let is_found = (next - root).abs() <= WIDTH * next.abs().max(1.0);
+        root = next;
+        let at = of(root);
+        if is_found || at == 0.0 {
             break;
         }
+        let raises_low = at > 0.0;
+        if raises_low {
+            (low, at_low) = (root, at);
+        } else {
+            (high, at_high) = (root, at);
+        }
+        // The end that stays twice counts half.
+        match (last_raised_low == Some(raises_low), raises_low) {
+            (true, true) => at_high *= 0.5,
+            (true, false) => at_low *= 0.5,
+            (false, _) => {}
+        }
+        last_raised_low = Some(raises_low);
+    }
+    root
+}
+
+/// Sums `weight(j) I_x(a + j, b)` over the counts j whose Poisson weight matters: beyond, all together weigh less than 1e-17.
+///
+/// `first` gives the weight of the first count, `ratio(j)` is that of the weights of j + 1 and j.
+fn mixture(
+    mean: f64,
+    first: impl Fn(f64) -> f64,
+    ratio: impl Fn(f64) -> f64,
+    (a, b): (f64, f64),
+    (x, y): (f64, f64),
+) -> f64 {
+    let reach = 9.0 * mean.sqrt() + 30.0;
+    let (mut j, most) = ((mean - reach).floor().max(0.0), mean + reach);
+    let (mut weight, mut beta, mut step) = (first(j), regularised_beta(a + j, b, x, y), 0.0);
+    let mut sum = 0.0;
+    while j <= most {
+        sum += weight * beta;
+        // A step that was too small for a double may grow again.
+        step = if step > f64::MIN_POSITIVE {
+            step * x * (a + j - 1.0 + b) / (a + j)
+        } else {
+            beta_step(a + j, b, x, y)
+        };
+        beta = (beta - step).max(0.0);
+        weight *= ratio(j);
+        j += 1.0;
     }
     sum
 }
 
-/// Probability of a noncentral t below a value (Lenth 1989, AS 243).
+/// Probability of a noncentral F below a value: central ones, weighted by Poisson.
+fn noncentral_f_below(f: f64, df: f64, error_df: f64, lambda: f64) -> f64 {
+    let parts = (df * f / (df * f + error_df), error_df / (df * f + error_df));
+    let half = 0.5 * lambda;
+    mixture(half, |j| poisson(half, j), |j| half / (j + 1.0), (0.5 * df, 0.5 * error_df), parts)
+}
+
+/// Probability of a noncentral t below a value (Lenth 1989, AS 243, summed about the largest weights).
 fn noncentral_t_below(t: f64, df: f64, delta: f64) -> f64 {
     if t < 0.0 {
         return 1.0 - noncentral_t_below(-t, df, -delta);
     }
-    if delta == 0.0 {
-        return 1.0 - 0.5 * student_two_sided(t, df);
-    }
-    let (x, y) = (t * t / (t * t + df), df / (t * t + df));
+    let parts = (t * t / (t * t + df), df / (t * t + df));
     let half = 0.5 * delta * delta;
-    let mut even = libm::exp(-half);
-    // delta / (sqrt(2) gamma(3/2)): gamma(3/2) is half of the root of pi.
-    let mut odd = delta * even / (std::f64::consts::SQRT_2 * 0.5 * std::f64::consts::PI.sqrt());
-    let mut sum = 0.0;
-    for term in 0..TERMS {
-        let term = f64::from(term);
-        sum += even * regularised_beta(term + 0.5, 0.5 * df, x, y)
-            + odd * regularised_beta(term + 1.0, 0.5 * df, x, y);
-        even *= half / (term + 1.0);
-        odd *= half / (term + 1.5);
-        if term > half && even.max(odd.abs()) < 1.0e-17 {
-            break;
-        }
+    let even = mixture(half, |j| poisson(half, j), |j| half / (j + 1.0), (0.5, 0.5 * df), parts);
+    // Gamma(j + 1) / Gamma(j + 3/2) turns a weight of the even part into one of the odd part.
+    let odd = |j: f64| poisson(half, j) * libm::exp(libm::lgamma(j + 1.0) - libm::lgamma(j + 1.5));
+    let odd = mixture(half, odd, |j| half / (j + 1.5), (1.0, 0.5 * df), parts);
+    (normal_below(-delta) + 0.5 * (even + delta / std::f64::consts::SQRT_2 * odd)).clamp(0.0, 1.0)
+}
+
+/// Poisson probability of a count.
+fn poisson(mean: f64, count: f64) -> f64 {
+    if mean == 0.0 {
+        return if count == 0.0 { 1.0 } else { 0.0 };
     }
-    (normal_below(-delta) + 0.5 * sum).clamp(0.0, 1.0)
+    libm::exp(count * libm::log(mean) - mean - libm::lgamma(count + 1.0))
 }

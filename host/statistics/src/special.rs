@@ -25,12 +25,22 @@ pub(crate) fn regularised_beta(a: f64, b: f64, x: f64, y: f64) -> f64 {
     if x < (a + 1.0) / (a + b + 2.0) { lower_tail(a, b, x, y) } else { 1.0 - lower_tail(b, a, y, x) }
 }
 
+/// Returns I_x(a, b) - I_x(a + 1, b), the step of the function in its first argument (Abramowitz and Stegun 26.5.16).
+pub(crate) fn beta_step(a: f64, b: f64, x: f64, y: f64) -> f64 {
+    front(a, b, x, y) / a
+}
+
 fn lower_tail(a: f64, b: f64, x: f64, y: f64) -> f64 {
+    front(a, b, x, y) * fraction(a, b, x) / a
+}
+
+/// x^a y^b / B(a, b).
+fn front(a: f64, b: f64, x: f64, y: f64) -> f64 {
     // ln(1 - y) keeps the digits that ln x would lose next to 1.
     let ln_x = if y < 0.5 { libm::log1p(-y) } else { libm::log(x) };
     let ln_y = if x < 0.5 { libm::log1p(-x) } else { libm::log(y) };
     let ln_beta = libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);
-    libm::exp(a * ln_x + b * ln_y - ln_beta) * fraction(a, b, x) / a
+    libm::exp(a * ln_x + b * ln_y - ln_beta)
 }
 
 fn fraction(a: f64, b: f64, x: f64) -> f64 {

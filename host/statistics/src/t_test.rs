@@ -2,7 +2,7 @@
 
 use crate::describe::{deviation, mean, sum_of_squares};
 use crate::distribution::{student_two_sided, student_two_sided_quantile};
-use crate::{StatisticsError, check, count};
+use crate::{ROUNDING, StatisticsError, check, count};
 use serde::Serialize;
 
 /// Result of a t-test, two-sided.
@@ -46,7 +46,8 @@ pub fn one_sample(values: &[f64], expected: f64) -> Result<TTest, StatisticsErro
 /// Do pairs differ in the mean? Positive where the first of a pair is larger.
 ///
 /// # Errors
-/// As [`one_sample`], or lists of different length.
+/// As [`one_sample`], or lists of different length; [`StatisticsError::NoDifference`] or [`StatisticsError::SameDifference`] where
+/// nothing but rounding errors varies.
 pub fn paired(first: &[f64], second: &[f64]) -> Result<TTest, StatisticsError> {
     if first.len() != second.len() {
         return Err(StatisticsError::Lengths {
@@ -56,6 +57,12 @@ pub fn paired(first: &[f64], second: &[f64]) -> Result<TTest, StatisticsError> {
         });
     }
     let differences: Vec<f64> = first.iter().zip(second).map(|(first, second)| first - second).collect();
+    let squares = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+    let rounding = ROUNDING * (squares(first) + squares(second));
+    if differences.len() > 1 && sum_of_squares(&differences) <= rounding {
+        let is_none = squares(&differences) <= rounding;
+        return Err(if is_none { StatisticsError::NoDifference } else { StatisticsError::SameDifference });
+    }
     one_sample(&differences, 0.0)
 }
 

@@ -1,14 +1,14 @@
 //! The linear part of an effect within subjects.
 
-use crate::describe::mean;
+use crate::describe::{mean, sum_of_squares};
 use crate::distribution::fisher_above;
 use crate::regression;
 use crate::t_test::one_sample;
-use crate::{StatisticsError, count};
+use crate::{Outcome, ROUNDING, StatisticsError, count};
 use serde::Serialize;
 
-/// How far the means of a within-subject factor lie on a line over its levels.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// Line through the means of a within-subject factor over its levels.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LinearTrend {
     /// Rise of the mean response per unit of the factor.
     pub slope: f64,
@@ -16,7 +16,15 @@ pub struct LinearTrend {
     pub intercept: f64,
     /// Share of the variation among the means that the line explains: the R² of the trend.
     pub r_squared: f64,
-    /// F of the linear contrast, tested against its own variation between subjects.
+    /// Test of the linear contrast.
+    #[serde(flatten)]
+    pub test: Outcome<ContrastTest>,
+}
+
+/// Test of a contrast against its own variation between subjects.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ContrastTest {
+    /// F of the contrast.
     pub f: f64,
     /// Degrees of freedom of the contrast.
     pub df: f64,
@@ -29,7 +37,7 @@ pub struct LinearTrend {
 /// The trend of responses over the levels of a factor: `responses[subject][level]`.
 ///
 /// # Errors
-/// Fewer than two subjects or three levels, rows of the wrong length, a value that is not finite.
+/// Fewer than three levels, rows of the wrong length, a value that is not finite, means that do not vary.
 pub fn linear(levels: &[f64], responses: &[Vec<f64>]) -> Result<LinearTrend, StatisticsError> {
     const WHAT: &str = "a linear trend";
     for row in responses {
@@ -41,19 +49,23 @@ pub fn linear(levels: &[f64], responses: &[Vec<f64>]) -> Result<LinearTrend, Sta
         |level: usize| responses.iter().filter_map(|row| row.get(level).copied()).collect::<Vec<_>>();
     let means: Vec<f64> = (0..levels.len()).map(|level| mean(&column(level))).collect();
     let line = regression::line(levels, &means)?;
+    let squares = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+    if sum_of_squares(&means) <= ROUNDING * squares(&means) {
+        return Err(StatisticsError::EqualMeans);
+    }
     let centre = mean(levels);
-    let contrast = |row: &Vec<f64>| levels.iter().zip(row).map(|(x, y)| (x - centre) * y).sum::<f64>();
-    let contrasts: Vec<f64> = responses.iter().map(contrast).collect();
-    let test = one_sample(&contrasts, 0.0)?;
-    let f = test.value * test.value;
+    let weighted = |row: &Vec<f64>| levels.iter().zip(row).map(|(x, y)| (x - centre) * y).collect::<Vec<_>>();
+    let contrasts: Vec<f64> = responses.iter().map(|row| weighted(row).iter().sum()).collect();
+    let rounding = ROUNDING * responses.iter().map(|row| squares(&weighted(row))).sum::<f64>();
+    let test = if responses.len() > 1 && sum_of_squares(&contrasts) <= rounding {
+        Err(StatisticsError::SameDifference)
+    } else {
+        one_sample(&contrasts, 0.0)
+    };
     let error_df = count(responses.len()) - 1.0;
-    Ok(LinearTrend {
-        slope: line.slope,
-        intercept: line.intercept,
-        r_squared: line.r_squared,
-        f,
-        df: 1.0,
-        error_df,
-        p: fisher_above(f, 1.0, error_df),
-    })
+    let test = Outcome::from(test).map(|test| {
+        let f = test.value * test.value;
+        ContrastTest { f, df: 1.0, error_df, p: fisher_above(f, 1.0, error_df) }
+    });
+    Ok(LinearTrend { slope: line.slope, intercept: line.intercept, r_squared: line.r_squared, test })
 }

@@ -131,9 +131,10 @@ fn trend_and_line() {
     near("slope", found.slope, &set["slope"]);
     near("intercept", found.intercept, &set["intercept"]);
     near("R squared", found.r_squared, &set["r_squared"]);
-    near("F", found.f, &set["f"]);
-    near("error df", found.error_df, &set["error_df"]);
-    near("p", found.p, &set["p"]);
+    let test = found.test.tested().unwrap();
+    near("F", test.f, &set["f"]);
+    near("error df", test.error_df, &set["error_df"]);
+    near("p", test.p, &set["p"]);
 
     let set = &reference["line"];
     let found = regression::line(&numbers(&set["x"]), &numbers(&set["y"])).unwrap();
@@ -243,7 +244,7 @@ fn several_tests_are_corrected_by_holm() {
 /// Sizes of effects and their intervals, as SciPy's noncentral t and F give them by root finding.
 #[test]
 fn sizes_of_effects_have_the_intervals_of_the_noncentral_distributions() {
-    use flotor_statistics::effect_size::{EffectSize, of_pairs, partial_eta_squared};
+    use flotor_statistics::effect_size::{EffectSize, of_pairs, partial_omega_squared};
     use flotor_statistics::t_test::TTest;
     let is = |found: EffectSize, expected: [f64; 3]| {
         let found = [found.value, found.interval[0], found.interval[1]];
@@ -256,40 +257,74 @@ fn sizes_of_effects_have_the_intervals_of_the_noncentral_distributions() {
         is(of_pairs(&TTest { df, value, p: 0.0, difference: 0.0, interval: [0.0; 2] }), expected);
     }
     for (f, df, error_df, expected) in F_SIZES {
-        is(partial_eta_squared(f, df, error_df), expected);
+        is(partial_omega_squared(f, df, error_df), expected);
     }
 }
 
-/// An interval that ends where the search does says so, and no other.
+/// The estimate of an effect's share lies in its own interval, which eta squared does not: `F(77, 154) = 500` has 0.996.
 #[test]
-fn an_interval_that_was_not_found_to_its_end_says_so() {
-    use flotor_statistics::effect_size::{Reach, of_pairs, partial_eta_squared};
+fn an_estimate_lies_in_its_interval() {
+    use flotor_statistics::effect_size::{EffectSize, of_pairs, partial_omega_squared};
     use flotor_statistics::t_test::TTest;
-    let t = |value| of_pairs(&TTest { df: 15.0, value, p: 0.0, difference: 0.0, interval: [0.0; 2] });
-    for (value, reach) in
-        [(3.3, Reach::Whole), (20.0, Reach::Whole), (30.0, Reach::OrWider), (-200.0, Reach::OrWider)]
+    let holds = |what: &str, size: EffectSize| {
+        let EffectSize { value, interval: [low, high] } = size;
+        assert!(low <= value && value <= high && low < 1.0e9, "{what}: {size:?}");
+    };
+    for (df, error_df) in [(1.0, 1.0), (1.0, 10.0), (2.0, 28.0), (11.0, 110.0), (11.0, 154.0), (77.0, 154.0)]
     {
-        assert_eq!(t(value).reach, reach, "t = {value}: {:?}", t(value));
+        for power in -4..=4 {
+            for f in [1.0, 1.7, 3.1, 6.0].map(|digit| digit * 10.0_f64.powi(power)) {
+                holds(&format!("F({df}, {error_df}) = {f}"), partial_omega_squared(f, df, error_df));
+            }
+        }
     }
-    for (f, reach) in [(11.94, Reach::Whole), (0.0, Reach::Whole), (2000.0, Reach::OrWider)] {
-        assert_eq!(partial_eta_squared(f, 1.0, 14.0).reach, reach, "F = {f}");
+    for df in [1.0, 2.0, 11.0, 154.0] {
+        for value in [-2000.0, -300.0, -37.0, -4.0, 0.0, 0.3, 2.0, 12.0, 60.0, 700.0] {
+            let t = TTest { df, value, p: 0.0, difference: 0.0, interval: [0.0; 2] };
+            holds(&format!("t({df}) = {value}"), of_pairs(&t));
+        }
     }
-    let json = serde_json::to_string(&t(3.3)).expect("JSON");
-    assert!(!json.contains("reach"), "{json}");
-    let json = serde_json::to_string(&t(200.0)).expect("JSON");
-    assert!(json.contains(r#""reach":"or-wider""#), "{json}");
 }
 
-const T_SIZES: [(f64, f64, [f64; 3]); 4] = [
+/// What does not vary is no error of the analysis: its reason stands in its place.
+#[test]
+fn differences_without_variation_are_not_testable_for_a_reason() {
+    use flotor_statistics::{Outcome, StatisticsError};
+    let base = [0.3, 1.7, 2.9, 1.1];
+    let tenth = base.map(|value| value + 0.1);
+    for (first, reason) in [(base, StatisticsError::NoDifference), (tenth, StatisticsError::SameDifference)] {
+        let outcome = Outcome::from(paired(&first, &base));
+        let json = serde_json::to_string(&outcome).unwrap();
+        assert_eq!(json, format!(r#"{{"not_testable":"{reason}"}}"#));
+        assert_eq!(outcome, Outcome::NotTestable { not_testable: reason });
+    }
+    let all_alike = within(&[[1.0, 2.0, 4.0]; 3]);
+    assert_eq!(all_alike.not_testable, Some(StatisticsError::NoError), "{all_alike:?}");
+    let flat = within(&[[1.0; 3], [2.0; 3], [0.5; 3]]);
+    assert_eq!(flat.not_testable, Some(StatisticsError::NothingLeft), "{flat:?}");
+    let levels = [1.0, 2.0, 3.0];
+    let flat: Vec<Vec<f64>> = [5.0, 1.0, 0.1].iter().map(|value| vec![*value; 3]).collect();
+    assert_eq!(trend::linear(&levels, &flat).unwrap_err(), StatisticsError::EqualMeans);
+    let alike = trend::linear(&levels, &vec![vec![1.0, 2.0, 3.5]; 3]).unwrap();
+    assert_eq!(alike.test, Outcome::NotTestable { not_testable: StatisticsError::SameDifference });
+    assert!(alike.r_squared > 0.9, "{alike:?}");
+}
+
+/// Beyond a noncentrality of 37 SciPy has no t: its normal density and chi-square tail, summed, have.
+const T_SIZES: [(f64, f64, [f64; 3]); 7] = [
     (3.3, 15.0, [0.825, 0.244_200_668_6, 1.385_636_383_7]),
     (0.4, 7.0, [0.141_421_356_2, -0.560_219_492_8, 0.833_282_324_2]),
     (-2.5, 11.0, [-0.721_687_836_5, -1.348_467_143_6, -0.069_579_992_5]),
     (12.0, 9.0, [3.794_733_192_2, 1.956_402_239_9, 5.614_578_461_6]),
+    (25.0, 15.0, [6.25, 3.979_320_216_4, 8.510_107_927_2]),
+    (60.0, 11.0, [17.320_508_075_7, 10.176_061_616_8, 24.470_637_789_2]),
+    (-200.0, 15.0, [-50.0, -67.692_257_671_6, -32.298_702_645_2]),
 ];
 
-const F_SIZES: [(f64, f64, f64, [f64; 3]); 4] = [
-    (11.94, 1.0, 14.0, [0.460_292_983_8, 0.067_559_447_1, 0.673_614_076_5]),
-    (23.01, 2.0, 28.0, [0.621_723_858_4, 0.340_832_843_6, 0.737_448_589_3]),
-    (0.5, 2.0, 28.0, [0.034_482_758_6, 0.0, 0.184_477_025_4]),
-    (3.1, 2.0, 28.0, [0.181_286_549_7, 0.0, 0.383_069_510_8]),
+const F_SIZES: [(f64, f64, f64, [f64; 3]); 5] = [
+    (11.94, 1.0, 14.0, [0.406_087_602_1, 0.067_559_447_1, 0.673_614_076_5]),
+    (23.01, 2.0, 28.0, [0.586_776_859_5, 0.340_832_843_6, 0.737_448_589_3]),
+    (0.5, 2.0, 28.0, [0.0, 0.0, 0.184_477_025_4]),
+    (3.1, 2.0, 28.0, [0.119_318_181_8, 0.0, 0.383_069_510_8]),
+    (370.0, 2.0, 20.0, [0.969_776_609_7, 0.937_445_366_9, 0.982_325_633_5]),
 ];

@@ -18,6 +18,12 @@ pub struct ExclusionRules {
     /// Sitting: largest share of catch trials in which one of two equal stimuli was named.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_false_alarms: Option<f64>,
+    /// Sitting: largest share of obvious pairs whose larger stimulus was not named.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub most_missed_obvious: Option<f64>,
+    /// Sitting: largest share of wrong answers to differences of 40 % and more.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub most_wrong_at_large: Option<f64>,
     /// Sitting: least share of repeated pairs with the same answer.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub least_agreement: Option<f64>,
@@ -41,7 +47,8 @@ pub struct ExclusionRules {
     pub most_excluded_trials: Option<f64>,
 }
 
-/// No rule of the file: the rules about trials have left nothing of a subject in some condition.
+/// No rule of the file: a subject has no result in some condition, because the rules about trials left nothing, or because no track
+/// came to a threshold.
 pub const EMPTY_CONDITION: &str = "empty_condition";
 
 /// What is excluded.

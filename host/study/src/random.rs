@@ -27,6 +27,8 @@ pub(crate) enum Purpose {
     CheckPlace = 7,
     /// Which earlier trial a check repeats.
     CheckTrial = 8,
+    /// Sets of answers that a fitted observer might give.
+    GoodnessOfFit = 9,
 }
 
 /// A stream of random numbers.

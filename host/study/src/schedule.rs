@@ -80,9 +80,12 @@ pub(crate) fn track_checks(
     track: u32,
 ) -> Vec<(u32, Phase)> {
     let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), track);
-    let (catch, repeats) = (protocol.checks.catch as usize, protocol.checks.repeats as usize);
+    let checks = protocol.checks;
+    let obvious = checks.obvious.map_or(0, |pairs| pairs.count);
+    // Those of another kind are drawn last, so that they move no other.
     let kinds =
-        std::iter::repeat_n(Phase::Catch, catch).chain(std::iter::repeat_n(Phase::RepeatCheck, repeats));
+        [(Phase::Catch, checks.catch), (Phase::RepeatCheck, checks.repeats), (Phase::Obvious, obvious)];
+    let kinds = kinds.into_iter().flat_map(|(kind, count)| std::iter::repeat_n(kind, count as usize));
     let places = (1..protocol.procedure.trials_least()).collect::<Vec<_>>();
     let mut of_repeats: Vec<u32> = places.iter().copied().skip(1).collect();
     let mut checks: Vec<(u32, Phase)> = Vec::new();
@@ -198,7 +201,7 @@ mod tests {
             }
         }
         for repeats in 1..=6 {
-            let checks = Checks { catch: 1, repeats };
+            let checks = Checks { catch: 1, repeats, obvious: None };
             let protocol = JndProtocol { checks, ..JndProtocol::default() };
             for (subject, track) in subjects().zip((1..=12).cycle()) {
                 let checks = track_checks(&protocol, 7, subject, track);

@@ -3,6 +3,7 @@
 //! [`Sitting::next`] says what is to be presented, [`Sitting::answer`] takes in what came of it. Both depend on the
 //! protocol, the seed, the subject's number and the answers so far, and on nothing else.
 
+use crate::estimate::NotBounded;
 use crate::procedure::Track;
 use crate::protocol::{AtBoundary, ComparisonSide, JndProtocol, PresentationOrder, Protocol, SubjectNumber};
 use crate::random::{Purpose, Stream};
@@ -56,6 +57,9 @@ pub struct TrackResult {
     pub base: f64,
     /// Threshold as a share of the base; none if the track never got there.
     pub threshold: Option<f64>,
+    /// The ends of the threshold that the answers do not bound.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_bounded: Option<NotBounded>,
     /// Trials it took.
     pub trials: u32,
 }
@@ -202,7 +206,9 @@ impl Sitting {
             return Ok(Verdict::Repeated);
         }
         self.repeat = 0;
-        if let (Phase::Catch | Phase::RepeatCheck, Some(running)) = (trial.phase, &mut self.running) {
+        if let (Phase::Catch | Phase::Obvious | Phase::RepeatCheck, Some(running)) =
+            (trial.phase, &mut self.running)
+        {
             running.checks.pop_front();
             return Ok(Verdict::Taken);
         }
@@ -239,9 +245,10 @@ impl Sitting {
         if let (Some(Item::Adapt { replication, modality, base }), Some(running)) =
             (self.items.pop_front(), self.running.take())
         {
-            let (threshold, trials) = (running.track.threshold(), running.trials);
-            let track = self.tracks_begun;
-            self.results.push(TrackResult { track, replication, modality, base, threshold, trials });
+            let Running { track: ended, trials, .. } = running;
+            let (track, threshold, not_bounded) = (self.tracks_begun, ended.threshold(), ended.not_bounded());
+            let result = TrackResult { track, replication, modality, base, threshold, not_bounded, trials };
+            self.results.push(result);
         }
         self.begin_track();
     }
@@ -251,6 +258,7 @@ impl Sitting {
         let Some(running) = &self.running else { return (Phase::Main, self.pair(base, 0.0, number)) };
         match running.check() {
             Some(Phase::Catch) => (Phase::Catch, self.pair(base, 0.0, number)),
+            Some(Phase::Obvious) => (Phase::Obvious, self.pair(base, self.obvious_delta(), number)),
             Some(Phase::RepeatCheck) => {
                 // Not the last one, where there are others: two equal pairs in a row would be noticed.
                 let earlier = running.pairs.len().saturating_sub(1).max(1);
@@ -263,6 +271,11 @@ impl Sitting {
             }
             _ => (Phase::Main, self.pair(base, running.track.delta(), number)),
         }
+    }
+
+    fn obvious_delta(&self) -> f64 {
+        let Protocol::Jnd(jnd) = &self.protocol else { return 0.0 };
+        jnd.checks.obvious.map_or(JndProtocol::LARGE_DELTA, |pairs| pairs.delta)
     }
 
     fn pair(&self, base: f64, delta: f64, number: u32) -> Pair {

@@ -47,6 +47,9 @@ pub enum Phase {
     Main,
     /// A check: a pair of equal stimuli, for a false alarm. Not analysed with those that count.
     Catch,
+    /// A check: a pair with an obvious difference, for a question misread and keys the wrong way round. Not analysed with those that
+    /// count.
+    Obvious,
     /// A check: what was presented once before, for how alike the two answers are. Not analysed with those that count.
     RepeatCheck,
 }
@@ -59,6 +62,7 @@ impl Phase {
             Self::Practice => "practice",
             Self::Main => "main",
             Self::Catch => "catch",
+            Self::Obvious => "obvious",
             Self::RepeatCheck => "repeat_check",
         }
     }

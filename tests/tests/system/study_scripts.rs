@@ -3,6 +3,9 @@
 
 #![allow(clippy::unwrap_used)] // tests may panic
 
+mod degenerate;
+
+use flotor_study::dataset::Dataset;
 use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -28,11 +31,12 @@ const WITH_RULES: &str = "task = \"jnd\"\n[options]\nout = \"ruled\"\nsubjects =
                           feel = \"20ms\"\nno_demo = true\ncatch_trials = 1\n[exclusion]\nmost_false_alarms = 0.3\n\
                           least_movement_mm = 0.03\n";
 
-/// The lines of a text that have a number, with single spaces.
+/// The lines of a text that have a number, or the reason why there is none, with single spaces.
 fn numbers(text: &str) -> Vec<String> {
     let plain = text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "));
     let has_number = |line: &String| line.contains(|one: char| one.is_ascii_digit());
-    plain.filter(has_number).filter(|line| !line.starts_with("Partial eta squared")).collect()
+    let is_result = |line: &String| has_number(line) || line.contains("not testable");
+    plain.filter(is_result).filter(|line| !line.starts_with("Partial omega squared")).collect()
 }
 
 /// Studies in `folder`, each with its table of trials and what `analyse` printed.
@@ -101,9 +105,46 @@ fn other_options_are_said_not_to_be_those_of_the_scripts() {
     }
 }
 
+/// One statistic that cannot be computed takes no other away, in text, JSON, page and tables.
+#[test]
+fn studies_without_variation_are_analysed_to_the_end() {
+    let scratch = Scratch::default();
+    for study in &degenerate::STUDIES {
+        study.write(scratch.path());
+        let files = ["r.json", "p.html", "r.csv", "t.csv"];
+        let words = [
+            "analyse", study.name, "--json", files[0], "--html", files[1], "--csv", files[2], "--trials",
+            files[3],
+        ];
+        let ran = Flotor::with(words).inside(scratch.path()).run();
+        assert_eq!(ran.code, Some(exit_code::OK), "{}: {ran:?}", study.name);
+        let [json, page, responses, _] =
+            files.map(|file| std::fs::read_to_string(scratch.path().join(file)).unwrap());
+        let ran = Flotor::with(["analyse", study.name]).inside(scratch.path()).run();
+        let lines = numbers(&ran.stdout);
+        assert!(lines.iter().any(|line| line == study.line), "{}: {lines:#?}", study.name);
+        let (_, reason) = study.line.split_once("not testable: ").unwrap();
+        assert!(json.contains(&format!("\"not_testable\": \"{reason}\"")), "{}: {json}", study.name);
+        assert!(page.contains("not testable: "), "{}", study.name);
+        let conditions = match study.task {
+            degenerate::Task::Pairs => 6,
+            degenerate::Task::Ratings => 8,
+        };
+        assert_eq!(responses.lines().count(), 1 + conditions * usize::from(study.subjects), "{}", study.name);
+        // A family keeps its size: each comparison has its row.
+        let comparisons = lines.iter().filter(|line| line.starts_with("h - vh, ")).count();
+        assert_eq!(comparisons, conditions / 2, "{}: {lines:#?}", study.name);
+    }
+}
+
 fn repeats_every_line(program: &str, extension: &str) {
     let scratch = Scratch::default();
-    for (number, expected) in studies(scratch.path()).into_iter().enumerate() {
+    let mut all = studies(scratch.path());
+    for study in &degenerate::STUDIES {
+        study.write(scratch.path());
+        all.push(numbers_of(scratch.path(), study.name, &format!("trials{}.csv", all.len())));
+    }
+    for (number, expected) in all.into_iter().enumerate() {
         let script = format!("trials{number}.{extension}");
         let ran = Command::new(program).arg(&script).current_dir(scratch.path()).output().unwrap();
         let said = String::from_utf8(ran.stdout).unwrap();
@@ -113,18 +154,76 @@ fn repeats_every_line(program: &str, extension: &str) {
     }
 }
 
-#[test]
-fn the_script_in_python_repeats_every_line() {
+/// A Python with numpy, scipy and pandas.
+fn science_python() -> Option<String> {
     let python = std::env::var("FLOTOR_SCIENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let has = Command::new(&python).args(["-c", "import numpy, pandas, scipy"]).output();
-    if !has.is_ok_and(|ran| ran.status.success()) {
-        lacks(
-            Tool::SciencePython,
-            "numpy, pandas and scipy are missing (FLOTOR_SCIENCE_PYTHON names a Python that has them)",
-        );
-        return;
+    if has.is_ok_and(|ran| ran.status.success()) {
+        return Some(python);
     }
-    repeats_every_line(&python, "py");
+    lacks(
+        Tool::SciencePython,
+        "numpy, pandas and scipy are missing (FLOTOR_SCIENCE_PYTHON names a Python that has them)",
+    );
+    None
+}
+
+#[test]
+fn the_script_in_python_repeats_every_line() {
+    if let Some(python) = science_python() {
+        repeats_every_line(&python, "py");
+    }
+}
+
+/// Runs a script that prints each number that is off, and at the end how many it compared.
+fn compares(python: &str, script: &str, folder: &Path, words: &[&str], least: u32) {
+    let ran = Command::new(python).args(["-c", script]).args(words).current_dir(folder).output().unwrap();
+    let said = String::from_utf8_lossy(&ran.stdout).into_owned();
+    let counted = said.trim().strip_prefix("compared ").and_then(|count| count.parse::<u32>().ok());
+    let errors = String::from_utf8_lossy(&ran.stderr);
+    assert!(counted.is_some_and(|count| count >= least), "{words:?}: {said} {errors}");
+}
+
+/// Every number of a report, by numpy and scipy: 1e-9 of F, t, means and sizes, 1e-6 of p, epsilons and limits.
+#[test]
+fn every_number_of_a_report_is_that_of_scipy() {
+    let Some(python) = science_python() else { return };
+    let scratch = Scratch::default();
+    let mut data: Vec<String> = (0..STUDIES.len()).map(|number| format!("data{number}")).collect();
+    studies(scratch.path());
+    for study in &degenerate::STUDIES {
+        study.write(scratch.path());
+        data.push(study.name.to_owned());
+    }
+    for data in &data {
+        let words = ["analyse", data, "--trials", "t.csv", "--json", "r.json"];
+        let ran = Flotor::with(words).inside(scratch.path()).run();
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        let script = include_str!("study_scripts/recompute.py");
+        compares(&python, script, scratch.path(), &["r.json", "t.csv"], 8);
+    }
+}
+
+/// Thresholds, lapses, their limits and the ends that answers do not bound, by scipy on a fine grid: 1e-6.
+#[test]
+fn psychometric_functions_are_those_of_a_fine_grid() {
+    let Some(python) = science_python() else { return };
+    let scratch = Scratch::default();
+    let conditions = if TestSize::of_this_run().leaves_out_long_tests() { "1" } else { "6" };
+    let words = ["study", "jnd", "--subjects", "2", "--apparatus", "none", "--out", "simulated"];
+    assert_eq!(Flotor::with(words).inside(scratch.path()).run().code, Some(exit_code::OK));
+    let mut data = vec!["simulated"];
+    for study in degenerate::STUDIES.iter().filter(|study| matches!(study.task, degenerate::Task::Pairs)) {
+        study.write(scratch.path());
+        Dataset::at(&scratch.path().join(study.name)).write_tables().unwrap();
+        data.push(study.name);
+    }
+    for data in data {
+        let words = ["analyse", data, "--each", "--json", "each.json"];
+        assert_eq!(Flotor::with(words).inside(scratch.path()).run().code, Some(exit_code::OK));
+        let script = include_str!("study_scripts/refit.py");
+        compares(&python, script, scratch.path(), &["each.json", data, conditions], 8);
+    }
 }
 
 /// Ways to start the script in a folder `Meine Daten (Übung)`, each with the folder in which R works.

@@ -16,9 +16,10 @@ mod design;
 
 pub use design::{BetweenFactor, Design, WithinFactor};
 
-use crate::count;
 use crate::distribution::fisher_above;
+use crate::effect_size::{EffectSize, partial_omega_squared};
 use crate::linear::{Basis, Matrix};
+use crate::{ROUNDING, StatisticsError, count};
 use design::Term;
 use serde::Serialize;
 
@@ -47,12 +48,20 @@ pub struct Effect {
     pub error_sum_of_squares: f64,
     /// Degrees of freedom of the error.
     pub error_df: f64,
-    /// F; NaN (`null` in JSON) where there is nothing to test: effect and error are rounding errors of the responses.
+    /// F; NaN (`null` in JSON) where the error is nothing but rounding errors of the responses.
     pub f: f64,
     /// Probability of a larger F without the effect; NaN as [`Self::f`].
     pub p: f64,
-    /// Share of what the effect and its error explain together; NaN as [`Self::f`].
+    /// Share of what the effect and its error explain together; NaN as [`Self::f`]. Larger in the mean than that of the population,
+    /// which [`partial_omega_squared`] estimates.
     pub partial_eta_squared: f64,
+    /// Partial omega squared with its interval, without a correction for unequally varying contrasts; none where there is nothing
+    /// to test.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub partial_omega_squared: Option<EffectSize>,
+    /// The reason why there is no F.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "reason")]
+    pub not_testable: Option<StatisticsError>,
     /// Share of what the effect and all errors explain together (Olejnik and Algina 2003, all factors manipulated).
     pub generalised_eta_squared: f64,
     /// Corrections where the effect has more than one contrast within subjects.
@@ -60,16 +69,17 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// Whether there was anything to test: an effect that scaling has removed from all responses has no F.
+    /// Whether there is an F: an effect that scaling has removed from all responses has none, nor one without an error.
     #[must_use]
     pub fn is_testable(&self) -> bool {
-        !self.f.is_nan()
+        self.not_testable.is_none()
     }
 }
 
-/// Squares below this share of those of the responses are rounding errors, whose relative size is 1e-16: an effect of them is
-/// none, and neither is an error.
-const ROUNDING: f64 = 1.0e-20;
+#[allow(clippy::ref_option)] // as serde asks
+fn reason<S: serde::Serializer>(reason: &Option<StatisticsError>, serializer: S) -> Result<S::Ok, S::Error> {
+    reason.as_ref().map(ToString::to_string).serialize(serializer)
+}
 
 /// Least degrees of freedom that are left of those of the residuals: fewer are rounding errors.
 const LEAST_LEFT: f64 = 1.0e-9;
@@ -152,8 +162,13 @@ fn test(
     let contrasts = error.columns();
     let (df, error_df) = (count(term_df * contrasts), count(residual_df * contrasts));
     let (squares, error_squares) = (hypothesis.trace(), error.trace());
-    let is_testable = squares > rounding || error_squares > rounding;
-    let f = if is_testable { (squares / df) / (error_squares / error_df) } else { f64::NAN };
+    let not_testable = match (squares > rounding, error_squares > rounding) {
+        (_, true) => None,
+        (false, false) => Some(StatisticsError::NothingLeft),
+        (true, false) => Some(StatisticsError::NoError),
+    };
+    let tested = |value: f64| if not_testable.is_none() { value } else { f64::NAN };
+    let f = tested((squares / df) / (error_squares / error_df));
     Effect {
         effect,
         sum_of_squares: squares,
@@ -161,11 +176,13 @@ fn test(
         error_sum_of_squares: error_squares,
         error_df,
         f,
-        p: if is_testable { fisher_above(f, df, error_df) } else { f64::NAN },
-        partial_eta_squared: if is_testable { squares / (squares + error_squares) } else { f64::NAN },
+        p: tested(fisher_above(f, df, error_df)),
+        partial_eta_squared: tested(squares / (squares + error_squares)),
+        partial_omega_squared: not_testable.is_none().then(|| partial_omega_squared(f, df, error_df)),
         generalised_eta_squared: f64::NAN, // known once all errors are
-        sphericity: (contrasts > 1 && is_testable)
+        sphericity: (contrasts > 1 && not_testable.is_none())
             .then(|| sphericity(error, f, df, error_df, count(residual_df))),
+        not_testable,
     }
 }
 

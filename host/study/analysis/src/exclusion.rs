@@ -1,5 +1,6 @@
 //! Application of the rules of exclusion to complete sittings.
 
+use crate::large::wrong_at_large;
 use crate::{Estimator, SubjectChecks, SubjectRecord};
 use flotor_study::exclusion::{EMPTY_CONDITION, Exclusion, ExclusionRules, Scope};
 use flotor_study::log::TrialEvent;
@@ -59,7 +60,7 @@ pub fn apply(
         }
         let kept = without(&record, &new);
         applied.excluded.extend(new);
-        match emptied(protocol, estimator, &record, &kept) {
+        match emptied(protocol, estimator, &kept) {
             // Nothing to compare with would be left: the whole sitting goes.
             Some(found) => applied.excluded.push(Exclusion {
                 subject: record.subject,
@@ -150,6 +151,8 @@ fn exclude_sitting(
     };
     let found = [
         ("most_false_alarms", above(rules.most_false_alarms, checks.false_alarm_share())),
+        ("most_missed_obvious", above(rules.most_missed_obvious, checks.missed_obvious_share())),
+        ("most_wrong_at_large", above(rules.most_wrong_at_large, wrong_at_large(record).share())),
         ("least_agreement", below(rules.least_agreement, checks.agreement)),
         ("most_retest_deviation", above(rules.most_retest_deviation, checks.retest_deviation)),
         ("most_dont_know", above(rules.most_dont_know, share(unsure))),
@@ -217,34 +220,28 @@ fn without(record: &SubjectRecord, excluded: &[Exclusion]) -> SubjectRecord {
     kept
 }
 
-/// A condition of which the rules left nothing to compute a result from, where there was something, in words.
-fn emptied(
-    protocol: &Protocol,
-    estimator: Estimator,
-    before: &SubjectRecord,
-    kept: &SubjectRecord,
-) -> Option<String> {
+/// Finds a condition with nothing to compute a result from, because the rules left nothing or no track came to a threshold.
+fn emptied(protocol: &Protocol, estimator: Estimator, kept: &SubjectRecord) -> Option<String> {
     let level = |event: &TrialEvent| match event.trial.presented {
         Presented::Pair(pair) => pair.base,
         Presented::One { value } => value,
     };
     // A track without a threshold has answers, and no result.
     let by_tracks = matches!((protocol, estimator), (Protocol::Jnd(_), Estimator::Procedure));
-    let has_result = |record: &SubjectRecord, (modality, at): (Modality, f64)| {
+    let has_result = |(modality, at): (Modality, f64)| {
         if by_tracks {
-            let mut tracks = record.tracks.iter().filter(|track| track.threshold.is_some());
+            let mut tracks = kept.tracks.iter().filter(|track| track.threshold.is_some());
             tracks.any(|track| track.modality == modality && track.base == at)
         } else {
-            record.counted().any(|event| event.trial.modality == modality && level(event) == at)
+            kept.counted().any(|event| event.trial.modality == modality && level(event) == at)
         }
     };
     let mut all = Modality::ALL
         .into_iter()
         .flat_map(|modality| protocol.levels().iter().map(move |at| (modality, *at)));
-    let (modality, at) =
-        all.find(|condition| has_result(before, *condition) && !has_result(kept, *condition))?;
+    let (modality, at) = all.find(|condition| !has_result(*condition))?;
     let what = if by_tracks { "track with a threshold" } else { "answer" };
-    Some(format!("{} at {at}: no {what} is left", modality.word()))
+    Some(format!("{} at {at}: no {what}", modality.word()))
 }
 
 #[cfg(test)]

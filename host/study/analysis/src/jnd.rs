@@ -6,6 +6,7 @@ use super::{
     AnalysisError, AnalysisOptions, CONFIDENCE, Estimator, PostHoc, ResponseRow, SubjectRecord,
     mean_responses, order_factor, post_hoc, response_rows, within_factors,
 };
+use flotor_statistics::Outcome;
 use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
 use flotor_statistics::describe::{MeanInterval, mean, mean_interval};
 use flotor_statistics::t_test::{TTest, paired};
@@ -60,12 +61,12 @@ pub struct JndAnalysis {
     /// The same with its variation and 95 % confidence interval.
     pub weber_detail: WeberFractions<MeanInterval>,
     /// Paired t-test between the modalities, positive if haptics alone is worse.
-    pub t: TTest,
+    pub t: Outcome<TTest>,
     /// Thresholds in the unit of the stimulus: order x modality x base.
     pub anova: Vec<Effect>,
     /// Thresholds as a share of the base, within each modality: is the Weber fraction constant over bases?
     pub constancy: WeberFractions<Option<Effect>>,
-    /// R² of the linear trend of thresholds over bases (all modalities).
+    /// R² of the linear trend of thresholds over bases (all modalities); NaN (`null` in JSON) without three bases, or with equal means.
     pub linear_r2: f64,
     /// Thresholds by condition.
     pub thresholds: Vec<ThresholdCell>,
@@ -88,7 +89,7 @@ pub struct JndAnalysis {
 /// Analyses thresholds.
 ///
 /// # Errors
-/// [`AnalysisError`], if a subject has no threshold in some condition or the statistics cannot be had.
+/// [`AnalysisError`], if a subject has no threshold in some condition.
 pub fn analyse_jnd(
     protocol: &JndProtocol,
     subjects: &[SubjectRecord],
@@ -113,10 +114,10 @@ pub fn analyse_jnd(
         estimator: options.estimator,
         weber: weber_detail.map(|detail| detail.mean),
         weber_detail,
-        t: paired(&of(Modality::H), &of(Modality::Vh))?,
+        t: paired(&of(Modality::H), &of(Modality::Vh)).into(),
         anova: analyse(&design, options.sums_of_squares),
         constancy: WeberFractions::try_each(|modality| constancy(protocol, &fractions, modality, options))?,
-        linear_r2: linear_r2(protocol, &fractions)?,
+        linear_r2: linear_r2(protocol, &fractions),
         thresholds: thresholds
             .map(|(modality, base, threshold)| ThresholdCell { modality, base, threshold })
             .collect(),
@@ -223,14 +224,11 @@ fn constancy(
     Ok(analyse(&design, options.sums_of_squares).into_iter().next())
 }
 
-fn linear_r2(protocol: &JndProtocol, fractions: &[Fractions]) -> Result<f64, AnalysisError> {
-    if protocol.bases.len() < 3 {
-        return Ok(f64::NAN);
-    }
+fn linear_r2(protocol: &JndProtocol, fractions: &[Fractions]) -> f64 {
     let row = |subject: &Fractions| {
         let both = subject.vh.iter().zip(&subject.h).zip(&protocol.bases);
         both.map(|((vh, h), base)| 0.5 * (vh + h) * base).collect::<Vec<_>>()
     };
     let rows: Vec<Vec<f64>> = fractions.iter().map(row).collect();
-    Ok(trend::linear(&protocol.bases, &rows)?.r_squared)
+    trend::linear(&protocol.bases, &rows).map_or(f64::NAN, |trend| trend.r_squared)
 }

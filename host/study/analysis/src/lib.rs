@@ -5,6 +5,7 @@ mod checks;
 pub mod exclusion;
 mod jnd;
 mod kinematics;
+mod large;
 mod magnitude;
 mod post_hoc;
 pub mod power;
@@ -17,12 +18,14 @@ pub use checks::SubjectChecks;
 pub use jnd::{JndAnalysis, ThresholdCell, WeberFractions, analyse_jnd};
 pub use kinematics::KinematicMeasure;
 pub use magnitude::{MagnitudeAnalysis, RatingCell, analyse_magnitude};
-pub use post_hoc::PostHoc;
+pub use post_hoc::{PairTest, PostHoc};
 pub use subject::{SubjectCondition, SubjectQuality};
 
 use flotor_statistics::StatisticsError;
 use flotor_statistics::anova::{BetweenFactor, Effect, SumOfSquares, WithinFactor};
 use flotor_statistics::describe::{MeanInterval, mean_interval};
+use flotor_statistics::effect_size::EffectSize;
+use flotor_statistics::t_test::TTest;
 use flotor_study::log::{SittingLog, TrialEvent};
 use flotor_study::protocol::{Protocol, SubjectNumber};
 use flotor_study::sitting::{TrackResult, Verdict};
@@ -184,6 +187,18 @@ impl Analysis {
             Self::Magnitude(analysis) => text::magnitude(analysis),
         }
     }
+}
+
+/// Returns a t-test as papers print it: `t(15) = 3.30, p = 0.005`.
+#[must_use]
+pub fn t_text(t: &TTest) -> String {
+    text::t_text(t, t.p)
+}
+
+/// Returns the interval of an effect size: `0.24 to 1.39`.
+#[must_use]
+pub fn size_interval_text(size: &EffectSize) -> String {
+    text::size_interval_text(size)
 }
 
 /// An effect in words, as papers print it: `F(2, 30) = 1.46, p = 0.250 (HF p = 0.251)`.

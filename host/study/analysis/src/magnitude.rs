@@ -6,6 +6,7 @@ use super::{
     AnalysisError, AnalysisOptions, PostHoc, ResponseRow, SubjectRecord, conditions, mean_responses,
     order_factor, post_hoc, response_rows, within_factors,
 };
+use flotor_statistics::Outcome;
 use flotor_statistics::anova::{Design, Effect, analyse};
 use flotor_statistics::describe::{MeanInterval, mean};
 use flotor_statistics::trend::{self, LinearTrend};
@@ -33,10 +34,10 @@ pub struct MagnitudeAnalysis {
     pub subjects: usize,
     /// How ratings were made comparable.
     pub rating_scale: RatingScale,
-    /// R² of the linear trend of the mean ratings over the stimuli.
+    /// R² of the linear trend of the mean ratings over the stimuli; NaN (`null` in JSON) without a trend.
     pub linear_r2: f64,
     /// The trend, all modalities together.
-    pub trend: LinearTrend,
+    pub trend: Outcome<LinearTrend>,
     /// Scaled ratings: order x modality x stimulus.
     pub anova: Vec<Effect>,
     /// Ratings by condition.
@@ -60,7 +61,7 @@ pub struct MagnitudeAnalysis {
 /// Analyses ratings.
 ///
 /// # Errors
-/// [`AnalysisError`], if ratings cannot be scaled as asked for or the statistics cannot be had.
+/// [`AnalysisError`], if ratings cannot be scaled as asked for.
 pub fn analyse_magnitude(
     protocol: &MagnitudeProtocol,
     subjects: &[SubjectRecord],
@@ -74,7 +75,7 @@ pub fn analyse_magnitude(
         let (vh, h) = row.split_at(stimuli.len());
         vh.iter().zip(h).map(|(vh, h)| 0.5 * (vh + h)).collect::<Vec<_>>()
     };
-    let trend = trend::linear(stimuli, &rows.iter().map(both).collect::<Vec<_>>())?;
+    let trend = Outcome::from(trend::linear(stimuli, &rows.iter().map(both).collect::<Vec<_>>()));
     let ratings = mean_responses(stimuli, &rows)?.into_iter();
     let counted: Vec<f64> = subjects.iter().map(|subject| subject.counted().count() as f64).collect();
     let repeats =
@@ -83,7 +84,7 @@ pub fn analyse_magnitude(
         task: "magnitude",
         subjects: subjects.len(),
         rating_scale: options.rating_scale,
-        linear_r2: trend.r_squared,
+        linear_r2: trend.tested().map_or(f64::NAN, |trend| trend.r_squared),
         trend,
         anova: analyse(&design, options.sums_of_squares),
         ratings: ratings

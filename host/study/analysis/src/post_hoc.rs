@@ -3,13 +3,22 @@
 use flotor_statistics::effect_size::{EffectSize, of_pairs};
 use flotor_statistics::multiple::holm;
 use flotor_statistics::t_test::{TTest, paired};
+use flotor_statistics::{Outcome, StatisticsError};
 use serde::Serialize;
 
-/// One comparison of two conditions, over subjects.
+/// A comparison of two conditions over subjects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PostHoc {
-    /// What is compared: `h - vh, base 26`.
+    /// The conditions: `h - vh, base 26`.
     pub comparison: String,
+    /// Test of the difference.
+    #[serde(flatten)]
+    pub test: Outcome<PairTest>,
+}
+
+/// Test of a difference between two conditions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PairTest {
     /// Paired t-test of the difference.
     pub t: TTest,
     /// Its p-value after Holm's correction for all comparisons of the same kind.
@@ -18,16 +27,17 @@ pub struct PostHoc {
     pub d: EffectSize,
 }
 
-/// Comparisons of one kind, each the responses under its two conditions, subject by subject. A difference that does not vary
-/// between subjects cannot be tested and is left out.
+/// Compares conditions of one kind, each the responses under its two conditions, subject by subject. A difference that does not vary
+/// between subjects cannot be tested; it counts in the family with a p of 1, so that a tie makes no other comparison more likely.
 pub(super) fn compare(pairs: impl IntoIterator<Item = (String, Vec<f64>, Vec<f64>)>) -> Vec<PostHoc> {
-    let tested = pairs
-        .into_iter()
-        .filter_map(|(comparison, first, second)| paired(&first, &second).ok().map(|t| (comparison, t)));
-    let tested: Vec<(String, TTest)> = tested.collect();
-    let corrected = holm(&tested.iter().map(|(_, t)| t.p).collect::<Vec<_>>());
-    let of = |((comparison, t), p_holm)| PostHoc { comparison, t, p_holm, d: of_pairs(&t) };
-    tested.into_iter().zip(corrected).map(of).collect()
+    let tested = pairs.into_iter().map(|(comparison, first, second)| (comparison, paired(&first, &second)));
+    let tested: Vec<(String, Result<TTest, StatisticsError>)> = tested.collect();
+    let p: Vec<f64> = tested.iter().map(|(_, test)| test.as_ref().map_or(1.0, |t| t.p)).collect();
+    let of = |((comparison, test), p_holm): ((String, Result<TTest, _>), f64)| PostHoc {
+        comparison,
+        test: test.map(|t| PairTest { t, p_holm, d: of_pairs(&t) }).into(),
+    };
+    tested.into_iter().zip(holm(&p)).map(of).collect()
 }
 
 /// The modalities at each level, of `responses[subject][modality by level]`.

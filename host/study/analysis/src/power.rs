@@ -38,10 +38,10 @@ pub fn population(ratio: f64, lapse: f64) -> Population {
     Population { h, lapse, ..usual }
 }
 
-/// p of the paired t-test, and the Weber fractions, of one simulated study.
+/// p of the paired t-test (1 where nothing varies), and the Weber fractions, of one simulated study.
 ///
 /// # Errors
-/// [`AnalysisError`]: a track that came to no threshold, or a study without any spread.
+/// [`AnalysisError`]: a track that came to no threshold.
 pub fn study(
     protocol: &JndProtocol,
     population: &Population,
@@ -65,7 +65,7 @@ pub fn study(
     };
     let subjects: Vec<SubjectRecord> = (1..=subjects).filter_map(SubjectNumber::new).map(sit).collect();
     let analysis = analyse_jnd(protocol, &subjects, &AnalysisOptions::default())?;
-    Ok((analysis.t.p, [analysis.weber.vh, analysis.weber.h]))
+    Ok((analysis.t.tested().map_or(1.0, |t| t.p), [analysis.weber.vh, analysis.weber.h]))
 }
 
 /// The power from the results of studies with so many subjects.

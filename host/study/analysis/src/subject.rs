@@ -1,19 +1,20 @@
 //! One subject by themselves, from the first trial on: the tracks as far as they came, psychometric functions, and whether the
 //! answers are those of somebody who felt what was presented.
 
-use super::{SubjectChecks, SubjectRecord};
+use crate::large::wrong_at_large;
+use crate::{SubjectChecks, SubjectRecord, p_text};
 use flotor_statistics::describe::quantile;
 use flotor_study::estimate::{Observation, Prior, Psychometric, psychometric};
 use flotor_study::log::Incident;
 use flotor_study::protocol::Protocol;
 use flotor_study::sitting::{TrackResult, Verdict};
-use flotor_study::trial::{Judgement, Modality, Phase, Presented, Response};
+use flotor_study::trial::{Modality, Phase, Presented, Response};
 use serde::Serialize;
 
 /// Less time with a stimulus than this is suspicious, s.
 const SHORT_S: f64 = 0.5;
-/// A wrong answer to a difference this many thresholds large is a lapse.
-const LARGE: f64 = 2.5;
+/// Level of a subject's tests of one kind together: worse than chance, and the fit of a psychometric function.
+const LEVEL: f64 = 0.05;
 
 /// The psychometric function in one condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -47,6 +48,26 @@ pub struct SubjectQuality {
     pub checks: SubjectChecks,
     /// What is suspicious, a sentence each.
     pub flags: Vec<String>,
+}
+
+impl SubjectCondition {
+    fn name(&self) -> String {
+        format!("{} base {}", self.modality.word(), self.base)
+    }
+
+    /// Says what makes the function doubtful, at a level for each of so many conditions.
+    fn suspicions(&self, level: f64) -> Vec<String> {
+        let Psychometric { named, wrong, p_chance, fit, .. } = self.function;
+        let chance = (p_chance < level).then(|| {
+            let p = p_text(p_chance);
+            format!("{}: worse than chance: {wrong} of {named} wrong, binomial {p}", self.name())
+        });
+        let misfit = (fit.p < level).then(|| {
+            let p = p_text(fit.p);
+            format!("{}: no psychometric function fits: chi-square {:.1}, {p}", self.name(), fit.chi_square)
+        });
+        chance.into_iter().chain(misfit).collect()
+    }
 }
 
 impl SubjectQuality {
@@ -96,14 +117,19 @@ impl SubjectQuality {
         };
         say(short, "answers after less than half a second with a stimulus");
         say(still, "answers without a whole movement down and up");
-        say(self.lapses(record), "wrong answers to a difference of more than 2.5 thresholds");
+        say(wrong_at_large(record).wrong, "wrong answers to differences of 40 % and more");
         say(
             without_difference(record),
             "answers to equal stimuli, judged by where the larger one would have been (--floor)",
         );
         let stuck = self.tracks.iter().filter(|track| track.threshold.is_none()).count();
         say(stuck, "tracks that did not reach a threshold");
+        let open = self.tracks.iter().filter(|track| track.not_bounded.is_some()).count();
+        say(open, "tracks whose answers do not bound the threshold");
         say(incidents.len(), "interruptions and disturbances in the log");
+        // Bonferroni's correction: a subject without any fault has a flag in one of twenty, at most.
+        let level = LEVEL / self.conditions.len().max(1) as f64;
+        flags.extend(self.conditions.iter().flat_map(|condition| condition.suspicions(level)));
         if let Some(first) = self.first
             && named >= 20.0
             // Two deviations of a binomial share of a half.
@@ -117,6 +143,9 @@ impl SubjectQuality {
         if self.checks.false_alarm_share().is_some_and(|share| share > 0.5) {
             flags.push("more than half of the catch trials named one of two equal stimuli".to_owned());
         }
+        if self.checks.missed_obvious_share().is_some_and(|share| share > 0.5) {
+            flags.push("more than half of the obvious pairs were missed".to_owned());
+        }
         if self.checks.agreement.is_some_and(|share| share < 0.5) {
             flags.push("fewer than half of the repeated pairs had the same answer".to_owned());
         }
@@ -126,43 +155,36 @@ impl SubjectQuality {
         flags
     }
 
-    fn lapses(&self, record: &SubjectRecord) -> usize {
-        let threshold = |modality, base| {
-            let known =
-                |condition: &&SubjectCondition| condition.modality == modality && condition.base == base;
-            self.conditions.iter().find(known).map(|condition| condition.function.threshold)
-        };
-        let is_lapse = |event: &&flotor_study::log::TrialEvent| match (event.trial.presented, event.verdict) {
-            (Presented::Pair(pair), Verdict::Judged { judgement: Judgement::Wrong, .. }) => {
-                threshold(event.trial.modality, pair.base).is_some_and(|known| pair.delta > LARGE * known)
-            }
-            _ => false,
-        };
-        record.counted().filter(is_lapse).count()
-    }
-
     /// The page for people.
     #[must_use]
     pub fn to_text(&self) -> String {
         let percent = |share: f64| format!("{:.1} %", share * 100.0);
         let mut lines = vec![format!("{}: {} answers that count", self.subject, self.answers)];
         for track in &self.tracks {
-            let TrackResult { track, replication, modality, base, threshold, trials } = track;
+            let TrackResult { track, replication, modality, base, threshold, not_bounded, trials } = track;
             let found = threshold.map_or("none".to_owned(), percent);
+            let found = not_bounded.map_or(found.clone(), |open| format!("{found} ({})", open.text()));
             lines.push(format!(
                 "  track {track:<3} replication {replication}  {:<3} base {base:<8} threshold {found:<9} {trials} trials",
                 modality.word(),
             ));
         }
         for SubjectCondition { modality, base, function } in &self.conditions {
-            let [low, high] = function.threshold_interval.map(percent);
+            let interval = match function.threshold_interval.map(|end| end.map(percent)) {
+                [Some(low), Some(high)] => format!("95 %: {low} to {high}"),
+                [Some(low), None] => format!("95 %: above {low}"),
+                [None, Some(high)] => format!("95 %: below {high}"),
+                [None, None] => "no interval".to_owned(),
+            };
+            let open = function.not_bounded.map_or(String::new(), |open| format!(", {}", open.text()));
             lines.push(format!(
-                "  {:<3} base {base:<8} {} answers: threshold {} (95 %: {low} to {high}), lapse {} (at most {})",
+                "  {:<3} base {base:<8} {} answers: threshold {} ({interval}{open}), lapse {} (at most {}), fit {}",
                 modality.word(),
                 function.answers,
                 percent(function.threshold),
                 percent(function.lapse),
                 percent(function.lapse_most),
+                p_text(function.fit.p),
             ));
         }
         if let Some([low, middle, high]) = self.response_time_s {

@@ -2,10 +2,12 @@
 
 use super::blinded::BlindedAnalysis;
 use super::published::Beside;
-use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PostHoc, published};
+use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PairTest, PostHoc, published};
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
-use flotor_statistics::effect_size::{EffectSize, Reach, partial_eta_squared};
+use flotor_statistics::effect_size::EffectSize;
+use flotor_statistics::not_testable_text;
+use flotor_statistics::t_test::TTest;
 use flotor_study::trial::Modality;
 
 pub(super) fn jnd(analysis: &JndAnalysis) -> String {
@@ -22,9 +24,7 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
         let [low, high] = detail.interval.map(|end| end * 100.0);
         page.row(name, &format!("{:.1} %  (95 %: {low:.1} to {high:.1})", detail.mean * 100.0), published);
     }
-    let t = &analysis.t;
-    let here = format!("t({}) = {:.2}, {}", t.df, t.value, p_text(t.p));
-    page.row("difference", &here, published::T);
+    page.row("difference", &analysis.t.to_text(|t| t_text(t, t.p)), published::T);
     page.gap();
     page.columns("Thresholds", "vision + haptics", "haptics alone");
     let of = |modality| analysis.thresholds.iter().filter(move |cell| cell.modality == modality);
@@ -54,12 +54,13 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
 
 pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
     let mut page = Page::beside(analysis.beside);
-    let MagnitudeAnalysis { subjects, trials_per_subject, repeated, linear_r2, .. } = analysis;
+    let MagnitudeAnalysis { subjects, trials_per_subject, repeated, .. } = analysis;
     let thesis = analysis.beside.text(" (thesis: 72)");
     page.line(format!("{subjects} subjects, {trials_per_subject} ratings each{thesis}"));
     page.line(format!("{repeated} presentations repeated because the handle left its range"));
     page.gap();
-    page.row("Linear trend", &format!("R² = {linear_r2:.3}"), &format!("R² = {}", published::LINEAR_R2));
+    let here = analysis.trend.to_text(|trend| format!("R² = {:.3}", trend.r_squared));
+    page.row("Linear trend", &here, &format!("R² = {}", published::LINEAR_R2));
     page.gap();
     page.columns("Rating", "vision + haptics", "haptics alone");
     let of = |modality| analysis.ratings.iter().filter(move |cell| cell.modality == modality);
@@ -125,13 +126,14 @@ impl Page {
         }
     }
 
-    /// How large the effects are.
+    /// Adds the sizes of the effects.
     fn sizes(&mut self, table: &[Effect]) {
         self.gap();
-        self.row("Partial eta squared", "with its 95 % interval", "");
-        for effect in table.iter().filter(|effect| effect.is_testable()) {
-            let size = partial_eta_squared(effect.f, effect.df, effect.error_df);
-            self.row(&effect.effect, &size_text(&size), "");
+        self.row("Partial omega squared", "with its 95 % interval", "");
+        for effect in table {
+            if let Some(size) = &effect.partial_omega_squared {
+                self.row(&effect.effect, &size_text(size), "");
+            }
         }
     }
 
@@ -141,9 +143,10 @@ impl Page {
         }
         self.gap();
         self.columns("Comparisons", "paired t, p after Holm", "   Cohen's d of the pairs");
-        for PostHoc { comparison, t, p_holm, d } in comparisons {
-            let test = format!("t({}) = {:.2}, {}", t.df, t.value, p_text(*p_holm));
-            self.lines.push(format!("  {comparison:<30}{test:<26}{}", size_text(d)));
+        for PostHoc { comparison, test } in comparisons {
+            let here =
+                |PairTest { t, p_holm, d }: &PairTest| format!("{:<26}{}", t_text(t, *p_holm), size_text(d));
+            self.lines.push(format!("  {comparison:<30}{}", test.to_text(here)));
         }
     }
 
@@ -159,9 +162,19 @@ impl Page {
 }
 
 fn size_text(size: &EffectSize) -> String {
-    let [low, high] = size.interval;
-    let wider = if size.reach == Reach::OrWider { ", or wider" } else { "" };
-    format!("{:.2}  ({low:.2} to {high:.2}{wider})", size.value)
+    format!("{:.2}  ({})", size.value, size_interval_text(size))
+}
+
+pub(super) fn size_interval_text(size: &EffectSize) -> String {
+    match size.interval {
+        [low, high] if high.is_infinite() => format!("{low:.2} or more"),
+        [low, high] if low.is_infinite() => format!("{high:.2} or less"),
+        [low, high] => format!("{low:.2} to {high:.2}"),
+    }
+}
+
+pub(super) fn t_text(t: &TTest, p: f64) -> String {
+    format!("t({}) = {:.2}, {}", t.df, t.value, p_text(p))
 }
 
 fn interval_text(value: &MeanInterval) -> String {
@@ -169,8 +182,8 @@ fn interval_text(value: &MeanInterval) -> String {
 }
 
 pub(super) fn effect_text(effect: &Effect) -> String {
-    if !effect.is_testable() {
-        return "not testable: nothing of it is left in the responses".to_owned();
+    if let Some(reason) = &effect.not_testable {
+        return not_testable_text(reason);
     }
     let corrected = effect.sphericity.map_or(String::new(), |s| format!(" (HF {})", p_text(s.p_hf)));
     format!("F({}, {}) = {:.2}, {}{corrected}", effect.df, effect.error_df, effect.f, p_text(effect.p))

@@ -167,7 +167,10 @@ impl Tally {
     /// The smallest p of all comparisons of a kind: one false alarm or more.
     fn family(&mut self, name: &str, comparisons: &[PostHoc]) {
         let here = comparisons.iter().filter(|one| one.comparison.starts_with(name));
-        self.take(name, here.map(|one| one.p_holm).fold(f64::NAN, f64::min));
+        self.take(
+            name,
+            here.filter_map(|one| one.test.tested()).map(|test| test.p_holm).fold(f64::NAN, f64::min),
+        );
     }
 
     /// Each share but those of effects that are there, and the largest distance from the level allowed.
@@ -203,7 +206,7 @@ fn every_p_of_a_difference_experiment_is_one() {
     for seed in 0..studies() {
         let records = subjects(&whole, &population(1.0, 0.0), 16, 90_000 + seed);
         let analysis = analyse_jnd(&protocol, &records, &AnalysisOptions::default()).unwrap();
-        tally.take("difference", analysis.t.p);
+        tally.take("difference", analysis.t.tested().unwrap().p);
         tally.effects("thresholds", &analysis.anova);
         for (name, effect) in [("vh", &analysis.constancy.vh), ("h", &analysis.constancy.h)] {
             tally.effects(&format!("fraction over base, {name}"), effect.as_slice());
@@ -291,7 +294,8 @@ fn power_is_what_studies_find() {
         let whole = Protocol::Jnd(protocol.clone());
         let found = (0..studies()).filter(|seed| {
             let records = subjects(&whole, &observers, count, 20_000 + seed);
-            analyse_jnd(&protocol, &records, &AnalysisOptions::default()).unwrap().t.p < LEVEL
+            analyse_jnd(&protocol, &records, &AnalysisOptions::default()).unwrap().t.tested().unwrap().p
+                < LEVEL
         });
         let found = found.count() as f64 / studies() as f64;
         let error = (2.0_f64).sqrt() * (said.power * (1.0 - said.power) / studies() as f64).sqrt();

@@ -108,14 +108,12 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let subjects = &applied.kept;
     if !applied.excluded.is_empty() {
         let (kept, excluded) = (subjects.len(), applied.excluded.len());
-        note(format_args!(
-            "the exclusion rules of the study file leave {kept} sittings ({excluded} exclusions)"
-        ));
+        note(format_args!("{kept} sittings are left to analyse ({excluded} exclusions)"));
     }
     let analysis = Analysis::of(protocol, subjects, &options).map_err(|error| {
         // What the rules took may be why; whoever must not know conditions does not see it.
-        if !rules.are_none() && !arguments.blind {
-            note(format_args!("what the rules of the study file took:\n{}", applied.to_text(&rules)));
+        if !applied.excluded.is_empty() && !arguments.blind {
+            note(format_args!("what was excluded:\n{}", applied.to_text(&rules)));
         }
         CommandError::Usage(format!("{}: {error}", arguments.data.display()))
     })?;
@@ -136,7 +134,8 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let text = || {
         let title = titled(format!("{} of {}", protocol.task(), protocol.stimulus()), observer);
         let analysed = format!("{}\n{}", style::title(&title), analysis.to_text());
-        let excluded = (!rules.are_none()).then(|| applied.to_text(&rules));
+        let has_exclusions = !rules.are_none() || !applied.excluded.is_empty();
+        let excluded = has_exclusions.then(|| applied.to_text(&rules));
         let checked = (!checks.is_empty()).then(|| checks_text(&checks));
         let blocks = [Some(analysed), checked, excluded, Some(provenance.to_text())];
         blocks.into_iter().flatten().collect::<Vec<_>>().join("\n\n")

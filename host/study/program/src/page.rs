@@ -8,13 +8,14 @@ use crate::analyse::provenance::Provenance;
 use flotor_analysis::exclusion::Applied;
 use flotor_analysis::published::Beside;
 use flotor_analysis::{
-    Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PostHoc, SubjectChecks,
-    SubjectRecord, effect_text, p_text, published,
+    Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PairTest, PostHoc, SubjectChecks,
+    SubjectRecord, effect_text, p_text, published, size_interval_text, t_text,
 };
 use flotor_plot::Figure;
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
-use flotor_statistics::effect_size::{EffectSize, Reach, partial_eta_squared};
+use flotor_statistics::not_testable_text;
+use flotor_statistics::trend::LinearTrend;
 use flotor_study::exclusion::{Exclusion, ExclusionRules};
 use flotor_study::log::Begin;
 use flotor_study::protocol::{Protocol, Stimulus};
@@ -70,12 +71,13 @@ fn checks(page: &mut Page, checks: &[SubjectChecks]) {
 
 /// What the rules of the study file took, and those that could not be applied; nothing where there are no rules.
 fn exclusions(page: &mut Page, rules: &ExclusionRules, applied: &Applied) {
-    if rules.are_none() {
+    if rules.are_none() && applied.excluded.is_empty() {
         return;
     }
     page.heading("Exclusions");
     let names: Vec<String> = rules.names().iter().map(|rule| rules.text_of(rule)).collect();
-    page.paragraph(&format!("Rules of the study file: {}. They took:", names.join("; ")));
+    let names = if names.is_empty() { "none".to_owned() } else { names.join("; ") };
+    page.paragraph(&format!("Rules of the study file: {names}. Excluded:"));
     page.table(&["Subject", "What", "Rule", "Found"], |rows| {
         if applied.excluded.is_empty() {
             rows.row(&["nothing".to_owned(), String::new(), String::new(), String::new()]);
@@ -103,14 +105,12 @@ fn jnd_page(
     };
     page.paragraph(&format!(
         "{} subjects compared {:.1} pairs each. The Weber fraction was {} with vision and haptics and {} with haptics \
-         alone, t({}) = {:.2}, {}. Thresholds are {how}.",
+         alone, {}. Thresholds are {how}.",
         analysis.subjects,
         analysis.pairs_per_subject,
         percent(vh),
         percent(h),
-        analysis.t.df,
-        analysis.t.value,
-        p_text(analysis.t.p),
+        analysis.t.to_text(t_text),
     ));
     page.figure(
         figures::thresholds(analysis, stimulus),
@@ -136,12 +136,11 @@ fn jnd_page(
             ]);
         }
         let t = &analysis.t;
-        let [low, high] = t.interval.map(|end| end * 100.0);
-        let here = format!("t({}) = {:.2}, {}", t.df, t.value, p_text(t.p));
+        let interval = t.tested().map(|t| t.interval.map(|end| end * 100.0));
         rows.row(&[
             "Difference".to_owned(),
-            here,
-            format!("{low:.1} to {high:.1} %"),
+            t.to_text(t_text),
+            interval.map_or(String::new(), |[low, high]| format!("{low:.1} to {high:.1} %")),
             analysis.beside.text(published::T).to_owned(),
         ]);
     });
@@ -199,19 +198,20 @@ fn tracks(page: &mut Page, subjects: &[SubjectRecord], stimulus: &Stimulus) {
 }
 
 fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stimulus, levels: &[f64]) {
-    let trend = &analysis.trend;
+    let rise = |trend: &LinearTrend| {
+        let test = trend
+            .test
+            .to_text(|test| format!("F({}, {}) = {:.2}, {}", test.df, test.error_df, test.f, p_text(test.p)));
+        let thesis = format!(" (thesis: {})", published::LINEAR_R2);
+        format!("R² = {:.3}{}, {test}", trend.r_squared, analysis.beside.text(&thesis))
+    };
     page.paragraph(&format!(
-        "{} subjects gave {} ratings each; {} presentations were repeated because the handle left its range. The mean \
-         rating rises linearly with the stimulus: R² = {:.3}{}, F({}, {}) = {:.2}, {}.",
+        "{} subjects gave {} ratings each; {} presentations were repeated because the handle left its range. Linear trend \
+         of the mean rating over the stimulus: {}.",
         analysis.subjects,
         analysis.trials_per_subject,
         analysis.repeated,
-        analysis.linear_r2,
-        analysis.beside.text(&format!(" (thesis: {})", published::LINEAR_R2)),
-        trend.df,
-        trend.error_df,
-        trend.f,
-        p_text(trend.p),
+        analysis.trend.to_text(rise),
     ));
     page.figure(
         figures::ratings(analysis, stimulus),
@@ -353,20 +353,27 @@ impl Page {
             "Comparisons by paired t-tests, p after Holm's correction for each kind of comparison:",
         );
         self.table(&["Comparison", "t", "p (Holm)", "Cohen's d of the pairs", "95 % interval"], |rows| {
-            for PostHoc { comparison, t, p_holm, d } in comparisons {
+            for PostHoc { comparison, test } in comparisons {
+                let PairTest { t, p_holm, d } = match test.result() {
+                    Ok(test) => test,
+                    Err(reason) => {
+                        rows.row(&[comparison.clone(), not_testable_text(reason)]);
+                        continue;
+                    }
+                };
                 rows.row(&[
                     comparison.clone(),
                     format!("t({}) = {:.2}", t.df, t.value),
                     p_cell(*p_holm),
                     format!("{:.2}", d.value),
-                    interval_cell(d),
+                    size_interval_text(d),
                 ]);
             }
         });
     }
 
     fn effects(&mut self, effects: &[Effect], report: &[published::Published]) {
-        let head = ["Effect", "F", "p", "ε (HF)", "p (HF)", "η² partial", "95 % interval", "thesis"];
+        let head = ["Effect", "F", "p", "ε (HF)", "p (HF)", "ω² partial", "95 % interval", "thesis"];
         self.table(&head, |rows| {
             for effect in effects {
                 let name = effect.effect.replace(':', " × ");
@@ -378,27 +385,20 @@ impl Page {
                 let corrected = |value: fn(&flotor_statistics::anova::Sphericity) -> String| {
                     effect.sphericity.as_ref().map_or(String::new(), value)
                 };
-                let size = partial_eta_squared(effect.f, effect.df, effect.error_df);
+                let size = effect.partial_omega_squared.as_ref();
                 rows.row(&[
                     name,
                     format!("F({}, {}) = {:.2}", effect.df, effect.error_df, effect.f),
                     p_cell(effect.p),
                     corrected(|s| format!("{:.3}", s.epsilon_hf.min(1.0))),
                     corrected(|s| p_cell(s.p_hf)),
-                    format!("{:.2}", size.value),
-                    interval_cell(&size),
+                    size.map_or(String::new(), |size| format!("{:.2}", size.value)),
+                    size.map_or(String::new(), size_interval_text),
                     beside.map_or(String::new(), |(_, text)| (*text).to_owned()),
                 ]);
             }
         });
     }
-}
-
-/// Returns the interval of an effect size.
-fn interval_cell(size: &EffectSize) -> String {
-    let [low, high] = size.interval;
-    let wider = if size.reach == Reach::OrWider { ", or wider" } else { "" };
-    format!("{low:.2} to {high:.2}{wider}")
 }
 
 /// Rows of a table in the making.

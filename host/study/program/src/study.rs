@@ -34,8 +34,8 @@ use flotor_study::log::{Person, Plan};
 use flotor_study::observer::Population;
 use flotor_study::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
 use flotor_study::protocol::{
-    Checks, ComparisonSide, JndDemo, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, Stimulus,
-    SubjectNumber,
+    Checks, ComparisonSide, JndDemo, JndProtocol, MagnitudeProtocol, ObviousPairs, PresentationOrder,
+    Protocol, Stimulus, SubjectNumber,
 };
 use serde_json::json;
 use std::num::NonZeroUsize;
@@ -262,6 +262,12 @@ struct JndArguments {
     /// Pairs presented once more in each track, which do not count: how alike are the answers?
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     repeat_checks: u32,
+    /// Obvious pairs in each track, which do not count: is the larger one named?
+    #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
+    obvious_pairs: u32,
+    /// Difference of the obvious pairs, as a share of the base
+    #[arg(long, default_value_t = 0.6, value_parser = real, value_name = "SHARE")]
+    obvious_difference: f64,
     /// No practice pairs
     #[arg(long)]
     no_demo: bool,
@@ -417,7 +423,12 @@ impl JndArguments {
             order: self.order,
             at_boundary: self.common.boundary.into(),
             demo: JndDemo { shown: !self.no_demo, ..JndDemo::default() },
-            checks: Checks { catch: self.catch_trials, repeats: self.repeat_checks },
+            checks: Checks {
+                catch: self.catch_trials,
+                repeats: self.repeat_checks,
+                obvious: (self.obvious_pairs > 0)
+                    .then_some(ObviousPairs { count: self.obvious_pairs, delta: self.obvious_difference }),
+            },
         })
     }
 }

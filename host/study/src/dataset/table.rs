@@ -17,7 +17,7 @@ const COLUMNS: [(&str, &str); 30] = [
     ("trial", "Count of presentations in the sitting, from 1"),
     (
         "phase",
-        "practice, main, catch (a pair of equal stimuli) or repeat_check (presented once before): only main counts",
+        "practice, main, catch (a pair of equal stimuli), obvious (a pair with an obvious difference) or repeat_check (presented once before): only main counts",
     ),
     ("replication", "Replication, from 1; 0 for practice"),
     ("track", "Track of the adaptive procedure, from 1; 0 where there is none"),

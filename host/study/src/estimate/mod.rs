@@ -4,17 +4,20 @@
 //! their likelihood and a weak prior. [`most_likely`] finds the best pair for any trials, however they were placed;
 //! [`Posterior`] holds the probability of many pairs, from which the next trial can be chosen as well.
 
+mod goodness_of_fit;
 mod most_likely;
 mod posterior;
+mod posterior_density;
 mod psychometric;
 
 pub use most_likely::most_likely;
 pub use posterior::{Posterior, PosteriorGrid};
-pub use psychometric::{Psychometric, psychometric};
+pub use psychometric::{GoodnessOfFit, NotBounded, Psychometric, psychometric};
 
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
 use flotor_statistics::distribution::normal_below;
+use posterior_density::{LapsePrior, Nodes, PosteriorDensity};
 use serde::{Deserialize, Serialize};
 
 /// One answer: the difference it was given at, as a share of the base, and what it was worth.
@@ -101,6 +104,24 @@ pub struct Estimate {
     pub criterion: f64,
     /// The difference at which the target is reached.
     pub threshold: f64,
+}
+
+/// Estimates the observer by the means of the posterior, sigma and threshold by geometric ones, and says which ends of the threshold
+/// the answers do not bound.
+pub(crate) fn posterior_mean(
+    observations: &[Observation],
+    prior: &Prior,
+    target: f64,
+) -> (Estimate, Option<NotBounded>) {
+    const NODES: Nodes = Nodes { thresholds: 24, criteria: 16, lapses: 1 };
+    let lapse = LapsePrior::Known(prior.lapse);
+    let posterior = PosteriorDensity::new(observations, prior, target, lapse, NODES);
+    let estimate = Estimate {
+        sigma: libm::exp(posterior.mean_log_sigma),
+        criterion: posterior.mean_criterion,
+        threshold: libm::exp(posterior.mean_log_threshold),
+    };
+    (estimate, NotBounded::of(posterior.is_bounded))
 }
 
 /// Probability that an observer answers so.

@@ -4,7 +4,7 @@
 //! information of its answer and the observer: the entropy of the answer as one now expects it, less the entropy it
 //! would have if one knew the observer.
 
-use super::{Estimate, Observation, Prior, probability};
+use super::{Observation, Prior, probability};
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
 
@@ -28,7 +28,6 @@ pub struct PosteriorGrid {
 #[derive(Clone, Debug)]
 struct Member {
     observer: TernaryObserver,
-    threshold: f64,
     prior: f64,
     /// Probability of each answer, and the entropy of the answer, at each difference.
     answers: Vec<([f64; 3], f64)>,
@@ -52,7 +51,7 @@ impl PosteriorGrid {
                 let observer = prior.observer(threshold, criterion, target);
                 let answers = deltas.iter().map(|delta| answers(&observer, *delta)).collect();
                 let weight = libm::exp(prior.log_density(libm::log(threshold), criterion));
-                observers.push(Member { observer, threshold, prior: weight, answers });
+                observers.push(Member { observer, prior: weight, answers });
             }
         }
         Self { observers, deltas }
@@ -116,25 +115,6 @@ impl Posterior {
         }
         best.1
     }
-
-    /// The middle of what is held probable: the mean criterion, geometric means of sigma and threshold.
-    #[must_use]
-    pub fn estimate(&self, grid: &PosteriorGrid) -> Estimate {
-        let mean = |value: fn(&Member) -> f64| {
-            let weighted = self.weights.iter().zip(&grid.observers);
-            libm::exp(weighted.map(|(weight, member)| weight * libm::log(value(member))).sum::<f64>())
-        };
-        Estimate {
-            sigma: mean(|member| member.observer.sigma),
-            criterion: self
-                .weights
-                .iter()
-                .zip(&grid.observers)
-                .map(|(w, member)| w * member.observer.criterion)
-                .sum(),
-            threshold: mean(|member| member.threshold),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -152,12 +132,11 @@ mod tests {
                 let delta = posterior.best_delta(&grid);
                 posterior.answer(&grid, &Observation { delta, judgement });
             }
-            (posterior.estimate(&grid).threshold, posterior.best_delta(&grid))
+            posterior.best_delta(&grid)
         };
-        let middle = (start.estimate(&grid).threshold, start.best_delta(&grid));
+        let middle = start.best_delta(&grid);
         let (keen, dull) = (after(Judgement::Correct), after(Judgement::Wrong));
-        assert!(keen.0 < middle.0 && middle.0 < dull.0, "{keen:?} {middle:?} {dull:?}");
-        assert!(keen.1 < middle.1 && middle.1 < dull.1, "{keen:?} {middle:?} {dull:?}");
+        assert!(keen < middle && middle < dull, "{keen:?} {middle:?} {dull:?}");
         assert!((start.weights.iter().sum::<f64>() - 1.0).abs() < 1.0e-12);
     }
 }

@@ -1,130 +1,124 @@
-//! The psychometric function of one subject in one condition: threshold and lapse, each with an interval.
+//! The psychometric function of one subject in one condition: threshold and lapse with intervals, and whether the answers are those
+//! of somebody whom such a function describes.
 //!
-//! The posterior over threshold, criterion and lapse on a grid, from the [`Prior`] of the other estimators and, for the lapse,
-//! an exponential prior with a mean of 2 % (Kuss, Jäkel and Wichmann 2005 use one of that size). The interval holds 95 % of it.
+//! The posterior is that of the [`Prior`] of the other estimators and, for the lapse, of an exponential prior with a mean of 2 %
+//! (Kuss, Jäkel and Wichmann 2005 use one of that size). An interval holds 95 % of it.
 
-use super::{Observation, Prior, probability};
+use super::posterior_density::{LapsePrior, Nodes, PosteriorDensity};
+use super::{Observation, Prior, goodness_of_fit};
+use crate::trial::Judgement;
+use flotor_statistics::distribution::binomial_at_least;
 use serde::Serialize;
 
-const THRESHOLDS: u32 = 61;
-const CRITERIA: u32 = 11;
-const LAPSES: [f64; 7] = [0.0, 0.01, 0.02, 0.04, 0.07, 0.11, 0.16];
-/// The grid reaches so many deviations of the prior to both sides.
-const REACH: f64 = 3.0;
 const MEAN_LAPSE: f64 = 0.02;
+/// Nodes that give quantiles to six digits.
+const NODES: Nodes = Nodes { thresholds: 96, criteria: 40, lapses: 48 };
 
-/// What a subject's answers in one condition say.
+/// The psychometric function of a subject's answers in one condition.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Psychometric {
     /// Answers it is made from.
     pub answers: usize,
+    /// Answers that name one of the pair.
+    pub named: usize,
+    /// Those of them that are wrong.
+    pub wrong: usize,
+    /// Probability of so many wrong answers or more by chance.
+    pub p_chance: f64,
     /// Median of the threshold, as a share of the base.
     pub threshold: f64,
-    /// 95 % of it.
-    pub threshold_interval: [f64; 2],
+    /// 95 % of it; none where the answers bound no end, and only the prior would.
+    pub threshold_interval: [Option<f64>; 2],
+    /// The ends that the answers do not bound.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_bounded: Option<NotBounded>,
+    /// Mean of the criterion.
+    pub criterion: f64,
     /// Mean share of trials without attention.
     pub lapse: f64,
     /// The smallest lapse that 97.5 % lie below.
     pub lapse_most: f64,
+    /// How well the function describes the answers.
+    pub fit: GoodnessOfFit,
 }
 
-/// The psychometric function that these answers are most likely to come from; `target` is the share of correct answers at the
-/// threshold. None without answers.
+/// Ends of an interval that the answers do not bound: without the prior, a threshold without end there would be inside the 95 %
+/// interval of the likelihood ratio.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NotBounded {
+    /// Any smaller threshold explains the answers as well.
+    Below,
+    /// Any larger one does.
+    Above,
+    /// Both.
+    Both,
+}
+
+impl NotBounded {
+    /// The open ends, from whether the lower and the upper are bounded.
+    pub(super) fn of(is_bounded: [bool; 2]) -> Option<Self> {
+        match is_bounded {
+            [true, true] => None,
+            [false, true] => Some(Self::Below),
+            [true, false] => Some(Self::Above),
+            [false, false] => Some(Self::Both),
+        }
+    }
+
+    /// Describes the open end.
+    #[must_use]
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Below => "not bounded below by these answers",
+            Self::Above => "not bounded above by these answers",
+            Self::Both => "not bounded by these answers",
+        }
+    }
+}
+
+/// Pearson's chi-square of the three kinds of answers in classes of the difference, against the fitted function.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GoodnessOfFit {
+    /// Sum over classes and kinds of the squared distance over the number expected.
+    pub chi_square: f64,
+    /// Classes of the difference.
+    pub classes: usize,
+    /// Probability of a larger sum: the share among simulated sets of answers of the fitted observer at the same differences.
+    pub p: f64,
+}
+
+/// Estimates the psychometric function of answers; `target` is the share of correct answers at the threshold. None without answers.
 #[must_use]
 pub fn psychometric(observations: &[Observation], prior: &Prior, target: f64) -> Option<Psychometric> {
     if observations.is_empty() {
         return None;
     }
-    let mut cells: Vec<(f64, f64, f64)> = Vec::new(); // threshold, lapse, logarithm of the density
-    for threshold in 0..THRESHOLDS {
-        let z = REACH * (2.0 * f64::from(threshold) / f64::from(THRESHOLDS - 1) - 1.0);
-        let log_threshold = libm::log(prior.threshold_median) + prior.threshold_spread * z;
-        let threshold = libm::exp(log_threshold);
-        for criterion in 0..CRITERIA {
-            let most = prior.criterion_mode + REACH * prior.criterion_spread;
-            let criterion = most * f64::from(criterion) / f64::from(CRITERIA - 1);
-            let before = prior.log_density(log_threshold, criterion);
-            for (index, lapse) in LAPSES.into_iter().enumerate() {
-                let with = Prior { lapse: lapse.max(0.001), ..*prior };
-                let observer = with.observer(threshold, criterion, target);
-                let likely: f64 = observations.iter().map(|one| libm::log(probability(&observer, one))).sum();
-                // The cells of the lapse are of unequal width.
-                let width = LAPSES.get(index + 1).map_or(0.06, |next| next - lapse);
-                cells.push((threshold, lapse, before + likely - lapse / MEAN_LAPSE + libm::log(width)));
-            }
-        }
-    }
-    let most = cells.iter().map(|(.., log)| *log).fold(f64::NEG_INFINITY, f64::max);
-    let weigh = |value: fn(&(f64, f64, f64)) -> f64| {
-        let mut list: Vec<(f64, f64)> =
-            cells.iter().map(|cell| (value(cell), libm::exp(cell.2 - most))).collect();
-        list.sort_by(|a, b| a.0.total_cmp(&b.0));
-        list
-    };
-    let (thresholds, lapses) = (weigh(|cell| cell.0), weigh(|cell| cell.1));
-    let total: f64 = lapses.iter().map(|(_, weight)| weight).sum();
+    let posterior =
+        PosteriorDensity::new(observations, prior, target, LapsePrior::Exponential(MEAN_LAPSE), NODES);
+    let quantile = |share| libm::exp(posterior.log_threshold.quantile(share));
+    let ends = [0.025, 0.975].map(quantile);
+    let [is_below, is_above] = posterior.is_bounded;
+    let (threshold, lapse) = (quantile(0.5), posterior.mean_lapse);
+    let root = posterior.root_lapse.as_ref().map_or(f64::NAN, |density| density.quantile(0.975));
+    let fitted = Prior { lapse, ..*prior }.observer(threshold, posterior.mean_criterion, target);
+    let count = |judgement| observations.iter().filter(|one| one.judgement == judgement).count();
+    let wrong = count(Judgement::Wrong);
+    let named = wrong + count(Judgement::Correct);
     Some(Psychometric {
         answers: observations.len(),
-        threshold: quantile(&thresholds, 0.5),
-        threshold_interval: [0.025, 0.975].map(|share| quantile(&thresholds, share)),
-        lapse: lapses.iter().map(|(lapse, weight)| lapse * weight).sum::<f64>() / total,
-        lapse_most: quantile(&lapses, 0.975),
+        named,
+        wrong,
+        p_chance: binomial_at_least(wrong, named, 0.5),
+        threshold,
+        threshold_interval: [is_below.then_some(ends[0]), is_above.then_some(ends[1])],
+        not_bounded: NotBounded::of(posterior.is_bounded),
+        criterion: posterior.mean_criterion,
+        lapse,
+        lapse_most: root * root,
+        fit: goodness_of_fit::of(observations, &fitted),
     })
 }
 
-/// The value below which a share of the weights lies.
-fn quantile(sorted: &[(f64, f64)], share: f64) -> f64 {
-    let total: f64 = sorted.iter().map(|(_, weight)| weight).sum();
-    let mut below = 0.0;
-    for (value, weight) in sorted {
-        below += weight;
-        if below >= share * total {
-            return *value;
-        }
-    }
-    sorted.last().map_or(f64::NAN, |(value, _)| *value)
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::observer::TernaryObserver;
-    use crate::trial::Judgement;
-
-    /// Answers in the shares that an observer is expected to give, at differences about the threshold.
-    fn answers(observer: &TernaryObserver, each: u32) -> Vec<Observation> {
-        let threshold = observer.threshold(0.75);
-        let mut list = Vec::new();
-        for factor in [0.3, 0.6, 1.0, 1.5, 2.5, 4.0] {
-            let delta = factor * threshold;
-            let [correct, wrong] = observer.correct_and_wrong(delta);
-            for index in 0..each {
-                let share = (f64::from(index) + 0.5) / f64::from(each);
-                let judgement = match share {
-                    share if share < correct => Judgement::Correct,
-                    share if share < correct + wrong => Judgement::Wrong,
-                    _ => Judgement::Unsure,
-                };
-                list.push(Observation { delta, judgement });
-            }
-        }
-        list
-    }
-
-    #[test]
-    fn threshold_and_lapse_of_a_known_observer_are_found_and_more_answers_say_more() {
-        let attentive = TernaryObserver { sigma: 0.12, criterion: 0.8, bias: 0.0, lapse: 0.0 };
-        let known = attentive.threshold(0.75);
-        let of = |observer, each| psychometric(&answers(observer, each), &Prior::default(), 0.75).unwrap();
-        let (few, many) = (of(&attentive, 8), of(&attentive, 60));
-        let width = |found: Psychometric| found.threshold_interval[1] - found.threshold_interval[0];
-        assert!(width(many) < 0.6 * width(few), "{few:?} {many:?}");
-        // The grid has steps of 7 %.
-        assert!((many.threshold / known - 1.0).abs() < 0.1, "{many:?} for {known}");
-        assert!(many.lapse < 0.02, "{many:?}");
-        let absent = TernaryObserver { lapse: 0.12, ..attentive };
-        let found = of(&absent, 60);
-        assert!(found.lapse > 0.05 && found.lapse_most >= 0.11, "{found:?}");
-        assert_eq!(psychometric(&[], &Prior::default(), 0.75), None);
-    }
-}
+mod tests;

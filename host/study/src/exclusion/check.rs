@@ -11,6 +11,8 @@ impl ExclusionRules {
     pub fn check(&self, protocol: &Protocol) -> Result<(), String> {
         let shares = [
             ("most_false_alarms", self.most_false_alarms),
+            ("most_missed_obvious", self.most_missed_obvious),
+            ("most_wrong_at_large", self.most_wrong_at_large),
             ("least_agreement", self.least_agreement),
             ("most_dont_know", self.most_dont_know),
             ("most_missed_ticks", self.most_missed_ticks),
@@ -43,9 +45,9 @@ impl ExclusionRules {
                 "exclusion.most_excluded_trials needs response_time_s or least_movement_mm".to_owned()
             );
         }
-        let (catch, repeats, is_jnd) = match protocol {
-            Protocol::Jnd(jnd) => (jnd.checks.catch, jnd.checks.repeats, true),
-            Protocol::Magnitude(magnitude) => (0, magnitude.repeat_checks, false),
+        let (catch, has_obvious, repeats, is_jnd) = match protocol {
+            Protocol::Jnd(jnd) => (jnd.checks.catch, jnd.checks.obvious.is_some(), jnd.checks.repeats, true),
+            Protocol::Magnitude(magnitude) => (0, false, magnitude.repeat_checks, false),
         };
         for (rule, is_said, is_had, needs) in [
             (
@@ -54,6 +56,13 @@ impl ExclusionRules {
                 catch > 0,
                 "catch_trials of a difference experiment",
             ),
+            (
+                "most_missed_obvious",
+                self.most_missed_obvious,
+                has_obvious,
+                "obvious_pairs of a difference experiment",
+            ),
+            ("most_wrong_at_large", self.most_wrong_at_large, is_jnd, "a difference experiment"),
             (
                 "least_agreement",
                 self.least_agreement,

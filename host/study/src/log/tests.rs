@@ -152,6 +152,8 @@ fn every_rule_of_a_study_file_is_read_again() {
         least_movement_mm: Some(f64::MAX),
         response_time_s: Some([0.0, f64::MAX]),
         most_excluded_trials: Some(0.1),
+        most_missed_obvious: Some(0.5),
+        most_wrong_at_large: Some(0.2),
     };
     let plan = Plan { file: "a.study.toml".to_owned(), sha256: digest("a"), text: "a".to_owned(), exclusion };
     let begin = Begin { plan: Some(plan), ..begin() };

@@ -8,6 +8,7 @@ mod weighted_up_down;
 pub use quest_plus::{QuestPlus, QuestPlusRule};
 pub use weighted_up_down::{Averaging, InvalidRule, StepAtReversal, WeightedUpDown, WeightedUpDownRule};
 
+use crate::estimate::NotBounded;
 use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
 
@@ -125,12 +126,21 @@ impl Track {
         }
     }
 
+    /// The ends of the threshold that the answers do not bound, once the track is over.
+    #[must_use]
+    pub fn not_bounded(&self) -> Option<NotBounded> {
+        match self {
+            Self::WeightedUpDown(_) => None,
+            Self::QuestPlus(track) => track.is_done().then(|| track.estimate().1).flatten(),
+        }
+    }
+
     /// The threshold, once it is over.
     #[must_use]
     pub fn threshold(&self) -> Option<f64> {
         match self {
             Self::WeightedUpDown(track) => track.threshold(),
-            Self::QuestPlus(track) => track.is_done().then(|| track.estimate().threshold),
+            Self::QuestPlus(track) => track.is_done().then(|| track.estimate().0.threshold),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Trials placed where their answer tells most, in the manner of QUEST+ (Watson 2017), with three answers.
 
 use super::InvalidRule;
-use crate::estimate::{Estimate, Observation, Posterior, PosteriorGrid, Prior};
+use crate::estimate::{Estimate, NotBounded, Observation, Posterior, PosteriorGrid, Prior, posterior_mean};
 use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -60,7 +60,7 @@ pub struct QuestPlus {
     grid: Arc<PosteriorGrid>,
     posterior: Posterior,
     delta: f64,
-    trials: u32,
+    answers: Vec<Observation>,
 }
 
 impl QuestPlus {
@@ -71,7 +71,7 @@ impl QuestPlus {
         let grid = Arc::new(PosteriorGrid::new(&rule.prior, rule.target, least, most));
         let posterior = Posterior::new(&grid);
         let delta = posterior.best_delta(&grid);
-        Self { rule: rule.clone(), grid, posterior, delta, trials: 0 }
+        Self { rule: rule.clone(), grid, posterior, delta, answers: Vec::new() }
     }
 
     /// The difference to present next.
@@ -85,20 +85,21 @@ impl QuestPlus {
         if self.is_done() {
             return;
         }
-        self.trials += 1;
-        self.posterior.answer(&self.grid, &Observation { delta: self.delta, judgement });
+        let observation = Observation { delta: self.delta, judgement };
+        self.answers.push(observation);
+        self.posterior.answer(&self.grid, &observation);
         self.delta = self.posterior.best_delta(&self.grid);
     }
 
     /// Whether it is over.
     #[must_use]
     pub fn is_done(&self) -> bool {
-        self.trials >= self.rule.trials
+        self.answers.len() >= self.rule.trials as usize
     }
 
-    /// What the answers say so far.
+    /// Estimates the observer from the answers so far, with the ends of the threshold that they do not bound.
     #[must_use]
-    pub fn estimate(&self) -> Estimate {
-        self.posterior.estimate(&self.grid)
+    pub fn estimate(&self) -> (Estimate, Option<NotBounded>) {
+        posterior_mean(&self.answers, &self.rule.prior, self.rule.target)
     }
 }

@@ -97,6 +97,10 @@ impl Default for JndProtocol {
 }
 
 impl JndProtocol {
+    /// A difference that nobody misses, as a share of the base: the first of a track of the thesis, more than twice the mean threshold
+    /// of its subjects.
+    pub const LARGE_DELTA: f64 = 0.4;
+
     pub(super) fn check(&self) -> Result<(), ProtocolError> {
         positive_and_different("--bases", &self.bases)?;
         at_least_one("--replications", self.replications)?;
@@ -105,6 +109,15 @@ impl JndProtocol {
             let value = f64::from(self.procedure.trials_least());
             let what = "trials of a track with checks";
             return Err(ProtocolError::Value { what, value, legal: "must be 2 or more" });
+        }
+        if let Some(pairs) = self.checks.obvious {
+            at_least_one("--obvious-pairs", pairs.count)?;
+            let (least, most) = (Self::LARGE_DELTA, self.procedure.largest_delta());
+            if !(least..=most).contains(&pairs.delta) {
+                let what = "--obvious-difference";
+                let legal = "must be 0.4 to the largest difference of a track";
+                return Err(ProtocolError::Value { what, value: pairs.delta, legal });
+            }
         }
         for (what, value) in [("close", self.demo.close), ("nearly equal", self.demo.nearly_equal)] {
             if !(0.0..1.0).contains(&value) {

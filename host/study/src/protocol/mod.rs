@@ -115,12 +115,24 @@ impl Default for AtBoundary {
 }
 
 /// Trials that check whether a subject does what they are asked; none of them counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Checks {
     /// Pairs without any difference, in each track.
     pub catch: u32,
     /// Pairs of the track presented once more in the same order, in each track.
     pub repeats: u32,
+    /// Pairs with a difference that everybody feels, in each track.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obvious: Option<ObviousPairs>,
+}
+
+/// Pairs with a difference that everybody feels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObviousPairs {
+    /// Pairs in each track.
+    pub count: u32,
+    /// Their difference, as a share of the base.
+    pub delta: f64,
 }
 
 impl Checks {
@@ -133,7 +145,7 @@ impl Checks {
     /// Checks in a track.
     #[must_use]
     pub fn in_a_track(self) -> u32 {
-        self.catch + self.repeats
+        self.catch + self.repeats + self.obvious.map_or(0, |pairs| pairs.count)
     }
 }
 

@@ -125,7 +125,7 @@ fn checks_are_placed_by_the_seed_and_do_not_count() {
         }
         (trials, sitting.results().to_vec())
     };
-    let protocol = with(Checks { catch: 1, repeats: 2 });
+    let protocol = with(Checks { catch: 1, repeats: 2, obvious: None });
     let (trials, results) = sit(&protocol, 5);
     assert_eq!(sit(&protocol, 5).0, trials, "the same seed, the same places");
     assert_eq!(sit(&with(Checks::default()), 5).1.len(), results.len());
@@ -165,7 +165,7 @@ fn checks_are_placed_by_the_seed_and_do_not_count() {
 /// A repeat check whose handle left its range comes again with the pair that it was to repeat.
 #[test]
 fn a_repeat_check_comes_again_with_its_pair() {
-    let checks = crate::protocol::Checks { catch: 0, repeats: 3 };
+    let checks = crate::protocol::Checks { catch: 0, repeats: 3, obvious: None };
     let mut jnd = JndProtocol { checks, ..JndProtocol::default() };
     jnd.demo.shown = false;
     let mut sitting = Sitting::new(&Protocol::Jnd(jnd), 3, subject(5));

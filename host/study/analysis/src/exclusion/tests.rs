@@ -1,6 +1,7 @@
 use super::*;
 use flotor_study::kinematics::StimulusKinematics;
-use flotor_study::protocol::{Checks, JndProtocol, MagnitudeProtocol};
+use flotor_study::procedure::{Procedure, QuestPlusRule};
+use flotor_study::protocol::{Checks, JndProtocol, MagnitudeProtocol, ObviousPairs};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::{Exploration, Phase, Position};
 
@@ -9,7 +10,7 @@ fn number(number: u16) -> SubjectNumber {
 }
 
 fn jnd() -> Protocol {
-    let checks = Checks { catch: 1, repeats: 1 };
+    let checks = Checks { catch: 1, repeats: 1, obvious: None };
     let mut jnd = JndProtocol { bases: vec![26.0], replications: 4, checks, ..JndProtocol::default() };
     jnd.demo.shown = false;
     Protocol::Jnd(jnd)
@@ -75,6 +76,45 @@ fn all(protocol: &Protocol) -> Vec<SubjectRecord> {
             },
         ),
     ]
+}
+
+/// Somebody with the keys the wrong way round has a threshold in every condition; what they are is said and can be excluded.
+#[test]
+fn who_answers_the_wrong_way_round_is_flagged_and_excluded() {
+    let Protocol::Jnd(mut jnd) = jnd() else { unreachable!("a difference experiment") };
+    jnd.procedure = Procedure::QuestPlus(QuestPlusRule { trials: 12, ..QuestPlusRule::default() });
+    jnd.checks.obvious = Some(ObviousPairs { count: 1, delta: 0.6 });
+    let protocol = Protocol::Jnd(jnd);
+    let reversed = |trial: &Trial| match honest(trial, Response::First) {
+        Response::First => Response::Second,
+        Response::Second => Response::First,
+        other => other,
+    };
+    let (usual, honest) = (|_: &Trial| 1.0, |trial: &Trial| honest(trial, Response::DontKnow));
+    let records = vec![sit(&protocol, 1, honest, usual), sit(&protocol, 2, reversed, usual)];
+    let flags = |record| crate::SubjectQuality::of(&protocol, record, &[]).flags.join("\n");
+    let said = flags(&records[1]);
+    for flag in [
+        "wrong answers to differences of 40 % and more",
+        "vh base 26: worse than chance: 24 of 24 wrong, binomial p < 0.001",
+        "h base 26: no psychometric function fits",
+        "tracks whose answers do not bound the threshold",
+        "more than half of the obvious pairs were missed",
+    ] {
+        assert!(said.contains(flag), "{flag}: {said}");
+    }
+    let of_the_other = flags(&records[0]);
+    assert!(!of_the_other.contains("wrong") && !of_the_other.contains("obvious"), "{of_the_other}");
+    for rules in [
+        ExclusionRules { most_wrong_at_large: Some(0.2), ..ExclusionRules::default() },
+        ExclusionRules { most_missed_obvious: Some(0.5), ..ExclusionRules::default() },
+    ] {
+        rules.check(&protocol).unwrap();
+        let applied = apply(&rules, &protocol, records.clone(), Estimator::Procedure, None);
+        assert_eq!(applied.kept.len(), 1, "{rules:?}");
+        let [exclusion] = applied.excluded.as_slice() else { panic!("{:?}", applied.excluded) };
+        assert_eq!((exclusion.subject, exclusion.scope), (number(2), Scope::Sitting));
+    }
 }
 
 #[test]
@@ -162,8 +202,8 @@ fn feeling_again_adds_to_the_way() {
     }
 }
 
-/// A sitting is compared by its thresholds: tracks without one do not make up for the track that a rule takes. What never had a
-/// threshold is not the rules' doing.
+/// A sitting is compared by its thresholds: tracks without one do not make up for the track that a rule takes, and a sitting that never
+/// had one in a condition takes no other away.
 #[test]
 fn a_condition_without_a_threshold_left_takes_the_sitting() {
     let protocol = jnd();
@@ -177,11 +217,13 @@ fn a_condition_without_a_threshold_left_takes_the_sitting() {
     records[0].tracks.iter_mut().for_each(|track| track.threshold = None);
     let times = ExclusionRules { response_time_s: Some([0.2, 20.0]), ..ExclusionRules::default() };
     let applied = apply(&times, &protocol, records.clone(), Estimator::Procedure, None);
-    let [_, Exclusion { subject, scope: Scope::Sitting, rule, found }] = applied.excluded.as_slice() else {
+    let [never, _, Exclusion { subject, scope: Scope::Sitting, rule, found }] = applied.excluded.as_slice()
+    else {
         panic!("{:?}", applied.excluded)
     };
-    assert_eq!((subject.get(), *rule, applied.kept.len()), (4, EMPTY_CONDITION, 3));
-    assert_eq!(*found, format!("{} at 26: no track with a threshold is left", modality.word()));
+    assert_eq!((never.subject.get(), never.scope, never.rule), (1, Scope::Sitting, EMPTY_CONDITION));
+    assert_eq!((subject.get(), *rule, applied.kept.len()), (4, EMPTY_CONDITION, 2));
+    assert_eq!(*found, format!("{} at 26: no track with a threshold", modality.word()));
     let applied = apply(&times, &protocol, records, Estimator::Map, None);
     assert_eq!(applied.kept.len(), 4, "all answers of the other track: {:?}", applied.excluded);
 }

@@ -81,7 +81,15 @@ first <- sapply(subjects, function(subject) trials$first_modality[trials$subject
 number <- function(value) format(value, digits = 15, trim = TRUE)
 say <- function(...) cat(paste(...), "\n", sep = "")
 p_text <- function(p) if (p < 0.001) "p < 0.001" else sprintf("p = %.3f", p)
-size_text <- function(size) sprintf("%.2f (%.2f to %.2f%s)", size[1], size[2], size[3], if (size[4]) ", or wider" else "")
+size_text <- function(size) {
+  if (size[3] == Inf) return(sprintf("%.2f (%.2f or more)", size[1], size[2]))
+  if (size[2] == -Inf) return(sprintf("%.2f (%.2f or less)", size[1], size[3]))
+  sprintf("%.2f (%.2f to %.2f)", size[1], size[2], size[3])
+}
+# Squares below this share of those of the responses are rounding errors, and what is nothing else is not testable.
+rounding <- 1e-20
+untestable <- function(reason) list(not_testable = reason)
+untestable_text <- function(test) paste("not testable:", test$not_testable)
 se <- function(x) sd(x) / sqrt(length(x))
 
 contrasts_of <- function(count) qr.Q(qr(cbind(1, diag(count)[, -1, drop = FALSE])))[, -1, drop = FALSE]
@@ -112,8 +120,11 @@ anova_of <- function(values, factors, counts, groups) {
       rest <- do.call(cbind, between[names(between) != name])
       squares <- sum(left_by(rest, seen)^2) - error
       df <- ncol(within)
-      effect <- list(f = NA)
-      if (max(squares, error) > 1e-20 * sum(values^2)) {
+      limit <- rounding * sum(values^2)
+      if (error <= limit) {
+        is_gone <- squares <= limit
+        effect <- untestable(if (is_gone) "nothing of it is left in the responses" else "no variation between subjects to test it against")
+      } else {
         products <- t(left) %*% left
         gg <- sum(diag(products))^2 / (df * sum(products^2))
         # Huynh and Feldt's correction, with Lecoutre's of it.
@@ -130,56 +141,98 @@ anova_of <- function(values, factors, counts, groups) {
 }
 
 effect_text <- function(effect) {
-  if (is.na(effect$f)) return("not testable: nothing of it is left in the responses")
+  if (!is.null(effect$not_testable)) return(untestable_text(effect))
   upper <- function(scale) pf(effect$f, scale * effect$df, scale * effect$error_df, lower.tail = FALSE)
   text <- sprintf("F(%d, %d) = %.2f, %s", effect$df, effect$error_df, effect$f, p_text(upper(1)))
   epsilon <- min(max(effect$epsilon, 1 / effect$df), 1)
   if (effect$df > 1) sprintf("%s (HF %s)", text, p_text(upper(epsilon))) else text
 }
 
-# Where a falling function is 0; an end, where it is there not yet or no more.
-solve_for <- function(of, low, high) {
-  if (of(low) <= 0) return(low)
-  if (of(high) >= 0) return(high)
+# Where a falling function is 0: first between two ends, then farther out; infinite beyond `least` and `most`.
+falling_root <- function(of, low, high, least, most) {
+  width <- high - low
+  while (of(low) < 0) {
+    if (low <= least) return(-Inf)
+    width <- 2 * width
+    high <- low
+    low <- max(low - width, least)
+  }
+  while (of(high) > 0) {
+    if (high >= most) return(Inf)
+    width <- 2 * width
+    low <- high
+    high <- min(high + width, most)
+  }
   uniroot(of, c(low, high), tol = 1e-12)$root
 }
 
-partial_eta_squared <- function(effect) {
+partial_omega_squared <- function(effect) {
   end <- function(below) {
     at <- function(shift) suppressWarnings(pf(effect$f, effect$df, effect$error_df, ncp = shift)) - below
     if (pf(effect$f, effect$df, effect$error_df) <= below) return(0)
-    # 1400 is as far as `flotor analyse` looks; mostly the end is much nearer.
-    near <- min(10 + 4 * effect$f * effect$df, 1400)
-    solve_for(at, 0, if (at(near) < 0) near else 1400)
+    # As far as `flotor analyse` looks; mostly the end is much nearer.
+    falling_root(at, 0, max(1, effect$f * effect$df), 0, 1e6)
   }
-  share <- function(shift) shift / (shift + effect$df + effect$error_df + 1)
-  explained <- effect$f * effect$df
-  ends <- c(end(0.975), end(0.025))
-  c(explained / (explained + effect$error_df), share(ends), any(ends >= 1400))
+  share <- function(shift) ifelse(is.finite(shift), shift / (shift + effect$df + effect$error_df + 1), 1)
+  c(share(max(effect$df * (effect$f - 1), 0)), share(min(end(0.975), 1e6)), share(end(0.025)))
+}
+
+noncentral_t_below <- function(t, df, shift) {
+  if (t < 0) return(1 - noncentral_t_below(-t, df, -shift))
+  if (abs(shift) < 37) return(suppressWarnings(pt(t, df, ncp = shift)))
+  # R has no value far from the middle: the tail of a chi-square, averaged over a normal number.
+  normal <- seq(-10, 10, length.out = 4001)
+  tail <- pchisq(pmax(normal + shift, 0)^2 * df / max(t, 1e-300)^2, df, lower.tail = FALSE)
+  sum(dnorm(normal) * tail) * (normal[2] - normal[1])
 }
 
 cohen_d <- function(t, df) {
-  end <- function(below) solve_for(function(shift) suppressWarnings(pt(t, df, ncp = shift)) - below, -37, 37)
-  ends <- c(end(0.975), end(0.025))
-  c(c(t, ends) / sqrt(df + 1), any(abs(ends) >= 37))
+  end <- function(below) falling_root(function(shift) noncentral_t_below(t, df, shift) - below, t - 1, t + 1, -1e3, 1e3)
+  c(t, min(end(0.975), 1e3), max(end(0.025), -1e3)) / sqrt(df + 1)
 }
 
 effects <- function(values, factors, counts, groups, sizes) {
   found <- anova_of(values, factors, counts, groups)
   for (name in names(found)) say(name, effect_text(found[[name]]))
   for (name in names(found)) {
-    if (sizes && !is.na(found[[name]]$f)) say(name, size_text(partial_eta_squared(found[[name]])))
+    if (sizes && is.null(found[[name]]$not_testable)) say(name, size_text(partial_omega_squared(found[[name]])))
   }
 }
 
+# t and p of pairs, or the reason why there are none.
+paired <- function(first, second) {
+  differences <- first - second
+  limit <- rounding * sum(first^2 + second^2)
+  if (sum((differences - mean(differences))^2) <= limit) {
+    is_none <- sum(differences^2) <= limit
+    return(untestable(if (is_none) "no difference in any subject" else "the same difference in every subject"))
+  }
+  test <- t.test(differences)
+  list(t = unname(test$statistic), p = test$p.value)
+}
+
+paired_text <- function(test, p = test$p) {
+  if (!is.null(test$not_testable)) return(untestable_text(test))
+  sprintf("t(%d) = %.2f, %s", n - 1, test$t, p_text(p))
+}
+
 comparisons <- function(names, first, second) {
-  tests <- lapply(seq_along(names), function(k) t.test(first[[k]], second[[k]], paired = TRUE))
-  p <- p.adjust(sapply(tests, function(test) test$p.value), "holm")
+  tests <- lapply(seq_along(names), function(k) paired(first[[k]], second[[k]]))
+  # What cannot be tested counts in the family all the same.
+  p <- p.adjust(sapply(tests, function(test) if (is.null(test$p)) 1 else test$p), "holm")
   for (k in seq_along(names)) {
-    t <- tests[[k]]$statistic
-    say(names[k], sprintf("t(%d) = %.2f, %s", n - 1, t, p_text(p[k])), size_text(cohen_d(t, n - 1)))
+    size <- if (is.null(tests[[k]]$t)) NULL else size_text(cohen_d(tests[[k]]$t, n - 1))
+    do.call(say, as.list(c(names[k], paired_text(tests[[k]], p[k]), size)))
   }
 }
+
+trend_text <- function(means) {
+  if (sum((means - mean(means))^2) <= rounding * sum(means^2)) return("not testable: equal means at all levels")
+  sprintf("R\u00b2 = %.3f", cor(levels, means)^2)
+}
+
+# Mean and interval of one number for each subject.
+interval <- function(values) mean(values) + c(0, -1, 1) * se(values) * qt(0.975, length(values) - 1)
 
 columns_of <- function(values) lapply(seq_len(ncol(values)), function(k) values[, k])
 
@@ -188,16 +241,14 @@ if (is_jnd) {
   fractions <- list(vh = sweep(vh, 2, levels, "/"), h = sweep(h, 2, levels, "/"))
   weber <- lapply(fractions, rowMeans)
   for (modality in modalities) {
-    test <- t.test(weber[[modality]])
-    say(sprintf("%s %.1f %% (95 %%: %.1f to %.1f)", names_of[modality], 100 * test$estimate, 100 * test$conf.int[1],
-                100 * test$conf.int[2]))
+    ends <- 100 * interval(weber[[modality]])
+    say(sprintf("%s %.1f %% (95 %%: %.1f to %.1f)", names_of[modality], ends[1], ends[2], ends[3]))
   }
-  test <- t.test(weber$h, weber$vh, paired = TRUE)
-  say(sprintf("difference t(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
+  say("difference", paired_text(paired(weber$h, weber$vh)))
 } else {
   say(sprintf("%d subjects, %s ratings each", n, number(nrow(counted) / n)))
   say(sum(main$repeat. > 0), "presentations repeated because the handle left its range")
-  say(sprintf("Linear trend R\u00b2 = %.3f", cor(levels, colMeans(vh + h))^2))
+  say("Linear trend", trend_text(colMeans(vh + h)))
 }
 for (k in seq_along(levels)) {
   name <- if (is_jnd) paste("base", number(levels[k])) else sprintf("stimulus %.2f", levels[k])

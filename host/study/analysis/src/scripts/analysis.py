@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy import integrate, optimize, stats
+from scipy import optimize, stats
 
 path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".csv")
 trials = pd.read_csv(path, na_values="n/a")
@@ -64,9 +64,16 @@ def p_text(p):
     return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
 
 
-def size_text(value, low, high, is_cut):
-    wider = ", or wider" if is_cut else ""
-    return f"{value:.2f} ({low:.2f} to {high:.2f}{wider})"
+def size_text(value, low, high):
+    if high == np.inf:
+        return f"{value:.2f} ({low:.2f} or more)"
+    if low == -np.inf:
+        return f"{value:.2f} ({high:.2f} or less)"
+    return f"{value:.2f} ({low:.2f} to {high:.2f})"
+
+
+# Squares below this share of those of the responses are rounding errors, and what is nothing else is not testable.
+ROUNDING = 1e-20
 
 
 def contrasts(count):
@@ -99,8 +106,11 @@ def anova(values, factors, groups):
                 smaller = np.column_stack(rest)
                 fit = smaller @ np.linalg.lstsq(smaller, seen, rcond=None)[0]
             squares, df = np.sum((seen - fit) ** 2) - error, within.shape[1]
-            if max(squares, error) <= 1e-20 * np.sum(values**2):
-                yield ":".join(parts), None
+            rounding = ROUNDING * np.sum(values**2)
+            if error <= rounding:
+                is_gone = squares <= rounding
+                reason = "nothing of it is left in the responses" if is_gone else "no variation between subjects to test it against"
+                yield ":".join(parts), reason
                 continue
             epsilon = None
             if df > 1:
@@ -115,8 +125,8 @@ def anova(values, factors, groups):
 
 
 def effect_text(effect):
-    if effect is None:
-        return "not testable: nothing of it is left in the responses"
+    if isinstance(effect, str):
+        return f"not testable: {effect}"
     f, df, error_df, epsilon = effect
     text = f"F({df}, {error_df}) = {f:.2f}, {p_text(stats.f.sf(f, df, error_df))}"
     if epsilon is not None:
@@ -125,11 +135,18 @@ def effect_text(effect):
     return text
 
 
-def solve(of, low, high):
-    """Where a falling function is 0; an end, where it is there not yet or no more."""
-    if of(low) <= 0.0:
-        return low
-    return high if of(high) >= 0.0 else optimize.brentq(of, low, high, xtol=1e-12)
+def falling_root(of, low, high, least, most):
+    """Where a falling function is 0: first between two ends, then farther out; infinite beyond `least` and `most`."""
+    width = high - low
+    while of(low) < 0.0:
+        if low <= least:
+            return -np.inf
+        width, high, low = 2.0 * width, low, max(low - width, least)
+    while of(high) > 0.0:
+        if high >= most:
+            return np.inf
+        width, low, high = 2.0 * width, high, min(high + width, most)
+    return optimize.brentq(of, low, high, xtol=1e-12)
 
 
 def noncentral_f(f, df, error_df, below):
@@ -137,35 +154,47 @@ def noncentral_f(f, df, error_df, below):
     if stats.f.cdf(f, df, error_df) <= below:
         return 0.0
 
-    def at(shift):
-        return stats.ncf.cdf(f, df, error_df, shift) - below
-
-    # 1400 is as far as `flotor analyse` looks; mostly the end is much nearer.
-    near = min(10.0 + 4.0 * f * df, 1400.0)
-    return solve(at, 1e-12, near if at(near) < 0.0 else 1400.0)
+    # As far as `flotor analyse` looks; mostly the end is much nearer.
+    return falling_root(lambda shift: noncentral_f_below(f, df, error_df, shift) - below, 1e-12, max(1.0, f * df), 0.0, 1e6)
 
 
-def partial_eta_squared(effect):
+def noncentral_f_below(f, df, error_df, shift):
+    below = stats.ncf.cdf(f, df, error_df, shift)
+    if np.isfinite(below):
+        return below
+    # scipy has no value far from the middle: a noncentral chi-square over the quantiles of the error's.
+    error = stats.chi2.ppf((np.arange(20000) + 0.5) / 20000, error_df)
+    return np.mean(stats.ncx2.cdf(f * df * error / error_df, df, shift))
+
+
+def partial_omega_squared(effect):
     f, df, error_df, _ = effect
-    ends = [noncentral_f(f, df, error_df, below) for below in (0.975, 0.025)]
-    shares = [end / (end + df + error_df + 1.0) for end in ends]
-    return f * df / (f * df + error_df), *shares, max(ends) >= 1400.0
+    low, high = (noncentral_f(f, df, error_df, below) for below in (0.975, 0.025))
+
+    def share(shift):
+        return shift / (shift + df + error_df + 1.0) if np.isfinite(shift) else 1.0
+
+    return share(max(df * (f - 1.0), 0.0)), share(min(low, 1e6)), share(high)
 
 
 def noncentral_t_below(t, df, shift):
-    below = stats.nct.cdf(t, df, shift)
+    if t < 0.0:
+        return 1.0 - noncentral_t_below(-t, df, -shift)
+    below = stats.nct.cdf(t, df, shift) if abs(shift) < 37.0 else np.nan
     if np.isfinite(below):
         return below
-    # scipy has no value far from the middle: a normal number over the deviation of others, integrated over that deviation.
-    most = np.sqrt(df) + 12.0
-    spread = np.linspace(0.0, most, 20001)
-    return integrate.trapezoid(stats.norm.cdf(t * spread / np.sqrt(df) - shift) * stats.chi.pdf(spread, df), spread)
+    # scipy has no value far from the middle: the tail of a chi-square, averaged over a normal number.
+    normal = np.linspace(-10.0, 10.0, 4001)
+    tail = stats.chi2.sf(np.maximum(normal + shift, 0.0) ** 2 * df / max(t, 1e-300) ** 2, df)
+    return np.sum(stats.norm.pdf(normal) * tail) * (normal[1] - normal[0])
 
 
 def cohen_d(t, df):
-    root = np.sqrt(df + 1.0)
-    ends = [solve(lambda d: noncentral_t_below(t, df, d) - below, -37.0, 37.0) for below in (0.975, 0.025)]
-    return t / root, ends[0] / root, ends[1] / root, max(map(abs, ends)) >= 37.0
+    low, high = (
+        falling_root(lambda d: noncentral_t_below(t, df, d) - below, t - 1.0, t + 1.0, -1e3, 1e3) for below in (0.975, 0.025)
+    )
+    ends = np.array([t, min(low, 1e3), max(high, -1e3)])
+    return ends / np.sqrt(df + 1.0)
 
 
 def effects(values, factors, groups, sizes):
@@ -173,15 +202,40 @@ def effects(values, factors, groups, sizes):
     for name, effect in found:
         print(name, effect_text(effect))
     for name, effect in found if sizes else []:
-        if effect is not None:
-            print(name, size_text(*partial_eta_squared(effect)))
+        if not isinstance(effect, str):
+            print(name, size_text(*partial_omega_squared(effect)))
+
+
+def paired(first, second):
+    """t and p of pairs, or the reason why there are none."""
+    first, second = np.asarray(first), np.asarray(second)
+    differences = first - second
+    rounding = ROUNDING * np.sum(first**2 + second**2)
+    if np.sum((differences - np.mean(differences)) ** 2) <= rounding:
+        return "no difference in any subject" if np.sum(differences**2) <= rounding else "the same difference in every subject"
+    test = stats.ttest_rel(first, second)
+    return test.statistic, test.pvalue
+
+
+def paired_text(test, p):
+    return f"t({subjects - 1}) = {test[0]:.2f}, {p_text(p)}"
 
 
 def comparisons(pairs):
-    tests = [(name, stats.ttest_rel(first, second)) for name, first, second in pairs]
-    for (name, test), p in zip(tests, holm([test.pvalue for _, test in tests])):
-        df = subjects - 1
-        print(f"{name} t({df}) = {test.statistic:.2f}, {p_text(p)} {size_text(*cohen_d(test.statistic, df))}")
+    tests = [(name, paired(first, second)) for name, first, second in pairs]
+    # What cannot be tested counts in the family all the same.
+    for (name, test), p in zip(tests, holm([1.0 if isinstance(test, str) else test[1] for _, test in tests])):
+        if isinstance(test, str):
+            print(f"{name} not testable: {test}")
+        else:
+            print(f"{name} {paired_text(test, p)} {size_text(*cohen_d(test[0], subjects - 1))}")
+
+
+def trend_text(levels, means):
+    spread = np.sum((means - np.mean(means)) ** 2)
+    if spread <= ROUNDING * np.sum(means**2):
+        return "not testable: equal means at all levels"
+    return f"R² = {np.corrcoef(levels, means)[0, 1] ** 2:.3f}"
 
 
 if is_jnd:
@@ -191,14 +245,14 @@ if is_jnd:
     for modality, name in (("vh", "vision + haptics"), ("h", "haptics alone")):
         mean, low, high = interval(weber[modality])
         print(f"{name} {mean * 100:.1f} % (95 %: {low * 100:.1f} to {high * 100:.1f})")
-    test = stats.ttest_rel(weber["h"], weber["vh"])
-    print(f"difference t({subjects - 1}) = {test.statistic:.2f}, {p_text(test.pvalue)}")
+    test = paired(weber["h"], weber["vh"])
+    print("difference", f"not testable: {test}" if isinstance(test, str) else paired_text(test, test[1]))
 else:
     print(f"{subjects} subjects, {number(len(counted) / subjects)} ratings each")
     repeats = main[main.repeat > 0]
     print(f"{len(repeats)} presentations repeated because the handle left its range")
     means = (table["vh"] + table["h"]).mean()[levels] / 2
-    print(f"Linear trend R² = {np.corrcoef(levels, means)[0, 1] ** 2:.3f}")
+    print("Linear trend", trend_text(levels, means.to_numpy()))
 for level in levels:
     name = f"base {number(level)}" if is_jnd else f"stimulus {level:.2f}"
     print(name, *(f"{table[m][level].mean():.3f} (se {table[m][level].sem():.3f})" for m in MODALITIES))
@@ -218,7 +272,7 @@ if is_jnd:
 
 for measure in ("speed", "acceleration", "force"):
     # One number for each stimulus of a trial; of a pair the base alone counts.
-    texts = counted[f"{measure}_each"].astype(str).str.split(" ")
+    texts = counted[f"{measure}_each"].map(lambda text: str(text).split(" "))
     if is_jnd:
         places = (counted.comparison_at == "first").astype(int)
         texts = pd.Series([text[place::2] for text, place in zip(texts, places)], index=texts.index)

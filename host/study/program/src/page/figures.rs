@@ -108,11 +108,13 @@ pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Figu
         let points = cells(modality).map(|cell| (beside(slot, cell.stimulus), cell.rating.mean));
         panel = panel.series(Series::points(name, points).slot(slot));
     }
-    let trend = &analysis.trend;
-    let line = cells(Modality::Vh).map(|cell| (cell.stimulus, trend.intercept + trend.slope * cell.stimulus));
-    let thesis = format!(" (thesis: {})", published::LINEAR_R2);
-    let label = format!("linear trend, R² {:.3}{}", analysis.linear_r2, analysis.beside.text(&thesis));
-    panel = panel.series(Series::line(label, line).slot(2));
+    if let Some(trend) = analysis.trend.tested() {
+        let line =
+            cells(Modality::Vh).map(|cell| (cell.stimulus, trend.intercept + trend.slope * cell.stimulus));
+        let thesis = format!(" (thesis: {})", published::LINEAR_R2);
+        let label = format!("linear trend, R² {:.3}{}", analysis.linear_r2, analysis.beside.text(&thesis));
+        panel = panel.series(Series::line(label, line).slot(2));
+    }
     let (name, unit) = stimulus.name_and_unit();
     Figure::new("Perceived against real", Axis::linear(name, unit))
         .subtitle("Mean over subjects")

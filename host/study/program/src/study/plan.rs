@@ -39,7 +39,8 @@ const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
     most_false_alarms = 0.5\n  \
     response_time_s = [0.2, 20]\n\n\
     Exclusion rules, which `flotor analyse` applies. About a sitting, the largest or least share: most_false_alarms (of \
-    catch trials), least_agreement (of repeated pairs), most_retest_deviation (of repeated ratings), most_dont_know, \
+    catch trials), most_missed_obvious (of obvious pairs), most_wrong_at_large (of answers to 40 % and more), \
+    least_agreement (of repeated pairs), most_retest_deviation (of repeated ratings), most_dont_know, \
     most_missed_ticks, most_excluded_trials. About a trial: response_time_s = [shortest, longest], least_movement_mm; a \
     trial of an adaptive track takes the track with it, unless the estimator is map.\n\n\
     Planned options of `flotor analyse`, which says whether a result is as planned: estimator, type, ratings.\n\n\

@@ -1,0 +1,272 @@
+//! The posterior of threshold, criterion and lapse over all real values they can have, by quadrature.
+//!
+//! A grid with fixed ends would cut an interval where answers say little. Here the threshold's range is found first: as far as the
+//! posterior is above `e^-28` of its largest value.
+
+use super::{Observation, Prior, unit_threshold};
+use crate::trial::Judgement;
+use flotor_statistics::distribution::normal_below;
+use flotor_statistics::quadrature::{Density, Node, gauss_legendre};
+
+/// The range of the threshold is looked for so many deviations of the prior to both sides, in steps of half of one.
+const REACH: i32 = 8;
+const STEP: f64 = 0.5;
+/// Logarithm of the density that ends the range, below the largest.
+const NEGLIGIBLE: f64 = 28.0;
+/// The criterion reaches so many deviations above its most likely value.
+const CRITERION_REACH: f64 = 7.0;
+/// Half of the chi-square below which 95 % lie, with one degree of freedom: the drop of a log-likelihood that bounds a parameter.
+const BOUND: f64 = 1.920_729_410_347_062;
+/// No answer is held less likely.
+const LEAST_PROBABILITY: f64 = 1.0e-30;
+/// Equal answers whose probabilities are multiplied: their product is a number yet.
+const EQUAL_MOST: usize = 8;
+/// A product below it is turned into its logarithm.
+const LEAST_PRODUCT: f64 = 1.0e-60;
+
+/// Prior of the share of trials without attention.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum LapsePrior {
+    /// The share itself.
+    Known(f64),
+    /// Exponential with this mean, up to 1.
+    Exponential(f64),
+}
+
+/// Number of quadrature nodes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nodes {
+    pub(super) thresholds: usize,
+    pub(super) criteria: usize,
+    pub(super) lapses: usize,
+}
+
+impl Nodes {
+    /// Enough to find the range.
+    const OF_THE_SEARCH: Self = Self { thresholds: 0, criteria: 12, lapses: 12 };
+}
+
+/// A criterion and the logarithm of its weight.
+struct Criterion {
+    value: f64,
+    /// Threshold of an observer whose sigma is 1.
+    unit: f64,
+    log_weight: f64,
+}
+
+/// A share of lapses and the logarithm of its density over the root of the share.
+struct Lapse {
+    value: f64,
+    node: Node,
+    log_density: f64,
+}
+
+/// Equal answers to one difference.
+struct Equal {
+    delta: f64,
+    counts: [usize; 3],
+}
+
+/// The observers that a prior holds possible, and what they have to explain.
+struct Model<'a> {
+    prior: &'a Prior,
+    answers: Vec<Equal>,
+    criteria: Vec<Criterion>,
+    lapses: Vec<Lapse>,
+}
+
+/// The posterior.
+pub(super) struct PosteriorDensity {
+    /// Of the logarithm of the threshold.
+    pub(super) log_threshold: Density,
+    /// Of the root of the lapse, where it is not known.
+    pub(super) root_lapse: Option<Density>,
+    /// Means of the logarithm of the threshold, of that of sigma, of the criterion, and of the lapse.
+    pub(super) mean_log_threshold: f64,
+    pub(super) mean_log_sigma: f64,
+    pub(super) mean_criterion: f64,
+    pub(super) mean_lapse: f64,
+    /// Whether the answers alone bound the threshold below and above: a threshold without end has a likelihood outside of the 95 %
+    /// interval of the likelihood ratio.
+    pub(super) is_bounded: [bool; 2],
+}
+
+impl<'a> Model<'a> {
+    fn new(
+        observations: &[Observation],
+        prior: &'a Prior,
+        target: f64,
+        lapse_prior: LapsePrior,
+        nodes: Nodes,
+    ) -> Self {
+        let most = prior.criterion_mode + CRITERION_REACH * prior.criterion_spread;
+        let criterion = |node: Node| Criterion {
+            value: node.at,
+            unit: unit_threshold(node.at, target),
+            log_weight: libm::log(node.weight)
+                + prior.log_density(libm::log(prior.threshold_median), node.at),
+        };
+        let criteria = gauss_legendre(nodes.criteria, [0.0, most]).into_iter().map(criterion).collect();
+        let lapses = match lapse_prior {
+            LapsePrior::Known(value) => {
+                vec![Lapse { value, node: Node { at: value.sqrt(), weight: 1.0 }, log_density: 0.0 }]
+            }
+            LapsePrior::Exponential(mean) => {
+                let lapse = |node: Node| {
+                    let value = node.at * node.at;
+                    Lapse { value, node, log_density: libm::log(2.0 * node.at) - value / mean }
+                };
+                gauss_legendre(nodes.lapses, [0.0, 1.0]).into_iter().map(lapse).collect()
+            }
+        };
+        Self { prior, answers: equal(observations), criteria, lapses }
+    }
+
+    fn log_prior(&self, log_threshold: f64) -> f64 {
+        self.prior.log_density(log_threshold, self.prior.criterion_mode)
+    }
+
+    /// Logarithms of the likelihood times the density of criterion and lapse, criterion by lapse.
+    fn cells(&self, log_threshold: f64) -> Vec<f64> {
+        let threshold = libm::exp(log_threshold);
+        let mut cells = Vec::with_capacity(self.criteria.len() * self.lapses.len());
+        for criterion in &self.criteria {
+            let of_answer = |answer: &Equal| {
+                let evidence = answer.delta * criterion.unit / threshold;
+                let named = [1.0, -1.0].map(|sign| normal_below(sign * evidence - criterion.value));
+                (named, answer.counts)
+            };
+            let attentive: Vec<_> = self.answers.iter().map(of_answer).collect();
+            for lapse in &self.lapses {
+                let log = criterion.log_weight + lapse.log_density;
+                cells.push(log + log_likelihood(&attentive, lapse.value));
+            }
+        }
+        cells
+    }
+
+    /// Logarithm of the likelihood of a threshold, averaged over criterion and lapse, up to a constant.
+    fn log_likelihood(&self, log_threshold: f64) -> f64 {
+        let cells = self.cells(log_threshold);
+        let most = cells.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let weights = self.lapses.iter().map(|lapse| lapse.node.weight).cycle();
+        most + libm::log(
+            cells.iter().zip(weights).map(|(cell, weight)| weight * libm::exp(cell - most)).sum(),
+        )
+    }
+}
+
+/// Logarithm of the likelihood of answers, from what an attentive observer does and the share of lapses.
+fn log_likelihood(attentive: &[([f64; 2], [usize; 3])], lapse: f64) -> f64 {
+    let (mut log, mut product) = (0.0, 1.0);
+    for ([correct, wrong], counts) in attentive {
+        let unsure = 1.0 - correct - wrong;
+        let kept = 1.0 - lapse;
+        let shares = [kept * correct + 0.5 * lapse, kept * wrong + 0.5 * lapse, kept * unsure];
+        for (share, count) in shares.into_iter().zip(counts) {
+            for _ in 0..*count {
+                product *= share.max(LEAST_PROBABILITY);
+            }
+        }
+        if product < LEAST_PRODUCT {
+            log += libm::log(product);
+            product = 1.0;
+        }
+    }
+    log + libm::log(product)
+}
+
+/// Groups answers of the same kind to the same difference.
+fn equal(observations: &[Observation]) -> Vec<Equal> {
+    let mut sorted = observations.to_vec();
+    sorted.sort_by(|a, b| a.delta.total_cmp(&b.delta));
+    let alike = sorted.chunk_by(|a, b| a.delta == b.delta).flat_map(|same| same.chunks(EQUAL_MOST));
+    let group = |same: &[Observation]| {
+        let count = |judgement| same.iter().filter(|one| one.judgement == judgement).count();
+        let delta = same.first().map_or(0.0, |one| one.delta);
+        Equal { delta, counts: [Judgement::Correct, Judgement::Wrong, Judgement::Unsure].map(count) }
+    };
+    alike.map(group).collect()
+}
+
+impl PosteriorDensity {
+    /// The posterior after answers.
+    pub(super) fn new(
+        observations: &[Observation],
+        prior: &Prior,
+        target: f64,
+        lapse_prior: LapsePrior,
+        nodes: Nodes,
+    ) -> Self {
+        let (range, is_bounded) =
+            range(&Model::new(observations, prior, target, lapse_prior, Nodes::OF_THE_SEARCH));
+        let model = Model::new(observations, prior, target, lapse_prior, nodes);
+        let thresholds = gauss_legendre(nodes.thresholds, range);
+        let rows: Vec<Vec<f64>> = thresholds
+            .iter()
+            .map(|node| {
+                let before = model.log_prior(node.at);
+                model.cells(node.at).into_iter().map(|cell| cell + before).collect()
+            })
+            .collect();
+        let most = rows.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut by_threshold = vec![0.0; thresholds.len()];
+        let mut by_criterion = vec![0.0; model.criteria.len()];
+        let mut by_lapse = vec![0.0; model.lapses.len()];
+        for ((node, row), threshold) in thresholds.iter().zip(&rows).zip(&mut by_threshold) {
+            for (cells, criterion) in row.chunks(model.lapses.len()).zip(&mut by_criterion) {
+                for ((cell, lapse), sum) in cells.iter().zip(&model.lapses).zip(&mut by_lapse) {
+                    let density = libm::exp(cell - most);
+                    *threshold += lapse.node.weight * density;
+                    *criterion += node.weight * lapse.node.weight * density;
+                    *sum += node.weight * density;
+                }
+            }
+        }
+        let total: f64 = by_criterion.iter().sum();
+        let mean = |weights: &mut dyn Iterator<Item = (f64, f64)>| {
+            weights.map(|(value, weight)| value * weight).sum::<f64>() / total
+        };
+        let of_threshold = |value: fn(&Node) -> f64| {
+            let weighted = thresholds.iter().zip(&by_threshold);
+            mean(&mut weighted.map(|(node, density)| (value(node), node.weight * density)))
+        };
+        let of_criterion = |value: fn(&Criterion) -> f64| {
+            mean(&mut model.criteria.iter().zip(&by_criterion).map(|(one, weight)| (value(one), *weight)))
+        };
+        let lapses = model.lapses.iter().zip(&by_lapse);
+        let mean_lapse = mean(&mut lapses.map(|(one, density)| (one.value, one.node.weight * density)));
+        let mean_log_threshold = of_threshold(|node| node.at);
+        let roots: Vec<Node> = model.lapses.iter().map(|lapse| lapse.node).collect();
+        Self {
+            log_threshold: Density::new(&thresholds, range, &by_threshold),
+            root_lapse: matches!(lapse_prior, LapsePrior::Exponential(_))
+                .then(|| Density::new(&roots, [0.0, 1.0], &by_lapse)),
+            mean_log_threshold,
+            // Each observer's sigma is the threshold over the criterion's unit.
+            mean_log_sigma: mean_log_threshold - of_criterion(|one| libm::log(one.unit)),
+            mean_criterion: of_criterion(|one| one.value),
+            mean_lapse,
+            is_bounded,
+        }
+    }
+}
+
+/// The range of the logarithm of the threshold outside of which the posterior is negligible, and whether its likelihood falls off at
+/// each end of the search.
+fn range(model: &Model<'_>) -> ([f64; 2], [bool; 2]) {
+    let (median, spread) = (libm::log(model.prior.threshold_median), model.prior.threshold_spread);
+    let at = |step: i32| median + spread * STEP * f64::from(step);
+    let ends = REACH * 2;
+    let steps: Vec<i32> = (-ends..=ends).collect();
+    let likelihoods: Vec<f64> = steps.iter().map(|step| model.log_likelihood(at(*step))).collect();
+    let posterior: Vec<f64> =
+        steps.iter().zip(&likelihoods).map(|(step, likely)| likely + model.log_prior(at(*step))).collect();
+    let largest = |list: &[f64]| list.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let least = largest(&posterior) - NEGLIGIBLE;
+    let matters = steps.iter().zip(&posterior).filter(|(_, log)| **log > least).map(|(step, _)| *step);
+    let (low, high) = (matters.clone().min().unwrap_or(-ends), matters.max().unwrap_or(ends));
+    let bound = largest(&likelihoods) - BOUND;
+    let falls_off = |likelihood: Option<&f64>| likelihood.is_some_and(|likelihood| *likelihood < bound);
+    ([at(low - 1), at(high + 1)], [falls_off(likelihoods.first()), falls_off(likelihoods.last())])
+}
