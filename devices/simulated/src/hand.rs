@@ -14,13 +14,16 @@
 //! - [`Impedance`]: K, B and m with published values.
 //! - [`Trajectory`]: what the hand aims at, as a few numbers, a [`Script`] or a [`Recording`].
 //! - [`Unsteadiness`]: tremor, and forces that are never quite what was meant.
+//! - [`guidance`]: a client of the run moves the hand in place of its trajectory.
 
+pub mod guidance;
 mod impedance;
 mod recording;
 mod script;
 mod trajectory;
 mod unsteadiness;
 
+pub(crate) use guidance::{Follower, Guidance};
 pub use impedance::{Grip, Impedance};
 pub use recording::{Recording, RecordingError};
 pub use script::{Script, ScriptError};

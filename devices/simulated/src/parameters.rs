@@ -1,5 +1,6 @@
 //! What the simulated flotor can be told, and how a set of values becomes a [`Setup`].
 
+pub(crate) mod live;
 mod machine;
 mod schema;
 

@@ -1,7 +1,7 @@
 //! The simulation as a device plugin.
 
 use crate::machine::{Machine, MachineParameters};
-use crate::parameters::{SCHEMA, in_force, machine, refuse_idle, setup};
+use crate::parameters::{SCHEMA, in_force, live, machine, refuse_idle, setup};
 use crate::plant::Wrench;
 use crate::sample_clock::SampleClock;
 use crate::simulation::{Setup, Simulation};
@@ -13,8 +13,8 @@ use crate::workspace::{
 use flotor_hal::{
     ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Damper, Device, DeviceInfo,
     DeviceState, EnergyLedger, EnergyLedgerDevice, Fault, IndependentStop, IndependentStopDevice, LoopConfig,
-    PacingDevice, Parameter, Pose, Refusal, SafeStop, SampleWait, SampledLoop, Settings, StoppedState, Tick,
-    Twist, VerticalCalibration, export_device,
+    OutOfRange, PacingDevice, Parameter, Pose, Refusal, SafeStop, SampleWait, SampledLoop, Settings,
+    StoppedState, Tick, Twist, VerticalCalibration, export_device,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -180,7 +180,9 @@ impl SimulatedFlotor {
     fn start(&self, tick_ns: u64, seed: u64) -> Result<(Simulation, Option<Box<Machine>>), InvalidParameter> {
         let setup = Setup { tick_ns, seed, ..self.setup.clone() };
         let machine = |parameters| Machine::new(parameters, &setup.start, seed).map(Box::new);
-        Ok((Simulation::new(&setup)?, self.machine.as_ref().map(machine).transpose()?))
+        let mut simulation = Simulation::new(&setup)?;
+        live::begin(&mut simulation, &self.values);
+        Ok((simulation, self.machine.as_ref().map(machine).transpose()?))
     }
 }
 
@@ -229,6 +231,10 @@ impl ActiveDevice for RunningFlotor {
         };
         self.is_limited = self.machine.is_none() && self.held != asked;
         Cycle::Fresh
+    }
+
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        live::change(&mut self.simulation, index, value)
     }
 
     fn deactivate(self) -> SimulatedFlotor {

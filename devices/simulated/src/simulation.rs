@@ -6,11 +6,13 @@
 //! hand. Each tick is cut at the grid and at the moment the hand releases the handle; within a piece the plant is exact
 //! (see `plant`).
 
-use crate::hand::{Aim, Hand, Intention, Pose, Trajectory, Wavering};
+use crate::hand::guidance::NotGuiding;
+use crate::hand::{Aim, Follower, Guidance, Hand, Intention, Pose, Trajectory, Wavering};
 use crate::ledger::Ledger;
 use crate::plant::{FlotorParameters, MAX_PIECE_NS, Outcome, Plant, State, Wrench};
 use crate::validation::InvalidParameter;
 use crate::workspace::SensorRange;
+use flotor_hal::glam::DVec3;
 
 /// Longest time one call of [`Simulation::advance`] simulates, ns: ten ticks of the slowest servo (100 Hz).
 /// It bounds what a tick may cost after a delay of the host.
@@ -73,6 +75,7 @@ pub struct Simulation {
     ledger: Ledger,
     time_ns: u64,
     wavering: Wavering,
+    guidance: Guidance,
     stroke: Stroke,
 }
 
@@ -90,6 +93,7 @@ impl Simulation {
             time_ns: 0,
             stroke: Stroke::at(0, &setup.hand.trajectory, &wavering),
             wavering,
+            guidance: Guidance::NONE,
             setup: setup.clone(),
         })
     }
@@ -99,6 +103,7 @@ impl Simulation {
         self.plant.place(&self.setup.start);
         self.ledger = Ledger::open(self.plant.energy());
         self.time_ns = 0;
+        self.guidance = Guidance::NONE;
         self.stroke = Stroke::at(0, &self.setup.hand.trajectory, &self.wavering);
     }
 
@@ -112,9 +117,34 @@ impl Simulation {
         let setup = Setup { hand, ..self.setup.clone() };
         self.plant = plant(&setup, &self.plant.state())?;
         self.wavering = Wavering::new(setup.hand.unsteadiness, setup.seed);
+        self.guidance = Guidance::NONE;
         self.stroke = Stroke::at(self.time_ns, &setup.hand.trajectory, &self.wavering);
         self.setup = setup;
         Ok(())
+    }
+
+    /// Lets the client `guide` take the hand (see [`guidance`](crate::hand::guidance)), or keep it; 0 releases the hand.
+    /// Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// [`NotGuiding`] while another client guides.
+    pub fn guide(&mut self, guide: f64) -> Result<(), NotGuiding> {
+        let start = self.stroke.follower(&self.plant.state());
+        self.guidance.take(guide, self.time_ns, start)
+    }
+
+    /// Moves the target of the guide along an axis (0 to 2: x, y, z of the device frame), m. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// [`NotGuiding`] if the client of the latest [`Self::guide`] does not guide.
+    pub fn guide_to(&mut self, axis: usize, target_m: f64) -> Result<(), NotGuiding> {
+        self.guidance.aim_at(axis, target_m, self.time_ns)
+    }
+
+    /// Number of the client that guides the hand; 0 for none. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn guided_by(&self) -> f64 {
+        self.guidance.guide()
     }
 
     /// Moves on by `dt_ns` under a coil wrench that is constant over that time (zero-order hold).
@@ -167,7 +197,7 @@ impl Simulation {
         SensorRange::of(state.position_m, state.orientation)
     }
 
-    /// What the hand aims at now; nothing while it is off the handle. Real-time: bounded, no allocation.
+    /// What the trajectory of the hand aims at now; nothing while it is off the handle. Real-time: bounded, no allocation.
     #[must_use]
     pub fn aim(&self) -> Option<Aim> {
         self.setup.hand.trajectory.aim(self.time_ns)
@@ -193,9 +223,13 @@ impl Simulation {
         let trajectory = &self.setup.hand.trajectory;
         if self.time_ns >= self.stroke.end_ns {
             self.stroke.go_on(trajectory, &self.wavering);
+            if !self.guidance.is_free() {
+                self.stroke.be_guided(&mut self.guidance, &self.plant.state());
+            }
         }
         let end_ns = tick_end_ns.min(self.stroke.end_ns);
-        let release_ns = trajectory.release_ns().unwrap_or(u64::MAX);
+        let planned_ns = if self.stroke.is_guided { None } else { trajectory.release_ns() };
+        let release_ns = planned_ns.unwrap_or(u64::MAX);
         if self.time_ns < release_ns {
             (end_ns.min(release_ns) - self.time_ns, self.stroke.drawn(self.time_ns))
         } else {
@@ -218,6 +252,10 @@ struct Stroke {
     end_ns: u64,
     start: Option<Aim>,
     end: Option<Aim>,
+    /// Whether a guide has a share in it: a release that the trajectory plans is then not made.
+    is_guided: bool,
+    /// Under a guide: what the trajectory would aim at at the end.
+    scripted: Option<Aim>,
 }
 
 impl Stroke {
@@ -226,7 +264,7 @@ impl Stroke {
         let start_ns = time_ns - time_ns % GRID_NS;
         let end_ns = start_ns.saturating_add(GRID_NS);
         let aim = |time_ns| Self::aim(time_ns, trajectory, wavering);
-        Self { start_ns, end_ns, start: aim(start_ns), end: aim(end_ns) }
+        Self { start_ns, end_ns, start: aim(start_ns), end: aim(end_ns), is_guided: false, scripted: None }
     }
 
     /// On to the next stroke, which starts where this one ends: their common grid point is evaluated once.
@@ -235,6 +273,34 @@ impl Stroke {
         (self.start_ns, self.start) = (self.end_ns, self.end);
         self.end_ns = self.end_ns.saturating_add(GRID_NS);
         self.end = Self::aim(self.end_ns, trajectory, wavering);
+        self.is_guided = false;
+    }
+
+    /// Lets the guide move the end of this stroke, at whose start the handle is in `state`.
+    #[cold] // hands mostly follow their trajectory
+    fn be_guided(&mut self, guidance: &mut Guidance, state: &State) {
+        let (scripted, dt_s) = (self.end, seconds(GRID_NS));
+        let (end, velocity_m_per_s) = guidance.advance(self.end_ns, dt_s, scripted, &Follower::of(state));
+        (self.end, self.is_guided) = (end, !guidance.is_free());
+        if guidance.is_free() {
+            self.start = self.scripted; // the trajectory goes on as if there had been no guide
+        } else if let (Some(start), Some(end), Some(scripted)) = (&mut self.start, end, scripted) {
+            // Where a force is meant, the intended position goes with the handle and the damper of the hand does not.
+            let from_m = end.pose.position_m - velocity_m_per_s * dt_s;
+            start.pose.position_m = DVec3::select(scripted.yielding, from_m, start.pose.position_m);
+        }
+        self.scripted = scripted;
+    }
+
+    /// The motion that the hand means at the end of the stroke: where a guide begins. Without a grip, the motion of the handle.
+    fn follower(&self, state: &State) -> Follower {
+        self.drawn(self.end_ns).map_or_else(
+            || Follower::of(state),
+            |meant| {
+                let pose = Pose { position_m: meant.position_m, orientation: meant.orientation };
+                Follower::moving(pose, meant.velocity_m_per_s)
+            },
+        )
     }
 
     /// What an unsteady hand aims at at a time.

@@ -184,6 +184,28 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     ),
     Parameter::real("hand_rise_s", "s", 0.01, 60.0, 1.0, "Oscillate, press: time until the full movement"),
     Parameter::real("hand_release_s", "s", 0.0, 3600.0, 1.0, "Release: when the hand opens"),
+    Parameter::real(
+        "hand_guide",
+        "1",
+        0.0,
+        4_294_967_295.0,
+        0.0,
+        "Client that guides the hand, by a number of its choice; 0: none. Silent for 1 s, it has released the hand",
+    )
+    .live(),
+    Parameter::real(
+        "hand_target_x_mm",
+        "mm",
+        -50.0,
+        50.0,
+        0.0,
+        "Guide: intended position of the handle, x; set with hand_guide",
+    )
+    .live(),
+    Parameter::real("hand_target_y_mm", "mm", -50.0, 50.0, 0.0, "Guide: intended position of the handle, y")
+        .live(),
+    Parameter::real("hand_target_z_mm", "mm", -50.0, 50.0, 0.0, "Guide: intended position of the handle, z")
+        .live(),
     Parameter::real("start_x_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, x"),
     Parameter::real("start_y_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, y"),
     Parameter::real("start_z_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, z"),

@@ -1,5 +1,7 @@
 //! Whole runs: energy, splitting of ticks, release, totality.
 
+mod guided;
+
 use super::*;
 use crate::hand::{Impedance, Pose, Script, Unsteadiness};
 use crate::plant::FeedForward;

@@ -1,0 +1,309 @@
+//! Guidance of the hand from outside: a client of the run (a pointer in a window) moves the intended position of the handle.
+//!
+//! A guide takes the hand over from its trajectory, sets a target, and releases the hand. The intended position follows the
+//! target as a critically damped oscillator of limited speed would, so that a jump of the target is no jump of the force. After
+//! the release it returns to the trajectory within [`RELEASE_NS`]; where the trajectory does not hold the handle, or means a
+//! force, it approaches the handle itself, and the grip fades.
+//!
+//! A guide that is silent for [`SILENCE_NS`] has released the hand: a client may end at any time. While one guides, no other
+//! can. Every time here is the clock of the simulation, so equal calls give equal bits.
+
+use super::{Aim, Pose, minimum_jerk};
+use crate::plant::State;
+use flotor_hal::glam::DVec3;
+
+/// Time without a value from the guide after which the hand is released, ns.
+pub const SILENCE_NS: u64 = 1_000_000_000;
+
+/// Duration of a release, ns.
+pub const RELEASE_NS: u64 = 500_000_000;
+
+/// Rate at which the intended position follows the target, 1/s: two thirds of a small step are done in 43 ms.
+const FOLLOWING_PER_S: f64 = 50.0;
+
+/// Largest speed of the intended position, m/s: quick for a hand that feels an object, and across the workspace in 0.1 s.
+const SPEED_LIMIT_M_PER_S: f64 = 0.25;
+
+/// Cause of a refusal: another client guides the hand, or none does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NotGuiding {
+    /// Number of the client that guides; 0 for none.
+    pub guide: f64,
+}
+
+/// Motion of the intended position towards the target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Follower {
+    /// Intended pose; the orientation is constant.
+    pub(crate) pose: Pose,
+    /// Its rate, m/s.
+    pub(crate) velocity_m_per_s: DVec3,
+}
+
+/// Source of the hand's motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    /// The trajectory.
+    Free,
+    /// A guide.
+    Guided(Follower),
+    /// The trajectory, with a share of the last guide that fades from the time of the release on, ns.
+    Releasing(Follower, u64),
+}
+
+/// Guidance of one hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Guidance {
+    phase: Phase,
+    /// Number of the client that guides.
+    guide: f64,
+    /// Whether the client that named itself last is the guide: coordinates are from that client.
+    is_guide_speaking: bool,
+    target_m: DVec3,
+    /// Time of the latest value from the guide, ns.
+    heard_ns: u64,
+}
+
+impl Guidance {
+    /// A hand that no client guides.
+    pub(crate) const NONE: Self =
+        Self { phase: Phase::Free, guide: 0.0, is_guide_speaking: false, target_m: DVec3::ZERO, heard_ns: 0 };
+
+    /// True while the trajectory alone moves the hand. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn is_free(&self) -> bool {
+        self.phase == Phase::Free
+    }
+
+    /// Number of the client that guides; 0 for none. Real-time: bounded, no allocation.
+    pub(crate) fn guide(&self) -> f64 {
+        if matches!(self.phase, Phase::Guided(_)) { self.guide } else { 0.0 }
+    }
+
+    /// Takes the hand for the client `guide`, or keeps it; 0 releases it. A hand that is taken begins its motion as `start` says.
+    ///
+    /// Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// [`NotGuiding`] while another client guides.
+    pub(crate) fn take(&mut self, guide: f64, now_ns: u64, start: Follower) -> Result<(), NotGuiding> {
+        if guide == 0.0 {
+            self.release(now_ns);
+            return Ok(());
+        }
+        self.is_guide_speaking = match self.phase {
+            Phase::Guided(_) => guide == self.guide,
+            Phase::Free | Phase::Releasing(..) => {
+                (self.phase, self.guide, self.target_m) =
+                    (Phase::Guided(start), guide, start.pose.position_m);
+                true
+            }
+        };
+        self.hear(now_ns)
+    }
+
+    /// Moves the target along an axis, m. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// [`NotGuiding`] if the client that named itself last does not guide.
+    pub(crate) fn aim_at(&mut self, axis: usize, target_m: f64, now_ns: u64) -> Result<(), NotGuiding> {
+        self.hear(now_ns)?;
+        self.target_m[axis.min(2)] = target_m;
+        Ok(())
+    }
+
+    fn hear(&mut self, now_ns: u64) -> Result<(), NotGuiding> {
+        if !self.is_guide_speaking || self.guide() == 0.0 {
+            return Err(NotGuiding { guide: self.guide() });
+        }
+        self.heard_ns = now_ns;
+        Ok(())
+    }
+
+    fn release(&mut self, now_ns: u64) {
+        if let Phase::Guided(follower) = self.phase {
+            self.phase = Phase::Releasing(follower, now_ns);
+        }
+        self.is_guide_speaking = false;
+    }
+
+    /// Moves on by `dt_s` (s) to the time `now_ns`: what the hand then aims at, where the trajectory would aim at `scripted` and
+    /// the handle is at `handle` before, with the guide's share of the velocity, m/s.
+    ///
+    /// Real-time: bounded, no allocation.
+    pub(crate) fn advance(
+        &mut self,
+        now_ns: u64,
+        dt_s: f64,
+        scripted: Option<Aim>,
+        handle: &Follower,
+    ) -> (Option<Aim>, DVec3) {
+        if now_ns.saturating_sub(self.heard_ns) > SILENCE_NS {
+            self.release(now_ns);
+        }
+        match &mut self.phase {
+            Phase::Free => (scripted, DVec3::ZERO),
+            Phase::Guided(follower) => {
+                follower.approach(self.target_m, dt_s);
+                (Some(Aim::at(follower.pose)), follower.velocity_m_per_s)
+            }
+            Phase::Releasing(follower, since_ns) => {
+                let elapsed_ns = now_ns.saturating_sub(*since_ns);
+                if elapsed_ns >= RELEASE_NS {
+                    self.phase = Phase::Free;
+                    return (scripted, DVec3::ZERO);
+                }
+                follower.approach(self.target_m, dt_s);
+                let share = minimum_jerk(elapsed_ns as f64, RELEASE_NS as f64);
+                let aim = between(&follower.pose, share, scripted, handle, dt_s);
+                (Some(aim), follower.velocity_m_per_s * (1.0 - share))
+            }
+        }
+    }
+}
+
+impl Follower {
+    /// A motion through a pose. Real-time: bounded, no allocation.
+    pub(crate) fn moving(pose: Pose, velocity_m_per_s: DVec3) -> Self {
+        Self { pose, velocity_m_per_s }
+    }
+
+    /// The motion of the handle. Real-time: bounded, no allocation.
+    pub(crate) fn of(state: &State) -> Self {
+        let pose = Pose { position_m: state.position_m, orientation: state.orientation };
+        Self::moving(pose, state.velocity_m_per_s)
+    }
+
+    /// Moves towards the target for `dt_s` (s, at most 1 ms): a critically damped oscillator, integrated by the semi-implicit Euler
+    /// method, which is stable up to 40 ms. What was faster than the limit at first only slows down.
+    fn approach(&mut self, target_m: DVec3, dt_s: f64) {
+        let way_m = target_m - self.pose.position_m;
+        let pull = way_m * (FOLLOWING_PER_S * FOLLOWING_PER_S);
+        let brake = self.velocity_m_per_s * (2.0 * FOLLOWING_PER_S);
+        let fastest = self.velocity_m_per_s.length().max(SPEED_LIMIT_M_PER_S);
+        self.velocity_m_per_s = limited(self.velocity_m_per_s + (pull - brake) * dt_s, fastest);
+        self.pose.position_m += self.velocity_m_per_s * dt_s;
+    }
+}
+
+/// The aim between a guided pose (`share` 0) and a trajectory (1), `dt_s` (s) after the handle was at `handle`. Where the trajectory
+/// does not hold the handle, or means a force along an axis, the handle itself stands for the intended position: the spring of
+/// the hand is then at rest.
+fn between(guided: &Pose, share: f64, scripted: Option<Aim>, handle: &Follower, dt_s: f64) -> Aim {
+    let Follower { pose: handle, velocity_m_per_s } = *handle;
+    let open = || Aim::at(Pose { position_m: handle.position_m + velocity_m_per_s * dt_s, ..handle });
+    let scripted = scripted.unwrap_or_else(open);
+    let position_m = DVec3::select(scripted.yielding, handle.position_m, scripted.pose.position_m);
+    let pose = Pose {
+        position_m: guided.position_m.lerp(position_m, share),
+        orientation: guided.orientation.lerp(scripted.pose.orientation, share),
+    };
+    Aim { force_n: scripted.force_n * share, ..Aim::at(pose) }
+}
+
+/// The vector, shortened to a length if it is longer.
+fn limited(vector: DVec3, length: f64) -> DVec3 {
+    let square = vector.length_squared();
+    if square > length * length { vector * (length / square.sqrt()) } else { vector }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::glam::BVec3;
+
+    const MILLISECOND_NS: u64 = 1_000_000;
+
+    fn at(z_m: f64) -> Pose {
+        Pose { position_m: DVec3::new(0.0, 0.0, z_m), ..Pose::HOME }
+    }
+
+    fn start() -> Follower {
+        Follower::moving(Pose::HOME, DVec3::ZERO)
+    }
+
+    /// Intended heights after each of some milliseconds, from a time on.
+    fn heights(guidance: &mut Guidance, from_ms: u64, to_ms: u64, scripted: Option<Aim>) -> Vec<f64> {
+        let handle = Follower::moving(at(-1.0e-3), DVec3::ZERO);
+        let z_m = |ms: u64| {
+            let (aim, _) = guidance.advance(ms * MILLISECOND_NS, 1.0e-3, scripted, &handle);
+            aim.map_or(f64::NAN, |aim| aim.pose.position_m.z)
+        };
+        (from_ms + 1..=to_ms).map(z_m).collect()
+    }
+
+    #[test]
+    fn a_jump_of_the_target_is_followed_within_the_speed_limit_and_without_overshoot() {
+        for target_m in [-20.0e-3, -1.0e-4, 5.0e-3] {
+            let mut guidance = Guidance::NONE;
+            guidance.take(7.0, 0, start()).expect("nobody guides");
+            guidance.aim_at(2, target_m, 0).expect("it guides");
+            let way = heights(&mut guidance, 0, 900, None);
+            let (mut before, mut speed) = (0.0, 0.0);
+            for z_m in way {
+                assert!((target_m - z_m) * target_m.signum() >= -1.0e-12, "it overshoots {target_m}: {z_m}");
+                let now = (z_m - before) / 1.0e-3;
+                assert!(f64::abs(now) <= SPEED_LIMIT_M_PER_S * (1.0 + 1.0e-9), "{now} m/s");
+                // The acceleration of the linear follower from rest is largest at the start.
+                let most = FOLLOWING_PER_S * FOLLOWING_PER_S * target_m.abs() * 1.0e-3;
+                assert!(f64::abs(now - speed) <= most * (1.0 + 1.0e-9), "a jump of the velocity");
+                (before, speed) = (z_m, now);
+            }
+            assert!((before - target_m).abs() < 1.0e-9, "{before}");
+        }
+    }
+
+    #[test]
+    fn one_client_guides_at_a_time_and_only_its_coordinates_count() {
+        let mut guidance = Guidance::NONE;
+        assert_eq!(guidance.aim_at(2, -1.0, 0), Err(NotGuiding { guide: 0.0 }), "nobody guides");
+        guidance.take(7.0, 0, start()).expect("nobody guides");
+        assert_eq!(guidance.take(8.0, 1, start()), Err(NotGuiding { guide: 7.0 }));
+        assert_eq!(guidance.aim_at(2, -9.0, 1), Err(NotGuiding { guide: 7.0 }), "from the other client");
+        guidance.take(7.0, 2, start()).expect("it guides already");
+        guidance.aim_at(2, -1.0e-3, 2).expect("it guides");
+        assert_eq!((guidance.target_m.z, guidance.heard_ns), (-1.0e-3, 2));
+        guidance.take(0.0, 3, start()).expect("a release is always legal");
+        assert_eq!(guidance.guide(), 0.0);
+        guidance.take(8.0, 4, start()).expect("nobody guides any more");
+        assert_eq!(guidance.guide(), 8.0);
+    }
+
+    #[test]
+    fn a_silent_guide_has_released_the_hand() {
+        let mut guidance = Guidance::NONE;
+        guidance.take(7.0, 0, start()).expect("nobody guides");
+        heights(&mut guidance, 0, 1000, None);
+        assert_eq!(guidance.guide(), 7.0);
+        heights(&mut guidance, 1000, 1001, None);
+        assert_eq!(guidance.guide(), 0.0);
+        assert!(!guidance.is_free());
+        heights(&mut guidance, 1001, 1501, None);
+        assert!(guidance.is_free());
+    }
+
+    #[test]
+    fn a_release_returns_to_the_trajectory_or_to_the_handle_without_a_jump() {
+        let scripted = Aim::at(at(4.0e-3));
+        let pushing = Aim { force_n: DVec3::Z, yielding: BVec3::new(false, false, true), ..scripted };
+        for (scripted, goal_m) in [(Some(scripted), 4.0e-3), (Some(pushing), -1.0e-3), (None, -1.0e-3)] {
+            let mut guidance = Guidance::NONE;
+            guidance.take(7.0, 0, start()).expect("nobody guides");
+            guidance.aim_at(2, -3.0e-3, 0).expect("it guides");
+            let held = heights(&mut guidance, 0, 500, scripted);
+            guidance.take(0.0, 500 * MILLISECOND_NS, start()).expect("a release is always legal");
+            let way = heights(&mut guidance, 500, 999, scripted);
+            let mut before = *held.last().expect("500 of them");
+            // A minimum-jerk curve is 15/8 as fast as its mean at most.
+            let most_m = 15.0 / 8.0 * (goal_m - before) / 500.0;
+            for z_m in way {
+                assert!(z_m >= before && z_m - before <= most_m * 1.001, "{before} to {z_m}");
+                before = z_m;
+            }
+            // 10 u^3 of the way a millisecond before the end.
+            assert!((before - goal_m).abs() < 1.0e-9, "{before}");
+            let (after, _) = guidance.advance(1000 * MILLISECOND_NS, 1.0e-3, scripted, &start());
+            assert_eq!(after, scripted);
+        }
+    }
+}

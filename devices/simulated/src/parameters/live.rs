@@ -1,0 +1,57 @@
+//! Parameters that change while the loop runs: the guide of the hand and its target.
+
+use super::{MM, SCHEMA};
+use crate::hand::guidance::NotGuiding;
+use crate::simulation::Simulation;
+use flotor_hal::OutOfRange;
+
+/// Indices of the coordinates of the target in the schema: x, y, z.
+const TARGET: [usize; 3] =
+    [index_of("hand_target_x_mm"), index_of("hand_target_y_mm"), index_of("hand_target_z_mm")];
+
+/// Index of the number of the client that guides.
+const GUIDE: usize = index_of("hand_guide");
+
+/// Returns the index of a parameter; fails to compile without one.
+const fn index_of(id: &str) -> usize {
+    let mut index = 0;
+    while !is_same(SCHEMA[index].id().as_bytes(), id.as_bytes()) {
+        index += 1;
+    }
+    index
+}
+
+const fn is_same(one: &[u8], other: &[u8]) -> bool {
+    let mut at = 0;
+    while at < one.len() && at < other.len() && one[at] == other[at] {
+        at += 1;
+    }
+    at == one.len() && at == other.len()
+}
+
+/// Changes the live parameter at `index` of the schema. Real-time: bounded, no allocation.
+///
+/// # Errors
+/// [`OutOfRange`] with the number of the client that guides, if the value is from another one; also for a parameter that is not live.
+pub(crate) fn change(simulation: &mut Simulation, index: usize, value: f64) -> Result<(), OutOfRange> {
+    let refused = |NotGuiding { guide }| OutOfRange { min: guide, max: guide, value };
+    if index == GUIDE {
+        return simulation.guide(value).map_err(refused);
+    }
+    match TARGET.iter().position(|target| *target == index) {
+        Some(axis) => simulation.guide_to(axis, value * MM).map_err(refused),
+        None => Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
+    }
+}
+
+/// Applies the values with which a device was opened: a guide that is named there begins with the first tick. Real-time: bounded, no
+/// allocation.
+pub(crate) fn begin(simulation: &mut Simulation, values: &[f64]) {
+    let guide = values.get(GUIDE).copied().unwrap_or_default();
+    if guide != 0.0 && simulation.guide(guide).is_ok() {
+        for (axis, index) in TARGET.into_iter().enumerate() {
+            // The guide was just named.
+            let _ = simulation.guide_to(axis, values.get(index).copied().unwrap_or_default() * MM);
+        }
+    }
+}
