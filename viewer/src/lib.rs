@@ -29,6 +29,7 @@ pub mod experiment;
 pub mod export;
 pub mod feed;
 pub mod flat;
+pub mod guide;
 pub mod history;
 pub mod palette;
 pub mod panel;

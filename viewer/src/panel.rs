@@ -4,6 +4,7 @@
 //! parameters, or the other way round, by its `mode`). The panel asks an instance of its own: a parameter that refuses
 //! the very value it has follows from others, or has no effect. It is shown, moves along, and cannot be pulled.
 
+use crate::guide::is_for_guides;
 use crate::shape::Shape;
 use flotor_live::{ChangeMessage, Outcome, PanelParameter, PanelPlugin, ParameterShape, SetValue, Subject};
 
@@ -74,7 +75,9 @@ impl Panel {
     /// From what a host says of a plugin, or what a recording's plugin says of itself.
     #[must_use]
     pub fn new(plugin: &PanelPlugin, purpose: Use) -> Self {
-        let plain: Vec<String> = plugin.parameters.iter().map(plain_name).collect();
+        // A hand is guided in the 3D view.
+        let shown = || plugin.parameters.iter().filter(|parameter| !is_for_guides(plugin, &parameter.id));
+        let plain: Vec<String> = shown().map(plain_name).collect();
         let knob = |(parameter, name): (&PanelParameter, &String)| Knob {
             name: if plain.iter().filter(|other| *other == name).count() > 1 {
                 format!("{name} ({})", parameter.unit)
@@ -90,7 +93,7 @@ impl Panel {
         Self {
             name: plugin.name.clone(),
             id: plugin.id.clone(),
-            knobs: plugin.parameters.iter().zip(&plain).map(knob).collect(),
+            knobs: shown().zip(&plain).map(knob).collect(),
             refusal: None,
             earlier: Vec::new(),
         }
@@ -302,7 +305,8 @@ mod tests {
     }
 
     fn plugin(parameters: Vec<PanelParameter>) -> PanelPlugin {
-        PanelPlugin { name: "s".into(), id: "spring".into(), file: "".into(), parameters }
+        let (name, id) = ("s".to_owned(), "spring".to_owned());
+        PanelPlugin { name, id, file: "".into(), is_simulated: false, parameters }
     }
 
     #[test]

@@ -389,6 +389,12 @@ fn in_scene_frame(first: Option<&Shape>, sample: &Sample) -> (Pose, Wrench) {
     (mapping.pose_to_model(&sample.pose), Wrench::new(turn * force_n, turn * torque_nm))
 }
 
+/// Where the handle of a device with this first shape is in the scene, before the device is placed, m.
+#[must_use]
+pub fn handle_m(first: Option<&Shape>, sample: &Sample) -> DVec3 {
+    in_scene_frame(first, sample).0.position()
+}
+
 /// The largest radius of what bodies stand on, m.
 fn plates_m(shapes: &[Shape], height_m: f64) -> f64 {
     shapes.iter().map(|shape| footprint_m(shape.rest())).fold(0.25 * height_m, f64::max)

@@ -250,3 +250,118 @@ fn without_a_driver_there_is_one_line_and_pictures_all_the_same() {
     assert!(said.starts_with("error: no window: ") && said.contains("libgl1-mesa-dri"), "{said}");
     assert!(said.contains("--screenshot"), "{said}");
 }
+
+/// Position and force of the run as the window shows them: the same interface without a display, on the same run.
+struct Twin<'a>(egui_kittest::Harness<'a, flotor_viewer::app::Viewer>);
+
+impl Twin<'_> {
+    fn on(directory: &Directory) -> Self {
+        let size = egui::vec2(f32::from(SIZE[0]), f32::from(SIZE[1]));
+        let start = flotor_viewer::app::Start::Live(flotor_viewer::app::Wanted::newest(directory.clone()));
+        let look = flotor_viewer::palette::Look::Dark;
+        Self(
+            egui_kittest::Harness::builder().with_size(size).build_eframe(|creation| {
+                flotor_viewer::app::Viewer::new(&creation.egui_ctx, None, start, look)
+            }),
+        )
+    }
+
+    /// The numbers of a row of the readout, x, y and z, or one; none before there are any.
+    fn row(&mut self, name: &str) -> Option<Vec<f64>> {
+        self.0.run_steps(2);
+        let mut texts: Vec<(egui::Pos2, String)> = Vec::new();
+        for clipped in &self.0.output().shapes {
+            if let egui::Shape::Text(text) = &clipped.shape {
+                texts.push((text.pos, text.galley.text().to_owned()));
+            }
+        }
+        let labels = texts.iter().filter(|(_, text)| text == name);
+        // The readout is above the traces, which have names, too.
+        let (label, _) = labels.min_by(|(a, _), (b, _)| a.y.total_cmp(&b.y))?;
+        let mut row: Vec<_> =
+            texts.iter().filter(|(at, _)| (at.y - label.y).abs() < 4.0 && at.x > label.x).collect();
+        row.sort_by(|(a, _), (b, _)| a.x.total_cmp(&b.x));
+        let numbers = row.iter().filter_map(|(_, text)| text.replace('−', "-").trim().parse().ok());
+        Some(numbers.collect::<Vec<f64>>()).filter(|numbers| !numbers.is_empty())
+    }
+
+    fn handle(&mut self) -> Option<egui::Pos2> {
+        use egui_kittest::kittest::Queryable;
+        self.0.run_steps(2);
+        self.0.query_by_label(flotor_viewer::ui::handle::DRAG).map(|handle| handle.rect().center())
+    }
+}
+
+/// A wall of 2 kN/m under a hand that rests above it: the handle is dragged down until it is shown a millimetre deep, and is
+/// released. The readout then shows 2 N, the force goes without a jump, and the recording replays bit for bit.
+#[test]
+fn a_handle_dragged_a_millimetre_into_a_wall_reads_two_newtons_and_is_released_softly() {
+    if !required(Tool::Display) {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let scene = folder.path().join("wall.toml");
+    let text = "title = \"A wall to press\"\n[device]\nplugin = \"simulated\"\n[device.parameters]\nhand = \"hold\"\nhand_depth_mm = -2\n\
+                [[model]]\nplugin = \"wall\"\n[model.parameters]\nstiffness_n_per_m = 2000\n[limits]\nwatchdog_ms = 60000\n";
+    std::fs::write(&scene, text).expect("a scratch folder can be written to");
+    let file = folder.path().join("run.mcap");
+    let mut run = alone("flotor", folder.path(), None);
+    run.arg("run").arg(&scene).args(["--duration", "10min", "--rate", "500", "--record"]).arg(&file);
+    let mut run = Owned::start(run.stderr(Stdio::null()).stdout(Stdio::null()));
+    let directory = Directory::at(folder.path().join("flotor"));
+    let client = patiently("the run is found", || Client::find(&directory).ok());
+
+    let display = Display::start(folder.path());
+    let mut window = alone("flotor-viewer", folder.path(), Some(&display));
+    window.args(["--size", &format!("{}x{}", SIZE[0], SIZE[1])]).stderr(Stdio::null());
+    let _window = Owned::start(&mut window);
+    let xdotool = |arguments: &[&str]| {
+        let mut command = Command::new("xdotool");
+        command.args(arguments).env("DISPLAY", &display.name).output().is_ok_and(|done| done.status.success())
+    };
+    patiently("the window opens", || xdotool(&["search", "--onlyvisible", "--name", "Flotor"]).then_some(()));
+    let mut twin = Twin::on(&directory);
+    let place = patiently("the handle is in sight", || twin.handle());
+    let [x, first] = [place.x, place.y].map(f64::from);
+    let mut y = first;
+    let moved = |x: f64, y: f64| xdotool(&["mousemove", &format!("{x:.0}"), &format!("{y:.0}")]);
+    // Taken again until the window, which may still be starting, has seen it.
+    patiently("the handle is taken", || {
+        moved(x, first);
+        xdotool(&["sleep", "0.2", "mouseup", "1", "mousedown", "1", "sleep", "0.2"]);
+        y = first + 40.0;
+        moved(x, y);
+        std::thread::sleep(Duration::from_secs(1));
+        (twin.row("Position")?.get(2)? < &1.0).then_some(())
+    });
+    let is_deep = |depth_mm: f64| (depth_mm - 1.0).abs() < 0.015;
+    patiently("the handle is a millimetre deep", || {
+        std::thread::sleep(Duration::from_millis(800));
+        let depth_mm = -*twin.row("Position")?.get(2)?;
+        // A pixel at least.
+        let step = (1.0 - depth_mm) * 8.0;
+        y += if is_deep(depth_mm) { 0.0 } else { step.signum() * step.abs().max(1.0) };
+        is_deep(depth_mm).then_some(()).or_else(|| moved(x, y).then_some(()).filter(|()| false))
+    });
+    let (depth_mm, force_n) =
+        (-twin.row("Position").expect("it is shown")[2], twin.row("Force").expect("it is shown")[2]);
+    eprintln!("shown: {depth_mm} mm deep, {force_n} N");
+    assert!(is_deep(depth_mm), "{depth_mm} mm");
+    assert!((force_n - 2.0 * depth_mm).abs() <= 0.02, "{force_n} N at {depth_mm} mm");
+    xdotool(&["mouseup", "1"]);
+    patiently("the hand is back where it rests", || (twin.row("Position")?[2] > 1.9).then_some(()));
+    client.asker().ask(Ask::Stop).expect("the host listens");
+    patiently("the run ends", || run.try_wait().expect("it is ours"));
+
+    let replay = alone("flotor", folder.path(), None).args(["replay", "--json", "-"]).arg(&file).output();
+    let replay = replay.expect("it starts");
+    let said = String::from_utf8_lossy(&replay.stdout);
+    assert!(replay.status.success() && said.contains("\"bit_exact\": true"), "{said}");
+    let mut recording = flotor_record::Recording::open(&file).expect("a recording");
+    let records = std::iter::from_fn(|| recording.next()).map(|record| record.expect("a whole tick"));
+    let forces: Vec<f64> = records.map(|record| record.model.force().z).collect();
+    let largest_n = forces.iter().copied().fold(0.0, f64::max);
+    let steepest_n = forces.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    // At most 0.25 m/s of the intended position: 0.5 mm in a tick of 2 ms, of which the handle makes half at most.
+    assert!(largest_n > 1.9 && steepest_n < 1.0, "{largest_n} N, {steepest_n} N in a tick");
+}

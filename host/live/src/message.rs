@@ -47,6 +47,9 @@ pub struct PanelPlugin {
     pub id: String,
     /// Its library.
     pub file: PathBuf,
+    /// Whether it is a device that exists in numbers only: nothing that it does reaches a person.
+    #[serde(default)]
+    pub is_simulated: bool,
     /// Its parameters, in the order of its schema.
     pub parameters: Vec<PanelParameter>,
 }
@@ -160,6 +163,7 @@ impl PanelPlugin {
             name: name.to_owned(),
             id: id.to_owned(),
             file,
+            is_simulated: false,
             parameters: schema.iter().enumerate().map(parameter).collect(),
         }
     }

@@ -2,6 +2,7 @@
 //!
 //! - [`geometry`] makes the triangles: wires, primitives, surfaces, arrows, ground.
 //! - A [`camera`] sees them in a [`light`].
+//! - [`drag`] moves a point of the scene with a pointer.
 //! - [`gpu`] draws them on a GPU or a software adapter, into a texture; [`raster`] on the processor, without an adapter.
 //!
 //! Knows neither a window nor a run: the viewer says what is drawn, in which colours, and where the picture goes.
@@ -9,6 +10,7 @@
 //! Nothing here is real-time.
 
 pub mod camera;
+pub mod drag;
 pub mod geometry;
 pub mod gpu;
 pub mod light;

@@ -4,6 +4,7 @@ use super::source::{Parts, connect};
 use super::{Audience, Heading, Source, Viewer, Wanted};
 use crate::devices::Devices;
 use crate::feed::{Arrivals, FeedState, STALE_AFTER};
+use crate::guide::Guide;
 use crate::history::{History, Keep};
 use crate::panel::Panel;
 use crate::player::Player;
@@ -66,6 +67,7 @@ impl Viewer {
         self.devices = Devices::new(History::of_each_device(feed.run(), Keep::Newest(kept)));
         self.heading = Heading::of(feed.run());
         self.limits = feed.greeting().limits;
+        (self.guide, self.drag) = (Guide::new(&feed.greeting().plugins), None);
         self.player = Player::live();
         self.plots.start_over();
         self.view.reset(SceneBuilder::extent(&parts.shapes, self.devices.count()));
@@ -83,6 +85,7 @@ impl Viewer {
         }
         for change in &arrivals.changes {
             self.panels.iter_mut().for_each(|panel| panel.take_in(change));
+            self.take_in_guide(change);
         }
         to_draw(&arrivals.changes).into_iter().for_each(|change| self.follow(change));
         for answer in arrivals.answers {

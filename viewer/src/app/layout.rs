@@ -156,6 +156,7 @@ impl Viewer {
         let part = if has_traces { part } else { 1.0 };
         let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * part).round()));
         self.scene(ui, view, &samples);
+        self.handles(ui, view, &samples, palette);
         self.texts(ui, view, &sample, palette);
         if has_traces {
             self.border(ui, area, view.bottom());

@@ -3,6 +3,7 @@
 //! A picture is made when something has changed, and not otherwise: ticks that came, a hand on the mouse, time that
 //! goes on. All that is shown is state of this module; the parts in [`crate::ui`] only show it.
 
+mod hand;
 mod intake;
 mod keys;
 mod layout;
@@ -16,6 +17,7 @@ use crate::canvas::Canvas;
 use crate::chosen::Chosen;
 use crate::devices::Devices;
 use crate::experiment::Prompt;
+use crate::guide::Guide;
 use crate::history::{History, Sample};
 use crate::palette::{Look, Palette};
 use crate::panel::Panel;
@@ -24,6 +26,7 @@ use crate::remembered::Remembered;
 use crate::scene::{SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use crate::sound::Bell;
+use crate::ui::handle::Drag;
 use crate::ui::plot_stack::{PlotStack, Window};
 use crate::ui::view3d::View3d;
 use crate::ui::{help, playback, readout, style};
@@ -72,6 +75,9 @@ pub struct Viewer {
     /// Force that arrows are scaled for, N, if somebody chose it.
     arrow_force_n: Option<f64>,
     facts: SceneFacts,
+    /// The hands that can be guided, and the drag of a handle that is under way.
+    guide: Guide,
+    drag: Option<Drag>,
     plots: PlotStack,
     look: Look,
     /// What was chosen, if anything was.
@@ -158,6 +164,8 @@ impl Viewer {
             view: View3d::new(Canvas::new(device), extent),
             arrow_force_n: None,
             facts: SceneFacts::default(),
+            guide: Guide::new(&[]),
+            drag: None,
             plots: PlotStack::new(window),
             look,
             shows_panel: None,

@@ -3,10 +3,12 @@
 use egui::{Context, Grid, RichText, Window};
 
 /// Key and what it does.
-const KEYS: [(&str, &str); 24] = [
+const KEYS: [(&str, &str); 26] = [
     ("Space", "emergency stop; of a recording: play"),
     ("Enter", "takes a typed number; Escape leaves it"),
     ("Ctrl+Z", "the value before the last change"),
+    ("Drag the handle", "guides a simulated hand; release it to give it back"),
+    ("Wheel, Q  E, Shift", "meanwhile: nearer and away; finer"),
     ("W A S D", "turn the view"),
     ("+  -", "nearer, farther"),
     ("R", "the experimenter's view"),

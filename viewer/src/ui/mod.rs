@@ -2,6 +2,7 @@
 
 pub mod device_row;
 pub mod force_position;
+pub mod handle;
 pub mod help;
 pub mod legend;
 pub mod marks;

@@ -3,6 +3,7 @@
 
 mod devices;
 mod effort;
+mod hand;
 mod live;
 mod look;
 mod recording;

@@ -87,10 +87,8 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
     let number = |(_, value): &(String, String)| value.parse().unwrap_or(f64::NAN);
     let values = parameters.iter().map(number);
     let soft: Vec<_> = schema.iter().zip(values).map(|(one, value)| SoftRange::around(one, value)).collect();
-    let panels = vec![
-        PanelPlugin::new("device", "simulated", PathBuf::new(), &[], &[], &[]),
-        PanelPlugin::new("spring", "spring", file, schema, &parameters, &soft),
-    ];
+    let panels =
+        vec![guided_device(), PanelPlugin::new("spring", "spring", file, schema, &parameters, &soft)];
     (run, panels)
 }
 
@@ -107,6 +105,15 @@ pub(crate) fn run_of_devices(title: &str, names: &[&str]) -> RunDescription {
     };
     run.plugins = (0..).zip(names).map(device).collect();
     run
+}
+
+/// What a host says of the simulated device, as far as it is live: the guide of its hand.
+fn guided_device() -> PanelPlugin {
+    let plugin = flotor_viewer::shape::load_file(&plugin_file("simulated")).expect("the device loads");
+    let mut device = PanelPlugin::new("device", "simulated", PathBuf::new(), plugin.parameters(), &[], &[]);
+    device.is_simulated = true;
+    device.parameters.retain(|parameter| parameter.live);
+    device
 }
 
 /// A tick of a handle that goes up and down once a second.
@@ -221,6 +228,23 @@ impl FakeHost {
         stream.set_read_timeout(Some(PATIENCE)).expect("a time-out is legal");
         let asked = self.frames.take().expect("they talk sense");
         assert!(filled.is_err() && asked.is_none(), "something was asked: {asked:?}");
+    }
+
+    /// All requests that have arrived, or do soon.
+    pub(crate) fn all_requests(&mut self) -> Vec<Ask> {
+        let mut asked = Vec::new();
+        loop {
+            while let Some((_, payload)) = self.frames.take().expect("they talk sense") {
+                asked.push(serde_json::from_slice::<Request>(payload).expect("a request").ask);
+            }
+            let stream = self.stream.as_mut().expect("somebody watches");
+            stream.set_read_timeout(Some(Duration::from_millis(200))).expect("a time-out is legal");
+            let filled = self.frames.fill(stream);
+            stream.set_read_timeout(Some(PATIENCE)).expect("a time-out is legal");
+            if filled.is_err() {
+                return asked;
+            }
+        }
     }
 
     /// The next request; answered with yes or the reason why not.

@@ -165,6 +165,8 @@ pub struct PluginReport {
     pub parameters: Vec<(String, String)>,
     /// Where each parameter is usefully moved by hand; none for what is no number.
     pub soft_ranges: Vec<Option<SoftRange>>,
+    /// Of a device: what it moves.
+    pub embodiment: Option<Embodiment>,
     /// Latency that a device declares, s; 0 of a model.
     pub latency_s: f64,
     /// Of a device: the outputs of models that reach the hand there.

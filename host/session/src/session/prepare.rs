@@ -395,6 +395,7 @@ fn report(
         schema: plugin.parameters(),
         settings: written.collect(),
         soft_ranges: soft_ranges(plugin, &parameters),
+        embodiment: plugin.device_info().map(|info| info.embodiment()),
         parameters,
         latency_s: 0.0,
         felt: Demand::WRENCH,
@@ -404,8 +405,12 @@ fn report(
     }
 }
 
-/// Of every parameter the range it is moved in by hand, by its value in force.
+/// Of every parameter the range it is moved in by hand, by its value in force. No hand is on a simulated device: its numbers
+/// change at once.
 fn soft_ranges(plugin: &Plugin, values: &[(String, String)]) -> Vec<Option<SoftRange>> {
+    if plugin.device_info().is_some_and(|info| info.embodiment() == Embodiment::Simulated) {
+        return vec![None; values.len()];
+    }
     let number = |(_, value): &(String, String)| value.parse().unwrap_or(f64::NAN);
     values.iter().map(number).enumerate().map(|(index, value)| plugin.soft_range(index, value)).collect()
 }

@@ -22,7 +22,7 @@ use crate::scene::Scene;
 use crate::{ControlError, Controls, LatchGuard, NewValue, Observer, PluginReport, Session};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_hal::Demand;
+use flotor_hal::{Demand, Embodiment};
 use flotor_live::{
     Ask, Directory, EndKind, Greeting, PROTOCOL, PanelPlugin, Publication, PublishError, RefusalCause, Serve,
     process_number,
@@ -72,8 +72,9 @@ pub fn announce(
 }
 
 fn panel(report: &PluginReport) -> PanelPlugin {
-    let PluginReport { name, metadata, schema, parameters, soft_ranges, .. } = report;
-    PanelPlugin::new(name, &metadata.id, metadata.path.clone(), schema, parameters, soft_ranges)
+    let PluginReport { name, metadata, schema, parameters, soft_ranges, embodiment, .. } = report;
+    let panel = PanelPlugin::new(name, &metadata.id, metadata.path.clone(), schema, parameters, soft_ranges);
+    PanelPlugin { is_simulated: *embodiment == Some(Embodiment::Simulated), ..panel }
 }
 
 /// An observer, and the clients of the telemetry server.

@@ -1,0 +1,62 @@
+//! The pointer as the hand: handles that can be dragged, and the requests that come of it.
+
+use super::Viewer;
+use crate::history::Sample;
+use crate::palette::Palette;
+use crate::player::Motion;
+use crate::scene::handle_m;
+use crate::ui::handle::{Handle, handle};
+use egui::{Rect, Ui};
+use flotor_drawing::geometry::MM_PER_M;
+use flotor_live::ChangeMessage;
+use std::time::{Duration, Instant};
+
+/// How soon the window looks again while a hand is held.
+const HOLDING: Duration = Duration::from_millis(50);
+
+impl Viewer {
+    /// The handles of the newest moment in an area with the 3D view.
+    pub(super) fn handles(&mut self, ui: &Ui, area: Rect, samples: &[Sample], palette: &Palette) {
+        let is_now = self.source.is_running() && self.player.motion == Motion::Follow;
+        for (device, sample) in samples.iter().enumerate() {
+            if !is_now || !self.guide.has_hand(device) {
+                continue;
+            }
+            let shape = self.shapes.iter().find(|shape| shape.device() == device);
+            let handle_mm = (handle_m(shape, sample) + self.facts.placing.place_m(device)) * MM_PER_M;
+            let at = Handle {
+                device,
+                position_m: sample.pose.position(),
+                scene_mm: handle_mm,
+                force_n: sample.force_n().length(),
+            };
+            let camera = self.view.camera;
+            let guided = (&mut self.guide, &mut self.drag);
+            handle(
+                ui,
+                (area, &camera),
+                &at,
+                guided,
+                |way_m| shape.map_or(way_m, |shape| shape.mapping().vector_to_device(way_m)),
+                palette,
+            );
+        }
+        let request = match self.drag {
+            Some(_) => self.guide.due(Instant::now()),
+            None => self.guide.release(),
+        };
+        if self.guide.held().is_some() {
+            ui.ctx().request_repaint_after(HOLDING);
+        }
+        if let Some(request) = request {
+            self.ask(request);
+        }
+    }
+
+    /// Hears of a change of the hand: another client may guide it.
+    pub(super) fn take_in_guide(&mut self, change: &ChangeMessage) {
+        if self.guide.take_in(change) {
+            self.say("Another window guides this hand; wait until it has released the handle");
+        }
+    }
+}

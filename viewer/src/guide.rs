@@ -1,0 +1,206 @@
+//! Guidance of a simulated hand: which devices have one, where it is to go, and the requests for it.
+//!
+//! The device declares four live parameters: the number of the client that guides, and the target. It releases the hand when a
+//! client has been silent for a second, so a target is repeated while it stays.
+
+use flotor_hal::DVec3;
+use flotor_live::{Ask, ChangeMessage, Outcome, PanelPlugin, SetValue};
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::time::{Duration, Instant};
+
+/// The parameter with the number of the client that guides; 0 releases the hand.
+const GUIDE: &str = "hand_guide";
+/// The parameters with the target: x, y, z of the device frame, mm.
+const TARGET: [&str; 3] = ["hand_target_x_mm", "hand_target_y_mm", "hand_target_z_mm"];
+/// Largest coordinate of a target, mm.
+const FARTHEST_MM: f64 = 50.0;
+/// Time after which a target that stays is repeated.
+const REPEATED_AFTER: Duration = Duration::from_millis(200);
+
+/// The hands of a run that this client may guide, and the one that it does.
+#[derive(Clone, Debug)]
+pub struct Guide {
+    number: u32,
+    /// Name of each device with such a hand, in the scene's order.
+    hands: Vec<Option<String>>,
+    held: Option<Held>,
+}
+
+#[derive(Clone, Debug)]
+struct Held {
+    device: usize,
+    target_mm: DVec3,
+    sent: Option<(DVec3, Instant)>,
+}
+
+impl Guide {
+    /// Of the plugins of a running host, whose devices come first; of none in a recording.
+    #[must_use]
+    pub fn new(plugins: &[PanelPlugin]) -> Self {
+        let hand = |plugin: &PanelPlugin| has_hand(plugin).then(|| plugin.name.clone());
+        // A number that no other client has, but for one in four thousand million.
+        let random = RandomState::new().build_hasher().finish().to_le_bytes();
+        let number = u32::from_le_bytes([random[0], random[1], random[2], random[3]]).max(1);
+        Self { number, hands: plugins.iter().map(hand).collect(), held: None }
+    }
+
+    /// Whether the hand of a device can be guided.
+    #[must_use]
+    pub fn has_hand(&self, device: usize) -> bool {
+        self.hands.get(device).is_some_and(Option::is_some)
+    }
+
+    /// The device whose hand is guided.
+    #[must_use]
+    pub fn held(&self) -> Option<usize> {
+        self.held.as_ref().map(|held| held.device)
+    }
+
+    /// Takes the hand of a device, whose handle is at a place, m.
+    pub fn take(&mut self, device: usize, handle_m: DVec3) {
+        self.held = self.has_hand(device).then(|| Held { device, target_mm: handle_m * 1.0e3, sent: None });
+    }
+
+    /// Moves the target, m.
+    pub fn move_by(&mut self, by_m: DVec3) {
+        if let Some(held) = &mut self.held {
+            let target_mm = held.target_mm + by_m * 1.0e3;
+            held.target_mm = target_mm.clamp(DVec3::splat(-FARTHEST_MM), DVec3::splat(FARTHEST_MM));
+        }
+    }
+
+    /// Releases the hand; the request for it, if one was held.
+    pub fn release(&mut self) -> Option<Ask> {
+        let device = self.held.take()?.device;
+        Some(Ask::Set { values: vec![self.value(device, GUIDE, "0".to_owned())] })
+    }
+
+    /// The request that is due at a time: the coordinates that have changed, or that the target stays.
+    pub fn due(&mut self, now: Instant) -> Option<Ask> {
+        let held = self.held.as_mut()?;
+        let (device, target_mm, sent) = (held.device, held.target_mm, held.sent);
+        let is_new = |axis: usize| sent.is_none_or(|(sent_mm, _)| sent_mm[axis] != target_mm[axis]);
+        let moved: Vec<usize> = (0..TARGET.len()).filter(|axis| is_new(*axis)).collect();
+        let is_old = sent.is_none_or(|(_, at)| now.duration_since(at) >= REPEATED_AFTER);
+        if moved.is_empty() && !is_old {
+            return None;
+        }
+        held.sent = Some((target_mm, now));
+        let mut values = vec![self.value(device, GUIDE, self.number.to_string())];
+        values.extend(
+            moved.iter().map(|axis| self.value(device, TARGET[*axis], format!("{:.5}", target_mm[*axis]))),
+        );
+        Some(Ask::Set { values })
+    }
+
+    /// Hears of a change; true if the device has refused this client, because another one guides the hand: it is not held then.
+    pub fn take_in(&mut self, change: &ChangeMessage) -> bool {
+        let is_ours = change.parameter == GUIDE && change.number == f64::from(self.number);
+        let is_refused = is_ours && change.outcome != Outcome::Applied && self.held.is_some();
+        if is_refused {
+            self.held = None;
+        }
+        is_refused
+    }
+
+    fn value(&self, device: usize, parameter: &str, value: String) -> SetValue {
+        let plugin = self.hands.get(device).cloned().flatten().unwrap_or_default();
+        SetValue { plugin, parameter: parameter.to_owned(), value }
+    }
+}
+
+/// Whether a plugin is a simulated device with a hand that a client may guide. What could push a person is none, whatever it
+/// declares.
+fn has_hand(plugin: &PanelPlugin) -> bool {
+    let has = |id: &str| plugin.parameters.iter().any(|parameter| parameter.live && parameter.id == id);
+    plugin.is_simulated && has(GUIDE) && TARGET.iter().all(|id| has(id))
+}
+
+/// Whether a parameter of a plugin is one with which its hand is guided, and not for a panel.
+#[must_use]
+pub fn is_for_guides(plugin: &PanelPlugin, parameter: &str) -> bool {
+    plugin.is_simulated && (parameter == GUIDE || TARGET.contains(&parameter))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_live::{PanelParameter, ParameterShape, Subject};
+
+    fn device(is_simulated: bool, live: bool) -> PanelPlugin {
+        let parameter = |id: &str| PanelParameter {
+            id: id.to_owned(),
+            unit: "mm".to_owned(),
+            doc: String::new(),
+            shape: ParameterShape::Real { min: -50.0, max: 50.0, default: 0.0 },
+            live,
+            value: "0".to_owned(),
+            first: "0".to_owned(),
+            soft: None,
+        };
+        PanelPlugin {
+            name: "device".to_owned(),
+            id: "simulated".to_owned(),
+            file: "".into(),
+            is_simulated,
+            parameters: [GUIDE].iter().chain(&TARGET).map(|id| parameter(id)).collect(),
+        }
+    }
+
+    fn sent(ask: Option<Ask>) -> Vec<(String, String)> {
+        let Some(Ask::Set { values }) = ask else { return Vec::new() };
+        assert!(values.iter().all(|value| value.plugin == "device"));
+        values.into_iter().map(|value| (value.parameter, value.value)).collect()
+    }
+
+    #[test]
+    fn only_a_simulated_device_with_live_parameters_has_a_hand() {
+        for (is_simulated, live) in [(true, true), (false, true), (true, false)] {
+            let mut guide = Guide::new(&[device(is_simulated, live)]);
+            assert_eq!(guide.has_hand(0), is_simulated && live);
+            guide.take(0, DVec3::ZERO);
+            assert_eq!(guide.held().is_some(), is_simulated && live);
+        }
+        assert!(!Guide::new(&[]).has_hand(0));
+    }
+
+    #[test]
+    fn a_target_is_sent_when_it_moves_and_repeated_while_it_stays() {
+        let mut guide = Guide::new(&[device(true, true)]);
+        let (start, number) = (Instant::now(), guide.number.to_string());
+        assert_eq!(guide.due(start), None);
+        guide.take(0, DVec3::new(0.0, 0.001, -0.002));
+        let first = sent(guide.due(start));
+        assert_eq!(first[0], (GUIDE.to_owned(), number.clone()));
+        assert_eq!(first[3], (TARGET[2].to_owned(), "-2.00000".to_owned()));
+        guide.move_by(DVec3::new(0.0, 0.0, -0.0005));
+        let next = sent(guide.due(start));
+        assert_eq!(next, [(GUIDE.to_owned(), number.clone()), (TARGET[2].to_owned(), "-2.50000".to_owned())]);
+        assert_eq!(guide.due(start + REPEATED_AFTER / 2), None);
+        assert_eq!(sent(guide.due(start + REPEATED_AFTER)), [(GUIDE.to_owned(), number)]);
+        guide.move_by(DVec3::Z * 1.0e3);
+        assert_eq!(sent(guide.due(start))[1].1, "50.00000");
+        assert_eq!(sent(guide.release()), [(GUIDE.to_owned(), "0".to_owned())]);
+        assert_eq!((guide.release(), guide.due(start)), (None, None));
+    }
+
+    #[test]
+    fn a_hand_that_another_client_guides_is_not_held() {
+        let mut guide = Guide::new(&[device(true, true)]);
+        guide.take(0, DVec3::ZERO);
+        let refused = |number: f64| ChangeMessage {
+            tick: 1,
+            time_ns: 1,
+            plugin: "device".to_owned(),
+            subject: Subject::Parameter,
+            parameter: GUIDE.to_owned(),
+            value: number.to_string(),
+            number,
+            outcome: Outcome::Refused,
+            settings: Vec::new(),
+        };
+        assert!(!guide.take_in(&refused(f64::from(guide.number) + 1.0)), "another client was refused");
+        assert!(guide.take_in(&refused(f64::from(guide.number))));
+        assert_eq!(guide.held(), None);
+    }
+}
