@@ -70,7 +70,9 @@ pub fn observer_of(threshold: f64, criterion: f64) -> TernaryObserver {
 #[must_use]
 pub fn rows(observer: &TernaryObserver, tracks: u32, runs: u32, seed: u64) -> Vec<BiasRow> {
     let threshold = observer.threshold(0.75);
-    let up_down = Procedure::WeightedUpDown(WeightedUpDownRule::default()).start();
+    // Without a floor, as published simulations of the rule.
+    let up_down = WeightedUpDownRule { floor: 0.0, ..WeightedUpDownRule::default() };
+    let up_down = Procedure::WeightedUpDown(up_down).start();
     let quest = Procedure::QuestPlus(QuestPlusRule::default()).start();
     let prior = Prior::default();
     let mut estimates: [Vec<f64>; 3] = Default::default();

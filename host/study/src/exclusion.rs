@@ -114,6 +114,14 @@ impl ExclusionRules {
         *self == Self::default()
     }
 
+    /// Returns what a rule depends on beside the subject, if it depends on the condition.
+    #[must_use]
+    pub fn caution(rule: &str) -> Option<&'static str> {
+        (rule == "least_movement_mm").then_some(
+            "least_movement_mm depends on the stimulus: the same hand moves a stiffer one less, so trials of the stiffest go first",
+        )
+    }
+
     /// The rule as the study file has it: `most_false_alarms = 0.5`.
     #[must_use]
     pub fn text_of(&self, rule: &str) -> String {

@@ -177,6 +177,14 @@ impl Applied {
         }
     }
 
+    /// Returns what the rules that excluded something depend on beside the subject.
+    pub fn cautions(&self) -> impl Iterator<Item = &'static str> {
+        let mut rules: Vec<&str> = self.excluded.iter().map(|exclusion| exclusion.rule).collect();
+        rules.sort_unstable();
+        rules.dedup();
+        rules.into_iter().filter_map(ExclusionRules::caution)
+    }
+
     /// What was excluded by which rule, for people.
     #[must_use]
     pub fn to_text(&self, rules: &ExclusionRules) -> String {
@@ -197,6 +205,7 @@ impl Applied {
                 None => {}
             }
         }
+        lines.extend(self.cautions().map(|caution| format!("  note                          {caution}")));
         lines.join("\n")
     }
 }

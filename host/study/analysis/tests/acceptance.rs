@@ -7,6 +7,7 @@ use flotor_analysis::{AnalysisOptions, JndAnalysis, SubjectRecord, analyse_jnd, 
 use flotor_study::bias::{BiasRow, Method, observer_of, rows};
 use flotor_study::log::TrialEvent;
 use flotor_study::observer::{Population, Sensitivity, SimulatedSubject};
+use flotor_study::procedure::{Procedure, WeightedUpDownRule};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, SubjectNumber};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::Exploration;
@@ -114,7 +115,10 @@ fn the_staircase_errs_as_it_is_known_to() {
         (0.75, 0.8797, 0.186, 0.058, 18.0),
         (1.0, 1.0505, 0.180, 0.050, 17.6),
     ];
-    let mut jnd = JndProtocol { bases: vec![26.0], replications: 20, ..JndProtocol::default() };
+    // The other simulation has no floor.
+    let rule = WeightedUpDownRule { floor: 0.0, ..WeightedUpDownRule::default() };
+    let procedure = Procedure::WeightedUpDown(rule);
+    let mut jnd = JndProtocol { bases: vec![26.0], replications: 20, procedure, ..JndProtocol::default() };
     jnd.demo.shown = false;
     let protocol = Protocol::Jnd(jnd);
     for (criterion, ratio, expected, deviation, trials) in table {

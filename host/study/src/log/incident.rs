@@ -35,11 +35,31 @@ pub enum Incident {
         /// How far forward, ms.
         by_ms: i64,
     },
+    /// The sitting broke off without a line of its own: the process was killed, or the power failed. Written when it goes on.
+    Killed,
     /// The movement of a trial could not be recorded; the sitting went on.
     NotRecorded {
         /// Why.
         reason: String,
     },
+}
+
+impl Incident {
+    /// Returns true if the sitting is over until it is resumed.
+    pub(super) fn ends_the_sitting(&self) -> bool {
+        match self {
+            Self::EmergencyStop { .. }
+            | Self::RunEnded { .. }
+            | Self::WindowClosed
+            | Self::Stopped
+            | Self::Signal
+            | Self::Killed => true,
+            Self::OutOfRange
+            | Self::MissedTicks { .. }
+            | Self::TimeOfDaySet { .. }
+            | Self::NotRecorded { .. } => false,
+        }
+    }
 }
 
 impl fmt::Display for Incident {
@@ -55,6 +75,9 @@ impl fmt::Display for Incident {
             Self::TimeOfDaySet { by_ms } => {
                 let (way, s) = (if *by_ms < 0 { "back" } else { "forward" }, by_ms.unsigned_abs() / 1000);
                 write!(f, "the time of day was set {way} by {s} s; times of the sitting go on without a jump")
+            }
+            Self::Killed => {
+                f.write_str("broke off without a line: the process was killed, or the power failed")
             }
             Self::NotRecorded { reason } => write!(f, "the movement was not recorded: {reason}"),
         }

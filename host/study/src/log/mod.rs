@@ -29,8 +29,8 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 /// Revision of the format: 2 has times of day and incidents, 3 has answers that were taken back, 4 has the contents of files and the
-/// time of day that was set.
-pub const FORMAT: u32 = 4;
+/// time of day that was set, 5 has sittings that broke off without a reason.
+pub const FORMAT: u32 = 5;
 
 /// What a line says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

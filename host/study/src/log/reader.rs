@@ -121,6 +121,8 @@ pub struct SittingLog {
     pub complete: bool,
     /// How often it was taken up again.
     pub resumed: u32,
+    /// The last event, notes aside, says why the sitting is over for now.
+    has_reason_to_end: bool,
     sitting: Sitting,
     path: PathBuf,
     complete_bytes: u64,
@@ -188,6 +190,7 @@ impl SittingLog {
             began: None,
             complete: false,
             resumed: 0,
+            has_reason_to_end: false,
             sitting,
             path: path.into(),
             complete_bytes: 0,
@@ -199,6 +202,10 @@ impl SittingLog {
     fn take_in(&mut self, event: Event, time: Option<TimeOfDay>) -> Result<(), LogProblem> {
         if self.complete && !matches!(event, Event::Note { .. }) {
             return Err(LogProblem::Order("after `end` only notes may follow"));
+        }
+        if !matches!(event, Event::Note { .. }) {
+            self.has_reason_to_end =
+                matches!(&event, Event::Incident(incident) if incident.ends_the_sitting());
         }
         match event {
             Event::Begin(_) => Err(LogProblem::Order("a second `begin`")),
@@ -299,14 +306,17 @@ impl SittingLog {
         Ok(if self.begin.is_of_a_person() { writer.stamped() } else { writer })
     }
 
-    /// The sitting where it stopped, and the log to go on with: a line that was never completed is cut off, and the
-    /// resumption is noted.
+    /// Returns the sitting where it stopped, and the log to go on with: a line that was never completed is cut off, and the
+    /// resumption is noted. If a person's sitting broke off without a reason in the log, that is an incident.
     ///
     /// # Errors
     /// What the system said.
     pub fn resume(self, version: &str) -> Result<(Sitting, LogWriter), LogError> {
         let mut writer = self.writer()?;
         let trials = self.sitting.presented();
+        if self.begin.is_of_a_person() && !self.has_reason_to_end {
+            writer.write(&Event::Incident(Incident::Killed))?;
+        }
         writer.write(&Event::Resume { trials, version: version.to_owned() })?;
         Ok((self.sitting, writer))
     }

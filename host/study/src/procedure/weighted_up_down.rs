@@ -56,7 +56,7 @@ pub struct WeightedUpDownRule {
     pub averaging: Averaging,
     /// Which step is applied at a halving reversal.
     pub step_at_reversal: StepAtReversal,
-    /// The difference never becomes smaller than this.
+    /// The difference never becomes smaller than this, which is above 0: without a difference no answer is right or wrong.
     pub floor: f64,
     /// Nor larger than this.
     pub ceiling: f64,
@@ -65,7 +65,7 @@ pub struct WeightedUpDownRule {
 }
 
 impl Default for WeightedUpDownRule {
-    /// The settings of CMU-RI-TR-07-21, section 4.2.
+    /// The settings of CMU-RI-TR-07-21, section 4.2; of the floor, which the thesis leaves open, 1 %.
     fn default() -> Self {
         Self {
             initial_delta: 0.40,
@@ -76,7 +76,7 @@ impl Default for WeightedUpDownRule {
             average_from: 4,
             averaging: Averaging::BothEnds,
             step_at_reversal: StepAtReversal::New,
-            floor: 0.0,
+            floor: 0.01,
             ceiling: 0.95,
             trials_most: 200,
         }
@@ -121,8 +121,9 @@ impl WeightedUpDownRule {
             1.0,
             "must be above 0 and below 1 (a base minus all of it is nothing)",
         )?;
-        if !(self.floor >= 0.0 && self.floor < self.ceiling) {
-            return Err(InvalidRule::new("--floor", self.floor, "must be 0 to below --ceiling"));
+        if !(self.floor > 0.0 && self.floor < self.ceiling) {
+            let legal = "must be above 0 (no answer to equal stimuli is right) and below --ceiling";
+            return Err(InvalidRule::new("--floor", self.floor, legal));
         }
         if !(self.initial_delta > self.floor && self.initial_delta <= self.ceiling) {
             let legal = "must be above --floor and up to --ceiling";

@@ -2,6 +2,7 @@
 
 use super::{Input, Screen};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// A line for a window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,6 +43,27 @@ pub enum Said {
     },
 }
 
+impl Said {
+    /// Reads a line of a window.
+    ///
+    /// # Errors
+    /// What is wrong with the line, in words.
+    pub fn read(line: &str) -> Result<Self, String> {
+        let value: Value =
+            serde_json::from_str(line).map_err(|error| format!("the line is no JSON: {error}"))?;
+        let wrong = |error: serde_json::Error| error.to_string();
+        match (value.get("input"), value.get("window")) {
+            (Some(_), _) => serde_json::from_value(value).map(Self::Input).map_err(wrong),
+            (None, Some(window)) => {
+                serde_json::from_value(window.clone()).map(|window| Self::Window { window }).map_err(wrong)
+            }
+            (None, None) => {
+                Err("the line has neither `input` nor `window`, like {\"input\":\"continue\"}".to_owned())
+            }
+        }
+    }
+}
+
 /// How a window stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -76,6 +98,22 @@ mod tests {
         for (said, line) in said {
             assert_eq!(serde_json::to_string(&said).unwrap(), line);
             assert_eq!(serde_json::from_str::<Said>(line).unwrap(), said);
+            assert_eq!(Said::read(line), Ok(said));
+        }
+    }
+
+    #[test]
+    fn a_wrong_line_is_named_in_words() {
+        for (line, reason) in [
+            ("continue", "the line is no JSON: "),
+            ("{\"key\":\"1\"}", "the line has neither `input` nor `window`"),
+            ("[1]", "the line has neither `input` nor `window`"),
+            ("{\"input\":\"contine\"}", "unknown variant `contine`, expected one of `continue`"),
+            ("{\"input\":\"answer\"}", "missing field `response`"),
+            ("{\"window\":\"shut\"}", "unknown variant `shut`, expected `open`"),
+        ] {
+            let error = Said::read(line).expect_err(line);
+            assert!(error.starts_with(reason) && !error.contains("untagged"), "{line}: {error}");
         }
     }
 }

@@ -88,8 +88,10 @@ pub(super) fn run(arguments: &PowerArguments) -> Result<(), CommandError> {
     };
     let rows: Vec<Power> = counts.into_iter().map(of_size).collect();
     progress.finish_and_clear();
-    let title =
-        format!("{} studies of each size, thresholds in the ratio {}", arguments.runs, arguments.ratio);
+    let title = format!(
+        "{} simulated studies of each size, thresholds in the ratio {}",
+        arguments.runs, arguments.ratio
+    );
     print_result(arguments.json.file(), &rows, || format!("{}\n{}", style::title(&title), to_text(&rows)))
 }
 

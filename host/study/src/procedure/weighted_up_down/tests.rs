@@ -70,7 +70,7 @@ fn the_difference_stays_between_floor_and_ceiling_and_an_endless_track_ends() {
     let mut track = WeightedUpDown::new(&WeightedUpDownRule::default());
     while !track.is_done() {
         track.answer(Correct);
-        assert!(track.delta() >= 0.0);
+        assert!(track.delta() >= 0.01, "no pair without a difference is judged");
     }
     assert_eq!((track.trials(), track.threshold()), (200, None));
     let mut track = WeightedUpDown::new(&WeightedUpDownRule::default());
@@ -82,11 +82,11 @@ fn the_difference_stays_between_floor_and_ceiling_and_an_endless_track_ends() {
 
 #[test]
 fn impossible_settings_are_refused() {
-    let refused = |change: fn(&mut WeightedUpDownRule)| {
+    fn refused(change: impl Fn(&mut WeightedUpDownRule)) -> String {
         let mut rule = WeightedUpDownRule::default();
         change(&mut rule);
         rule.check().unwrap_err().to_string()
-    };
+    }
     assert_eq!(WeightedUpDownRule::default().check(), Ok(()));
     assert_eq!(refused(|rule| rule.target = 0.5), "--target 0.5: must be above 0.5 (guessing) and below 1");
     assert_eq!(refused(|rule| rule.first_step = f64::NAN), "--step NaN: must be above 0 and below 1");
@@ -94,6 +94,10 @@ fn impossible_settings_are_refused() {
         refused(|rule| rule.initial_delta = 0.0),
         "--initial 0: must be above --floor and up to --ceiling"
     );
-    assert_eq!(refused(|rule| rule.floor = -0.1), "--floor -0.1: must be 0 to below --ceiling");
+    for floor in [0.0, -0.1] {
+        let said = refused(|rule| rule.floor = floor);
+        let legal = "must be above 0 (no answer to equal stimuli is right) and below --ceiling";
+        assert_eq!(said, format!("--floor {floor}: {legal}"));
+    }
     assert_eq!(refused(|rule| rule.average_from = 9), "--average-from 9: must be 1 to --stop-after (8)");
 }

@@ -41,11 +41,11 @@ impl<W: Write> FrontEnd for JsonLines<W> {
             // The window is closed.
             Err(RecvTimeoutError::Disconnected) => return Ok(Heard::Closed),
         };
-        match serde_json::from_str(&line) {
+        match Said::read(&line) {
             Ok(Said::Input(input)) => Ok(Heard::Input(input)),
             Ok(Said::Window { .. }) => Ok(Heard::Nothing),
             Err(error) => {
-                self.refuse(&error.to_string())?;
+                self.refuse(&error)?;
                 Ok(Heard::Nothing)
             }
         }
