@@ -75,6 +75,7 @@ impl Cohort {
     #[must_use]
     pub fn subject(&self, subject: SubjectNumber) -> SimulatedSubject {
         SimulatedSubject::new(&self.population, self.seed, subject, self.middle())
+            .about(self.protocol.stimulus())
     }
 
     fn begin(&self, subject: SubjectNumber) -> Begin {

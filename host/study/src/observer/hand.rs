@@ -4,9 +4,9 @@ use crate::protocol::SubjectNumber;
 use crate::random::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
-/// The movement of a hand on a vertical object: down and up about a place below home, as the subjects of
-/// CMU-RI-TR-07-21 told of themselves (section 5). The hand is compliant, so a stiffer object moves less under it and
-/// pushes back more.
+/// The movement of a hand on a vertical object: it aims at places, down and up about one below home at a pace of its own, whatever
+/// it feels. The hand is compliant, so a stiffer object moves less under it and pushes back more: speed and acceleration fall with
+/// the stiffness and force rises, contrary to section 5 of CMU-RI-TR-07-21 (`docs/src/experiments.md`, Simulated observers).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HandManner {
     /// Cycles per second.

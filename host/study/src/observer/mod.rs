@@ -9,10 +9,11 @@ mod ternary;
 pub use hand::HandManner;
 pub use ternary::TernaryObserver;
 
-use crate::protocol::SubjectNumber;
+use crate::protocol::{Stimulus, SubjectNumber};
 use crate::random::{Purpose, Stream};
 use crate::trial::{Modality, Phase, Position, Presented, Response, Trial};
 use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// How well a modality tells differences.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,9 +24,20 @@ pub struct Sensitivity {
     pub criterion: f64,
 }
 
+/// A quality of which a Weber fraction is published.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Percept {
+    /// Stiffness that is pressed.
+    Stiffness,
+    /// Weight that pulls at the hand.
+    FeltForce,
+    /// Constant resistance that is pushed against.
+    ExertedForce,
+}
+
 /// The people a study draws its simulated subjects from.
 ///
-/// The defaults are those whose expected result equals the published one (Weber fractions of 14.2 and 17.2 %, about
+/// The defaults are of stiffness: those whose expected result equals the published one (Weber fractions of 14.2 and 17.2 %, about
 /// 200 pairs, t(15) of 3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Population {
@@ -45,9 +57,9 @@ pub struct Population {
     pub bias_spread: f64,
     /// Share of trials answered without attention, first or second by chance.
     pub lapse: f64,
-    /// Spread between subjects of how much a rating rises with the stimulus (mean 1).
-    pub rating_slope_spread: f64,
-    /// Noise of a rating, as a share of the mean rating.
+    /// Spread between subjects of the exponent by which a rating rises with the stimulus (mean 1; Stevens's power law).
+    pub rating_exponent_spread: f64,
+    /// Noise of a rating (deviation of its logarithm).
     pub rating_noise: f64,
     /// Spread of the subjects' free scales (deviation of the logarithm).
     pub rating_modulus_spread: f64,
@@ -64,14 +76,39 @@ impl Default for Population {
             criterion_spread: 0.25,
             bias_spread: 0.0,
             lapse: 0.0,
-            rating_slope_spread: 1.1,
-            rating_noise: 0.5,
+            rating_exponent_spread: 0.7,
+            rating_noise: 0.47,
             rating_modulus_spread: 1.0,
         }
     }
 }
 
 impl Population {
+    /// Returns the people who judge a quality.
+    ///
+    /// Of forces the published fractions are thresholds at about 75 %: 5.9 % of weights of 0.3 to 3 kg (Fechner's data, after Laming
+    /// 1986), 7 % of constant resistances of 2.5 to 10 N (Pang, Tan and Durlach 1991, Percept. Psychophys. 49:531). On
+    /// neither is an effect of vision assumed.
+    #[must_use]
+    pub fn judging(percept: Percept) -> Self {
+        match percept {
+            Percept::Stiffness => Self::default(),
+            Percept::FeltForce => Self::with_thresholds([0.059; 2]),
+            Percept::ExertedForce => Self::with_thresholds([0.07; 2]),
+        }
+    }
+
+    /// Returns the usual people, but with these mean thresholds at 75 %, shares of the base, with vision and without.
+    #[must_use]
+    pub fn with_thresholds([vh, h]: [f64; 2]) -> Self {
+        let usual = Self::default();
+        let of = |usual: Sensitivity, threshold: f64| {
+            let unit = TernaryObserver { sigma: 1.0, criterion: usual.criterion, bias: 0.0, lapse: 0.0 };
+            Sensitivity { sigma: threshold / unit.threshold(0.75), ..usual }
+        };
+        Self { vh: of(usual.vh, vh), h: of(usual.h, h), ..usual }
+    }
+
     /// How a modality tells differences on average.
     #[must_use]
     pub fn sensitivity(&self, modality: Modality) -> Sensitivity {
@@ -87,10 +124,11 @@ impl Population {
 pub struct SimulatedSubject {
     population: Population,
     seed: u64,
+    answer_seed: u64,
     subject: SubjectNumber,
     vh: TernaryObserver,
     h: TernaryObserver,
-    rating_slope: f64,
+    rating_exponent: f64,
     rating_modulus: f64,
     middle: f64,
 }
@@ -117,10 +155,11 @@ impl SimulatedSubject {
         Self {
             population: *population,
             seed,
+            answer_seed: seed,
             subject,
             vh,
             h,
-            rating_slope: (1.0 + stream.normal() * population.rating_slope_spread).max(0.0),
+            rating_exponent: (1.0 + stream.normal() * population.rating_exponent_spread).max(0.0),
             rating_modulus: 10.0 * libm::exp(stream.normal() * population.rating_modulus_spread),
             middle,
         }
@@ -147,20 +186,27 @@ impl SimulatedSubject {
         }
     }
 
+    /// Draws the noise of answers for this stimulus: the same subject has other noise with another object.
+    #[must_use]
+    pub fn about(self, stimulus: &Stimulus) -> Self {
+        Self { answer_seed: self.seed ^ xxh3_64(stimulus.to_string().as_bytes()), ..self }
+    }
+
     /// The answer to a trial.
     #[must_use]
     pub fn respond(&self, trial: &Trial) -> Response {
         if trial.phase == Phase::Practice {
             return Response::Seen;
         }
-        let mut stream = Stream::new(self.seed, Purpose::Answer, self.subject.get(), trial.number);
+        let mut stream = Stream::new(self.answer_seed, Purpose::Answer, self.subject.get(), trial.number);
         match trial.presented {
             Presented::One { value } => {
-                let rise = self.rating_slope * (value / self.middle - 1.0);
+                let rise = self.rating_exponent * libm::log(value / self.middle);
                 let noise = stream.normal() * self.population.rating_noise;
-                // People do not write ratings with sixteen digits: three are kept of the usual size.
+                // People do not write ratings with sixteen digits, and none that is not above 0.
                 let step = self.rating_modulus / 100.0;
-                Response::Rating((self.rating_modulus * (1.0 + rise + noise) / step).round() * step)
+                let steps = (100.0 * libm::exp(rise + noise)).round().max(1.0);
+                Response::Rating(steps * step)
             }
             Presented::Pair(pair) => {
                 let observer = self.observer(trial.modality, pair.base);
@@ -171,5 +217,58 @@ impl SimulatedSubject {
                 observer.respond(second_minus_first, &mut stream)
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A threshold at 75 % of the people who judge a quality is the published one.
+    #[test]
+    fn each_quality_has_the_published_threshold() {
+        for (percept, published) in [(Percept::FeltForce, 0.059), (Percept::ExertedForce, 0.07)] {
+            let population = Population::judging(percept);
+            for Sensitivity { sigma, criterion } in [population.vh, population.h] {
+                let observer = TernaryObserver { sigma, criterion, bias: 0.0, lapse: 0.0 };
+                assert!((observer.threshold(0.75) - published).abs() < 1.0e-12, "{percept:?}");
+            }
+        }
+        assert_eq!(Population::judging(Percept::Stiffness), Population::default());
+    }
+
+    /// People write numbers above 0 alone.
+    #[test]
+    fn every_rating_is_above_0() {
+        for subject in (1..=200).filter_map(SubjectNumber::new) {
+            let simulated = SimulatedSubject::new(&Population::default(), 7, subject, 30.0);
+            for number in 1..=100 {
+                let presented = Presented::One { value: if number % 2 == 0 { 12.0 } else { 48.0 } };
+                let (phase, replication, track, repeat) = (Phase::Main, 1, 0, 0);
+                let modality = Modality::H;
+                let answer = simulated.respond(&Trial {
+                    number,
+                    phase,
+                    replication,
+                    track,
+                    modality,
+                    presented,
+                    repeat,
+                });
+                assert!(matches!(answer, Response::Rating(rating) if rating > 0.0), "{answer:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn another_object_has_other_noise_and_the_same_subject() {
+        let subject = SubjectNumber::new(1).expect("a number");
+        let of = |model: &str| {
+            let stimulus = Stimulus { model: model.to_owned(), parameter: "stiffness_n_per_m".to_owned() };
+            SimulatedSubject::new(&Population::default(), 7, subject, 30.0).about(&stimulus)
+        };
+        let (wall, spring) = (of("wall"), of("spring"));
+        assert_eq!(wall.observer(Modality::H, 17.0), spring.observer(Modality::H, 17.0));
+        assert_ne!(wall.answer_seed, spring.answer_seed);
     }
 }

@@ -52,6 +52,12 @@ impl Stimulus {
         (name.replace('_', " "), unit)
     }
 
+    /// Returns true where the value is proportional to a stiffness.
+    #[must_use]
+    pub fn is_stiffness(&self) -> bool {
+        self.parameter.starts_with("gamma") || self.parameter.contains("stiffness")
+    }
+
     /// What people are asked about when this is varied: a force where the parameter is one, else stiffness.
     #[must_use]
     pub fn quality(&self) -> Quality {

@@ -2,7 +2,8 @@
 
 use clap::ValueEnum;
 use flotor_command::options::real;
-use flotor_study::protocol::{AtBoundary, FirstModality};
+use flotor_study::observer::{Percept, Population};
+use flotor_study::protocol::{AtBoundary, FirstModality, Quality, Stimulus};
 use flotor_study::trial::Modality;
 
 /// `--first`
@@ -107,6 +108,33 @@ impl ForceWay {
             Self::Exerted => &[],
         }
     }
+}
+
+/// Returns the simulated people who judge pairs of a stimulus.
+///
+/// # Errors
+/// No Weber fraction of the stimulus is published.
+pub(super) fn population(stimulus: &Stimulus, way: Option<ForceWay>) -> Result<Population, String> {
+    let percept = match (stimulus.quality(), way) {
+        (Quality::Force, Some(ForceWay::Exerted)) => Percept::ExertedForce,
+        (Quality::Force, Some(ForceWay::Felt) | None) => Percept::FeltForce,
+        (Quality::Stiffness, _) if stimulus.is_stiffness() => Percept::Stiffness,
+        (Quality::Stiffness, _) => {
+            return Err(format!(
+                "stimulus {stimulus}: simulated observers know Weber fractions of stiffness and of force alone; give their \
+                 thresholds, with vision and without, like --weber 0.14,0.17"
+            ));
+        }
+    };
+    Ok(Population::judging(percept))
+}
+
+/// `VH,H`: two shares between 0 and 1.
+pub(super) fn thresholds(text: &str) -> Result<[f64; 2], String> {
+    let (vh, h) = text.split_once(',').ok_or("write VH,H, like 0.14,0.17")?;
+    let both = [real(vh)?, real(h)?];
+    let are_shares = both.iter().all(|share| (0.0..1.0).contains(share) && *share > 0.0);
+    if are_shares { Ok(both) } else { Err("both are shares above 0 and below 1".to_owned()) }
 }
 
 /// `LEAST-MOST`, of which the first is smaller.
