@@ -14,6 +14,7 @@ use flotor_tests::process::Owned;
 use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::watched::{watch, watch_strong};
+use flotor_tests::workspace_root;
 use rustix::process::Signal;
 use serialport::{SerialPort, TTYPort};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -614,4 +615,34 @@ fn noise_on_the_line_is_counted_and_moves_nothing() {
         emulator.lines.by_ref().map(|line| line.expect("text")).find(|line| !line.starts_with("connected"));
     let line = line.expect("the emulator says what it rejected");
     assert!(line.starts_with("closed") && number(&line, "rejected") >= 20, "{line}");
+}
+
+/// The book's first command for a person at a device, with the book's scene of that device.
+#[test]
+fn a_study_runs_with_the_scene_of_the_book() {
+    let book = workspace_root().join("docs/src");
+    let read = |chapter: &str| std::fs::read_to_string(book.join(chapter)).expect("a chapter of the book");
+    let page = read("devices/maglev.md");
+    let (_, rest) =
+        page.split_once("<!-- test: file maglev.toml -->\n```toml\n").expect("the scene of the book");
+    let (scene, _) = rest.split_once("```").expect("its end");
+    let command = "flotor study jnd --observer human --subject 3 --scene maglev.toml --out people";
+    assert!(read("experiments.md").contains(command), "the book has another command");
+    // The scene is tried with several stimuli before the sitting.
+    let emulator = Emulator::staying("tcp", "127.0.0.1:0", &[]);
+    let scratch = Scratch::default();
+    // A busy machine may answer late.
+    let scene = scene
+        .replace(
+            "\"127.0.0.1:5679\"",
+            &format!("\"{}\"\nwatchdog_ms = 700\ntimeout_ms = 8000", emulator.address),
+        )
+        .replace("[limits]", "[limits]\nwatchdog_ms = 60000");
+    let _ = scratch.file("maglev.toml", scene);
+    let words = command.split_whitespace().skip(1);
+    let more =
+        ["--screen", "terminal", "--noise", "off", "--no-demo", "--least-time=0s", "--least-movement-mm=0"];
+    let ran = Flotor::with(words.chain(more)).inside(scratch.path()).reading("\n\n\n1\nq\n").run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(ran.stdout.contains("sub-03 stopped after 1 presentations"), "{ran:?}");
 }

@@ -452,7 +452,8 @@ fn screens_travel_as_json_lines() {
         ran.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let names: Vec<&str> = screens.iter().filter_map(|screen| screen["screen"].as_str()).collect();
     assert_eq!(names, ["ready", "feel", "feel", "ask", "feel"]);
-    assert!(screens.iter().any(|line| line["refused"].is_string()), "nonsense is answered");
+    let refused = screens.iter().find_map(|line| line["refused"].as_str()).expect("nonsense is answered");
+    assert!(refused.starts_with("the line is no JSON: "), "{refused}");
     assert_eq!(SittingLog::read(&log_of(&out, 1)).unwrap().trials.len(), 1);
 }
 
@@ -600,6 +601,29 @@ fn an_emergency_stop_in_a_sitting_leaves_a_line_and_a_recording() {
     assert!(motion.join("sub-01_task-jnd_trial-0001_run-2_motion.mcap").exists());
     let log = SittingLog::read(&log_of(&out, 1)).unwrap();
     assert_eq!(log.incidents.last().map(|(_, _, incident)| incident), Some(&Incident::Stopped));
+}
+
+/// What kill -9 or a power failure leaves: the last line of the log gives no reason. Whoever goes on finds the incident.
+#[test]
+fn a_sitting_that_broke_off_without_a_reason_has_an_incident() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let begun = person("terminal", "\n\n\n1\nq\n", &["--no-demo", "--subject", "1"], &out);
+    assert_eq!(begun.code, Some(exit_code::OK), "{begun:?}");
+    let path = log_of(&out, 1);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let kept: String = text.split_inclusive('\n').take_while(|line| !line.contains("\"stopped\"")).collect();
+    assert!(kept.len() < text.len() && kept.contains("\"trial\""), "{text}");
+    std::fs::write(&path, kept).unwrap();
+    for killed in [1, 1] {
+        let resumed = person("terminal", "q\n", &["--no-demo", "--subject", "1", "--resume"], &out);
+        assert_eq!(resumed.code, Some(exit_code::OK), "{resumed:?}");
+        let log = SittingLog::read(&path).unwrap();
+        let found = log.incidents.iter().filter(|(.., incident)| *incident == Incident::Killed).count();
+        assert_eq!(found, killed, "a sitting that was stopped has its reason");
+    }
+    let each = Flotor::with(["analyse", out.to_str().unwrap(), "--each"]).run();
+    assert!(each.stdout.contains("broke off without a line: the process was killed"), "{each:?}");
 }
 
 /// A log that was copied into the folder of another subject would count twice.

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used)] // tests may panic
 
+use flotor_study::dataset::Dataset;
+use flotor_study::log::{Begin, Event, FORMAT, Incident};
+use flotor_study::protocol::{JndProtocol, Protocol, SubjectNumber};
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use serde_json::Value;
@@ -252,5 +255,108 @@ fn an_unfinished_sitting_is_named_and_is_no_data() {
     assert!(
         ran.error().contains("no sitting is complete (sub-01: incomplete after 7 trials, sub-02: "),
         "{ran:?}"
+    );
+}
+
+/// Runs a study of simulated observers without apparatus, and returns the mean Weber fractions of its analysis.
+fn weber(folder: &Path, study: &[&str], out: &str) -> [f64; 2] {
+    let common = ["--apparatus", "none", "--no-demo", "--subjects", "8", "--seed", "7", "--out", out];
+    succeeds(folder, &[&["study"][..], study, &common].concat());
+    succeeds(folder, &["analyse", out, "--json", "result.json"]);
+    let weber = json(folder, "result.json")["weber"].clone();
+    ["vh", "h"].map(|modality| weber[modality].as_f64().unwrap())
+}
+
+/// One observer for everything gave springs, walls, weights and resistances the same Weber fractions to 17 digits.
+#[test]
+fn each_quality_has_weber_fractions_of_its_own() {
+    let scratch = Scratch::default();
+    let folder = scratch.path();
+    let spring = weber(folder, &["jnd"], "spring");
+    let wall =
+        weber(folder, &["jnd", "--stimulus", "wall.stiffness_n_per_m", "--bases", "500,1000,1500"], "wall");
+    let felt = weber(folder, &["force", "--way", "felt"], "felt");
+    let exerted = weber(folder, &["force", "--way", "exerted"], "exerted");
+    let all = [spring, wall, felt, exerted];
+    for (index, one) in all.iter().enumerate() {
+        assert!(all[index + 1..].iter().all(|other| one != other), "{all:?}");
+    }
+    // The published fractions of stiffness are twice those of force and more.
+    for force in [felt, exerted] {
+        assert!(force[0] < 0.8 * spring[0] && force[1] < 0.8 * spring[1], "{all:?}");
+    }
+    let length = ["jnd", "--stimulus", "spring.free_length_mm", "--bases", "25", "--ceiling", "0.5"];
+    let refused =
+        flotor(folder, &[&["study"][..], &length, &["--apparatus", "none", "--out", "length"]].concat());
+    assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
+    assert!(refused.error().contains("--weber 0.14,0.17") && !folder.join("length").exists(), "{refused:?}");
+    let given = weber(folder, &[&length[..], &["--weber", "0.03,0.3"]].concat(), "length");
+    assert!(given[0] < 0.1 && given[1] > 0.2, "{given:?}");
+}
+
+/// A person's rating of 0 or less is refused, and nobody simulated gives one: the usual scale takes the default data.
+#[test]
+fn ratings_of_simulated_observers_are_those_that_people_can_give() {
+    let scratch = Scratch::default();
+    let folder = scratch.path();
+    succeeds(folder, &["study", "magnitude", "--seed", "7", "--apparatus", "none", "--out", "data"]);
+    succeeds(folder, &["analyse", "data", "--ratings", "geometric-mean", "--trials", "trials.csv"]);
+    let table = read(folder, "trials.csv");
+    let head: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let column = head.iter().position(|name| *name == "rating").unwrap();
+    let ratings: Vec<f64> =
+        table.lines().skip(1).filter_map(|line| line.split(',').nth(column).unwrap().parse().ok()).collect();
+    assert!(ratings.len() == 16 * 72 && ratings.iter().all(|rating| *rating > 0.0), "{}", ratings.len());
+}
+
+/// The direction of an effect stands beside that of the thesis.
+#[test]
+fn the_direction_of_movement_stands_beside_that_of_the_thesis() {
+    let scratch = Scratch::default();
+    let folder = scratch.path();
+    let short = ["--subjects", "3", "--replications", "1", "--demo", "0", "--feel", "700ms", "--out", "data"];
+    succeeds(folder, &[&["study", "magnitude"][..], &short].concat());
+    let ran = succeeds(folder, &["analyse", "data", "--html", "page.html"]);
+    let lines: Vec<&str> =
+        ran.stdout.lines().filter(|line| line.contains("exponent of the stimulus")).collect();
+    let ways = ["rises", "rises", "falls"].map(|way| format!("{way} (section 5): not reproduced"));
+    assert!(lines.len() == 3 && lines.iter().zip(&ways).all(|(line, way)| line.ends_with(way)), "{lines:?}");
+    let exponent = |line: &str| -> f64 { line.split_whitespace().nth(4).unwrap().parse().unwrap() };
+    assert!(exponent(lines[0]) < 0.0 && exponent(lines[1]) < 0.0 && exponent(lines[2]) > 0.0, "{lines:?}");
+    let page = words_of(&read(folder, "page.html"));
+    assert!(ways.iter().all(|way| page.contains(way)), "{page}");
+}
+
+/// Thirteen lines about one missed tick each hid everything else.
+#[test]
+fn missed_ticks_are_one_line() {
+    let scratch = Scratch::default();
+    let protocol = Protocol::Jnd(JndProtocol::default());
+    let begin = Begin {
+        format: FORMAT,
+        version: "0.1.0".to_owned(),
+        subject: SubjectNumber::new(1).unwrap(),
+        seed: 1,
+        plan: None,
+        protocol,
+        person: None,
+        observer: Value::from("human"),
+        apparatus: Value::Null,
+        inputs: Vec::new(),
+    };
+    let (_, mut log) = Dataset::at(&scratch.path().join("data")).begin(begin).unwrap();
+    for incident in [
+        Incident::MissedTicks { ticks: 1 },
+        Incident::OutOfRange,
+        Incident::MissedTicks { ticks: 12 },
+        Incident::Stopped,
+    ] {
+        log.write(&Event::Incident(incident)).unwrap();
+    }
+    let ran = succeeds(scratch.path(), &["analyse", "data", "--each"]);
+    let about: Vec<&str> = ran.stdout.lines().filter(|line| line.contains("were missed")).collect();
+    assert_eq!(about, ["  while 2 stimuli were felt: 13 ticks were missed"], "{ran:?}");
+    assert!(
+        ran.stdout.contains("the handle left its range") && ran.stdout.contains("stopped at the keyboard")
     );
 }

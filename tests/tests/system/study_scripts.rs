@@ -27,8 +27,8 @@ const STUDIES: [&[&str]; 6] = [
 ];
 
 /// Rules that take whole sittings and single tracks.
-const WITH_RULES: &str = "task = \"jnd\"\n[options]\nout = \"ruled\"\nsubjects = 5\nbases = [26.5]\nreplications = 4\n\
-                          feel = \"20ms\"\nno_demo = true\ncatch_trials = 1\n[exclusion]\nmost_false_alarms = 0.3\n\
+const WITH_RULES: &str = "task = \"jnd\"\n[options]\nout = \"ruled\"\nsubjects = 8\nbases = [26.5]\nreplications = 4\n\
+                          feel = \"20ms\"\nno_demo = true\ncatch_trials = 1\n[exclusion]\nmost_false_alarms = 0.6\n\
                           least_movement_mm = 0.03\n";
 
 /// The lines of a text that have a number, or the reason why there is none, with single spaces.

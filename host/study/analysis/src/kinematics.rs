@@ -3,9 +3,9 @@
 //! Of a pair, the base alone counts. An adaptive procedure presents larger comparisons where thresholds are larger, and a larger
 //! stimulus is moved otherwise by the same hand: the comparisons would give each modality an effect that is its threshold's.
 
-use super::{AnalysisError, AnalysisOptions, SubjectRecord, conditions, within_factors};
+use super::{AnalysisError, AnalysisOptions, CONFIDENCE, SubjectRecord, conditions, within_factors};
 use flotor_statistics::anova::{Design, Effect, analyse};
-use flotor_statistics::describe::{deviation, mean};
+use flotor_statistics::describe::{MeanInterval, deviation, mean, mean_interval};
 use flotor_study::kinematics::StimulusKinematics;
 use flotor_study::log::TrialEvent;
 use flotor_study::trial::{Position, Presented};
@@ -32,6 +32,9 @@ pub struct KinematicMeasure {
     pub means: Vec<f64>,
     /// Standard error of each mean over subjects.
     pub standard_errors: Vec<f64>,
+    /// Exponent of the stimulus to which the measure is proportional, over subjects: 1 where it is directly, -1 where it is inversely
+    /// proportional; none of a single level.
+    pub exponent: Option<MeanInterval>,
 }
 
 /// Analyses movements over the levels of the stimulus (bases, or stimuli rated). Nothing where some were not measured.
@@ -54,7 +57,9 @@ pub(super) fn measures(
         let means = (0..levels.len()).map(at).collect();
         let standard_errors =
             (0..levels.len()).map(|level| standard_error(&rows, level, levels.len())).collect();
-        found.push(KinematicMeasure { measure, anova, means, standard_errors });
+        let exponents: Option<Vec<f64>> = rows.iter().map(|row| exponent(levels, row)).collect();
+        let exponent = exponents.and_then(|exponents| mean_interval(&exponents, CONFIDENCE).ok());
+        found.push(KinematicMeasure { measure, anova, means, standard_errors, exponent });
     }
     Ok(found)
 }
@@ -65,6 +70,19 @@ fn standard_error(rows: &[Vec<f64>], level: usize, levels: usize) -> f64 {
         |row: &Vec<f64>| mean(&row.iter().skip(level).step_by(levels).copied().collect::<Vec<_>>());
     let means: Vec<f64> = rows.iter().map(of_subject).collect();
     deviation(&means) / (means.len() as f64).sqrt()
+}
+
+/// Slope of the logarithm of a subject's measure, both modalities together, over the logarithm of the stimulus, by least squares; none
+/// of a single level, or where a mean is not above 0.
+fn exponent(levels: &[f64], row: &[f64]) -> Option<f64> {
+    let (vh, h) = row.split_at_checked(levels.len())?;
+    let x: Vec<f64> = levels.iter().map(|level| libm::log(*level)).collect();
+    let y: Vec<f64> = vh.iter().zip(h).map(|(vh, h)| libm::log(0.5 * (vh + h))).collect();
+    let (mean_x, mean_y) = (mean(&x), mean(&y));
+    let products = x.iter().zip(&y).map(|(x, y)| (x - mean_x) * (y - mean_y)).sum::<f64>();
+    let squares = x.iter().map(|x| (x - mean_x) * (x - mean_x)).sum::<f64>();
+    let slope = products / squares;
+    slope.is_finite().then_some(slope)
 }
 
 /// Means of one subject, modality by level; none if one of them was never measured.

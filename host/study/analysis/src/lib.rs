@@ -207,6 +207,20 @@ pub fn effect_text(effect: &Effect) -> String {
     text::effect_text(effect)
 }
 
+/// Returns why effects have no order of modalities, if they have none.
+#[must_use]
+pub fn order_note(effects: &[Effect]) -> Option<&'static str> {
+    effects.iter().all(|effect| effect.effect != "order").then_some(
+        "order is not in the model: it needs three subjects or more, and some who start with each modality",
+    )
+}
+
+/// An exponent with its interval, as text.
+#[must_use]
+pub fn exponent_text(exponent: &MeanInterval) -> String {
+    text::exponent_text(exponent)
+}
+
 /// A probability in words.
 #[must_use]
 pub fn p_text(p: f64) -> String {

@@ -1,5 +1,6 @@
 //! What CMU-RI-TR-07-21 reports (section 4.3), to stand beside one's own results.
 
+use flotor_statistics::describe::MeanInterval;
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Stimulus};
 
 /// What of the thesis may stand beside a study: its numbers are of springs, at its bases and stimuli, and of nothing else.
@@ -92,5 +93,48 @@ pub fn movement(task: &str, measure: &str) -> &'static [Published] {
         }
         ("magnitude", "mean force") => &[("stimulus", "F(11, 77) = 11.92, p < 0.001"), ("modality", "none")],
         _ => &[],
+    }
+}
+
+/// Direction in which a measure of movement changes with the stimulus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// With a larger stimulus it is larger.
+    Rises,
+    /// With a larger stimulus it is smaller.
+    Falls,
+}
+
+/// The direction of section 5: "velocity and acceleration are directly proportional and force is inversely proportional to the
+/// rendered gamma".
+#[must_use]
+pub fn direction(measure: &str) -> Option<Direction> {
+    match measure {
+        "mean speed" | "mean acceleration" => Some(Direction::Rises),
+        "mean force" => Some(Direction::Falls),
+        _ => None,
+    }
+}
+
+impl Direction {
+    /// Returns true if the interval of an exponent lies on this side of 0.
+    #[must_use]
+    pub fn is_reproduced(self, exponent: &MeanInterval) -> bool {
+        let [low, high] = exponent.interval;
+        match self {
+            Self::Rises => low > 0.0,
+            Self::Falls => high < 0.0,
+        }
+    }
+
+    /// Returns the direction beside an exponent, as text.
+    #[must_use]
+    pub fn beside(self, exponent: &MeanInterval) -> String {
+        let way = match self {
+            Self::Rises => "rises",
+            Self::Falls => "falls",
+        };
+        let reproduced = if self.is_reproduced(exponent) { "reproduced" } else { "not reproduced" };
+        format!("{way} (section 5): {reproduced}")
     }
 }

@@ -2,7 +2,7 @@
 
 use super::blinded::BlindedAnalysis;
 use super::published::Beside;
-use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PairTest, PostHoc, published};
+use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PairTest, PostHoc, order_note, published};
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
 use flotor_statistics::effect_size::EffectSize;
@@ -33,6 +33,7 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
         page.columns(&name, &interval_text(&vh.threshold), &interval_text(&h.threshold));
     }
     page.effects("thresholds", &analysis.anova, &published::JND);
+    page.lines.extend(order_note(&analysis.anova).map(|note| format!("  {note}")));
     page.sizes(&analysis.anova);
     page.post_hoc(&analysis.post_hoc);
     let constancy = [
@@ -69,6 +70,7 @@ pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
         page.columns(&name, &interval_text(&vh.rating), &interval_text(&h.rating));
     }
     page.effects("ratings", &analysis.anova, &published::MAGNITUDE);
+    page.lines.extend(order_note(&analysis.anova).map(|note| format!("  {note}")));
     page.sizes(&analysis.anova);
     page.post_hoc(&analysis.post_hoc);
     page.movements(analysis.task, &analysis.kinematics);
@@ -109,11 +111,12 @@ impl Page {
     /// Name, value here, and value in the thesis.
     fn row(&mut self, name: &str, here: &str, published: &str) {
         let published = self.beside.text(published);
-        self.lines.push(format!("  {name:<30}{here:<46}{published}").trim_end().to_owned());
+        let line = format!("  {}{}{published}", column(name, 30), column(here, 46));
+        self.lines.push(line.trim_end().to_owned());
     }
 
     fn columns(&mut self, name: &str, first: &str, second: &str) {
-        self.lines.push(format!("  {name:<30}{first:<23}{second}"));
+        self.lines.push(format!("  {}{}{second}", column(name, 30), column(first, 23)));
     }
 
     fn effects(&mut self, what: &str, table: &[Effect], published: &[(&str, &str)]) {
@@ -144,21 +147,31 @@ impl Page {
         self.gap();
         self.columns("Comparisons", "paired t, p after Holm", "   Cohen's d of the pairs");
         for PostHoc { comparison, test } in comparisons {
-            let here =
-                |PairTest { t, p_holm, d }: &PairTest| format!("{:<26}{}", t_text(t, *p_holm), size_text(d));
-            self.lines.push(format!("  {comparison:<30}{}", test.to_text(here)));
+            let here = |PairTest { t, p_holm, d }: &PairTest| column(&t_text(t, *p_holm), 26) + &size_text(d);
+            self.lines.push(format!("  {}{}", column(comparison, 30), test.to_text(here)));
         }
     }
 
     fn movements(&mut self, task: &str, measures: &[KinematicMeasure]) {
         for measure in measures {
             self.effects(measure.measure, &measure.anova, published::movement(task, measure.measure));
+            if let Some(exponent) = &measure.exponent {
+                let direction = published::direction(measure.measure);
+                let beside = direction.map_or_else(String::new, |direction| direction.beside(exponent));
+                self.row("exponent of the stimulus", &exponent_text(exponent), &beside);
+            }
         }
     }
 
     fn end(self) -> String {
         self.lines.join("\n")
     }
+}
+
+/// Returns a text as wide as a column; a text that fills the column has two spaces behind it.
+fn column(text: &str, width: usize) -> String {
+    let is_full = text.chars().count() + 2 > width;
+    if is_full { format!("{text}  ") } else { format!("{text:<width$}") }
 }
 
 fn size_text(size: &EffectSize) -> String {
@@ -177,6 +190,11 @@ pub(super) fn t_text(t: &TTest, p: f64) -> String {
     format!("t({}) = {:.2}, {}", t.df, t.value, p_text(p))
 }
 
+pub(super) fn exponent_text(exponent: &MeanInterval) -> String {
+    let [low, high] = exponent.interval;
+    format!("{:.3} (95 %: {low:.3} to {high:.3})", exponent.mean)
+}
+
 fn interval_text(value: &MeanInterval) -> String {
     format!("{:.3} (se {:.3})", value.mean, value.se)
 }
@@ -191,4 +209,18 @@ pub(super) fn effect_text(effect: &Effect) -> String {
 
 pub(super) fn p_text(p: f64) -> String {
     if p < 0.001 { "p < 0.001".to_owned() } else { format!("p = {p:.3}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// "(HF p < 0.001)F(11, 154)": two columns were one.
+    #[test]
+    fn a_full_column_keeps_its_distance() {
+        let long = "F(11, 110) = 1127.73, p < 0.001 (HF p < 0.001)";
+        assert_eq!(column(long, 46), format!("{long}  "));
+        assert_eq!(column("R² = 1", 9), "R² = 1   ");
+        assert_eq!(column("abcdefgh", 9), "abcdefgh  ");
+    }
 }

@@ -9,7 +9,7 @@ use flotor_analysis::exclusion::Applied;
 use flotor_analysis::published::Beside;
 use flotor_analysis::{
     Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PairTest, PostHoc, SubjectChecks,
-    SubjectRecord, effect_text, p_text, published, size_interval_text, t_text,
+    SubjectRecord, effect_text, exponent_text, order_note, p_text, published, size_interval_text, t_text,
 };
 use flotor_plot::Figure;
 use flotor_statistics::anova::Effect;
@@ -89,6 +89,7 @@ fn exclusions(page: &mut Page, rules: &ExclusionRules, applied: &Applied) {
     for rule in &applied.not_applied {
         page.paragraph(&format!("Not applied: {rule}."));
     }
+    applied.cautions().for_each(|caution| page.paragraph(&format!("{caution}.")));
 }
 
 fn jnd_page(
@@ -149,6 +150,7 @@ fn jnd_page(
     page.means("Base", cells);
     page.heading("Effects on thresholds");
     page.effects(&analysis.anova, analysis.beside.effects(&published::JND));
+    order_note(&analysis.anova).into_iter().for_each(|note| page.paragraph(&format!("{note}.")));
     page.comparisons(&analysis.post_hoc);
     page.paragraph("Is the Weber fraction the same at every base? Within each modality, on fractions:");
     let constancy =
@@ -224,6 +226,7 @@ fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stim
     page.means("Stimulus", analysis.ratings.iter().map(|cell| (cell.modality, cell.stimulus, &cell.rating)));
     page.heading("Effects on ratings");
     page.effects(&analysis.anova, analysis.beside.effects(&published::MAGNITUDE));
+    order_note(&analysis.anova).into_iter().for_each(|note| page.paragraph(&format!("{note}.")));
     page.comparisons(&analysis.post_hoc);
     movements(page, (analysis.task, analysis.beside), &analysis.kinematics, levels, stimulus);
 }
@@ -241,6 +244,12 @@ fn movements(
     for measure in measures {
         page.paragraph(&format!("Effects on {}:", measure.measure));
         page.effects(&measure.anova, beside.effects(published::movement(task, measure.measure)));
+        if let Some(exponent) = &measure.exponent {
+            let direction = published::direction(measure.measure).map(|direction| direction.beside(exponent));
+            let beside = direction.filter(|_| beside == Beside::Thesis);
+            let beside = beside.map_or(String::new(), |text| format!("; thesis: {text}"));
+            page.paragraph(&format!("Exponent of the stimulus: {}{beside}.", exponent_text(exponent)));
+        }
     }
 }
 

@@ -278,7 +278,15 @@ for (measure in c("speed", "acceleration", "force")) {
   place <- sequence(lengths(each)) - 1
   if (is_jnd) rows <- rows[place %% 2 == (rows$comparison_at == "first"), ]
   moved <- cells_of(rows[!is.na(rows$value), ])
-  if (!anyNA(moved)) effects(moved, c("modality", if (several) "stimulus"), counts, rep("", n), FALSE)
+  if (anyNA(moved)) next
+  effects(moved, c("modality", if (several) "stimulus"), counts, rep("", n), FALSE)
+  if (several) {
+    # Exponent of the stimulus to which the measure is proportional, subject by subject.
+    both <- log((moved[, seq_along(levels)] + moved[, length(levels) + seq_along(levels)]) / 2)
+    exponents <- apply(both, 1, function(values) cov(log(levels), values) / var(log(levels)))
+    ends <- mean(exponents) + c(-1, 1) * qt(0.975, n - 1) * se(exponents)
+    say(sprintf("exponent of the stimulus %.3f (95 %%: %.3f to %.3f)", mean(exponents), ends[1], ends[2]))
+  }
 }
 if (is_jnd) {
   none <- aggregate(!is.na(threshold) ~ subject + track, counted, any)

@@ -272,10 +272,9 @@ if is_jnd:
 
 for measure in ("speed", "acceleration", "force"):
     # One number for each stimulus of a trial; of a pair the base alone counts.
-    texts = counted[f"{measure}_each"].map(lambda text: str(text).split(" "))
+    texts = [str(text).split(" ") for text in counted[f"{measure}_each"]]
     if is_jnd:
-        places = (counted.comparison_at == "first").astype(int)
-        texts = pd.Series([text[place::2] for text, place in zip(texts, places)], index=texts.index)
+        texts = [text[int(at == "first") :: 2] for text, at in zip(texts, counted.comparison_at)]
     each = counted[["subject", "modality", LEVEL]].assign(value=texts)
     each = each.explode("value").assign(value=lambda rows: pd.to_numeric(rows.value, errors="coerce")).dropna()
     moved = each.groupby(["subject", "modality", LEVEL]).value.mean().unstack([1, 2])
@@ -283,6 +282,11 @@ for measure in ("speed", "acceleration", "force"):
         seen = moved.loc[table.index][columns].to_numpy()
         several = [("stimulus", len(levels))] if len(levels) > 1 else []
         effects(seen, [("modality", 2), *several], np.array([""] * subjects), sizes=False)
+        if several:
+            # Exponent of the stimulus to which the measure is proportional, subject by subject.
+            both = np.log((seen[:, : len(levels)] + seen[:, len(levels) :]) / 2)
+            mean, low, high = interval(np.polyfit(np.log(levels), both.T, 1)[0])
+            print(f"exponent of the stimulus {mean:.3f} (95 %: {low:.3f} to {high:.3f})")
 if is_jnd:
     last = counted.groupby(["subject", "track"]).threshold.last()
     if last.isna().any():
