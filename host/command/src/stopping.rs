@@ -11,7 +11,6 @@ use crate::platform::{INTERRUPTED, KeyTerminal, Request, Requests, is_orphaned, 
 use flotor_servo::last_stop::{calls, leave_process, stop_all, was_armed};
 use flotor_servo::{EmergencySource, StopSwitch, Stuck, THREAD_ADVICE, enter_guard_priority};
 use std::io::{self, Read, stdin};
-use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -105,13 +104,13 @@ fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
             continue;
         };
         if request == Request::Emergency {
-            stop.emergency_flag().store(true, Ordering::Relaxed);
+            stop.press(EmergencySource::Signal);
             continue;
         }
         match insistence.answer(Instant::now()) {
             Answer::InOrder if first == First::InOrderOnceEnergised && !was_armed() => exit.take(),
             Answer::InOrder => stop.stop(),
-            Answer::AtOnce => stop.emergency_flag().store(true, Ordering::Relaxed),
+            Answer::AtOnce => stop.press(EmergencySource::Signal),
             Answer::Leave => exit.take(),
         }
     }

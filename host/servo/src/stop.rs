@@ -1,8 +1,10 @@
 //! How the rest of the process ends a run: in order, or at once.
 
+use super::platform::clock;
 use super::state::EmergencySource;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::time::Duration;
 
 /// Ends a run from any thread or signal handler. Clones are the same switch.
 ///
@@ -11,8 +13,8 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 pub struct StopSwitch {
     in_order: Arc<AtomicBool>,
     by_signal: Arc<AtomicBool>,
-    /// Who else has pressed the emergency stop first: the place in [`EmergencySource::ALL`], from 1; 0: nobody.
-    pressed: Arc<AtomicU8>,
+    /// First other source of the emergency stop: its place in [`EmergencySource::ALL`], from 1; 0: none.
+    pressed: Arc<AtomicU32>,
 }
 
 impl StopSwitch {
@@ -21,11 +23,19 @@ impl StopSwitch {
         self.in_order.store(true, Ordering::Relaxed);
     }
 
-    /// Presses the emergency stop. Who pressed first stays known. Real-time: bounded, no allocation.
+    /// Presses the emergency stop and wakes the threads that wait for it. The first source stays known. Real-time: one system call,
+    /// after the last tick.
     pub fn press(&self, source: EmergencySource) {
         let place = EmergencySource::ALL.iter().position(|other| *other == source);
-        let code = place.and_then(|place| u8::try_from(place + 1).ok()).unwrap_or(1);
+        let code = place.and_then(|place| u32::try_from(place + 1).ok()).unwrap_or(1);
         let _ = self.pressed.compare_exchange(0, code, Ordering::Relaxed, Ordering::Relaxed);
+        clock::wake_all(&self.pressed);
+    }
+
+    /// Sleeps until [`StopSwitch::press`], or until the timeout. The flag of a signal handler does not end the sleep; the loop
+    /// presses in the tick that sees this flag. Not real-time.
+    pub fn sleep_until_pressed(&self, timeout: Duration) {
+        clock::sleep_while_zero(&self.pressed, timeout);
     }
 
     /// True if an orderly end is asked for. Real-time: bounded, no allocation.
@@ -39,7 +49,7 @@ impl StopSwitch {
     #[inline]
     #[must_use]
     pub fn emergency(&self) -> Option<EmergencySource> {
-        let place = usize::from(self.pressed.load(Ordering::Relaxed)).checked_sub(1);
+        let place = (self.pressed.load(Ordering::Relaxed) as usize).checked_sub(1);
         let by_signal = || self.by_signal.load(Ordering::Relaxed).then_some(EmergencySource::Signal);
         place.and_then(|place| EmergencySource::ALL.get(place).copied()).or_else(by_signal)
     }

@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 
 /// Purpose of the thread without which nothing is energised.
 pub(super) const WATCH: &str = "the emergency stop of the machine";
-/// Pause between two looks at the latch.
-const LOOK_PERIOD: Duration = Duration::from_millis(5);
+/// Poll interval of the latch file, for the stops of other runs. The emergency stop of this run wakes the thread at once.
+const POLL: Duration = Duration::from_millis(5);
 /// Time in which the other runs confirm an emergency stop.
 const CONFIRM_WAIT: Duration = Duration::from_secs(2);
 
@@ -80,10 +80,14 @@ impl LatchGuard {
     /// # Errors
     /// No thread.
     pub fn watch(&self, stop: &StopSwitch) -> io::Result<LatchWatch> {
+        self.watch_with(POLL, stop)
+    }
+
+    fn watch_with(&self, poll: Duration, stop: &StopSwitch) -> io::Result<LatchWatch> {
         let is_over = Arc::<AtomicBool>::default();
         let (guard, stop, until) = (self.clone(), stop.clone(), Arc::clone(&is_over));
         let thread = std::thread::Builder::new().name("flotor-latch".to_owned());
-        let thread = thread.spawn(move || guard.attend(&stop, &until))?;
+        let thread = thread.spawn(move || guard.attend(poll, &stop, &until))?;
         Ok(LatchWatch { is_over, thread: Some(thread) })
     }
 
@@ -119,7 +123,7 @@ impl LatchGuard {
         self.check().map(|()| watch)
     }
 
-    fn attend(&self, stop: &StopSwitch, is_over: &AtomicBool) {
+    fn attend(&self, poll: Duration, stop: &StopSwitch, is_over: &AtomicBool) {
         // A stop of another run waits for this thread.
         enter_guard_priority();
         loop {
@@ -136,7 +140,7 @@ impl LatchGuard {
             if is_last {
                 return;
             }
-            std::thread::sleep(LOOK_PERIOD);
+            stop.sleep_until_pressed(poll);
         }
     }
 }
@@ -225,6 +229,29 @@ mod tests {
         stop.press(EmergencySource::Key);
         drop(watch);
         assert!(directory.latch().state().pressed.is_some());
+    }
+
+    /// The poll interval of this run was in series with that of the other one.
+    #[test]
+    fn an_emergency_stop_reaches_the_latch_and_the_other_runs_without_a_poll() {
+        let scratch = tempfile::tempdir().unwrap();
+        let directory = Directory::at(scratch.path().join("runs"));
+        let silent = directory.listen().unwrap();
+        let (stop, guard) = (StopSwitch::default(), LatchGuard::of(&directory));
+        let watch = guard.watch_with(Duration::from_secs(60), &stop).unwrap();
+        std::thread::sleep(Duration::from_millis(100)); // the thread has polled once, and sleeps
+        stop.press(EmergencySource::Key);
+        let before_the_second_poll = Instant::now() + Duration::from_secs(30);
+        while guard.reach().is_none() {
+            assert!(Instant::now() < before_the_second_poll, "the press wakes nobody");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert!(directory.latch().state().pressed.is_some());
+        assert!(
+            guard.reach().unwrap().to_string().contains("not confirmed by process"),
+            "the other was asked"
+        );
+        drop((watch, silent));
     }
 
     #[test]

@@ -1,7 +1,9 @@
-//! The monotonic clock, and sleeping on it.
+//! The monotonic clock, and sleeping on it or until a word of memory changes.
 
-use rustix::thread::{ClockId, clock_nanosleep_absolute};
+use rustix::thread::{ClockId, clock_nanosleep_absolute, futex};
 use rustix::time::{Timespec, clock_gettime};
+use std::sync::atomic::AtomicU32;
+use std::time::Duration;
 
 /// Nanoseconds of the monotonic clock. Real-time: bounded, no allocation (a vDSO call).
 #[inline]
@@ -21,4 +23,14 @@ pub fn sleep_until(deadline_ns: u64) {
     };
     // An interrupted sleep is as good as a short one: the spin afterwards looks at the clock.
     let _ = clock_nanosleep_absolute(ClockId::Monotonic, &request);
+}
+
+/// Sleeps while a word is zero, until [`wake_all`] or the timeout. Not real-time.
+pub(crate) fn sleep_while_zero(word: &AtomicU32, timeout: Duration) {
+    let _ = futex::wait(word, futex::Flags::PRIVATE, 0, Timespec::try_from(timeout).ok().as_ref());
+}
+
+/// Wakes the threads that sleep on a word. Real-time: one system call.
+pub(crate) fn wake_all(word: &AtomicU32) {
+    let _ = futex::wake(word, futex::Flags::PRIVATE, i32::MAX as u32);
 }

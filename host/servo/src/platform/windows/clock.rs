@@ -1,6 +1,7 @@
 //! The monotonic clock, and sleeping on it.
 
 use std::sync::OnceLock;
+use std::sync::atomic::AtomicU32;
 use std::time::{Duration, Instant};
 
 /// Time before the first look at the clock, ns: so long ago is no time before the clock.
@@ -24,3 +25,12 @@ pub fn sleep_until(deadline_ns: u64) {
         std::thread::sleep(Duration::from_nanos(left_ns));
     }
 }
+
+/// Sleeps for one poll interval of a word, or until the timeout.
+#[allow(clippy::disallowed_methods)]
+pub(crate) fn sleep_while_zero(_: &AtomicU32, timeout: Duration) {
+    std::thread::sleep(timeout.min(Duration::from_millis(5)));
+}
+
+/// Wakes nothing: [`sleep_while_zero`] polls.
+pub(crate) fn wake_all(_: &AtomicU32) {}
