@@ -24,6 +24,8 @@ const LAST_PATIENCE: Duration = Duration::from_secs(5);
 /// itself waits for one second.
 const CALL_PATIENCE: Duration = Duration::from_millis(1500);
 const LOOK: Duration = Duration::from_millis(100);
+/// Interval between two looks at the switch as long as no signal was taken here.
+const UNASKED_LOOK: Duration = Duration::from_millis(400);
 /// How long devices may take to be told to stop when a process is left.
 const STOP_PATIENCE: Duration = Duration::from_millis(50);
 
@@ -84,10 +86,14 @@ fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
     enter_guard_priority();
     let (mut insistence, mut hang) = (Insistence::default(), Hang::default());
     loop {
-        let patience = if insistence.last.is_some() { LOOK } else { LAST_PATIENCE };
+        // A thread that does not block a signal may have taken it: then only the switch says so.
+        let is_asked = || insistence.last.is_some() || stop.is_stop_asked();
+        let patience = if is_asked() { LOOK } else { UNASKED_LOOK };
         let Some(request) = requests.next(patience) else {
             let now = Instant::now();
-            if let Some((who, at)) = insistence.last.and_then(|_| hang.look(calls(), now)) {
+            if is_asked()
+                && let Some((who, at)) = hang.look(calls(), now)
+            {
                 let call = at.place.call();
                 print_error_line(format_args!(
                     "error: `{who}` did not return from {call} in tick {} after the request to stop",
