@@ -2,7 +2,7 @@
 //! plugins are.
 
 use clap::Parser;
-use flotor_core::terminal::escaped;
+use flotor_core::terminal::{escaped, escaped_arguments};
 use flotor_drawing::camera::View;
 use flotor_live::Directory;
 use flotor_study::screen::{Screen, Told};
@@ -133,7 +133,11 @@ impl From<WindowError> for Failure {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| {
+        let _ = Arguments::parse_from(escaped_arguments());
+        error.exit()
+    });
+    match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure(text, code)) => {
             eprintln!("error: {}", escaped(&text));

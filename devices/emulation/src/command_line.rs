@@ -1,9 +1,19 @@
 //! What the programs of emulators read and write.
 
-use flotor_core::terminal::escaped;
+use clap::Parser;
+use flotor_core::terminal::{escaped, escaped_arguments};
 use std::error::Error;
 use std::io::Write;
 use std::path::Path;
+
+/// Returns the arguments of this process. Ends the process if they are wrong, with an error without control characters.
+#[must_use]
+pub fn arguments<T: Parser>() -> T {
+    T::try_parse().unwrap_or_else(|error| {
+        let _ = T::parse_from(escaped_arguments());
+        error.exit()
+    })
+}
 
 /// A number of an option, within its limits.
 ///

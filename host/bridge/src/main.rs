@@ -11,7 +11,7 @@ use flotor_bridge::remote::{Remote, bridges};
 use flotor_bridge::request::{Request, Right};
 use flotor_bridge::serve::{Launcher, Service, serve};
 use flotor_bridge::stop_channel::press_both_ways;
-use flotor_core::terminal::escaped;
+use flotor_core::terminal::{escaped, escaped_arguments};
 use flotor_live::{Directory, SetValue};
 use std::error::Error;
 use std::path::PathBuf;
@@ -162,7 +162,10 @@ fn set_value(text: &str) -> Result<SetValue, String> {
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| {
+        let _ = Arguments::parse_from(escaped_arguments());
+        error.exit()
+    });
     match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -4,6 +4,7 @@ use crate::CommandError;
 use clap::{Args, Command, Parser, ValueEnum};
 pub use flotor_core::LARGEST_SEED;
 use flotor_core::limits::Limits;
+use flotor_core::terminal::escaped_arguments;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_servo::Core;
 use flotor_session::Strength;
@@ -29,7 +30,12 @@ pub fn arguments<T: Parser>() -> T {
         ));
         std::process::exit(2);
     }
-    let matches = with_negative_numbers(T::command()).get_matches();
+    let command = || with_negative_numbers(T::command());
+    let refused = |error: clap::Error| {
+        let _ = command().get_matches_from(escaped_arguments());
+        error.exit()
+    };
+    let matches = command().try_get_matches().unwrap_or_else(refused);
     T::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 

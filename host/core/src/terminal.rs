@@ -24,6 +24,12 @@ fn is_harmless(character: char) -> bool {
     }
 }
 
+/// Returns the arguments of this process with their control characters escaped. A parser that has refused the arguments parses these
+/// instead, for its message. Not real-time.
+pub fn escaped_arguments() -> impl Iterator<Item = String> {
+    std::env::args_os().map(|argument| escaped(&argument.to_string_lossy()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

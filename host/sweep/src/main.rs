@@ -1,7 +1,7 @@
 //! `flotor-sweep`, what `flotor sweep` starts.
 
 use clap::Parser;
-use flotor_command::options::{JsonOption, PluginPathOption};
+use flotor_command::options::{JsonOption, PluginPathOption, arguments};
 use flotor_command::{print_error_line, say};
 use flotor_sweep::executor::execute;
 use flotor_sweep::plan::Plan;
@@ -51,7 +51,7 @@ enum Failure {
 }
 
 fn main() -> ExitCode {
-    let (code, message) = match run(&Arguments::parse()) {
+    let (code, message) = match run(&arguments()) {
         Ok(()) => return ExitCode::SUCCESS,
         Err(Failure::Usage(message)) => (2, message),
         Err(Failure::Other(message)) => (1, message),

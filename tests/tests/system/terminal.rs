@@ -1,5 +1,6 @@
 //! Names and messages of strangers reach a terminal without control characters, in results and in errors.
 
+use flotor_tests::library::build_folder;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 
@@ -67,12 +68,28 @@ fn who_pressed_an_emergency_stop_is_escaped() {
     assert_escaped(&released);
 }
 
+#[test]
+fn options_that_do_not_exist_are_escaped() {
+    let option = format!("--{HOSTILE}");
+    for command in ["run", "study", "validate", "test", "calibrate", "scenes"] {
+        // On a terminal the parser leaves the escapes of the argument beside its own colours.
+        let ran = Flotor::with([command, &option]).env("NO_COLOR", "1").run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{command}: {ran:?}");
+        assert_escaped(&ran);
+    }
+}
+
 /// Arguments of a user, and names of devices, reach the lines and errors of emulators.
 #[test]
 fn lines_of_emulators_are_escaped() {
     let set = format!("{HOSTILE}=1");
     let cases: [&[&str]; 2] = [&["maglev", "--listen", HOSTILE], &["maglev", "--set", &set]];
-    for arguments in cases {
+    // Refused by the parser of the options.
+    let option = format!("--{HOSTILE}");
+    let refused = ["maglev", "falcon", "haply-service"].map(|emulator| [emulator, option.as_str()]);
+    let is_built = |emulator: &str| build_folder().join(format!("flotor-{emulator}-emulator")).is_file();
+    let refused = refused.iter().map(|arguments| &arguments[..]).filter(|arguments| is_built(arguments[0]));
+    for arguments in cases.into_iter().chain(refused) {
         let ran = Flotor::with([&["emulate"], arguments].concat()).run();
         assert_ne!(ran.code, Some(exit_code::OK), "{arguments:?}: {ran:?}");
         assert_escaped(&ran);

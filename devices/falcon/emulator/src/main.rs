@@ -2,7 +2,7 @@
 
 use clap::{Parser, ValueEnum};
 use flotor_emulation::clients::{Clients, Tenure};
-use flotor_emulation::command_line::{say, warn, within};
+use flotor_emulation::command_line::{arguments, say, warn, within};
 use flotor_emulation::port::{Port, ReachArguments};
 use flotor_emulation::rig::RigArguments;
 use flotor_falcon::kinematics::CENTRE_M;
@@ -83,7 +83,7 @@ fn frequency_hz(text: &str) -> Result<f64, String> {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
+    match run(&arguments()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             warn(&format!("error: {error}"));

@@ -11,7 +11,7 @@ mod usb;
 
 use clap::{Parser, ValueEnum};
 use flotor_emulation::clients::{Clients, Tenure};
-use flotor_emulation::command_line::{link_to, say, warn};
+use flotor_emulation::command_line::{arguments, link_to, say, warn};
 use flotor_emulation::port::{Port, ReachArguments};
 use flotor_emulation::rig::{RigArguments, serve};
 use flotor_hal::Refusal;
@@ -115,7 +115,7 @@ enum PaceOption {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
+    match run(&arguments()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             warn(&format!("error: {error}"));
@@ -266,8 +266,6 @@ fn tell(event: Event) {
             let why = if faults.is_empty() { String::new() } else { format!(" faults={faults}") };
             say(&format!("mode {mode:?} at_us={at_us} silence_us={silence_us}{why}"));
         }
-        Event::Closed { rejections } => {
-            say(&format!("closed rejected={} {rejections:?}", rejections.total()))
-        }
+        Event::Closed { rejections } => say(&format!("closed rejected={} {rejections}", rejections.total())),
     }
 }
