@@ -263,8 +263,8 @@ impl FalconDevice {
         self.chip = Some(chip);
         let posture = posture(angles_rad(report.encoders), CENTRE_M).ok_or_else(|| {
             Refusal::resource(format!(
-                "the Falcon counts {:?}, which its arms cannot have: switch its power off and on, and start again",
-                report.encoders
+                "the Falcon counts {}, which its arms cannot have: switch its power off and on, and start again",
+                report.encoders.map(|count| count.to_string()).join(", ")
             ))
         })?;
         Ok((exchange, report, posture))

@@ -32,6 +32,17 @@ pub enum Scalar<'a> {
     Null,
 }
 
+impl std::fmt::Display for Scalar<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number(number) => write!(formatter, "{number}"),
+            Self::Text(text) => write!(formatter, "`{text}`"),
+            Self::Flag(flag) => write!(formatter, "{flag}"),
+            Self::Null => formatter.write_str("null"),
+        }
+    }
+}
+
 impl<'a> Cursor<'a> {
     /// At the beginning of a text.
     #[must_use]

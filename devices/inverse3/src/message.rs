@@ -185,7 +185,7 @@ pub fn differing(
         match element.at(path)? {
             Some(said) if said == *value => {}
             None if *presence == Presence::Optional => {}
-            said => return Ok(Some((path, said.map_or("nothing".to_owned(), |said| format!("{said:?}"))))),
+            said => return Ok(Some((path, said.map_or("nothing".to_owned(), |said| said.to_string())))),
         }
     }
     Ok(None)

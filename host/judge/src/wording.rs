@@ -2,6 +2,7 @@
 
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, DeviceState, LinearField, Output, Pose, Twist, Wrench, rotation_vector};
+use std::time::Duration;
 
 /// Returns the words for a call status.
 pub(crate) fn status(status: CallStatus) -> &'static str {
@@ -15,9 +16,23 @@ pub(crate) fn status(status: CallStatus) -> &'static str {
 }
 
 /// Returns a vector as `[x, y, z]`.
-fn vector(vector: DVec3) -> String {
+pub(crate) fn vector(vector: DVec3) -> String {
     let [x, y, z] = vector.to_array();
     format!("[{x}, {y}, {z}]")
+}
+
+/// Returns a time in the unit that suits its length, with three digits.
+pub(crate) fn time(time: Duration) -> String {
+    let (number, unit) = match time.as_nanos() {
+        0..1_000 => (time.as_secs_f64() * 1.0e9, "ns"),
+        1_000..1_000_000 => (time.as_secs_f64() * 1.0e6, "µs"),
+        1_000_000..1_000_000_000 => (time.as_secs_f64() * 1.0e3, "ms"),
+        _ => (time.as_secs_f64(), "s"),
+    };
+    let digits = if number < 10.0 { 2 } else { usize::from(number < 100.0) };
+    let number = format!("{number:.digits$}");
+    let short = if digits > 0 { number.trim_end_matches('0').trim_end_matches('.') } else { &number };
+    format!("{short} {unit}")
 }
 
 /// Returns position, m, and rotation vector, rad, of a pose.
@@ -67,4 +82,17 @@ pub(crate) fn sample(state: &DeviceState) -> String {
         twist(&state.twist),
         wrench(&state.delivered)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::time;
+    use std::time::Duration;
+
+    #[test]
+    fn a_time_has_the_unit_that_suits_it() {
+        let of_ns = |ns| time(Duration::from_nanos(ns));
+        let shown = [0, 999, 1_500, 47_100, 500_000, 2_345_678, 10_000_000_000].map(of_ns);
+        assert_eq!(shown, ["0 ns", "999 ns", "1.5 µs", "47.1 µs", "500 µs", "2.35 ms", "10 s"]);
+    }
 }

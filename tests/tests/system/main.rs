@@ -12,6 +12,7 @@ mod changes;
 mod composition;
 mod crash;
 mod damaged_inputs;
+mod debug_texts;
 mod demand;
 mod determinism;
 #[cfg(feature = "drop-ins")]

@@ -61,7 +61,7 @@ pub(crate) enum Failed {
 impl std::fmt::Display for Failed {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::At(function, why) => write!(f, "{function:?}: {why}"),
+            Self::At(function, why) => write!(f, "{}: {why}", function.name()),
             Self::Faulted(bits) => write!(
                 f,
                 "the controller stays faulted ({bits}); hold the handle inside the range of its sensors"

@@ -25,6 +25,17 @@ pub struct Rejections {
     pub session: u32,
 }
 
+impl std::fmt::Display for Rejections {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { length, checksum, magic, version, kind, not_finite, duplicate, old, session } = self;
+        write!(
+            formatter,
+            "length={length} checksum={checksum} magic={magic} version={version} kind={kind} not_finite={not_finite} \
+             duplicate={duplicate} old={old} session={session}"
+        )
+    }
+}
+
 impl Rejections {
     /// Counts one.
     pub fn count(&mut self, rejection: Rejection) {

@@ -83,7 +83,7 @@ pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Resu
     };
     let changed = numbers(before).into_iter().zip(numbers(now)).find(|(before, now)| before != now);
     let changed = changed.map_or("`sensed` or `actuated`".to_owned(), |((field, before), (_, now))| {
-        format!("`{field}` was {before:?}, then {now:?}")
+        format!("`{field}` was {}, then {}", list(&before), list(&now))
     });
     Err(Refusal::broken(format!(
         "its capabilities changed from one call to the next; they are constant from `open` on: {changed}"
@@ -113,6 +113,15 @@ impl Group {
     }
 }
 
+/// Returns numbers as a scene writes them: one alone, several in brackets, the largest with an exponent.
+fn list(numbers: &[f64]) -> String {
+    let words: Vec<String> = numbers.iter().map(|number| format!("{number:?}")).collect();
+    match words.iter().map(|word| word.trim_end_matches(".0")).collect::<Vec<_>>()[..] {
+        [number] => number.to_owned(),
+        ref numbers => format!("[{}]", numbers.join(", ")),
+    }
+}
+
 impl Number<f64> {
     fn has_an_end(&self) -> Result<(), Refusal> {
         let Self { value, most, unit, .. } = self;
@@ -133,7 +142,7 @@ impl Number<[f64; 3]> {
         if value.iter().all(|value| (0.0..=*most).contains(value)) {
             return Ok(()); // false for NaN
         }
-        Err(wrong(field, &format!("{value:?}"), &format!("must be 0 to {most} {unit} on each axis")))
+        Err(wrong(field, &list(value), &format!("must be 0 to {most} {unit} on each axis")))
     }
 
     fn is_more_than_nothing_on(&self, axes: [bool; 3], mend: &str) -> Result<(), Refusal> {
@@ -141,9 +150,7 @@ impl Number<[f64; 3]> {
         let mut empty = ["x", "y", "z"].into_iter().zip(value.iter().zip(axes));
         match empty.find(|(_, (value, is_needed))| *is_needed && **value == 0.0) {
             None => Ok(()),
-            Some((name, _)) => {
-                Err(wrong(field, &format!("{value:?}"), &format!("{name} is driven, so {mend}")))
-            }
+            Some((name, _)) => Err(wrong(field, &list(value), &format!("{name} is driven, so {mend}"))),
         }
     }
 }

@@ -5,9 +5,7 @@ use super::path::CONFIG;
 use crate::wording;
 use flotor_core::plausibility::{PoseBounds, is_rotation};
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
-use flotor_hal::{
-    Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Fault, Tick, Wrench, rotation_vector,
-};
+use flotor_hal::{Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Fault, Tick, Wrench};
 use flotor_session::LatchGuard;
 use std::time::{Duration, Instant};
 
@@ -42,9 +40,9 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
             if running.ticks >= TICKS {
                 if started.elapsed() > PATIENCE {
                     return Err(match samples {
-                        0 => format!("no fresh sample within {PATIENCE:?}"),
-                        1 => format!("no second sample within {PATIENCE:?}"),
-                        _ => format!("no write took a command within {PATIENCE:?}"),
+                        0 => format!("no fresh sample within {}", wording::time(PATIENCE)),
+                        1 => format!("no second sample within {}", wording::time(PATIENCE)),
+                        _ => format!("no write took a command within {}", wording::time(PATIENCE)),
                     });
                 }
                 std::thread::sleep(TICK);
@@ -92,7 +90,11 @@ pub(super) fn time(mut device: OpenedDevice) -> Result<(), String> {
 }
 
 fn within(call: &str, took: Duration, limit: Duration) -> Result<(), String> {
-    if took <= limit { Ok(()) } else { Err(format!("{call} takes {took:?}, above the limit of {limit:?}")) }
+    if took <= limit {
+        return Ok(());
+    }
+    let [took, limit] = [took, limit].map(wording::time);
+    Err(format!("{call} takes {took}, above the limit of {limit}"))
 }
 
 pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Seen> {
@@ -230,10 +232,11 @@ impl Running {
         }
         if !PoseBounds::of(&self.told).contain(&state.pose) {
             let Capabilities { range_m, range_rad, .. } = self.told;
-            let rotation_rad = rotation_vector(orientation);
             return Err(format!(
-                "{} m and {rotation_rad} rad, beyond twice its range {range_m:?} m and {range_rad:?} rad",
-                state.pose.position()
+                "{}, beyond twice its range {} m and {} rad",
+                wording::pose(&state.pose),
+                wording::vector(range_m.into()),
+                wording::vector(range_rad.into())
             ));
         }
         if !KNOWN.contains(state.conditions) {
@@ -266,8 +269,9 @@ impl Running {
         while !self.delivers() {
             if started.elapsed() > PATIENCE {
                 return Err(format!(
-                    "commanded {} N, it reports no force for {PATIENCE:?}, so its stop cannot be checked",
-                    push.force()
+                    "commanded {} N, it reports no force for {}, so its stop cannot be checked",
+                    push.force(),
+                    wording::time(PATIENCE)
                 ));
             }
             let _ = self.turn(push)?;
@@ -285,7 +289,10 @@ impl Running {
             if started.elapsed() > PATIENCE {
                 return Err(match self.delivers() {
                     true => format!("it still delivers {}", wording::wrench(&self.state.delivered)),
-                    false => format!("it has given {at_rest} samples in {PATIENCE:?} since it was stopped"),
+                    false => format!(
+                        "it has given {at_rest} samples in {} since it was stopped",
+                        wording::time(PATIENCE)
+                    ),
                 });
             }
             match self.turn(push) {

@@ -75,7 +75,8 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
     let usual = took.get(TIMES / 2).copied().unwrap_or_default();
     let limit = Duration::from_nanos(CONFIG.period_ns / 2);
     if usual > limit {
-        return Err(format!("setting `{id}` to {value} takes {usual:?}, above the limit of {limit:?}"));
+        let [usual, limit] = [usual, limit].map(wording::time);
+        return Err(format!("setting `{id}` to {value} takes {usual}, above the limit of {limit}"));
     }
     // A model need not tell the value in force; if it does, it is the one. A conversion of units may round.
     let read_back = model.parameter(index);

@@ -22,7 +22,7 @@ pub use checks::check;
 pub use rule::Check;
 
 use crate::platform::{anonymous_file, end_at_once, ending_signal, locked, standard_input};
-use crate::watch;
+use crate::{watch, wording};
 use flotor_hal::abi::loader::read_metadata;
 use flotor_hal::conformance::Rule;
 use flotor_session::PluginProcess;
@@ -203,12 +203,14 @@ pub fn validate(
             Ok(Some(verdict)) => verdict,
             // Its allocator is slow, and whether a call ends is seen without it.
             Ok(None) if check == Check::Contract(Rule::InsideMemory) => {
+                let patience = wording::time(patience);
                 let late =
-                    format!("a life of an instance takes more than {patience:?} with the guarding allocator");
+                    format!("a life of an instance takes more than {patience} with the guarding allocator");
                 Verdict { seen: Some(Seen::Missing(late)), figures: None }
             }
             Ok(None) => Verdict::violated(format!(
-                "it did not return within {own_patience:?}; the rules after it were not checked (`--timeout` allows more)"
+                "it did not return within {}; the rules after it were not checked (`--timeout` allows more)",
+                wording::time(own_patience)
             )),
             Err(error) => Verdict::violated(format!("cannot be checked: {error}")),
         };

@@ -56,9 +56,9 @@ pub(super) fn demand(model: &mut Model) -> Result<(), String> {
                 || has_torque && is_other(all_of.torque_nm, less_of.torque_nm)
         });
         if let Some((tick, (all, less))) = other {
-            let [with, without] = [all, less].map(|output| output.wrench.force_n);
+            let [with, without] = [all, less].map(|output| wording::vector(output.wrench.force()));
             return Err(format!(
-                "step {tick} of a path gave the force {with:?} N with everything demanded, and {without:?} N with {what}"
+                "step {tick} of a path gave the force {with} N with everything demanded, and {without} N with {what}"
             ));
         }
     }
@@ -133,7 +133,8 @@ pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
     if usual <= limit {
         return Ok(());
     }
-    Err(format!("the 99th percentile of a step is {usual:?} of a processor, above the limit of {limit:?}"))
+    let [usual, limit] = [usual, limit].map(wording::time);
+    Err(format!("the 99th percentile of a step is {usual} of a processor, above the limit of {limit}"))
 }
 
 /// Wrenches of a walk; two models may be walked in turns.

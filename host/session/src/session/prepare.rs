@@ -17,8 +17,8 @@ use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting, Stopper};
 use flotor_hal::{
-    Axes, Capabilities, Demand, Embodiment, LoopConfig, Parameter, ParameterKind, Refusal, SampledLoop,
-    SoftRange,
+    Axes, Capabilities, DVec3, Demand, Embodiment, LoopConfig, Parameter, ParameterKind, Refusal,
+    SampledLoop, SoftRange,
 };
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerOrder};
@@ -259,9 +259,9 @@ impl Making {
             let (mut engine, mapping) = (self.engine(budget_ns, progress)?, mapping.at(*place_m));
             if pushes_at_home(&engine.workspace_bounds(), &mapping) {
                 let problem = format!(
-                    "at {:?} mm the workspace limits of the model exclude the home of its device, and the wall at these \
+                    "at {} mm the workspace limits of the model exclude the home of its device, and the wall at these \
                      limits would push there; move the model (`position_mm`) or choose parameters that extend its limits",
-                    place_m.map(|m| m * 1.0e3)
+                    DVec3::from(*place_m) * 1.0e3
                 );
                 return Err(complain(model, &problem).into());
             }

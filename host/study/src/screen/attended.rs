@@ -299,8 +299,9 @@ impl Attended {
         self.practice.pop_front();
         (self.exploration, self.again) = (Exploration::default(), 0);
         self.stage = self.next_stage(trial, Verdict::Taken);
-        let (values, word) = (trial.presented.values(), response.word());
-        Ok(Step::Practised(format!("practice before going on: presented {values:?}, answer {word}")))
+        let values: Vec<String> = trial.presented.values().iter().map(ToString::to_string).collect();
+        let (values, word) = (values.join(" and "), response.word());
+        Ok(Step::Practised(format!("practice before going on: presented {values}, answer {word}")))
     }
 
     fn withdraw(&mut self) -> Result<Step, InputError> {
