@@ -136,6 +136,9 @@ enum Command {
     /// A process that stops devices when the host is gone, started by `run`
     #[command(hide = true)]
     Watchdog(watchdog::WatchdogArguments),
+    /// A process that starts the program of `lend`, and kills what remains of it
+    #[command(hide = true)]
+    ProgramGuard(lend::guard::GuardArguments),
     /// Print a completion script for a shell
     Completions {
         /// The shell
@@ -201,6 +204,7 @@ fn carry_out(command: Command) -> Result<(), CommandError> {
         Command::Calibrate(separate) => CALIBRATION.carry_out("calibrate", &separate.arguments),
         Command::Emulate(arguments) => emulate::run(&arguments),
         Command::Lend(arguments) => lend::run(arguments),
+        Command::ProgramGuard(arguments) => lend::guard::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Worker(arguments) => worker::run(arguments),
         Command::Watchdog(arguments) => watchdog::run(arguments),

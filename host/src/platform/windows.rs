@@ -109,6 +109,20 @@ pub(crate) mod lend {
     pub(crate) fn run(_: LendArguments) -> Result<(), CommandError> {
         Err(CommandError::Usage("`flotor lend` is not on Windows yet: its libraries are Linux's".to_owned()))
     }
+
+    pub(crate) mod guard {
+        //! The guard of a program of `flotor lend`.
+
+        use flotor_command::CommandError;
+
+        /// Arguments of the guard
+        #[derive(clap::Args)]
+        pub(crate) struct GuardArguments {}
+
+        pub(crate) fn run(_: &GuardArguments) -> Result<(), CommandError> {
+            Ok(())
+        }
+    }
 }
 
 #[cfg(test)]

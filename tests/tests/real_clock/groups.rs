@@ -219,7 +219,10 @@ fn other_commands(post: &Post, wait_s: &str) -> Vec<Vec<String>> {
     let lend =
         |api, scene| ["lend", "--api", api, "--listen", "127.0.0.1:0", scene, "--", "/bin/sleep", wait_s];
     let of_words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect();
-    let mut commands = vec![post.calibration(), of_words(&lend("ml-api", &scene))];
+    let device = post.library().display().to_string();
+    let emulate =
+        ["emulate", "maglev", "--protocol", "ml-api", "--listen", "127.0.0.1:0", "--device", &device];
+    let mut commands = vec![post.calibration(), of_words(&lend("ml-api", &scene)), of_words(&emulate)];
     // The service of Haply is built for the longer tests.
     if !TestSize::of_this_run().leaves_out_long_tests() {
         commands.extend([of_words(&service), of_words(&lend("haply", &program))]);

@@ -31,7 +31,7 @@ impl Post {
         post
     }
 
-    fn library(&self) -> PathBuf {
+    pub(crate) fn library(&self) -> PathBuf {
         self.scratch.path().join("libpost.so")
     }
 

@@ -6,9 +6,10 @@ use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tools::{Tool, required};
 use flotor_tests::{TestSize, workspace_root};
-use rustix::process::{Signal, kill_process_group};
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 /// A folder with a scene of a model that hangs in tick 70, and a test of it.
@@ -27,7 +28,10 @@ impl Hanging {
         let scene = format!(
             "duration_s = 0.2\n[device]\nplugin = \"simulated\"\n[[model]]\nname = \"jelly\"\nplugin = {model:?}\n"
         );
+        // A study varies the spring.
+        let _ = folder.file("study.toml", format!("{scene}[[model]]\nplugin = \"spring\"\n"));
         let _ = folder.file("scene.toml", scene);
+        let _ = folder.file("program.sh", PROGRAM);
         let _ = folder.file(
             "hangs.test.toml",
             "scene = \"scene.toml\"\nvalidate = true\nstress = \"short\"\n[expect]\npeak_force_n = { min = 0 }\n",
@@ -41,7 +45,13 @@ impl Hanging {
 
     fn flotor(&self, arguments: &[&str]) -> Flotor {
         let model = self.model.display().to_string();
-        let arguments = arguments.iter().map(|word| if *word == "MODEL" { model.as_str() } else { word });
+        let new = self.path().join(format!("data-{}", NUMBER.fetch_add(1, Ordering::Relaxed)));
+        let new = new.display().to_string();
+        let arguments = arguments.iter().map(|word| match *word {
+            "MODEL" => model.as_str(),
+            "NEW" => &new,
+            word => word,
+        });
         Flotor::with(arguments).inside(self.path())
     }
 
@@ -95,8 +105,16 @@ impl End {
     }
 }
 
+/// A program that ignores every request to end, as its child and grandchild do: one waits, one spins.
+const PROGRAM: &str = "trap '' TERM INT HUP\n(while :; do sleep 600; done) &\nwhile :; do :; done\n";
+
+/// Number of the next folder of a study.
+static NUMBER: AtomicU32 = AtomicU32::new(0);
+
 /// Each would go on for minutes.
-const COMMANDS: [&[&str]; 4] = [
+const COMMANDS: [&[&str]; 6] = [
+    &["lend", "--api", "ml-api", "--listen", "127.0.0.1:0", "--", "sh", "program.sh"],
+    &["study", "jnd", "--scene", "study.toml", "--out", "NEW"],
     &["run", "scene.toml", "--clock", "virtual"],
     &["test", "hangs.test.toml"],
     &["validate", "MODEL", "--timeout", "600s"],
@@ -115,6 +133,7 @@ fn nothing_is_left_of_a_command_that_is_killed_while_a_model_hangs() {
     let hanging = HANGS.map(Hanging::by);
     let mut slowest = Duration::ZERO;
     for command in COMMANDS {
+        let mut most = 0;
         for number in 0..kills {
             let end = [End::Kill, End::Term, End::Interrupt][number % 3];
             let scene = &hanging[number / 3 % 2];
@@ -122,12 +141,31 @@ fn nothing_is_left_of_a_command_that_is_killed_while_a_model_hangs() {
             // Spread evenly, without a period of its own: the golden section.
             let share = (number as f64 * 0.618_034).fract();
             std::thread::sleep(Duration::from_secs_f64(1.5 * share));
+            most = most.max(scene.processes().len());
             end.bring_about(&started);
             slowest = slowest.max(scene.is_left(&format!("{command:?} {end:?} after {share}")));
-            let _ = started.wait();
+            let ended = started.wait();
+            assert_ne!(ended.code, Some(exit_code::CONFIGURATION), "{ended:?}");
         }
+        assert!(most > 1, "{command:?} never had a process of its own");
     }
     println!("{kills} kills of each command: the last process ended after {slowest:.2?} at most");
+}
+
+/// A daemon is meant to go on; whoever ends the program has to know of it.
+#[test]
+fn a_process_that_leaves_the_group_of_a_lent_program_is_named() {
+    let scratch = Scratch::default();
+    let program = "setsid sh -c 'echo $$ >daemon.new; mv daemon.new daemon; exec sleep 600' >/dev/null 2>&1 &
+                   until [ -e daemon ]; do sleep 0.01; done";
+    let lend = ["lend", "--api", "ml-api", "--listen", "127.0.0.1:0", "--", "sh", "-c", program];
+    let ran = Flotor::with(lend).inside(scratch.path()).run();
+    let daemon = std::fs::read_to_string(scratch.path().join("daemon")).expect("it has started");
+    let daemon = daemon.trim().parse().ok().and_then(Pid::from_raw).expect("a number");
+    kill_process(daemon, Signal::KILL).expect("it goes on");
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let named = format!("`sleep` (process {}) has left the process group", daemon.as_raw_nonzero());
+    assert!(ran.stderr.contains(&named), "{ran:?}");
 }
 
 #[test]

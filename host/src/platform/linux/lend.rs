@@ -1,6 +1,7 @@
 //! `flotor lend`: somebody's program on a Flotor device, without a changed line: a drop-in library answers where the program
 //! calls its maker's.
 
+pub(crate) mod guard;
 mod outcome;
 mod program;
 mod service;
@@ -11,16 +12,16 @@ use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note};
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::spawn_unblocked;
+use flotor_session::RunError;
 use flotor_session::registry::PATH_VARIABLE;
 use flotor_session::scene::Scene;
-use flotor_session::{RunError, end_with_this_thread};
+use guard::{KILL_GROUP, ProgramEnd};
 use outcome::Runs;
 use program::Program;
 use rustix::process::{Pid, Signal, kill_process};
 use service::Service;
 use std::ffi::OsString;
 use std::os::unix::fs::{DirBuilderExt, symlink};
-use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
@@ -208,6 +209,13 @@ impl Folder {
     }
 }
 
+impl Folder {
+    /// File for the end of the program.
+    fn program_end(&self) -> PathBuf {
+        self.0.join("program-end.json")
+    }
+}
+
 impl Drop for Folder {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.0);
@@ -254,11 +262,10 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
             .err()
             .unwrap_or_else(|| CommandError::Failed("no library".to_owned())));
     }
-    let mut command = Command::new(&program.path);
-    command.args(rest);
+    let mut command = guarded(&program, rest, &folder, &own);
     environment(&mut command, &arguments, &folder.0, &own)?;
-    let status = wait(start(&mut command, &program)?, &stop);
-    let runs = Runs::read(&folder.0, &status);
+    let end = carry_out(&mut command, &program, &folder, &stop)?;
+    let runs = Runs::read(&folder.0, &end);
     if !runs.tell(&program, arguments.record.as_deref()) {
         let which = api.map_or_else(
             || "none of dhd, openhaptics and chai3d".to_owned(),
@@ -270,13 +277,33 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
             program.path.display()
         ));
     }
-    end_as(&runs, arguments.json.as_deref(), folder)
+    end_as(&runs, arguments.json.as_deref(), folder, 0)
 }
 
-/// Starts the program, which ends with this process, however that ends.
-fn start(command: &mut Command, program: &Program) -> Result<Child, CommandError> {
-    end_with_this_thread(command);
-    spawn_unblocked(command).map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))
+/// Returns the command that starts the program under its [`guard`].
+fn guarded(program: &Program, rest: &[OsString], folder: &Folder, own: &Path) -> Command {
+    let mut command = Command::new(own);
+    command.args(["program-guard", "--parent", &std::process::id().to_string(), "--end"]);
+    command.arg(folder.program_end()).arg("--").arg(&program.path).args(rest);
+    command
+}
+
+/// Runs the guarded program; its end. Exits with the code of the guard if that could not start the program, and has said why.
+fn carry_out(
+    command: &mut Command,
+    program: &Program,
+    folder: &Folder,
+    stop: &StopSwitch,
+) -> Result<ProgramEnd, CommandError> {
+    let guard = spawn_unblocked(command)
+        .map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))?;
+    let status = wait(guard, stop);
+    let end = ProgramEnd::read(&folder.program_end()).unwrap_or_else(|| match status.code() {
+        Some(code) => std::process::exit(code),
+        None => ProgramEnd::of(status),
+    });
+    end.tell();
+    Ok(end)
 }
 
 /// Serves a program by the network.
@@ -289,23 +316,23 @@ fn serve(
     stop: &StopSwitch,
 ) -> Result<(), CommandError> {
     let folder = Folder::new()?;
-    let mut served = service.start(arguments, &folder, own)?;
-    let mut command = Command::new(&program.path);
-    let status = wait(start(command.args(rest), program)?, stop);
-    served.tell();
-    drop(served);
-    let runs = Runs::read(&folder.0, &status);
+    let served = service.start(arguments, &folder, own)?;
+    let end = carry_out(&mut guarded(program, rest, &folder, own), program, &folder, stop)?;
+    let served = served.finish();
+    let runs = Runs::read(&folder.0, &end);
     runs.tell(program, arguments.record.as_deref());
-    end_as(&runs, arguments.json.as_deref().filter(|_| service.leaves_its_summary_here()), folder)
+    let json = arguments.json.as_deref().filter(|_| service.leaves_its_summary_here());
+    end_as(&runs, json, folder, served)
 }
 
-/// Writes the summaries, removes the folder, and ends with the exit code of the program and its runs.
-fn end_as(runs: &Runs<'_>, json: Option<&Path>, folder: Folder) -> Result<(), CommandError> {
+/// Writes the summaries, removes the folder, and ends with the exit code of the program and its runs; where these give 0, with that of
+/// the service, whose run may have been refused.
+fn end_as(runs: &Runs<'_>, json: Option<&Path>, folder: Folder, service: i32) -> Result<(), CommandError> {
     json.map_or(Ok(()), |json| runs.write(json))?;
     drop(folder);
-    match runs.exit_code() {
-        0 => Ok(()),
-        code => std::process::exit(code),
+    match (runs.exit_code(), service) {
+        (0, 0) => Ok(()),
+        (0, code) | (code, _) => std::process::exit(code),
     }
 }
 
@@ -385,12 +412,15 @@ fn told(
     Ok(())
 }
 
-/// How long a program may take to end once it is asked to, before it is asked again.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Time that a program has to end by the signal of the terminal, before SIGTERM.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// Time that a program has to end once it was asked to, before it is killed.
+const LAST_PATIENCE: Duration = Duration::from_millis(1300);
 /// Pause between two looks at it.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Waits for the program. The terminal asks it to end as well; if it does not, or was asked by nobody else, this does.
+/// Waits for the guard of the program. The terminal asks the program to end as well; if the program goes on, or has been asked by
+/// nobody else, this sends SIGTERM and at last kills it.
 fn wait(mut child: Child, stop: &StopSwitch) -> ExitStatus {
     let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
     let send = |signal| process.map(|process| kill_process(process, signal));
@@ -399,17 +429,18 @@ fn wait(mut child: Child, stop: &StopSwitch) -> ExitStatus {
     loop {
         match child.try_wait() {
             Ok(Some(status)) => return status,
-            Err(_) => return ExitStatus::from_raw(1 << 8),
+            Err(_) => return ExitStatus::default(),
             Ok(None) => {}
         }
-        if stop.emergency().is_some() {
-            let _ = send(Signal::KILL);
-        } else if stop.is_stop_asked() {
-            let since = *asked.get_or_insert_with(Instant::now);
-            if !was_told && since.elapsed() > PATIENCE {
-                was_told = true;
-                let _ = send(Signal::TERM);
-            }
+        if stop.is_stop_asked() {
+            asked.get_or_insert_with(Instant::now);
+        }
+        let waited = asked.map(|since| since.elapsed()).unwrap_or_default();
+        if stop.emergency().is_some() || waited > LAST_PATIENCE {
+            let _ = send(KILL_GROUP);
+        } else if !was_told && waited > PATIENCE {
+            was_told = true;
+            let _ = send(Signal::TERM);
         }
         std::thread::sleep(LOOK);
     }

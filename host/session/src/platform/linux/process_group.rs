@@ -6,6 +6,7 @@ use rustix::process::{
     waitid,
 };
 use std::io;
+use std::mem::MaybeUninit;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command};
 
@@ -14,16 +15,28 @@ pub(crate) fn lead_until_parent_ends(command: &mut Command) {
     end_with_this_thread(command.process_group(0));
 }
 
-/// Lets the system kill the process of a command when the thread that starts it ends, however that ends. Not real-time.
+/// Lets the system kill the process of a command when the thread that starts it ends, however that ends. The process blocks no signal;
+/// the thread may block them all meanwhile, so that none ends it while it starts the process. Not real-time.
 pub fn end_with_this_thread(command: &mut Command) {
     let parent = getpid();
     let end_with_parent = move || {
         set_parent_process_death_signal(Some(Signal::KILL))?;
+        block_no_signal();
         // A parent that ended before sends no signal any more.
         if getppid() == Some(parent) { Ok(()) } else { Err(io::ErrorKind::NotFound.into()) }
     };
     // SAFETY: system calls alone, without a lock or an allocation.
     unsafe { command.pre_exec(end_with_parent) };
+}
+
+/// Lets this thread take every signal.
+fn block_no_signal() {
+    let mut none = MaybeUninit::<libc::sigset_t>::zeroed();
+    // SAFETY: a set on this stack that the first call initialises, and a null pointer where nothing is to be written.
+    unsafe {
+        libc::sigemptyset(none.as_mut_ptr());
+        libc::pthread_sigmask(libc::SIG_SETMASK, none.as_ptr(), std::ptr::null_mut());
+    }
 }
 
 /// Returns true once a child has ended, without waiting for it.

@@ -1,5 +1,6 @@
 //! Summaries of the runs behind a program in the folder of `flotor lend`: one of each process that opened a device.
 
+use super::guard::ProgramEnd;
 use super::program::Program;
 use flotor_command::{CommandError, note, say, write_json};
 use flotor_servo::last_stop::SignalName;
@@ -7,7 +8,6 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::ExitStatus;
 
 /// Exit code of a run that a device, the watchdog or an oscillation has ended, as that of `flotor run`.
 const RUN_FAILED: i32 = 4;
@@ -26,7 +26,7 @@ struct Run {
 /// The runs behind a program, by what is in the names of their files.
 pub(super) struct Runs<'a> {
     runs: BTreeMap<String, Run>,
-    status: &'a ExitStatus,
+    program: &'a ProgramEnd,
 }
 
 impl<'a> Runs<'a> {
@@ -36,7 +36,7 @@ impl<'a> Runs<'a> {
     }
 
     /// Reads what is there at the end of the program.
-    pub(super) fn read(folder: &Path, status: &'a ExitStatus) -> Self {
+    pub(super) fn read(folder: &Path, program: &'a ProgramEnd) -> Self {
         let mut runs = BTreeMap::<String, Run>::new();
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
@@ -58,7 +58,7 @@ impl<'a> Runs<'a> {
                 _ => {}
             }
         }
-        Self { runs, status }
+        Self { runs, program }
     }
 
     /// Prints what is known of each run; whether anything is.
@@ -83,7 +83,8 @@ impl<'a> Runs<'a> {
 
     /// How the program ended, for a run that did not end before.
     fn end(&self) -> String {
-        match (self.status.signal(), self.status.code()) {
+        let status = self.program.status();
+        match (status.signal(), status.code()) {
             (Some(signal), _) => format!("killed by {}", SignalName(signal)),
             (None, code) => {
                 format!("ended with exit code {} without an end of its run", code.unwrap_or_default())
@@ -104,6 +105,10 @@ impl<'a> Runs<'a> {
             if !run.is_whole || run.summary.is_none() {
                 summary["end"] = self.end().into();
             }
+            if !self.program.left_running.is_empty() {
+                let left = self.program.left_running.iter().map(ToString::to_string);
+                summary["left_running"] = left.collect::<Vec<_>>().into();
+            }
             write_json(&named(file, suffix), &summary)?;
         }
         Ok(())
@@ -115,7 +120,8 @@ impl<'a> Runs<'a> {
             let end = run.summary.as_ref().and_then(|summary| summary.get("end")).and_then(Value::as_str);
             run.is_whole && end.is_some_and(|end| !["finished", "stopped"].contains(&end))
         };
-        match (self.status.code(), self.status.signal()) {
+        let status = self.program.status();
+        match (status.code(), status.signal()) {
             (Some(0), _) if self.runs.values().any(ended_early) => RUN_FAILED,
             (Some(code), _) => code,
             (None, signal) => 128 + signal.unwrap_or_default(),
@@ -137,6 +143,7 @@ fn named(file: &Path, suffix: &str) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::process::ExitStatus;
 
     #[test]
     fn each_run_has_a_summary_with_its_end() {
@@ -148,7 +155,8 @@ mod tests {
             let text = std::fs::read_to_string(folder.join(name)).expect("it was written");
             serde_json::from_str::<Value>(&text).expect("JSON")["end"].as_str().expect("an end").to_owned()
         };
-        let crashed = ExitStatus::from_raw(11);
+        let ended = |status| ProgramEnd::of(ExitStatus::from_raw(status));
+        let crashed = ended(11);
         Runs::read(&folder, &crashed).write(&folder.join("out.json")).expect("it can be written");
         assert!(end("out.json").starts_with("the program opened no device: killed by signal 11"));
         write("report.json.so-far", "{\"end\": \"watchdog\", \"ticks\": 5}");
@@ -159,8 +167,8 @@ mod tests {
         assert!(end("out.json").starts_with("killed by signal 11"), "{}", end("out.json"));
         assert_eq!(end("out-2.json"), "oscillation");
         assert_eq!(runs.exit_code(), 128 + 11);
-        assert_eq!(Runs::read(&folder, &ExitStatus::from_raw(7 << 8)).exit_code(), 7);
-        assert_eq!(Runs::read(&folder, &ExitStatus::from_raw(0)).exit_code(), RUN_FAILED);
+        assert_eq!(Runs::read(&folder, &ended(7 << 8)).exit_code(), 7);
+        assert_eq!(Runs::read(&folder, &ended(0)).exit_code(), RUN_FAILED);
         std::fs::remove_dir_all(&folder).expect("it is ours");
     }
 }

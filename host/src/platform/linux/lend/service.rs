@@ -146,22 +146,23 @@ impl Served {
         Ok(served)
     }
 
+    /// Ends it, prints what it said of the run, and returns its exit code; that is not 0 where its run has failed.
+    pub(super) fn finish(mut self) -> i32 {
+        let said = self.end();
+        if !said.trim().is_empty() {
+            say!("{}", said.trim_end());
+        }
+        self.child.wait().ok().and_then(|status| status.code()).unwrap_or_default()
+    }
+
     /// Ends it; what it said of the run.
-    pub(super) fn end(&mut self) -> String {
+    fn end(&mut self) -> String {
         if self.child.try_wait().ok().flatten().is_none() {
             let process = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
             let _ = process.map(|process| kill_process(process, Signal::TERM));
         }
         let _ = self.child.wait();
         self.said.take().and_then(|said| said.join().ok()).unwrap_or_default()
-    }
-
-    /// Ends it and tells what it said of the run.
-    pub(super) fn tell(&mut self) {
-        let said = self.end();
-        if !said.trim().is_empty() {
-            say!("{}", said.trim_end());
-        }
     }
 }
 
