@@ -1,5 +1,10 @@
 """Virtual runs and recordings."""
 
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -35,3 +40,19 @@ def test_what_is_wrong_is_said(tmp_path):
     (tmp_path / "text.mcap").write_text("no recording at all")
     with pytest.raises(flotor.FlotorError, match="not an MCAP file"):
         flotor.read_recording(tmp_path / "text.mcap")
+
+
+def test_a_step_that_does_not_return_is_an_error_with_its_plugin_and_tick(tmp_path):
+    compiler = shutil.which("cc") or pytest.skip("no C compiler")
+    root, library, scene = Path(__file__).parents[3], tmp_path / "libhangs.so", tmp_path / "scene.toml"
+    habit = "-DIN_STEP=if (input->tick == 70) for (;;) {}"
+    source = root / "tests" / "c" / "model_that.c"
+    subprocess.run([compiler, "-shared", "-fPIC", "-I", root / "hal" / "include", habit, source, "-o", library], check=True)
+    scene.write_text(
+        f'duration_s = 0.2\n[device]\nplugin = "simulated"\n[[model]]\nname = "jelly"\nplugin = "{library}"\n'
+    )
+    # In a process of its own: its thread is left behind.
+    program = [sys.executable, "-c", "import flotor, sys; flotor.run(sys.argv[1])", scene]
+    ran = subprocess.run(program, capture_output=True, text=True, timeout=60)
+    assert ran.returncode == 1, ran
+    assert "FlotorError: `jelly` did not return from `step` in tick 70 within 1 s of processor time" in ran.stderr
