@@ -1,5 +1,5 @@
 //! No message for a person contains a value as Rust's `Debug` prints it: outside of tests and assertions, a source uses `{:?}` only for
-//! a reader that is a program.
+//! a reader that is a program, or for numbers.
 
 use flotor_tests::{files_under, workspace_root};
 use std::collections::BTreeSet;

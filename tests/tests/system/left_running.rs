@@ -9,7 +9,6 @@ use flotor_tests::{TestSize, workspace_root};
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 /// A folder with a scene of a model that hangs in tick 70, and a test of it.
@@ -28,8 +27,6 @@ impl Hanging {
         let scene = format!(
             "duration_s = 0.2\n[device]\nplugin = \"simulated\"\n[[model]]\nname = \"jelly\"\nplugin = {model:?}\n"
         );
-        // A study varies the spring.
-        let _ = folder.file("study.toml", format!("{scene}[[model]]\nplugin = \"spring\"\n"));
         let _ = folder.file("scene.toml", scene);
         let _ = folder.file("program.sh", PROGRAM);
         let _ = folder.file(
@@ -45,13 +42,7 @@ impl Hanging {
 
     fn flotor(&self, arguments: &[&str]) -> Flotor {
         let model = self.model.display().to_string();
-        let new = self.path().join(format!("data-{}", NUMBER.fetch_add(1, Ordering::Relaxed)));
-        let new = new.display().to_string();
-        let arguments = arguments.iter().map(|word| match *word {
-            "MODEL" => model.as_str(),
-            "NEW" => &new,
-            word => word,
-        });
+        let arguments = arguments.iter().map(|word| if *word == "MODEL" { model.as_str() } else { word });
         Flotor::with(arguments).inside(self.path())
     }
 
@@ -108,13 +99,9 @@ impl End {
 /// A program that ignores every request to end, as its child and grandchild do: one waits, one spins.
 const PROGRAM: &str = "trap '' TERM INT HUP\n(while :; do sleep 600; done) &\nwhile :; do :; done\n";
 
-/// Number of the next folder of a study.
-static NUMBER: AtomicU32 = AtomicU32::new(0);
-
 /// Each would go on for minutes.
-const COMMANDS: [&[&str]; 6] = [
+const COMMANDS: [&[&str]; 5] = [
     &["lend", "--api", "ml-api", "--listen", "127.0.0.1:0", "--", "sh", "program.sh"],
-    &["study", "jnd", "--scene", "study.toml", "--out", "NEW"],
     &["run", "scene.toml", "--clock", "virtual"],
     &["test", "hangs.test.toml"],
     &["validate", "MODEL", "--timeout", "600s"],

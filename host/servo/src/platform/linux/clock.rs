@@ -32,5 +32,5 @@ pub(crate) fn sleep_while_zero(word: &AtomicU32, timeout: Duration) {
 
 /// Wakes the threads that sleep on a word. Real-time: one system call.
 pub(crate) fn wake_all(word: &AtomicU32) {
-    let _ = futex::wake(word, futex::Flags::PRIVATE, i32::MAX as u32);
+    let _ = futex::wake(word, futex::Flags::PRIVATE, i32::MAX.cast_unsigned());
 }
