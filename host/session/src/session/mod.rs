@@ -28,7 +28,7 @@ use crate::long_call::Exceeded;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{Isolation, Pacing, Scene, SceneError};
 use ceiling::{norm_notice, under_ceiling};
-use controls::{ChangeLog, Parts};
+use controls::{ChangeLog, PluginTable};
 use epilogue::Epilogue;
 use flotor_core::Change;
 use flotor_core::ModelOutputs;
@@ -423,14 +423,14 @@ impl Session {
             Clock::Virtual => WatchdogStart::default(),
         };
         warnings.extend(stops_missing);
-        let parts = Parts::new(&plugins);
+        let table = PluginTable::new(&plugins);
         let Scheduled { changes, replacements } =
-            prepare::schedule(scene, &parts, registry, &config, options.clock)?;
+            prepare::schedule(scene, &table, registry, &config, options.clock)?;
         let room = models.len() + replacements.len();
         let (parameters, sender, reports) = ParameterQueue::new(changes, room);
         let (swaps, host_swaps) = swap_queues(models.len(), replacements);
         let controls =
-            Controls::new(parts.clone(), sender, &scene.models, (config, options.clock), host_swaps);
+            Controls::new(table.clone(), sender, &scene.models, (config, options.clock), host_swaps);
 
         let capabilities: Vec<_> = opened.iter().map(|opened| opened.capabilities).collect();
         let guard = |limits: &Limits, device: &Capabilities| {
@@ -477,7 +477,7 @@ impl Session {
         Ok(Self {
             standby: Standby::new(devices, forces, parameters, swaps, config, run),
             controls,
-            changes: ChangeLog::new(parts, reports),
+            changes: ChangeLog::new(table, reports),
             clock: options.clock,
             pacing: scene.pacing,
             period_ns,

@@ -1,7 +1,7 @@
 //! From a scene to what a loop is made of: plugins loaded, their settings checked, everything paired.
 
 use super::choice::chosen;
-use super::controls::{ChosenBy, ControlError, NewValue, Parts, understands};
+use super::controls::{ChosenBy, ControlError, NewValue, PluginTable, understands};
 use super::stop_without_host::StopWithoutHost;
 use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
@@ -523,7 +523,7 @@ pub(super) struct Scheduled {
 /// The changes a scene has scheduled, checked, and the models they put in, created; complaints name file and line.
 pub(super) fn schedule(
     scene: &Scene,
-    parts: &Parts,
+    plugins: &PluginTable,
     registry: &Registry,
     config: &LoopConfig,
     clock: Clock,
@@ -540,7 +540,7 @@ pub(super) fn schedule(
         let checked = match &change.what {
             ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {
                 let new = NewValue { plugin, parameter: key, value };
-                match parts.check(&new) {
+                match plugins.check(&new) {
                     Ok(checked) => checked,
                     // It is for another seed.
                     Err(_) if passed_over.iter().flatten().any(|part| understands(part, &new)) => continue,
@@ -548,11 +548,11 @@ pub(super) fn schedule(
                 }
             }
             ChangeWhat::Weight { model, weight } => {
-                parts.check_weight(model, *weight).map_err(|error| complain("change.weight", error))?
+                plugins.check_weight(model, *weight).map_err(|error| complain("change.weight", error))?
             }
             ChangeWhat::Swap { model, by } => {
                 let choice = chosen(config.seed, draw, by.len());
-                for number in parts.models(model).map_err(|error| complain("change.swap", error))? {
+                for number in plugins.models(model).map_err(|error| complain("change.swap", error))? {
                     let Some(place) = scene.models.get(number) else { continue };
                     let make = |Alternative { plugin, parameters }: &Alternative| {
                         let mut other = place.replaced_by(plugin.as_deref(), &[]);
@@ -570,7 +570,7 @@ pub(super) fn schedule(
                         *others = made.into_iter().map(|(_, report)| report).collect();
                     }
                     let chosen_by = if by.len() > 1 { ChosenBy::Seed } else { ChosenBy::Name };
-                    let generation = parts.put_in(number, report, chosen_by);
+                    let generation = plugins.add(number, report, chosen_by);
                     let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
                     let replacement = Replacement { model, generation, layer: Box::new(layer) };
                     scheduled.replacements.push((time_ns, replacement));
@@ -580,7 +580,7 @@ pub(super) fn schedule(
         };
         scheduled.changes.extend(checked.into_iter().map(|change| ScheduledChange { time_ns, change }));
     }
-    parts.start_with_the_first();
+    plugins.start_with_the_first();
     Ok(scheduled)
 }
 

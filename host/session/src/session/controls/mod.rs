@@ -1,0 +1,273 @@
+//! Changes of a running loop by other threads: new values of parameters, weights, replacements of models.
+//!
+//! Texts are checked against the schema of a plugin here; only numbers enter the loop.
+
+mod change_log;
+mod plugin_table;
+mod swaps;
+mod versions;
+
+pub(super) use change_log::ChangeLog;
+pub(super) use plugin_table::{PluginTable, understands};
+pub use swaps::Misbehaved;
+pub(super) use swaps::Settled;
+pub(super) use versions::ChosenBy;
+
+use super::prepare::prepare_model_while;
+use crate::registry::Registry;
+use crate::scene::{Location, ModelUse};
+use flotor_hal::abi::loader::SettingError;
+use flotor_hal::{LoopConfig, Parameter};
+use flotor_live::RefusalCause;
+use flotor_servo::{ChangeSender, Clock, HostSwaps, Layer, LayerReport, ParameterChange, Replacement};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use swaps::Swaps;
+
+/// Reason for a refused change.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ControlError {
+    /// No plugin of the run has this name.
+    #[error(
+        "the run has no plugin `{name}`{} (its plugins: {})",
+        nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
+        names.join(", ")
+    )]
+    UnknownPlugin {
+        /// The name in the request.
+        name: String,
+        /// The most similar name there is.
+        nearest: Option<String>,
+        /// All names.
+        names: Vec<String>,
+    },
+    /// The plugin has no such parameter, or the value is not legal for it.
+    #[error("[{plugin}] {error}")]
+    Setting {
+        /// The plugin.
+        plugin: String,
+        /// What is wrong.
+        #[source]
+        error: SettingError,
+    },
+    /// The parameter is only read when the plugin is created.
+    #[error("[{plugin}] `{id}` cannot change while the loop runs; {}", live_words(live))]
+    Fixed {
+        /// The plugin.
+        plugin: String,
+        /// The parameter.
+        id: String,
+        /// Parameters that can.
+        live: Vec<String>,
+    },
+    /// Only models are mixed and replaced.
+    #[error("only models have a weight and can be swapped; this is a device")]
+    NoWeight,
+    /// A model cannot be replaced.
+    #[error("[{model}] model unchanged: {problem}")]
+    Refused {
+        /// The model.
+        model: String,
+        /// Why.
+        problem: String,
+        /// What is wrong.
+        cause: RefusalCause,
+    },
+    /// More changes wait than the loop takes in, or the model replaced last is still fading.
+    #[error("previous changes are pending, or a swap is still fading in; try again in a moment")]
+    Busy,
+    /// The loop has ended.
+    #[error("the run is over")]
+    Ended,
+}
+
+fn live_words(live: &[String]) -> String {
+    if live.is_empty() {
+        "none of its parameters can".to_owned()
+    } else {
+        format!("parameters that can: {}", live.join(", "))
+    }
+}
+
+/// A new value for a parameter of a plugin of the run, in words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NewValue<'a> {
+    /// The name of a device or model in the scene (a model on several devices: `NAME@DEVICE` is the one on that
+    /// device, `NAME` all), or a plugin's id.
+    pub plugin: &'a str,
+    /// Id of the parameter.
+    pub parameter: &'a str,
+    /// Its value, as a person would type it.
+    pub value: &'a str,
+}
+
+/// A handle to a running loop, for any thread; clone it freely. Nothing here makes the loop wait.
+#[derive(Clone)]
+pub struct Controls {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    plugins: PluginTable,
+    /// Locked by panels and scripts, never by the loop.
+    changes: Mutex<ChangeSender>,
+    /// The models of the scene: place and mixing of a replacement.
+    models: Vec<ModelUse>,
+    config: LoopConfig,
+    clock: Clock,
+    swaps: Mutex<Swaps>,
+}
+
+impl Shared {
+    fn changes(&self) -> MutexGuard<'_, ChangeSender> {
+        self.changes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Controls {
+    pub(super) fn new(
+        plugins: PluginTable,
+        changes: ChangeSender,
+        models: &[ModelUse],
+        (config, clock): (LoopConfig, Clock),
+        queues: HostSwaps,
+    ) -> Self {
+        let (changes, swaps) = (Mutex::new(changes), Mutex::new(Swaps::new(queues, models.len())));
+        Self { shared: Arc::new(Shared { plugins, changes, models: models.to_vec(), config, clock, swaps }) }
+    }
+
+    /// Every plugin of the run with its schema: the device, then the models in the scene's order.
+    #[must_use]
+    pub fn plugins(&self) -> Vec<(String, &'static [Parameter])> {
+        let plugins = self.shared.plugins.lock();
+        plugins.iter().map(|plugin| (plugin.now().name.clone(), plugin.now().schema)).collect()
+    }
+
+    /// Moves a live parameter to a new value, a tenth of its [soft range](flotor_hal::SoftRange) in 50 ms; what is no number
+    /// changes before the next tick. Not real-time.
+    ///
+    /// The plugin may still refuse it, if it does not fit its other values: observers are told what became of it
+    /// ([`super::Observer::change`]).
+    ///
+    /// # Errors
+    /// [`ControlError`]: no such plugin, parameter or value; not a live one; the loop is busy or over.
+    pub fn set_parameter(&self, plugin: &str, parameter: &str, value: &str) -> Result<(), ControlError> {
+        self.set_parameters(&[NewValue { plugin, parameter, value }])
+    }
+
+    /// Moves several live parameters to new values, all from the same tick on; each as [`Controls::set_parameter`] does. Not
+    /// real-time.
+    ///
+    /// # Errors
+    /// [`ControlError`]; then none of them changes.
+    pub fn set_parameters(&self, values: &[NewValue<'_>]) -> Result<(), ControlError> {
+        let Shared { plugins, .. } = &*self.shared;
+        let slowed = |change: &ParameterChange| ParameterChange { pace: plugins.pace(change), ..*change };
+        let checked =
+            values.iter().map(|value| plugins.check(value)).collect::<Result<Vec<_>, _>>()?.concat();
+        self.send(&checked.iter().map(slowed).collect::<Vec<_>>())
+    }
+
+    /// Gives several live parameters new values, all before the same tick: for what no hand feels while it changes, such as the
+    /// next stimulus of an experiment. Not real-time.
+    ///
+    /// # Errors
+    /// [`ControlError`]; then none of them changes.
+    pub fn set_parameters_at_once(&self, values: &[NewValue<'_>]) -> Result<(), ControlError> {
+        let checked = values.iter().map(|value| self.shared.plugins.check(value));
+        self.send(&checked.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+
+    /// Lets a model be felt more or less: its weight moves there at the rate of its fade, from the next tick on. A
+    /// weight of 0 silences it, and it is not asked any more. Not real-time.
+    ///
+    /// # Errors
+    /// [`ControlError`]: no such model; the loop is busy or over.
+    pub fn set_weight(&self, model: &str, weight: f64) -> Result<(), ControlError> {
+        self.send(&self.shared.plugins.check_weight(model, weight)?)
+    }
+
+    fn send(&self, checked: &[ParameterChange]) -> Result<(), ControlError> {
+        let mut changes = self.shared.changes();
+        if changes.is_abandoned() {
+            return Err(ControlError::Ended);
+        }
+        // All or none, and the loop sees them at once.
+        changes.push_entire_slice(checked).map_err(|_| ControlError::Busy)
+    }
+
+    /// Hot swap of a model by another plugin, or by the same one rebuilt: the new one is loaded and created here, and fades
+    /// in from the next tick on while the old one fades out. Not real-time: takes as long as creating the model.
+    ///
+    /// Without `plugin` it is the one the scene names, with the scene's settings; another one starts from its own
+    /// defaults. `settings` come on top. Places, mapping and weight stay.
+    ///
+    /// # Errors
+    /// [`ControlError`]: no such model; the plugin is refused; the model replaced last is still fading; the loop is over.
+    pub fn swap(
+        &self,
+        registry: &Registry,
+        model: &str,
+        plugin: Option<&str>,
+        settings: &[(&str, &str)],
+    ) -> Result<(), ControlError> {
+        let Shared { plugins, models, config, clock, .. } = &*self.shared;
+        let numbers = plugins.models(model)?;
+        if self.shared.changes().is_abandoned() {
+            return Err(ControlError::Ended);
+        }
+        self.swaps().reserve(plugins, &numbers)?;
+        let refused = |error: super::RunError| ControlError::Refused {
+            model: model.to_owned(),
+            problem: error.to_string(),
+            cause: if error.is_configuration() { RefusalCause::Request } else { RefusalCause::Plugin },
+        };
+        let make = |number: &usize| {
+            let mut other = models.get(*number).ok_or(ControlError::Ended)?.replaced_by(plugin, settings);
+            if plugin.is_some() {
+                other.plugin.location = Location { file: "--plugin".into(), line: 0 };
+            }
+            // After the end of a run nothing waits for the code of a plugin.
+            let is_wanted = || !self.shared.changes().is_abandoned();
+            prepare_model_while(registry, &other, config, *clock, is_wanted).map_err(refused)
+        };
+        // Without the lock: the run goes on meanwhile, and may end.
+        let made = numbers.iter().map(make).collect::<Result<Vec<_>, _>>();
+        let mut swaps = self.swaps();
+        let made = made.inspect_err(|_| swaps.release(&numbers))?;
+        for (number, (layer, report)) in numbers.into_iter().zip(made) {
+            swaps.warn(report.warning());
+            let generation = plugins.add(number, report, ChosenBy::Name);
+            let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
+            swaps.send(number, Replacement { model, generation, layer: Box::new(layer) })?;
+        }
+        Ok(())
+    }
+
+    /// Returns warnings about replacements, a sentence each. Not real-time.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        self.swaps().take_warnings()
+    }
+
+    fn swaps(&self) -> MutexGuard<'_, Swaps> {
+        self.shared.swaps.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Frees models that the loop has returned, unless another thread does. Not real-time.
+    pub(super) fn sweep(&self) {
+        if let Ok(mut swaps) = self.shared.swaps.try_lock() {
+            swaps.sweep(&self.shared.plugins);
+        }
+    }
+
+    /// Returns the models that a finished loop has returned last, each with its number. Not real-time.
+    pub(super) fn take_retired(&self) -> Vec<(usize, Box<Layer>)> {
+        self.swaps().take_retired()
+    }
+
+    /// Returns the faults of all plugins of a run that is over; `in_loop` has those still in the loop. Not real-time.
+    pub(super) fn settle(&self, in_loop: Vec<LayerReport>) -> Settled {
+        let Shared { plugins, models, .. } = &*self.shared;
+        self.swaps().settle(plugins, models.len(), in_loop)
+    }
+}

@@ -1,0 +1,208 @@
+//! The plugins of a run with their replacements: checks of new values before they enter the loop, and descriptions of its reports.
+
+use super::super::PluginReport;
+use super::versions::{ChosenBy, Versions};
+use super::{ControlError, NewValue};
+use crate::scene::{is_named, nearest};
+use flotor_core::{Change, ChangeSubject};
+use flotor_hal::abi::PluginKind;
+use flotor_hal::abi::loader::Setting;
+use flotor_hal::{Mutability, Parameter};
+use flotor_servo::{ChangeReport, PLUGIN, Pace, ParameterChange, WEIGHT};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Parses a new value of a live parameter.
+///
+/// # Errors
+/// [`ControlError::Setting`], [`ControlError::Fixed`].
+fn live_setting(part: &PluginReport, new: &NewValue<'_>) -> Result<Setting, ControlError> {
+    let setting = Setting::parse(part.schema, new.parameter, new.value)
+        .map_err(|error| ControlError::Setting { plugin: part.name.clone(), error })?;
+    let is_live = |parameter: &Parameter| parameter.mutability() == Mutability::Live;
+    if part.schema.get(setting.index()).is_some_and(is_live) {
+        return Ok(setting);
+    }
+    let live = part.schema.iter().filter(|parameter| is_live(parameter));
+    Err(ControlError::Fixed {
+        plugin: part.name.clone(),
+        id: new.parameter.to_owned(),
+        live: live.map(|parameter| parameter.id().to_owned()).collect(),
+    })
+}
+
+/// True if a new value names a plugin and is legal for it. Not real-time.
+pub(in super::super) fn understands(part: &PluginReport, new: &NewValue<'_>) -> bool {
+    let is_named = is_named(&part.name, new.plugin) || part.metadata.id == new.plugin;
+    is_named && live_setting(part, new).is_ok()
+}
+
+/// The plugins of a run by number: devices first, then models in the scene's order. Clones share one table.
+#[derive(Clone)]
+pub(in super::super) struct PluginTable {
+    places: Arc<Mutex<Vec<Versions>>>,
+}
+
+impl PluginTable {
+    /// The plugins that a run begins with.
+    pub(in super::super) fn new(plugins: &[PluginReport]) -> Self {
+        Self { places: Arc::new(Mutex::new(plugins.iter().map(Versions::new).collect())) }
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Vec<Versions>> {
+        self.places.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds the replacement of a model and returns its generation; new values are checked against it from now on.
+    pub(in super::super) fn add(&self, model: usize, report: PluginReport, chosen_by: ChosenBy) -> u16 {
+        let mut places = self.lock();
+        let devices = devices(&places);
+        places.get_mut(devices + model).map_or(0, |versions| versions.add(report, chosen_by))
+    }
+
+    /// Records that the loop has put a generation in place; new values are checked against it from now on.
+    pub(super) fn set_current(&self, plugin: u16, generation: u16) {
+        if let Some(versions) = self.lock().get_mut(usize::from(plugin)) {
+            (versions.current, versions.in_place) = (generation, generation);
+            versions.forget();
+        }
+    }
+
+    /// Returns the plugin of a model and generation.
+    pub(super) fn plugin(&self, model: usize, generation: u16) -> Option<PluginReport> {
+        let places = self.lock();
+        places.get(devices(&places) + model).map(|versions| versions.get(generation).clone())
+    }
+
+    /// Returns the replacements in place, except those that the seed chose.
+    pub(super) fn replacements(&self) -> Vec<PluginReport> {
+        let in_place = |versions: &Versions| {
+            let mut later = versions.later.iter();
+            let version = later.find(|version| version.generation == versions.in_place)?;
+            (version.chosen_by == ChosenBy::Name).then(|| version.report.clone())
+        };
+        self.lock().iter().filter_map(in_place).collect()
+    }
+
+    /// Records that the loop has returned a generation of a model, which may be forgotten.
+    pub(super) fn retire(&self, model: usize, generation: u16) {
+        let mut places = self.lock();
+        let devices = devices(&places);
+        let Some(versions) = places.get_mut(devices + model) else { return };
+        let retired = versions.later.iter_mut().find(|version| version.generation == generation);
+        if let Some(version) = retired {
+            version.is_retired = true;
+        }
+        versions.forget();
+    }
+
+    /// Checks new values against the plugins that a run begins with.
+    pub(in super::super) fn start_with_the_first(&self) {
+        self.lock().iter_mut().for_each(|versions| versions.current = 0);
+    }
+
+    /// Returns the numbers of the plugins with a name (a model has one on each of its devices), else that of the first plugin with
+    /// this id.
+    fn numbers(&self, name: &str) -> Result<Vec<u16>, ControlError> {
+        let places = self.lock();
+        let named = |versions: &Versions| is_named(&versions.now().name, name);
+        let found: Vec<u16> =
+            (0..).zip(&*places).filter(|(_, versions)| named(versions)).map(|(number, _)| number).collect();
+        if !found.is_empty() {
+            return Ok(found);
+        }
+        let of_id = (0..).zip(&*places).find(|(_, versions)| versions.now().metadata.id == name);
+        of_id.map(|(number, _)| vec![number]).ok_or_else(|| {
+            let names = || places.iter().map(|versions| versions.now().name.as_str());
+            ControlError::UnknownPlugin {
+                name: name.to_owned(),
+                nearest: nearest(name, names()).map(str::to_owned),
+                names: names().map(str::to_owned).collect(),
+            }
+        })
+    }
+
+    /// Returns the numbers, among the models, of the models with a name.
+    pub(in super::super) fn models(&self, name: &str) -> Result<Vec<usize>, ControlError> {
+        let devices = devices(&self.lock());
+        let model = |number: u16| usize::from(number).checked_sub(devices).ok_or(ControlError::NoWeight);
+        self.numbers(name)?.into_iter().map(model).collect()
+    }
+
+    /// Returns the changes that give a model a new weight, limited to 0 to 1.
+    pub(in super::super) fn check_weight(
+        &self,
+        model: &str,
+        weight: f64,
+    ) -> Result<Vec<ParameterChange>, ControlError> {
+        self.models(model)?;
+        let value = weight.clamp(0.0, 1.0);
+        let change =
+            |plugin| ParameterChange { plugin, generation: 0, parameter: WEIGHT, value, pace: Pace::AtOnce };
+        Ok(self.numbers(model)?.into_iter().map(change).collect())
+    }
+
+    /// Returns the changes of a new value, one for each plugin that it names.
+    pub(in super::super) fn check(&self, new: &NewValue<'_>) -> Result<Vec<ParameterChange>, ControlError> {
+        self.numbers(new.plugin)?.into_iter().map(|plugin| self.check_one(plugin, new)).collect()
+    }
+
+    fn check_one(&self, plugin: u16, new: &NewValue<'_>) -> Result<ParameterChange, ControlError> {
+        let places = self.lock();
+        let versions = places.get(usize::from(plugin)).ok_or(ControlError::Ended)?;
+        let (part, generation) = (versions.now(), versions.current);
+        let setting = live_setting(part, new)?;
+        let parameter = u32::try_from(setting.index()).unwrap_or(u32::MAX); // schemas have tens of entries
+        Ok(ParameterChange { plugin, generation, parameter, value: setting.value(), pace: Pace::AtOnce })
+    }
+
+    /// Returns the rate at which a person's request moves a number: a tenth of its soft range in 50 ms.
+    pub(super) fn pace(&self, change: &ParameterChange) -> Pace {
+        let places = self.lock();
+        let part = places.get(usize::from(change.plugin)).map(|versions| versions.get(change.generation));
+        let index = change.parameter as usize;
+        part.and_then(|part| {
+            let range = part.soft_ranges.get(index)?.as_ref()?;
+            let (_, value) = part.parameters.get(index)?;
+            let from = value.parse().ok().or_else(|| part.schema.get(index).map(Parameter::default))?;
+            Some(Pace::Gradual { from, per_s: range.rate_per_s() })
+        })
+        .unwrap_or(Pace::AtOnce)
+    }
+
+    /// Describes a change that the loop has reported.
+    pub(super) fn describe(&self, report: &ChangeReport) -> Change {
+        let ChangeReport { tick, time_ns, change, outcome } = *report;
+        let places = self.lock();
+        let part = places.get(usize::from(change.plugin)).map(|versions| versions.get(change.generation));
+        let (subject, parameter, value) = match (part, change.parameter) {
+            (_, WEIGHT) => (ChangeSubject::Weight, "weight".to_owned(), change.value.to_string()),
+            (Some(part), PLUGIN) => {
+                (ChangeSubject::Plugin, part.metadata.id.clone(), part.metadata.version.clone())
+            }
+            (Some(part), parameter) => {
+                let id = part.schema.get(parameter as usize).map_or("", Parameter::id);
+                let setting = Setting::number(part.schema, id, change.value);
+                let shown = setting.map_or_else(|_| String::new(), |setting| setting.display());
+                (ChangeSubject::Parameter, id.to_owned(), shown)
+            }
+            (None, _) => (ChangeSubject::Parameter, String::new(), String::new()),
+        };
+        let settings = part.filter(|_| subject == ChangeSubject::Plugin).map(|part| part.settings.clone());
+        Change {
+            tick,
+            time_ns,
+            plugin: part.map_or_else(String::new, |part| part.name.clone()),
+            subject,
+            parameter,
+            value,
+            number: change.value,
+            settings: settings.unwrap_or_default(),
+            outcome,
+        }
+    }
+}
+
+/// Returns the number of devices, which come first.
+fn devices(plugins: &[Versions]) -> usize {
+    plugins.iter().take_while(|versions| versions.now().metadata.kind == PluginKind::Device).count()
+}

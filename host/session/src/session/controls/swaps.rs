@@ -1,0 +1,192 @@
+//! Hot swaps of models: replacements on their way into the loop, and plugins that the loop has returned.
+
+use super::super::PluginReport;
+use super::ControlError;
+use super::plugin_table::PluginTable;
+use crate::calls::{Attended, Call, Unresponsive, end_limit};
+use flotor_servo::{HostSwaps, Layer, LayerReport, ModelHealth, Replacement};
+use std::time::Duration;
+
+/// A plugin of a run, the first of a model or its replacement, that broke a rule.
+#[derive(Clone, Debug)]
+pub struct Misbehaved {
+    /// The plugin; its name is that of the model.
+    pub plugin: PluginReport,
+    /// Its faults.
+    pub health: ModelHealth,
+    /// Its last message; may be empty.
+    pub words: String,
+}
+
+/// Hot swaps of models: their queues, models with a pending replacement, and faults of plugins that the loop has returned.
+pub(super) struct Swaps {
+    queues: HostSwaps,
+    busy: Vec<bool>,
+    /// With the number of the model and the generation: the first of each file, which bounds the list.
+    misbehaved: Vec<(usize, u16, Misbehaved)>,
+    /// Warnings about replacements, a sentence each.
+    warnings: Vec<String>,
+    /// Plugins being freed on threads of their own: `sweep` does not wait for the code of a plugin.
+    freeing: Vec<Attended<LayerReport>>,
+    /// The first plugin that was not freed in time.
+    hung: Option<Unresponsive>,
+}
+
+/// Models of a run that is over.
+pub(in super::super) struct Settled {
+    /// Health and last message of the models of the scene, in its order.
+    pub(in super::super) first: Vec<(ModelHealth, String)>,
+    /// Replacements that broke a rule.
+    pub(in super::super) misbehaved: Vec<Misbehaved>,
+    /// Replacements in place at the end.
+    pub(in super::super) replacements: Vec<PluginReport>,
+    /// The first plugin that was not freed in time.
+    pub(in super::super) hung: Option<Unresponsive>,
+}
+
+impl Swaps {
+    pub(super) fn new(queues: HostSwaps, models: usize) -> Self {
+        Self {
+            queues,
+            busy: vec![false; models],
+            misbehaved: Vec::new(),
+            warnings: Vec::new(),
+            freeing: Vec::new(),
+            hung: None,
+        }
+    }
+
+    /// Starts to free plugins that the loop has returned, and notes faults of the freed ones. Not real-time; does not wait.
+    pub(super) fn sweep(&mut self, plugins: &PluginTable) {
+        while let Ok((model, mut layer)) = self.queues.retired.pop() {
+            let number = model as usize;
+            let who =
+                plugins.plugin(number, layer.generation()).map_or_else(String::new, |plugin| plugin.name);
+            let freed = Attended::start(end_limit(), move |progress| {
+                let report = layer.report(number, || progress.enter(&who, Call::LastMessage));
+                progress.enter(&who, Call::Destroy);
+                drop(layer);
+                report
+            });
+            self.freeing.extend(freed);
+            if let Some(busy) = self.busy.get_mut(number) {
+                *busy = false;
+            }
+        }
+        self.collect(plugins, Duration::ZERO);
+    }
+
+    /// Reserves models for a replacement, all or none.
+    ///
+    /// # Errors
+    /// [`ControlError::Busy`].
+    pub(super) fn reserve(&mut self, plugins: &PluginTable, numbers: &[usize]) -> Result<(), ControlError> {
+        self.sweep(plugins);
+        if numbers.iter().any(|number| self.busy.get(*number).is_none_or(|busy| *busy)) {
+            return Err(ControlError::Busy);
+        }
+        self.set_busy(numbers, true);
+        Ok(())
+    }
+
+    /// Cancels a reservation.
+    pub(super) fn release(&mut self, numbers: &[usize]) {
+        self.set_busy(numbers, false);
+    }
+
+    fn set_busy(&mut self, numbers: &[usize], is_busy: bool) {
+        let models = self.busy.iter_mut().enumerate().filter(|(number, _)| numbers.contains(number));
+        models.for_each(|(_, busy)| *busy = is_busy);
+    }
+
+    /// Notes the faults of freed plugins, waiting for each up to a time.
+    pub(super) fn collect(&mut self, plugins: &PluginTable, time: Duration) {
+        let mut at = 0;
+        while let Some(calls) = self.freeing.get(at) {
+            let Some(freed) = calls.look(time) else {
+                at += 1;
+                continue;
+            };
+            self.freeing.swap_remove(at);
+            match freed {
+                Ok(report) => {
+                    let (model, generation) = (report.model, report.generation);
+                    self.note(plugins, report);
+                    plugins.retire(model, generation);
+                }
+                Err(hung) => {
+                    self.hung.get_or_insert(hung);
+                }
+            }
+        }
+    }
+
+    /// Keeps the faults of a layer, if it has any.
+    pub(super) fn note(&mut self, plugins: &PluginTable, report: LayerReport) {
+        let LayerReport { model, generation, health, words } = report;
+        if health.is_good() {
+            return;
+        }
+        let Some(plugin) = plugins.plugin(model, generation) else { return };
+        let is_known = |(of, which, known): &(usize, u16, Misbehaved)| {
+            *of == model
+                && (*which == 0) == (generation == 0)
+                && known.plugin.metadata.path == plugin.metadata.path
+        };
+        if !self.misbehaved.iter().any(is_known) {
+            self.misbehaved.push((model, generation, Misbehaved { plugin, health, words }));
+        }
+    }
+
+    /// Sends a replacement to the loop. There is room: each model has at most one under way.
+    ///
+    /// # Errors
+    /// [`ControlError::Busy`].
+    pub(super) fn send(&mut self, number: usize, replacement: Replacement) -> Result<(), ControlError> {
+        let sent = self.queues.leaving_for_the_loop.push(replacement);
+        if let Some(busy) = self.busy.get_mut(number) {
+            *busy = sent.is_ok();
+        }
+        sent.map_err(|_| ControlError::Busy)
+    }
+
+    /// Returns the models that a finished loop has returned last, each with its number.
+    pub(super) fn take_retired(&mut self) -> Vec<(usize, Box<Layer>)> {
+        let retired = std::iter::from_fn(|| self.queues.retired.pop().ok());
+        retired.map(|(model, layer)| (model as usize, layer)).collect()
+    }
+
+    pub(super) fn warn(&mut self, warning: Option<String>) {
+        self.warnings.extend(warning);
+    }
+
+    pub(super) fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
+    }
+
+    /// Returns the faults of all plugins of a run that is over; `in_loop` has those still in the loop. Not real-time.
+    pub(super) fn settle(
+        &mut self,
+        plugins: &PluginTable,
+        models: usize,
+        in_loop: Vec<LayerReport>,
+    ) -> Settled {
+        self.collect(plugins, end_limit());
+        let mut first = vec![(ModelHealth::default(), String::new()); models];
+        for report in in_loop {
+            if let (0, Some(first)) = (report.generation, first.get_mut(report.model)) {
+                *first = (report.health, report.words);
+            } else {
+                self.note(plugins, report);
+            }
+        }
+        let mut later = Vec::new();
+        for (model, generation, misbehaved) in &self.misbehaved {
+            match first.get_mut(*model) {
+                Some(first) if *generation == 0 => *first = (misbehaved.health, misbehaved.words.clone()),
+                _ => later.push(misbehaved.clone()),
+            }
+        }
+        Settled { first, misbehaved: later, replacements: plugins.replacements(), hung: self.hung.take() }
+    }
+}

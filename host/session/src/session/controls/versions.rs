@@ -1,0 +1,78 @@
+//! The plugins of one place in a run: the first one and its replacements, by generation.
+
+use super::super::PluginReport;
+use std::collections::VecDeque;
+
+/// Capacity that stays allocated: the version in place, the one before, one that fades in, one that fades out.
+const USUAL_VERSIONS: usize = 4;
+
+/// The first plugin of a place in a run, and its replacements.
+pub(super) struct Versions {
+    pub(super) first: PluginReport,
+    /// Replacements that reports may still name, oldest first.
+    pub(super) later: VecDeque<Version>,
+    /// The newest generation.
+    newest: u16,
+    /// The generation that new values are checked against.
+    pub(super) current: u16,
+    /// The newest generation that the loop has put in place.
+    pub(super) in_place: u16,
+}
+
+/// The source of a replacement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) enum ChosenBy {
+    /// A name: in the scene, or of a person.
+    Name,
+    /// The seed, among several; hidden from reports.
+    Seed,
+}
+
+/// A replacement.
+pub(super) struct Version {
+    pub(super) generation: u16,
+    pub(super) report: PluginReport,
+    pub(super) chosen_by: ChosenBy,
+    /// Whether the loop has returned it.
+    pub(super) is_retired: bool,
+}
+
+impl Versions {
+    /// The place of a plugin without replacements.
+    pub(super) fn new(first: &PluginReport) -> Self {
+        Self { first: first.clone(), later: VecDeque::new(), newest: 0, current: 0, in_place: 0 }
+    }
+
+    /// Returns the plugin of a generation; the first plugin, if it is forgotten.
+    pub(super) fn get(&self, generation: u16) -> &PluginReport {
+        let version = self.later.iter().find(|version| version.generation == generation);
+        version.map_or(&self.first, |version| &version.report)
+    }
+
+    /// Adds a replacement and returns its generation. Generation 0 is the plugin of the scene; after the last number, 1 follows,
+    /// whose replacement was forgotten long before.
+    pub(super) fn add(&mut self, report: PluginReport, chosen_by: ChosenBy) -> u16 {
+        self.newest = self.newest.checked_add(1).unwrap_or(1);
+        self.current = self.newest;
+        self.later.push_back(Version { generation: self.newest, report, chosen_by, is_retired: false });
+        self.newest
+    }
+
+    /// Forgets replacements that no report can name any more, so that a run may replace its models without end. A pending
+    /// change may name the version before the one in place; the loop may name an older one until it returns it.
+    pub(super) fn forget(&mut self) {
+        let in_place = self.later.iter().position(|version| version.generation == self.in_place);
+        let mut old = in_place.unwrap_or(0).saturating_sub(1);
+        while old > 0 && self.later.front().is_some_and(|version| version.is_retired) {
+            self.later.pop_front();
+            old -= 1;
+        }
+        // A slow thread may have kept more of them for a while.
+        self.later.shrink_to(USUAL_VERSIONS);
+    }
+
+    /// Returns the plugin that new values are checked against.
+    pub(super) fn now(&self) -> &PluginReport {
+        self.get(self.current)
+    }
+}
