@@ -171,6 +171,11 @@ impl MarkLabel {
     pub(super) fn start(&self) -> f64 {
         self.middle - self.half_px
     }
+
+    /// Right end of a name of a vertical mark.
+    fn end(&self) -> f64 {
+        self.middle + self.half_px
+    }
 }
 
 /// The baseline of text whose middle is at `middle`.
@@ -196,31 +201,50 @@ pub(super) fn side_labels(marks: &[Mark], projection: &Projection) -> Vec<MarkLa
     labels
 }
 
-/// Names of vertical marks: flags that fly to the right of their mark, or to the left where the picture ends.
-/// Rows fill from the right, so that no pole crosses a name: what stands in a lower row begins further right.
+/// Names of vertical marks: flags that fly to the right of their mark, or to the left where the picture ends. No pole crosses a name:
+/// rows fill with right flags from the right, as what stands in a lower row begins further right, then with left flags from the left.
 pub(super) fn top_labels(marks: &[Mark], x: &Domain, left: f64, right: f64) -> Vec<MarkLabel> {
-    let mut labels: Vec<MarkLabel> = visible_marks(marks, Direction::X, x)
-        .map(|(label, at)| {
-            let text = text::shorten(label, right - left, font_px::LABEL);
-            let width_px = text::width_px(&text, font_px::LABEL);
-            let anchor = left + (right - left) * x.fraction(at);
-            let start = anchor + FLAG_GAP_PX;
-            let fits = start + width_px <= right + FLAG_OVERHANG_PX;
-            let start = if fits { start } else { anchor - FLAG_GAP_PX - width_px };
-            MarkLabel { text, anchor, middle: start + 0.5 * width_px, half_px: 0.5 * width_px, row: 0 }
-        })
+    let mut named: Vec<(f64, &str)> = visible_marks(marks, Direction::X, x)
+        .map(|(label, at)| (left + (right - left) * x.fraction(at), label))
         .collect();
-    labels.sort_by(|one, other| other.anchor.total_cmp(&one.anchor));
+    named.sort_by(|(one, _), (other, _)| other.total_cmp(one));
+    let (mut flags, mut left_flags) = (Vec::new(), Vec::new());
+    // A right flag ends before the pole of the first left one, which stands in a higher row.
+    let mut limit = right + FLAG_OVERHANG_PX;
+    for (anchor, label) in named {
+        let text = text::shorten(label, right - left, font_px::LABEL);
+        let width_px = text::width_px(&text, font_px::LABEL);
+        let has_no_room_at_left = anchor - FLAG_GAP_PX - width_px < left;
+        let fits = anchor + FLAG_GAP_PX + width_px <= limit || has_no_room_at_left;
+        let start = if fits { anchor + FLAG_GAP_PX } else { anchor - FLAG_GAP_PX - width_px };
+        let flag =
+            MarkLabel { text, anchor, middle: start + 0.5 * width_px, half_px: 0.5 * width_px, row: 0 };
+        if fits {
+            flags.push(flag);
+        } else {
+            limit = anchor - FLAG_GAP_PX;
+            left_flags.push(flag);
+        }
+    }
     let mut row_starts: Vec<f64> = Vec::new();
-    for label in &mut labels {
-        let (start, end) = (label.start().min(label.anchor), label.middle + label.half_px + FLAG_GAP_PX);
-        label.row = row_starts.iter().position(|&row_start| end <= row_start).unwrap_or(row_starts.len());
-        match row_starts.get_mut(label.row) {
+    for flag in &mut flags {
+        let (start, end) = (flag.anchor, flag.end() + FLAG_GAP_PX);
+        flag.row = row_starts.iter().position(|&row_start| end <= row_start).unwrap_or(row_starts.len());
+        match row_starts.get_mut(flag.row) {
             Some(row_start) => *row_start = start,
             None => row_starts.push(start),
         }
     }
-    labels
+    for mut flag in left_flags.into_iter().rev() {
+        // Above every flag beside which it has no room, and whose pole would cross it.
+        let meets = |other: &&MarkLabel| {
+            other.anchor.max(other.end()) + FLAG_GAP_PX > flag.start()
+                && other.start().min(other.anchor) < flag.anchor
+        };
+        flag.row = flags.iter().filter(meets).map(|other| other.row + 1).max().unwrap_or(0);
+        flags.push(flag);
+    }
+    flags
 }
 
 fn side_text(label: &str) -> String {

@@ -163,16 +163,20 @@ fn names_of_marks_keep_apart() {
     }
     assert!(labels.iter().all(|label| (FRAME.top..=FRAME.bottom()).contains(&label.middle)));
 
-    let times: Vec<Mark> = [5.0, 5.1, 5.2, 9.9].map(|x| Mark::at_x(x, "a long name")).to_vec();
-    let labels = top_labels(&times, &projection.x, FRAME.left, FRAME.right());
-    let end = |start: f64| start + text::width_px("a long name", 11.5);
-    for (index, one) in labels.iter().enumerate() {
-        assert!(end(one.start()) <= FRAME.right() + 24.0);
-        for other in labels.iter().skip(index + 1) {
-            let apart = end(one.start()) <= other.start() || end(other.start()) <= one.start();
-            assert!(one.row != other.row || apart, "{one:?} {other:?}");
-            let is_crossed = other.row > one.row && (one.start()..end(one.start())).contains(&other.anchor);
-            assert!(!is_crossed, "the pole of {other:?} crosses {one:?}");
+    for times in [&[5.0, 5.1, 5.2, 9.9][..], &[9.7, 9.9, 9.95], &[0.1, 9.0, 9.6, 9.8], &[9.9]] {
+        let marks: Vec<Mark> = times.iter().map(|x| Mark::at_x(*x, "a long name")).collect();
+        let labels = top_labels(&marks, &projection.x, FRAME.left, FRAME.right());
+        assert_eq!(labels.len(), times.len());
+        let end = |start: f64| start + text::width_px("a long name", 11.5);
+        for (index, one) in labels.iter().enumerate() {
+            assert!(end(one.start()) <= FRAME.right() + 24.0);
+            for (other_index, other) in labels.iter().enumerate().filter(|(other, _)| *other != index) {
+                let apart = end(one.start()) <= other.start() || end(other.start()) <= one.start();
+                assert!(one.row != other.row || apart, "{one:?} {other:?}");
+                let is_crossed =
+                    other.row > one.row && (one.start()..end(one.start())).contains(&other.anchor);
+                assert!(!is_crossed, "the pole of {other_index}, {other:?}, crosses {one:?}");
+            }
         }
     }
 }
