@@ -6,6 +6,9 @@ use flotor_hal::DVec3;
 /// Least displacement of the handle from which a stiffness is computed, m: ten steps of a common position sensor.
 const LEAST_WAY_M: f64 = 50.0e-6;
 
+/// Part of the largest force from which a point has force: below it, the rounding of a recording is a force, too.
+const LEAST_FORCE: f64 = 0.01;
+
 /// Stiffness felt along the motion, N/m: the secant `-dF/dx` from the newest of some earlier samples (the newest first) that is far
 /// enough away. Positive where the force grows against the motion; NaN where the handle rests.
 #[must_use]
@@ -25,8 +28,11 @@ pub fn felt_stiffness_n_per_m<'a>(earlier: impl Iterator<Item = &'a Sample>, now
 pub struct ForcePosition {
     /// Position, m, and force on the hand, N, in order of time.
     pub points: Vec<[f64; 2]>,
-    /// Stiffness, N/m: that of the straight line closest to the points. None where the handle rests.
+    /// Stiffness, N/m, of the straight line closest to the points with force: contact without the air beside it. None where the handle
+    /// rests.
     pub stiffness_n_per_m: Option<f64>,
+    /// Stiffness, N/m, of the straight line closest to all points, with force and without. None where the handle rests.
+    pub stiffness_of_all_n_per_m: Option<f64>,
     /// Whole cycles, and the energy that each takes from the hand, J: the area of the loop. None without a whole cycle.
     pub cycles: Option<(u32, f64)>,
 }
@@ -40,7 +46,15 @@ impl ForcePosition {
             .map(|sample| [sample.pose.position().to_array()[axis], sample.force_n().to_array()[axis]])
             .filter(|point| point.iter().all(|part| part.is_finite()))
             .collect();
-        Self { stiffness_n_per_m: stiffness(&points), cycles: cycles(&points), points }
+        let largest_n = points.iter().map(|[_, force]| force.abs()).fold(0.0, f64::max);
+        let has_force = |point: &&[f64; 2]| point[1].abs() > LEAST_FORCE * largest_n;
+        let with_force: Vec<[f64; 2]> = points.iter().filter(has_force).copied().collect();
+        Self {
+            stiffness_n_per_m: stiffness(&with_force),
+            stiffness_of_all_n_per_m: stiffness(&points),
+            cycles: cycles(&points),
+            points,
+        }
     }
 
     /// At most so many of the points, evenly taken.
@@ -122,7 +136,28 @@ mod tests {
         assert!(spring.cycles.expect("cycles").1.abs() < 0.01 * expected_j, "a spring takes nothing");
         assert!(spring.thinned(100).count() <= 100);
         let at_rest = ForcePosition::of(spring_and_damper(0.0)[..2].iter(), 0);
-        assert_eq!((at_rest.stiffness_n_per_m, at_rest.cycles), (None, None));
+        let fits = (at_rest.stiffness_n_per_m, at_rest.stiffness_of_all_n_per_m);
+        assert_eq!((fits, at_rest.cycles), ((None, None), None));
+    }
+
+    /// A wall has its stiffness, whatever time the handle spends in the air before it.
+    #[test]
+    fn the_stiffness_of_a_wall_is_that_of_the_contact() {
+        const WALL_N_PER_M: f64 = 2000.0;
+        let sample = |tick: i32| {
+            let z = 0.001 + 0.004 * (TAU * f64::from(tick) * 1.0e-3).sin();
+            let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
+            record.pose.position_m = [0.0, 0.0, z];
+            record.commanded.force_n = [0.0, 0.0, (-WALL_N_PER_M * z).max(0.0)];
+            Sample::from(&record)
+        };
+        let samples: Vec<Sample> = (0..2500).map(sample).collect();
+        let found = ForcePosition::of(samples.iter(), 2);
+        let [contact, all] =
+            [found.stiffness_n_per_m, found.stiffness_of_all_n_per_m].map(|fit| fit.expect("it moved"));
+        // A sample holds its force in single precision.
+        assert!((contact / WALL_N_PER_M - 1.0).abs() < 1.0e-5, "{contact}");
+        assert!(all < 0.8 * WALL_N_PER_M, "the line through the air, too, is flatter: {all}");
     }
 
     #[test]

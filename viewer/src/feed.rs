@@ -4,6 +4,7 @@ use flotor_core::trace::TickRecord;
 use flotor_live::{Answer, Ask, Asker, ChangeMessage, Client, End, EndKind, Event, Greeting, LiveError};
 use flotor_record::RunDescription;
 use std::collections::VecDeque;
+use std::io::ErrorKind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,6 +17,10 @@ const MOST_ARRIVALS: usize = 1024;
 const READ_WAIT: Duration = Duration::from_millis(200);
 /// Without a tick for this long, what is shown is old.
 pub const STALE_AFTER: Duration = Duration::from_millis(500);
+
+/// Reason of a connection that ends without a message.
+const GONE: &str = "The program that ran the loop has ended without a message: it was killed, or it crashed; its watchdog takes the \
+                    force from the device. Look at its terminal, and start the run again";
 
 /// How the connection stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -171,6 +176,9 @@ impl Waiting {
             Ok(Some(Event::Answer(answer))) if answers.len() < MOST_ARRIVALS => answers.push(answer),
             Ok(Some(Event::Answer(_))) => {}
             Ok(Some(Event::End(End { words, kind }))) => self.state = FeedState::Ended(words, kind),
+            Err(LiveError::Connection(cause)) if cause.kind() == ErrorKind::UnexpectedEof => {
+                self.state = FeedState::Lost(GONE.to_owned());
+            }
             Err(error) => self.state = FeedState::Lost(error.to_string()),
         }
         self.state == FeedState::Running

@@ -27,7 +27,7 @@ pub struct Remembered {
     pub side_pt: f32,
     /// Part of the height that the 3D view gets; not chosen: as the window is high.
     pub view_part: Option<f32>,
-    /// Width and height of the window, points.
+    /// Width and height of the window, points without the zoom.
     pub size_pt: [f32; 2],
     /// Size of text and lines: pixels per point over those of the display.
     pub zoom: f32,

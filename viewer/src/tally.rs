@@ -9,13 +9,15 @@ use flotor_core::trace::Events;
 pub struct Tally {
     counts: [u64; Events::NAMES.len()],
     scale: ArrowScale,
+    since_s: Option<f64>,
     /// Ticks that found no room on the way.
     pub dropped: u64,
 }
 
 impl Default for Tally {
     fn default() -> Self {
-        Self { counts: [0; Events::NAMES.len()], scale: ArrowScale::fitting(std::iter::empty()), dropped: 0 }
+        let scale = ArrowScale::fitting(std::iter::empty());
+        Self { counts: [0; Events::NAMES.len()], scale, since_s: None, dropped: 0 }
     }
 }
 
@@ -30,6 +32,7 @@ impl Tally {
 
     /// Takes a sample in.
     pub fn add(&mut self, sample: &Sample) {
+        self.since_s.get_or_insert(sample.time_s());
         let bits = sample.events.bits();
         for (bit, count) in self.counts.iter_mut().enumerate() {
             *count += u64::from(bits >> bit & 1);
@@ -41,6 +44,12 @@ impl Tally {
     #[must_use]
     pub fn counts(&self) -> &[u64] {
         &self.counts
+    }
+
+    /// Returns the time of the first sample, s: a window that opens during a run has not seen what was before.
+    #[must_use]
+    pub fn since_s(&self) -> f64 {
+        self.since_s.unwrap_or(0.0)
     }
 
     /// Lengths of arrows that fit everything seen.

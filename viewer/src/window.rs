@@ -15,6 +15,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
+/// Least width and height of a window, points: emergency stop, state, warnings and clock have room.
+const LEAST_SIZE_PT: [f32; 2] = [320.0, 200.0];
+
 /// Why there is no window.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -86,19 +89,17 @@ fn for_the_next_time(
     request: WindowOptions,
     chosen: &Chosen,
 ) -> Remembered {
-    let zoom = now.zoom;
     if chosen.traces() == Some(&now.traces[..]) {
         now.traces.clone_from(&before.traces);
     }
     if request.look == Some(now.look) {
         now.look = before.look;
     }
-    if request.scale.is_some_and(|scale| (scale - zoom).abs() < 1.0e-3) {
+    if request.scale.is_some_and(|scale| (scale - now.zoom).abs() < 1.0e-3) {
         now.zoom = before.zoom;
     }
-    // Larger text makes fewer points of the same window.
     let is_as_requested = |size: [usize; 2]| {
-        size.iter().zip(now.size_pt).all(|(requested, is)| (*requested as f32 - is * zoom).abs() < 2.0)
+        size.iter().zip(now.size_pt).all(|(requested, is)| (*requested as f32 - is).abs() < 2.0)
     };
     if request.size.is_some_and(is_as_requested) {
         now.size_pt = before.size_pt;
@@ -122,7 +123,7 @@ pub fn open(start: Start, chosen: Chosen, request: WindowOptions) -> Result<Opti
         .with_title("Flotor")
         .with_app_id("flotor-viewer")
         .with_inner_size(size)
-        .with_min_inner_size([640.0, 480.0])
+        .with_min_inner_size(LEAST_SIZE_PT)
         // In front of a subject there is nothing but the screen of the sitting.
         .with_fullscreen(matches!(start, Start::Sitting(..)));
     let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
@@ -210,12 +211,11 @@ impl eframe::App for Kept {
         }
         self.viewer.show(ui);
         let Some(file) = &self.file else { return };
-        let size_pt = ui.input(|input| input.viewport().inner_rect.map(|rect| rect.size().into()));
-        let now = Remembered {
-            size_pt: size_pt.unwrap_or(self.kept.size_pt),
-            zoom: ui.ctx().zoom_factor(),
-            ..self.viewer.remembered()
-        };
+        let zoom = ui.ctx().zoom_factor();
+        // Larger text makes fewer points of the same window; it opens the next time before it has its zoom.
+        let size_pt = ui.input(|input| input.viewport().inner_rect.map(|rect| (rect.size() * zoom).into()));
+        let now =
+            Remembered { size_pt: size_pt.unwrap_or(self.kept.size_pt), zoom, ..self.viewer.remembered() };
         let now = for_the_next_time(now, &self.before, self.request, &self.chosen);
         // Not with every picture while something is pulled.
         if now != self.kept && !ui.input(|input| input.pointer.any_down()) {
@@ -263,7 +263,7 @@ mod tests {
             measure: None,
         };
         let as_requested =
-            Remembered { look: Look::Light, zoom: 2.0, size_pt: [320.0, 200.0], ..Remembered::default() };
+            Remembered { look: Look::Light, zoom: 2.0, size_pt: [640.0, 400.0], ..Remembered::default() };
         let nothing = Chosen::default();
         let as_it_is = for_the_next_time(as_requested.clone(), &before, WindowOptions::default(), &nothing);
         assert_eq!(as_it_is, as_requested);

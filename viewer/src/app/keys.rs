@@ -3,6 +3,7 @@
 use super::Viewer;
 use crate::player::Motion;
 use crate::scene::SceneBuilder;
+use crate::ui::key::pressed_alone;
 use crate::ui::style;
 use egui::{Context, Key, Ui};
 use flotor_live::Ask;
@@ -13,7 +14,7 @@ impl Viewer {
     pub(super) fn keys(&mut self, ui: &Ui) {
         let span_s = self.devices.history().span_s();
         let is_live = self.source.is_running();
-        let pressed = |key: Key| ui.input(|input| input.key_pressed(key) && !input.modifiers.command);
+        let pressed = |key: Key| ui.input(|input| pressed_alone(input, key));
         if is_live && ui.input(|input| input.key_pressed(Key::Space)) {
             self.ask(Ask::EmergencyStop);
         }

@@ -113,7 +113,7 @@ impl Viewer {
             ui.set_max_width(ui.available_width() - 12.0); // room for the bar that scrolls
             // How close the hand is to the limits comes before anything that can be changed.
             if let Some(sample) = self.devices.history().at(self.player.now_s) {
-                standing::limits(ui, sample, &self.limits, palette);
+                standing::limits(ui, sample, &self.limits, self.plots.units, palette);
                 ui.add_space(8.0);
             }
             // Models before devices: they are what people came for.

@@ -8,6 +8,8 @@ use crate::ui::plots::{marks, plain, short, y_axis};
 use egui::{Color32, RichText, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 
+/// Narrower, the choice of the axis has the row alone, points.
+const ROOM_FOR_NAME_PT: f32 = 230.0;
 /// Points drawn at most.
 const MOST_POINTS: usize = 2000;
 
@@ -55,7 +57,9 @@ impl ForcePositionPlot {
         let Some(mut axis) = self.axis else { return };
         let (length, per_m) = Quantity::Position.unit(units);
         ui.horizontal(|ui| {
-            ui.strong("Force over position");
+            if ui.available_width() >= ROOM_FOR_NAME_PT {
+                ui.strong("Force over position");
+            }
             // A picture, in which no moment is shown, has nothing to press.
             if cursor_s.is_nan() {
                 ui.weak(Quantity::Position.components()[axis]);
@@ -92,16 +96,19 @@ impl ForcePositionPlot {
     }
 }
 
-/// Slope and area of a curve, in words.
+/// Returns the slopes and the area of a curve in words: what each number is stands beside it.
 #[must_use]
 pub fn said(curve: &ForcePosition, units: Units) -> String {
     let (stiffness, per_si) = Quantity::Stiffness.unit(units);
     let (energy, per_j) = Quantity::Energy.unit(units);
-    let slope = curve.stiffness_n_per_m.map(|slope| format!("{:.3} {stiffness}", slope * per_si));
+    let slope = |slope: f64| format!("{:.3} {stiffness}", slope * per_si);
+    let contact =
+        curve.stiffness_n_per_m.map(|fit| format!("stiffness where there is force: {}", slope(fit)));
+    let all = curve.stiffness_of_all_n_per_m.map(|fit| format!("line through all: {}", slope(fit)));
     let area = curve.cycles.map(|(cycles, loss_j)| {
         let many = if cycles == 1 { "" } else { "s" };
-        format!("hysteresis {:.4} {energy} a cycle ({cycles} cycle{many})", loss_j * per_j)
+        format!("hysteresis: {:.4} {energy} a cycle ({cycles} cycle{many})", loss_j * per_j)
     });
-    let parts: Vec<String> = slope.into_iter().chain(area).collect();
+    let parts: Vec<String> = contact.into_iter().chain(all).chain(area).collect();
     if parts.is_empty() { "the handle rests".to_owned() } else { parts.join("  ·  ") }
 }

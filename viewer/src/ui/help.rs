@@ -1,9 +1,9 @@
 //! The keys of the window.
 
-use egui::{Context, Grid, RichText, Window};
+use egui::{Context, Grid, RichText, ScrollArea, Window};
 
 /// Key and what it does.
-const KEYS: [(&str, &str); 26] = [
+const KEYS: [(&str, &str); 27] = [
     ("Space", "emergency stop; of a recording: play"),
     ("Enter", "takes a typed number; Escape leaves it"),
     ("Ctrl+Z", "the value before the last change"),
@@ -19,7 +19,8 @@ const KEYS: [(&str, &str); 26] = [
     ("Home  End", "beginning and end"),
     ("M", "one trace in the room of all, and back"),
     ("Right drag on a trace", "a box: these times and values"),
-    ("Wheel on a trace", "values larger or smaller"),
+    ("Wheel on a trace", "values larger or smaller; of more traces than have room: the next"),
+    ("Alt+wheel on a trace", "values larger or smaller"),
     ("Ctrl+wheel on a trace", "time longer or shorter"),
     ("Middle drag on a trace", "shifts the time"),
     ("Double click on a trace", "all of it again"),
@@ -36,12 +37,14 @@ const KEYS: [(&str, &str); 26] = [
 pub fn keys(context: &Context, is_open: &mut bool) {
     let window = Window::new("Keys").open(is_open).collapsible(false).resizable(false);
     window.anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO).show(context, |ui| {
-        Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).show(ui, |ui| {
-            for (key, does) in KEYS {
-                ui.label(RichText::new(key).strong());
-                ui.label(does);
-                ui.end_row();
-            }
+        ScrollArea::vertical().max_height(0.7 * context.content_rect().height()).show(ui, |ui| {
+            Grid::new("keys").num_columns(2).spacing([24.0, 4.0]).show(ui, |ui| {
+                for (key, does) in KEYS {
+                    ui.label(RichText::new(key).strong());
+                    ui.label(does);
+                    ui.end_row();
+                }
+            });
         });
     });
 }

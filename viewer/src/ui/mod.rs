@@ -4,6 +4,7 @@ pub mod device_row;
 pub mod force_position;
 pub mod handle;
 pub mod help;
+pub mod key;
 pub mod legend;
 pub mod marks;
 pub mod messages;

@@ -1,5 +1,7 @@
 //! Traces one above the other over one time, and what a person chooses about them.
 
+mod choices;
+
 use crate::chosen::Chosen;
 use crate::export::ExportOptions;
 use crate::history::History;
@@ -9,33 +11,21 @@ use crate::quantity::{Quantity, Units};
 use crate::trace::Trace;
 use crate::ui::force_position::ForcePositionPlot;
 use crate::ui::marks::Marks;
-use crate::ui::overlay::width_pt;
 use crate::ui::plots::{Maximise, PlotView, plot};
-use crate::ui::style::SMALL_PT;
 use crate::ui::zoom::{Wheel, ZoomRequest};
-use egui::containers::menu::{MenuButton, MenuConfig};
-use egui::{Color32, ComboBox, FontId, PopupCloseBehavior, Rect, RichText, Role, Ui, UiBuilder, WidgetInfo};
+use egui::{Rect, Ui, UiBuilder};
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// Lengths of time that can be shown, s.
-pub const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];
 
 /// The traces shown to who has not chosen others.
 pub const FIRST_TRACES: [Quantity; 2] = [Quantity::Force, Quantity::Position];
 
-/// Lower, the choice of traces is a menu, points.
-const ROOM_FOR_TABS_PT: f32 = 230.0;
-/// Width of the choices of time, units and export, points.
-const PRESENTATION_PT: f32 = 200.0;
 /// Height of the row of choices with the gap beneath, points.
 const CHOICES_PT: f32 = 30.0;
 /// No trace is lower than this, points: three marks of an axis are still apart. Traces without room are scrolled to.
 const LEAST_TRACE_PT: f32 = 48.0;
 /// Height of a trace for which the 3D view gives way, points.
 const GOOD_TRACE_PT: f32 = 60.0;
-/// Width of the number of traces that are out of sight, points.
-const MORE_PT: f32 = 130.0;
 /// Distance of headings and traces, points.
 const GAP_PT: f32 = 3.0;
 /// Turn of the wheel by which the next trace comes into sight, points.
@@ -353,22 +343,7 @@ impl PlotStack {
     ) -> Vec<PlotRequest> {
         self.end_s = self.end_of_window(seen.0.span_s(), now_s, motion);
         let mut requests = Vec::new();
-        let more_pt = if self.out_of_sight == [0; 2] { 0.0 } else { MORE_PT };
-        let has_tabs = ui.available_height() >= ROOM_FOR_TABS_PT
-            && ui.available_width() >= tabs_pt(ui) + PRESENTATION_PT + more_pt;
-        ui.horizontal(|ui| {
-            if has_tabs {
-                self.quantities(ui, palette);
-            } else {
-                ui.menu_button(RichText::new("Traces").size(SMALL_PT + 0.5), |ui| {
-                    ui.horizontal_wrapped(|ui| self.quantities(ui, palette));
-                });
-            }
-            if ui.available_width() >= PRESENTATION_PT + more_pt {
-                self.more(ui, palette);
-            }
-            self.presentation(ui, &mut requests);
-        });
+        self.choices(ui, palette, &mut requests);
         let (span_s, cursor_s) = (self.span_s(seen.0), self.hover_s.unwrap_or(now_s));
         if self.force_position.axis.is_some() && ui.available_width() < ROOM_BESIDE_PT {
             self.force_position.show(ui, (seen.0, cursor_s), span_s, self.units, palette);
@@ -406,16 +381,6 @@ impl PlotStack {
         self.out_of_sight = [self.first, all.len().saturating_sub(self.first + count)];
         let height_pt = room_for(count).max(LEAST_TRACE_PT);
         requests.extend(self.stack(ui, seen, now_s, (shown, height_pt, wheel), palette));
-    }
-
-    /// Shows how many traces are out of sight.
-    fn more(&self, ui: &mut Ui, palette: &Palette) {
-        let counts = self.out_of_sight.into_iter().zip(["above", "below"]).filter(|(count, _)| *count > 0);
-        let more: Vec<String> = counts.map(|(count, place)| format!("{count} more {place}")).collect();
-        if !more.is_empty() {
-            ui.label(RichText::new(more.join(", ")).size(SMALL_PT).color(palette.faint))
-                .on_hover_text("The wheel scrolls the traces; with Alt it zooms values");
-        }
     }
 
     /// Brings the next trace into sight, or the one before, when the wheel turns over the traces.
@@ -502,66 +467,6 @@ impl PlotStack {
         }
     }
 
-    /// Which quantities are shown.
-    fn quantities(&mut self, ui: &mut Ui, palette: &Palette) {
-        ui.spacing_mut().item_spacing.x = 4.0;
-        for quantity in Quantity::ALL {
-            let is_shown = self.shown.contains(&quantity);
-            let text = RichText::new(quantity.name()).size(SMALL_PT + 0.5);
-            // White on the blue of what is chosen, light and dark.
-            let text = text.color(if is_shown { Color32::WHITE } else { palette.faint });
-            if ui.selectable_label(is_shown, text).clicked() {
-                self.toggle(quantity);
-            }
-        }
-        let is_shown = self.force_position.axis.is_some();
-        let text = RichText::new("F(x)").size(SMALL_PT + 0.5);
-        let text = text.color(if is_shown { Color32::WHITE } else { palette.faint });
-        if ui.selectable_label(is_shown, text).on_hover_text("Force over position").clicked() {
-            self.force_position.toggle();
-        }
-    }
-
-    /// How they are shown, from the right.
-    fn presentation(&mut self, ui: &mut Ui, requests: &mut Vec<PlotRequest>) {
-        ui.spacing_mut().item_spacing.x = 4.0;
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            let menu = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
-            let button = MenuButton::new(RichText::new("Export").size(SMALL_PT + 0.5)).config(menu);
-            button.ui(ui, |ui| {
-                self.export.choose(ui);
-                for (format, name) in
-                    [(ExportFormat::Csv, "CSV"), (ExportFormat::Svg, "SVG"), (ExportFormat::Png, "PNG")]
-                {
-                    if ui.button(name).clicked() {
-                        requests.push(PlotRequest::Export(format));
-                        ui.close();
-                    }
-                }
-            });
-            let units = match self.units {
-                Units::Handy => "mm, N",
-                Units::Si => "SI",
-            };
-            let switch = ui.button(RichText::new(units).size(SMALL_PT + 0.5));
-            if switch.on_hover_text("Units: millimetres and degrees, or SI (U)").clicked() {
-                self.switch_units();
-            }
-            let shown = match self.window {
-                Window::Whole => "all".to_owned(),
-                Window::Newest(length_s) => format!("{length_s} s"),
-                Window::Between(..) => "zoomed".to_owned(),
-            };
-            let list = ComboBox::from_id_salt("window").selected_text(shown).width(64.0).show_ui(ui, |ui| {
-                ui.selectable_value(&mut self.window, Window::Whole, "all");
-                for length_s in WINDOWS_S {
-                    ui.selectable_value(&mut self.window, Window::Newest(length_s), format!("{length_s} s"));
-                }
-            });
-            list.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, "Time shown"));
-        });
-    }
-
     /// Shows or hides a quantity; the last one stays.
     pub fn toggle(&mut self, quantity: Quantity) {
         self.alone = None;
@@ -592,13 +497,4 @@ fn split_for_force_position(all: Rect, gap_pt: f32) -> (Rect, Rect) {
     const PART: f32 = 0.36;
     let beside = all.with_min_x(all.right() - (PART * all.width()).round());
     (all.with_max_x(beside.left() - gap_pt), beside)
-}
-
-/// Returns the width of the choice of quantities, points.
-fn tabs_pt(ui: &Ui) -> f32 {
-    let font = FontId::proportional(SMALL_PT + 0.5);
-    let names = Quantity::ALL.iter().map(|quantity| quantity.name()).chain(["F(x)"]);
-    let tab_pt =
-        |name| width_pt(ui.painter(), name, font.clone()) + 2.0 * ui.spacing().button_padding.x + 4.0;
-    names.map(tab_pt).sum()
 }

@@ -5,6 +5,7 @@ use crate::history::Sample;
 use crate::palette::{Look, Palette};
 use crate::scene::{ArrowScale, SceneBuilder, SceneFacts};
 use crate::shape::Shape;
+use crate::ui::key::pressed_alone;
 use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2};
 use flotor_drawing::camera::{Camera, Extent};
 use flotor_hal::Pose;
@@ -135,10 +136,7 @@ impl View3d {
     /// Follows the keys that turn and zoom: W A S D, plus, minus, R for the experimenter's view.
     pub fn keys(&mut self, ui: &Ui, extent: Extent) {
         ui.input(|input| {
-            if input.modifiers.command || input.modifiers.alt {
-                return;
-            }
-            let pressed = |key: Key| f64::from(u8::from(input.key_pressed(key)));
+            let pressed = |key: Key| f64::from(u8::from(pressed_alone(input, key)));
             let turn = pressed(Key::D) - pressed(Key::A);
             let incline = pressed(Key::W) - pressed(Key::S);
             let nearer = pressed(Key::Plus) + pressed(Key::Equals) - pressed(Key::Minus);
@@ -148,7 +146,7 @@ impl View3d {
             if nearer != 0.0 {
                 self.camera.zoom(ZOOM_PER_KEY.powf(nearer), extent.height_mm);
             }
-            if input.key_pressed(Key::R) {
+            if pressed_alone(input, Key::R) {
                 self.reset(extent);
             }
         });

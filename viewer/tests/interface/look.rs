@@ -2,11 +2,12 @@
 
 use super::window::{recorded, recording};
 use egui::accesskit::Role;
-use egui::{Key, vec2};
+use egui::{Key, Modifiers, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use flotor_viewer::app::Viewer;
 use flotor_viewer::palette::Look;
+use flotor_viewer::quantity::Units;
 
 #[test]
 fn the_view_turns_zooms_and_comes_back() {
@@ -29,6 +30,24 @@ fn the_view_turns_zooms_and_comes_back() {
     window.key_press(Key::R);
     window.run_steps(1);
     assert_eq!(window.state().view().camera, start, "the experimenter's view");
+}
+
+/// A key with Ctrl or Alt is another command than the key alone.
+#[test]
+fn a_key_with_a_modifier_turns_nothing() {
+    let mut window = recording();
+    let start = window.state().view().camera;
+    for modifiers in [Modifiers::CTRL, Modifiers::COMMAND, Modifiers::ALT] {
+        for key in [Key::A, Key::D, Key::W, Key::S, Key::L, Key::U, Key::P] {
+            window.key_press_modifiers(modifiers, key);
+            window.run_steps(1);
+        }
+    }
+    assert_eq!(window.state().view().camera, start);
+    assert_eq!((window.state().look(), window.state().plots().units), (Look::Dark, Units::Handy));
+    window.key_press(Key::A);
+    window.run_steps(1);
+    assert_ne!(window.state().view().camera, start, "the key alone turns it");
 }
 
 #[test]

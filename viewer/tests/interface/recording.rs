@@ -137,7 +137,9 @@ fn force_over_position_says_stiffness_and_hysteresis() {
     let mut window = recording();
     window.get_by_role_and_label(Role::Button, "F(x)").click();
     window.run_steps(3);
-    window.get_by_label_contains("Force over position, N and mm: 0.700 N/mm  ·  hysteresis");
+    window.get_by_label_contains(
+        "Force over position, N and mm: stiffness where there is force: 0.700 N/mm  ·  line through all: 0.700 N/mm",
+    );
     window.get_by_label("Force over time, N");
     let viewer = window.state();
     let svg = flotor_viewer::export::svg(viewer.history(), None, viewer.plots());
