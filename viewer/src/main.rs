@@ -9,6 +9,7 @@ use flotor_study::screen::{Screen, Told};
 use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::chosen::Chosen;
 use flotor_viewer::devices::Devices;
+use flotor_viewer::experiment::texts::Texts;
 use flotor_viewer::experiment::wire::at_standard_streams;
 use flotor_viewer::experiment::{Prompt, StopKey};
 use flotor_viewer::export::{self, ExportError};
@@ -91,6 +92,9 @@ struct Arguments {
     /// The picture is what a person in a sitting sees on a screen, as `flotor study --screen json` writes it
     #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"], value_parser = screen)]
     screen: Option<Screen>,
+    /// File with the texts of the screens in the language of the person (default: English)
+    #[arg(long, value_name = "FILE", value_parser = texts)]
+    texts: Option<Texts>,
     #[command(flatten)]
     request: WindowOptions,
 }
@@ -110,6 +114,11 @@ fn axis(text: &str) -> Result<usize, String> {
 /// A line of an experiment.
 fn screen(text: &str) -> Result<Screen, String> {
     serde_json::from_str(text).map_err(|error| format!("no screen: {error}"))
+}
+
+/// `german.toml`
+fn texts(file: &str) -> Result<Texts, String> {
+    Texts::read(Path::new(file)).map_err(|error| format!("{file}: {error}"))
 }
 
 /// Why there is nothing to see, with an exit code: 2 where the recording or an option is wrong, else 1.
@@ -154,6 +163,11 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
             "`{}` does not end with .png, and the picture is one",
             out.display()
         )));
+    }
+    if arguments.texts.is_some() && !arguments.sitting && arguments.screen.is_none() {
+        return Err(Failure::usage(
+            "--texts is for the screens of a sitting: name --sitting or --screen, too",
+        ));
     }
     fits_file(arguments).map_err(Failure::usage)?;
     let read = |path: &PathBuf| History::read(path).map_err(Failure::usage);
@@ -214,6 +228,7 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
     }
     let mut prompt = at_standard_streams().map_err(Failure::file)?;
     prompt.stop_key = arguments.stop_key;
+    prompt.texts = arguments.texts.clone().unwrap_or_else(Texts::english);
     Ok(Start::Sitting(wanted, Box::new(prompt)))
 }
 
@@ -231,7 +246,9 @@ fn whole_window(
     // The experiment's end of the way to the screen stays open while it is drawn.
     let ((teller, told), (said, _hears)) = (channel(), channel());
     if let Some(screen) = &arguments.screen {
-        viewer.rehearse(Prompt::new(told, said));
+        let mut prompt = Prompt::new(told, said);
+        prompt.texts = arguments.texts.clone().unwrap_or_else(Texts::english);
+        viewer.rehearse(prompt);
         let _ = teller.send(Told::Screen(screen.clone())); // its other end is above
     }
     let image = draw_without_window(size, scale, look, |ui| viewer.show(ui));

@@ -52,6 +52,9 @@ pub(crate) struct ViewArguments {
     /// With --screenshot: draw a screen of a sitting, as `flotor study --screen json` writes it
     #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"])]
     screen: Option<String>,
+    /// With --screen: file with the texts of the screens in another language
+    #[arg(long, value_name = "FILE", requires = "screen")]
+    texts: Option<String>,
     /// Device of the recording whose numbers and traces are shown, where there are several (default: the first)
     #[arg(long, value_name = "NAME", requires = "file")]
     device: Option<String>,
@@ -117,6 +120,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         ("--arrow-force", &arguments.arrow_force),
         ("--title", &arguments.title),
         ("--screen", &arguments.screen),
+        ("--texts", &arguments.texts),
         ("--look", &arguments.look),
         ("--size", &arguments.size),
         ("--scale", &arguments.scale),

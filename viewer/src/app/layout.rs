@@ -17,7 +17,7 @@ use crate::ui::messages::{Extent, Messages};
 use crate::ui::overlay::{Corner, Overlay};
 use crate::ui::plot_stack::{PlotRequest, PlotStack};
 use crate::ui::style::SMALL_PT;
-use crate::ui::top_bar::{PanelSwitch, TopBar, TopBarRequest};
+use crate::ui::top_bar::{PanelSwitch, STOP, Stop, TopBar, TopBarRequest};
 use crate::ui::view3d::Subject;
 use crate::ui::{device_row, legend, parameters, readout, standing, style};
 use egui::{
@@ -27,6 +27,8 @@ use egui::{
 use flotor_live::{Ask, SetValue};
 use std::time::Instant;
 
+/// Height of the bar, points, for which its texts have their usual size.
+const USUAL_BAR_PT: f32 = 42.0;
 /// Part of the height of the window that the messages of a run that has failed may take.
 const MOST_OF_HEIGHT: f32 = 0.3;
 /// What the border is called.
@@ -54,6 +56,8 @@ fn has_room_for_traces(height_pt: f32) -> bool {
 impl Viewer {
     pub(super) fn top(&mut self, ui: &mut Ui, palette: &Palette) {
         let State { words, status } = self.state();
+        // The screens of a sitting say it, in the language of the person.
+        let words = if self.audience == Audience::Subject { "" } else { words };
         let title = match (&self.source, self.audience) {
             (Source::Waiting(_), _) => "Flotor",
             // Names of parameters are nothing for a subject's eyes.
@@ -66,7 +70,8 @@ impl Viewer {
             title,
             state: words,
             status,
-            stop_key: can_stop.then(|| self.stop_key().name()),
+            stop: can_stop.then(|| self.stop()),
+            scale: (ui.available_height() / USUAL_BAR_PT).max(1.0),
             panel: match (self.audience, self.is_panel_shown(ui.ctx())) {
                 (Audience::Subject, _) => PanelSwitch::None,
                 (Audience::Experimenter, true) => PanelSwitch::PutAway,
@@ -82,9 +87,12 @@ impl Viewer {
         }
     }
 
-    /// Returns the key that is the emergency stop: the largest one, except in a sitting.
-    fn stop_key(&self) -> egui::Key {
-        self.sitting.as_ref().map_or(egui::Key::Space, |prompt| prompt.stop_key.key())
+    /// Returns the name and the key of the emergency stop: the largest key, except in a sitting.
+    fn stop(&self) -> Stop {
+        match &self.sitting {
+            Some(prompt) => Stop { name: prompt.texts.stop.clone(), key: prompt.stop_key.key().name() },
+            None => Stop { name: STOP.to_owned(), key: egui::Key::Space.name() },
+        }
     }
 
     /// Shows the row of messages beneath the bar.
@@ -269,7 +277,7 @@ impl Viewer {
     }
 
     /// A line and what to do about it, in the middle of an area.
-    pub(super) fn words(&self, ui: &mut Ui, area: Rect, first: &str, second: &str, palette: &Palette) {
+    fn words(&self, ui: &mut Ui, area: Rect, first: &str, second: &str, palette: &Palette) {
         let layout = egui::Layout::top_down(egui::Align::Center);
         let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(area).layout(layout));
         inner.add_space(0.42 * area.height());

@@ -8,8 +8,9 @@ use egui::{CentralPanel, Frame, Key, Panel as Edge, Rect, Ui, ViewportCommand};
 use flotor_live::Ask;
 use flotor_study::screen::Screen;
 
-/// Height of the words beneath the 3D view, points.
-const ROOM_FOR_WORDS_PT: f32 = 84.0;
+/// Height of the bar, part of that of the window, and its least height, points.
+const BAR_PART: f32 = 0.06;
+const LEAST_BAR_PT: f32 = 48.0;
 
 impl Viewer {
     /// The sitting under way, if this window is one.
@@ -40,11 +41,14 @@ impl Viewer {
             screens::keys(ui).into_iter().for_each(|key| prompt.key(key));
         }
         let plain = Frame::new().fill(palette.panel).inner_margin(egui::Margin::symmetric(16, 4));
+        self.sitting = Some(prompt); // the bar has its texts
+        let bar_pt = (BAR_PART * ui.available_height()).max(LEAST_BAR_PT);
         Edge::top("top")
-            .exact_size(48.0)
+            .exact_size(bar_pt)
             .frame(plain)
             .show_separator_line(false)
             .show(ui, |ui| self.top(ui, palette));
+        let Some(prompt) = self.sitting.take() else { return };
         CentralPanel::default().frame(Frame::new().fill(palette.panel)).show(ui, |ui| {
             let area = ui.max_rect();
             self.screen(ui, area, &prompt, palette);
@@ -53,27 +57,27 @@ impl Viewer {
     }
 
     fn screen(&mut self, ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
-        const CALL: &str = "Please call the experimenter";
+        let texts = &prompt.texts;
         let samples = self.devices.at(self.player.now_s);
         match (&self.source, prompt.screen(), samples) {
             (_, Some(Screen::Over), _) => screens::show(ui, area, prompt, palette),
-            _ if prompt.is_lost() => self.words(ui, area, "The experiment has stopped", CALL, palette),
+            _ if prompt.is_lost() => {
+                screens::line(ui, area, [&texts.experiment_stopped, &texts.call], palette)
+            }
             (Source::Live { .. }, ..) if !self.source.is_running() => {
-                self.words(ui, area, "The device has stopped", CALL, palette);
+                screens::line(ui, area, [&texts.device_stopped, &texts.call], palette);
             }
             (Source::Live { .. } | Source::Recording, Some(_), Some(samples)) => {
                 if prompt.shows_scene() {
                     // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
                     // largest force, and a wire that stays what it is.
                     self.view.shows_arrows = false;
-                    // What to press stands beneath it, not before it.
-                    let view = area.with_max_y(area.bottom() - ROOM_FOR_WORDS_PT);
-                    self.scene(ui, view, &samples);
+                    self.scene(ui, screens::beneath_scene(area).0, &samples);
                     self.view.keys(ui, SceneBuilder::extent(&self.shapes, self.devices.count()));
                 }
                 screens::show(ui, area, prompt, palette);
             }
-            _ => self.words(ui, area, "One moment", "The device is being started", palette),
+            _ => screens::line(ui, area, [&texts.wait, &texts.starting], palette),
         }
     }
 }

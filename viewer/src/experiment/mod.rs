@@ -6,6 +6,7 @@
 //! holds the device.
 
 pub mod screens;
+pub mod texts;
 pub mod wire;
 
 use egui::Context;
@@ -14,6 +15,7 @@ use flotor_study::trial::Response;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
+use texts::Texts;
 
 /// What a key means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,6 +80,8 @@ pub struct Prompt {
     waker: Waker,
     /// What stops the device at once.
     pub stop_key: StopKey,
+    /// Texts of the screens.
+    pub texts: Texts,
 }
 
 /// Wakes the window when the experiment has said something: shared with who listens to it, and without effect until the window is
@@ -109,6 +113,7 @@ impl Prompt {
             is_lost: false,
             waker: Waker::default(),
             stop_key: StopKey::default(),
+            texts: Texts::english(),
         }
     }
 

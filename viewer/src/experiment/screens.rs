@@ -1,84 +1,128 @@
-//! What a person in a sitting sees: few words, large, in the middle; nothing that tells how stiff anything is.
+//! The screens of a person in a sitting: few words, large, in the middle; nothing that tells how stiff anything is.
+//!
+//! All sizes are shares of the height, so that a text is read from the same distance on every display, and the keys stand beneath the
+//! text that they belong to.
 
+use super::texts::Texts;
 use super::{Prompt, StudyKey};
 use crate::palette::Palette;
-use egui::{Align, Color32, Key, Layout, Rect, RichText, Ui, UiBuilder};
+use crate::ui::key::pressed_alone;
+use egui::{Align, Color32, Key, Layout, Rect, RichText, ScrollArea, Ui, UiBuilder, vec2};
 use flotor_study::protocol::Quality;
 use flotor_study::screen::{May, Pause, Question, Screen, TrialView};
 use flotor_study::trial::{Phase, Position};
 
-/// Sizes of text, points: read from an arm's length and more.
-const HEADLINE_PT: f32 = 34.0;
-const TEXT_PT: f32 = 21.0;
-const KEYS_PT: f32 = 18.0;
-const TYPED_PT: f32 = 54.0;
+/// Part of the height that is for words where the scene is seen.
+const WORDS_PART: f32 = 0.27;
+/// Part of the height above the words where nothing is seen.
+const ABOVE_PART: f32 = 0.2;
+/// Part of the height of a text to be read, at most: a longer one is scrolled.
+const READ_PART: f32 = 0.6;
+/// Least height whose share is taken, of the width: on a display that stands on end the lines are still wide enough.
+const HEIGHT_OF_WIDTH: f32 = 0.75;
+
+/// Sizes of text, points: shares of the height.
+struct Sizes {
+    headline: f32,
+    text: f32,
+    keys: f32,
+    typed: f32,
+    count: f32,
+    gap: f32,
+}
+
+impl Sizes {
+    fn of(area: Rect) -> Self {
+        let height = area.height().min(HEIGHT_OF_WIDTH * area.width());
+        let [headline, text, keys, typed, count, gap] =
+            [0.058, 0.036, 0.032, 0.09, 0.024, 0.02].map(|share| share * height);
+        Self { headline, text, keys, typed, count, gap }
+    }
+}
 
 /// The words of a screen.
-struct Words {
-    headline: &'static str,
+struct Words<'a> {
+    headline: &'a str,
     text: String,
     keys: String,
 }
 
-/// Shows the screen of a moment over an area; the scene, if it may be seen, lies beneath.
-pub fn show(ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
-    let Some(screen) = prompt.screen() else { return };
-    if let Screen::Read { text } = screen {
-        read(ui, area, text, palette);
-        below(ui, area, prompt, "Enter to go on", palette);
-        return;
-    }
-    let Words { headline, text, keys } = words(screen);
-    let over_scene = prompt.shows_scene();
-    let centred = Layout::top_down(Align::Center);
-    let mut inner = ui.new_child(UiBuilder::new().max_rect(area).id_salt("screen").layout(centred));
-    // Over the scene the words keep out of its way.
-    inner.add_space(if over_scene { 0.05 } else { 0.30 } * area.height());
-    inner.label(RichText::new(headline).size(HEADLINE_PT).color(palette.text));
-    inner.add_space(14.0);
-    inner.label(RichText::new(text).size(TEXT_PT).color(palette.faint));
-    if matches!(screen, Screen::Ask { question: Question::HowMuch, .. }) {
-        inner.add_space(24.0);
-        let (typed, color) =
-            if prompt.typed().is_empty() { ("–", palette.faint) } else { (prompt.typed(), palette.text) };
-        inner.label(RichText::new(typed).size(TYPED_PT).monospace().color(color));
-    }
-    below(ui, area, prompt, &keys, palette);
+/// Returns the areas of the scene and of the words beneath it.
+#[must_use]
+pub fn beneath_scene(area: Rect) -> (Rect, Rect) {
+    area.split_top_bottom_at_y((area.bottom() - WORDS_PART * area.height()).round())
 }
 
-/// A text of the experimenter, from the top; a long one is scrolled by the wheel.
-fn read(ui: &mut Ui, area: Rect, text: &str, palette: &Palette) {
+/// Shows the screen of a moment in an area; the scene, if it may be seen, has its own part of it.
+pub fn show(ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
+    let Some(screen) = prompt.screen() else { return };
+    let sizes = Sizes::of(area);
+    let place = if prompt.shows_scene() { beneath_scene(area).1 } else { area };
+    let centred = Layout::top_down(Align::Center);
+    let mut inner = ui.new_child(UiBuilder::new().max_rect(place).id_salt("screen").layout(centred));
+    inner.spacing_mut().item_spacing.y = 0.5 * sizes.gap;
+    if let Screen::Read { text } = screen {
+        inner.add_space(0.05 * area.height());
+        read(&mut inner, text, &sizes, area, palette);
+        below(&mut inner, prompt, &prompt.texts.key_go_on, &sizes, palette);
+        return;
+    }
+    let Words { headline, text, keys } = words(screen, &prompt.texts);
+    inner.add_space(if prompt.shows_scene() { 0.0 } else { ABOVE_PART * area.height() });
+    inner.label(RichText::new(headline).size(sizes.headline).color(palette.text));
+    if !text.is_empty() {
+        inner.label(RichText::new(text).size(sizes.text).color(palette.faint));
+    }
+    if matches!(screen, Screen::Ask { question: Question::HowMuch, .. }) {
+        inner.add_space(sizes.gap);
+        let (typed, color) =
+            if prompt.typed().is_empty() { ("–", palette.faint) } else { (prompt.typed(), palette.text) };
+        inner.label(RichText::new(typed).size(sizes.typed).monospace().color(color));
+    }
+    inner.add_space(if prompt.shows_scene() { 0.0 } else { sizes.gap });
+    below(&mut inner, prompt, &keys, &sizes, palette);
+}
+
+/// Shows a line and what to do about it.
+pub fn line(ui: &mut Ui, area: Rect, [first, second]: [&str; 2], palette: &Palette) {
+    let (sizes, centred) = (Sizes::of(area), Layout::top_down(Align::Center));
+    let mut inner = ui.new_child(UiBuilder::new().max_rect(area).layout(centred));
+    inner.add_space(0.4 * area.height());
+    inner.label(RichText::new(first).size(sizes.headline));
+    inner.label(RichText::new(second).size(sizes.text).color(palette.faint));
+}
+
+/// Shows a text of the experimenter, from the top; a long one is scrolled by the wheel.
+fn read(ui: &mut Ui, text: &str, sizes: &Sizes, area: Rect, palette: &Palette) {
     let (title, rest) = text.split_once('\n').unwrap_or((text, ""));
-    let inside = area.shrink2(egui::vec2(0.12 * area.width(), 20.0));
-    let inside = Rect::from_min_max(inside.min, egui::pos2(inside.right(), area.bottom() - 130.0));
-    let mut inner = ui.new_child(UiBuilder::new().max_rect(inside).id_salt("read"));
-    inner.label(RichText::new(title).size(HEADLINE_PT).color(palette.text));
-    inner.add_space(14.0);
-    egui::ScrollArea::vertical().show(&mut inner, |ui| {
-        ui.label(RichText::new(rest.trim()).size(TEXT_PT).color(palette.text));
+    let width = 0.76 * area.width();
+    ui.allocate_ui_with_layout(vec2(width, area.height()), Layout::top_down(Align::Min), |ui| {
+        ui.set_width(width);
+        ui.label(RichText::new(title).size(sizes.headline).color(palette.text));
+        ui.add_space(sizes.gap);
+        ScrollArea::vertical().max_height(READ_PART * area.height()).auto_shrink([false, true]).show(
+            ui,
+            |ui| {
+                ui.label(RichText::new(rest.trim()).size(sizes.text).color(palette.text));
+            },
+        );
     });
 }
 
-/// The foot of a screen: warnings, which keys mean something, how far it is.
-fn below(ui: &mut Ui, area: Rect, prompt: &Prompt, keys: &str, palette: &Palette) {
-    let top = area.bottom() - if prompt.shows_scene() { 92.0 } else { 118.0 };
-    let area = Rect::from_min_max(egui::pos2(area.left(), top), area.max);
-    let centred = Layout::top_down(Align::Center);
-    let mut inner = ui.new_child(UiBuilder::new().max_rect(area).id_salt("keys").layout(centred));
-    let warning = prompt.is_warned().then_some("The handle is out of its range: let it come back");
-    if let Some(warning) = warning.or(prompt.refused()) {
-        inner.label(RichText::new(warning).size(TEXT_PT).strong().color(palette.warning));
-    } else {
-        inner.add_space(TEXT_PT + 8.0);
-    }
-    let color = if prompt.is_persons_turn() { accent(palette) } else { palette.faint };
-    inner.label(
-        RichText::new(if prompt.is_persons_turn() { keys } else { "One moment" }).size(KEYS_PT).color(color),
-    );
-    inner.add_space(6.0);
+/// Shows what follows the words of a screen: warnings, the keys that mean something, the count of trials.
+fn below(ui: &mut Ui, prompt: &Prompt, keys: &str, sizes: &Sizes, palette: &Palette) {
+    let texts = &prompt.texts;
+    let (keys, color) =
+        if prompt.is_persons_turn() { (keys, accent(palette)) } else { (texts.wait.as_str(), palette.faint) };
+    ui.label(RichText::new(keys).size(sizes.keys).color(color));
     if let Some(trial) = prompt.screen().and_then(Screen::trial) {
-        let text = format!("{} of about {}", trial.number, trial.of_about);
-        inner.label(RichText::new(text).small().color(palette.faint));
+        let count = texts.count.replace("{number}", &trial.number.to_string());
+        let count = count.replace("{of_about}", &trial.of_about.to_string());
+        ui.label(RichText::new(count).size(sizes.count).color(palette.faint));
+    }
+    let warning = prompt.is_warned().then_some(texts.handle_out_of_range.as_str());
+    if let Some(warning) = warning.or(prompt.refused()) {
+        ui.label(RichText::new(warning).size(sizes.text).strong().color(palette.warning));
     }
 }
 
@@ -86,128 +130,97 @@ fn accent(palette: &Palette) -> Color32 {
     palette.components[2]
 }
 
-fn words(screen: &Screen) -> Words {
+fn words<'a>(screen: &Screen, texts: &'a Texts) -> Words<'a> {
     match screen {
-        Screen::Ready { reason, next } => pause(*reason, next),
-        Screen::Feel { trial, position } => feel(trial, *position),
-        Screen::Ask { trial, question } => ask(trial, *question),
+        Screen::Ready { reason, next } => pause(*reason, next, texts),
+        Screen::Feel { trial, position } => feel(trial, *position, texts),
+        Screen::Ask { trial, question } => ask(trial, *question, texts),
         // Shown by itself.
         Screen::Read { .. } => Words { headline: "", text: String::new(), keys: String::new() },
-        Screen::Over => Words {
-            headline: "Thank you",
-            text: "That was all. Please let go of the handle.".to_owned(),
-            keys: "Enter closes the window".to_owned(),
-        },
+        Screen::Over => {
+            Words { headline: &texts.over, text: texts.over_how.clone(), keys: texts.key_close.clone() }
+        }
     }
 }
 
-fn pause(reason: Pause, next: &TrialView) -> Words {
+fn pause<'a>(reason: Pause, next: &TrialView, texts: &'a Texts) -> Words<'a> {
     let seen = match (next.object_is_shown, next.quality) {
-        (true, Quality::Stiffness) => "You will see the spring while you feel it.",
-        (true, Quality::Force) => "You will see what you feel.",
-        (false, _) => "There will be nothing to see, only to feel.",
+        (true, Quality::Stiffness) => &texts.seen_stiffness,
+        (true, Quality::Force) => &texts.seen_force,
+        (false, _) => &texts.not_seen,
     };
-    let (headline, text, keys) = match reason {
-        Pause::Welcome => (task(next), format!("{}\n\n{seen}", how(next)), "Enter to begin"),
-        Pause::PhaseChanges if next.phase == Phase::Main => {
-            ("From now on it counts", seen.to_owned(), "Enter to go on")
+    let (headline, text) = match reason {
+        Pause::Welcome => {
+            let (task, how) = task(next, texts);
+            (task, format!("{how}\n\n{}\n\n{seen}", texts.press_often))
         }
-        Pause::PhaseChanges => {
-            ("A few to get used to it", format!("They do not count.\n{seen}"), "Enter to go on")
-        }
-        Pause::ModalityChanges if next.object_is_shown => {
-            ("From now on you see what you feel", seen.to_owned(), "Enter to go on")
-        }
-        Pause::ModalityChanges => ("From now on you feel only", seen.to_owned(), "Enter to go on"),
-        Pause::Rest => ("Time for a rest", "Let go of the handle for a while.".to_owned(), "Enter to go on"),
-        Pause::OutOfRange => (
-            "Once more",
-            "The handle was pushed out of its range, so this one comes again.\nPress a little less far."
-                .to_owned(),
-            "Enter to go on",
-        ),
+        Pause::PhaseChanges if next.phase == Phase::Main => (&texts.main_begins, seen.clone()),
+        Pause::PhaseChanges => (&texts.practice_begins, format!("{}\n{seen}", texts.practice_does_not_count)),
+        Pause::ModalityChanges if next.object_is_shown => (&texts.vision_begins, seen.clone()),
+        Pause::ModalityChanges => (&texts.vision_ends, seen.clone()),
+        Pause::Rest => (&texts.rest, texts.rest_how.clone()),
+        Pause::OutOfRange => (&texts.out_of_range, texts.out_of_range_how.clone()),
     };
-    Words { headline, text, keys: keys.to_owned() + &others(next) }
+    let keys = if reason == Pause::Welcome { &texts.key_begin } else { &texts.key_go_on };
+    Words { headline, text, keys: keys.to_owned() + &others(next, texts) }
 }
 
-/// The keys for what a person may do but need not.
-fn others(trial: &TrialView) -> String {
-    let key = |may: &May| match (may, trial.stimuli) {
-        (May::Again { left }, stimuli) => {
-            let what = if stimuli == 1 { "it" } else { "them" };
+/// Returns the keys for what a person may do but need not.
+fn others(trial: &TrialView, texts: &Texts) -> String {
+    let key = |may: &May| match may {
+        May::Again { left } => {
+            let again = if trial.stimuli == 1 { &texts.key_again_one } else { &texts.key_again_pair };
             let most = match left {
                 None => String::new(),
-                Some(1) => ", once more at most".to_owned(),
-                Some(left) => format!(", {left} times more at most"),
+                Some(1) => texts.again_last.clone(),
+                Some(left) => texts.again_left.replace("{left}", &left.to_string()),
             };
-            format!("          A  feel {what} again{most}")
+            format!("{again}{most}")
         }
-        (May::Practise, _) => "          P  practise first".to_owned(),
-        (May::Withdraw, _) => "          U  take the last answer back".to_owned(),
+        May::Practise => texts.key_practise.clone(),
+        May::Withdraw => texts.key_withdraw.clone(),
     };
-    trial.may.iter().map(key).collect()
+    trial.may.iter().map(|may| format!("          {}", key(may))).collect()
 }
 
-fn task(trial: &TrialView) -> &'static str {
+/// Returns the task of a trial and how it goes.
+fn task<'a>(trial: &TrialView, texts: &'a Texts) -> (&'a String, &'a str) {
     match (trial.stimuli, trial.quality) {
-        (1, Quality::Stiffness) => "How stiff is the spring?",
-        (1, Quality::Force) => "How strong is the force?",
-        (_, Quality::Stiffness) => "Which spring is stiffer?",
-        (_, Quality::Force) => "Which force is stronger?",
+        (1, Quality::Stiffness) => (&texts.task_rate_stiffness, &texts.how_rate_stiffness),
+        (1, Quality::Force) => (&texts.task_rate_force, &texts.how_rate_force),
+        (_, Quality::Stiffness) => (&texts.task_pair_stiffness, &texts.how_pair_stiffness),
+        (_, Quality::Force) => (&texts.task_pair_force, &texts.how_pair_force),
     }
 }
 
-fn how(trial: &TrialView) -> String {
-    let (noun, more, how) = match trial.quality {
-        Quality::Stiffness => ("spring", "stiffer", "stiff"),
-        Quality::Force => ("force", "stronger", "strong"),
-    };
-    let press = "Press the handle down and let it come up, as often as you like.";
-    if trial.stimuli == 1 {
-        format!(
-            "You will feel one {noun} at a time.\nGive each a number that says how {how} it is to you:\ntwice as {how}, twice \
-             the number. Any number will do.\n\n{press}"
-        )
-    } else {
-        format!(
-            "You will feel two, one after the other.\nThen say which of the two was {more}, or that you do not know.\n\n{press}"
-        )
-    }
-}
-
-fn feel(trial: &TrialView, position: Option<Position>) -> Words {
+fn feel<'a>(trial: &TrialView, position: Option<Position>, texts: &'a Texts) -> Words<'a> {
     let headline = match (position, trial.quality) {
-        (None, Quality::Stiffness) => "Feel the spring",
-        (Some(Position::First), Quality::Stiffness) => "First spring",
-        (Some(Position::Second), Quality::Stiffness) => "Second spring",
-        (None, Quality::Force) => "Feel the force",
-        (Some(Position::First), Quality::Force) => "First force",
-        (Some(Position::Second), Quality::Force) => "Second force",
+        (None, Quality::Stiffness) => &texts.feel_stiffness,
+        (Some(Position::First), Quality::Stiffness) => &texts.feel_first_stiffness,
+        (Some(Position::Second), Quality::Stiffness) => &texts.feel_second_stiffness,
+        (None, Quality::Force) => &texts.feel_force,
+        (Some(Position::First), Quality::Force) => &texts.feel_first_force,
+        (Some(Position::Second), Quality::Force) => &texts.feel_second_force,
     };
-    let practice = if trial.phase == Phase::Practice { "To get used to it. " } else { "" };
-    let text = format!("{practice}Press the handle down and let it come up.");
-    Words { headline, text, keys: "Enter when you have felt it".to_owned() + &others(trial) }
+    let text = if trial.phase == Phase::Practice { &texts.press_in_practice } else { &texts.press };
+    Words { headline, text: text.clone(), keys: texts.key_felt.clone() + &others(trial, texts) }
 }
 
-fn ask(trial: &TrialView, question: Question) -> Words {
+fn ask<'a>(trial: &TrialView, question: Question, texts: &'a Texts) -> Words<'a> {
     let is_practice = trial.phase == Phase::Practice;
-    let (headline, text, keys) = match (question, trial.quality) {
-        (Question::WhichIsMore, quality) => (
-            if quality == Quality::Stiffness { "Which one was stiffer?" } else { "Which one was stronger?" },
-            if is_practice { "To practise: this answer does not count" } else { "" },
-            "1  the first          2  the second          0  I don't know",
-        ),
-        (Question::HowMuch, quality) => (
-            if quality == Quality::Stiffness { "How stiff was it?" } else { "How strong was it?" },
-            if is_practice {
-                "Type a number above 0; to practise, it does not count"
-            } else {
-                "Type a number above 0"
-            },
-            "Enter when it is right          Backspace corrects",
-        ),
+    let headline = match (question, trial.quality) {
+        (Question::WhichIsMore, Quality::Stiffness) => &texts.ask_pair_stiffness,
+        (Question::WhichIsMore, Quality::Force) => &texts.ask_pair_force,
+        (Question::HowMuch, Quality::Stiffness) => &texts.ask_rate_stiffness,
+        (Question::HowMuch, Quality::Force) => &texts.ask_rate_force,
     };
-    Words { headline, text: text.to_owned(), keys: keys.to_owned() + &others(trial) }
+    let (text, keys) = match question {
+        Question::WhichIsMore if is_practice => (texts.answer_in_practice.clone(), &texts.key_answer_pair),
+        Question::WhichIsMore => (String::new(), &texts.key_answer_pair),
+        Question::HowMuch if is_practice => (texts.type_number_in_practice.clone(), &texts.key_answer_rate),
+        Question::HowMuch => (texts.type_number.clone(), &texts.key_answer_rate),
+    };
+    Words { headline, text, keys: keys.to_owned() + &others(trial, texts) }
 }
 
 /// The keys pressed in this picture that mean something here.
@@ -215,7 +228,7 @@ fn ask(trial: &TrialView, question: Question) -> Words {
 pub fn keys(ui: &Ui) -> Vec<StudyKey> {
     ui.input(|input| {
         let pressed =
-            |digit: &u8| Key::from_name(&digit.to_string()).is_some_and(|key| input.key_pressed(key));
+            |digit: &u8| Key::from_name(&digit.to_string()).is_some_and(|key| pressed_alone(input, key));
         let mut keys: Vec<StudyKey> = (0..=9).filter(pressed).map(StudyKey::Digit).collect();
         let others = [
             (Key::Period, StudyKey::Point),
@@ -226,7 +239,7 @@ pub fn keys(ui: &Ui) -> Vec<StudyKey> {
             (Key::U, StudyKey::Withdraw),
             (Key::P, StudyKey::Practise),
         ];
-        keys.extend(others.into_iter().filter(|(key, _)| input.key_pressed(*key)).map(|(_, means)| means));
+        keys.extend(others.into_iter().filter(|(key, _)| pressed_alone(input, *key)).map(|(_, means)| means));
         keys
     })
 }

@@ -11,7 +11,7 @@ use egui::{
     Align, Button, Color32, CornerRadius, FontId, Label, Layout, RichText, Role, Stroke, Ui, WidgetInfo, vec2,
 };
 
-/// Name of the emergency stop.
+/// Name of the emergency stop in front of an experimenter.
 pub const STOP: &str = "EMERGENCY STOP";
 /// Width of a button that is a sign, with its gaps, and of the dot before the state, points.
 const SIGN_PT: f32 = 32.0;
@@ -27,12 +27,23 @@ pub struct TopBar<'a> {
     pub state: &'a str,
     /// Whether the state is in order.
     pub status: RunStatus,
-    /// Name of the key that is the emergency stop, while there is a run to stop.
-    pub stop_key: Option<&'a str>,
+    /// The emergency stop, while there is a run to stop.
+    pub stop: Option<Stop>,
+    /// Size of the emergency stop, of the usual one.
+    pub scale: f32,
     /// What the button of the panel does.
     pub panel: PanelSwitch,
     /// Light or dark, where that can be switched.
     pub look: Option<Look>,
+}
+
+/// The emergency stop: what its button says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stop {
+    /// Name.
+    pub name: String,
+    /// Name of its key.
+    pub key: &'static str,
 }
 
 /// What the button of the panel does.
@@ -86,7 +97,7 @@ impl TopBar<'_> {
     pub fn show(&self, ui: &mut Ui, palette: &Palette) -> Option<TopBarRequest> {
         let mut request = None;
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if self.stop_key.is_some_and(|key| emergency_stop(ui, key).clicked()) {
+            if self.stop.as_ref().is_some_and(|stop| emergency_stop(ui, stop, self.scale).clicked()) {
                 request = Some(TopBarRequest::EmergencyStop);
             }
             let state_pt = DOT_PT + width_pt(ui.painter(), self.state, FontId::proportional(BODY_PT)) + 12.0;
@@ -140,22 +151,22 @@ impl TopBar<'_> {
 }
 
 /// Shows the one button that must be found without a search: in the same colours light and dark, with its key.
-fn emergency_stop(ui: &mut Ui, key: &str) -> egui::Response {
+fn emergency_stop(ui: &mut Ui, Stop { name, key }: &Stop, scale: f32) -> egui::Response {
     const RED: Color32 = Color32::from_rgb(196, 30, 36);
     const YELLOW: Color32 = Color32::from_rgb(255, 214, 64);
     let format = |size_pt: f32, color: Color32| TextFormat {
         valign: Align::Center,
-        ..TextFormat::simple(FontId::proportional(size_pt), color)
+        ..TextFormat::simple(FontId::proportional(scale * size_pt), color)
     };
     let mut text = LayoutJob::default();
-    text.append(STOP, 0.0, format(BODY_PT, Color32::WHITE));
-    text.append(key, 8.0, format(SMALL_PT, YELLOW));
+    text.append(name, 0.0, format(BODY_PT, Color32::WHITE));
+    text.append(key, 8.0 * scale, format(SMALL_PT, YELLOW));
     let button = Button::new(text)
         .fill(RED)
         .stroke(Stroke::new(1.5, YELLOW))
         .corner_radius(CornerRadius::same(6))
-        .min_size(vec2(150.0, ui.available_height().min(32.0)));
+        .min_size(vec2(150.0, 32.0_f32.min(ui.available_height())) * scale);
     let response = ui.add(button).on_hover_text(format!("No force at once; the run is over (key: {key})"));
-    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, STOP));
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
     response
 }

@@ -1,9 +1,9 @@
 //! A person in front of an experiment: every screen, by keyboard alone.
 
-use super::window::{until, until_fresh, window};
+use super::window::{recorded, until, until_fresh, window};
 use crate::support::{FakeHost, PATIENCE};
 use egui::accesskit::Role;
-use egui::{Key, Pos2, Rect, vec2};
+use egui::{Key, Pos2, Rect, Vec2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
@@ -16,7 +16,9 @@ use flotor_study::sitting::Sitting;
 use flotor_study::trial::{Phase, Position};
 use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::experiment::Prompt;
+use flotor_viewer::experiment::texts::Texts;
 use flotor_viewer::palette::Look;
+use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
@@ -100,6 +102,53 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
 fn trial(quality: Quality, stimuli: usize, object_is_shown: bool) -> TrialView {
     let (number, of_about, phase, repeat, may) = (3, 12, Phase::Main, 0, Vec::new());
     TrialView { number, of_about, phase, object_is_shown, repeat, stimuli, quality, may }
+}
+
+/// Text is a share of the height, with its keys beside it, from a laptop to a display of 3840 x 2160 at any scale.
+#[test]
+fn the_text_of_a_screen_grows_with_its_height_and_has_its_keys_beside_it() {
+    let ((teller, told), (said, _hears)) = (channel(), channel());
+    let mut prompt = Prompt::new(told, said);
+    prompt.texts =
+        Texts::read(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/texts/german.toml"))).expect("texts");
+    let question = Question::WhichIsMore;
+    let screen = Screen::Ask { trial: trial(Quality::Stiffness, 2, false), question };
+    teller.send(Told::Screen(screen)).expect("the window listens");
+    let mut window = window(recorded(100, None));
+    window.state_mut().rehearse(prompt);
+    for size in [[800.0, 600.0], [1280.0, 800.0], [1920.0, 1080.0], [3840.0, 2160.0], [1920.0, 1080.0]] {
+        let height = size[1];
+        window.set_size(Vec2::from(size));
+        window.run_steps(3);
+        let question = window.get_by_label("Welche war steifer?").rect();
+        let keys = window.get_by_label_contains("2  die zweite").rect();
+        assert!(question.height() > 0.05 * height, "{size:?}: {question:?}");
+        assert!(keys.height() > 0.025 * height, "{size:?}: {keys:?}");
+        assert!(
+            keys.top() > question.bottom() && keys.top() - question.bottom() < 0.1 * height,
+            "{size:?}: {keys:?}"
+        );
+        assert!(window.get_by_label("3 von etwa 12").rect().height() > 0.02 * height);
+        let stop = window.get_by_label("NOT-HALT").rect();
+        assert!(stop.height() > 0.03 * height, "{size:?}: {stop:?}");
+    }
+}
+
+/// All of a text is in sight where there is room, with the key that goes on beneath it.
+#[test]
+fn a_text_to_be_read_is_shown_to_its_end() {
+    let ((teller, told), (said, _hears)) = (channel(), channel());
+    let text =
+        "Consent\n\nYou take part.\n\nYou may stop at any time.\n\nNobody else sees your answers.".to_owned();
+    teller.send(Told::Screen(Screen::Read { text })).expect("the window listens");
+    let mut window = window(recorded(100, None));
+    window.state_mut().rehearse(Prompt::new(told, said));
+    window.run_steps(3);
+    let [text, key] = ["Nobody else sees your answers.", "Enter to go on"]
+        .map(|label| window.get_by_label_contains(label).rect());
+    let line = window.get_by_label("Consent").rect().height();
+    assert!(text.height() > 3.0 * line, "{text:?} has seven lines");
+    assert!(key.top() >= text.bottom() && key.bottom() < 800.0, "{text:?}, {key:?}");
 }
 
 /// Every screen there is: its headline and the keys that mean something, in sight, apart from each other, in a small window too.

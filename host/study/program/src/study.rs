@@ -159,6 +159,9 @@ struct Common {
     /// Key that is the emergency stop in the viewer's window (human)
     #[arg(long, value_enum, default_value_t, value_name = "KEY")]
     stop_key: front::StopKeyOption,
+    /// Texts of the screens in the viewer's window, in the language of the person (human; default: English)
+    #[arg(long, value_name = "FILE")]
+    texts: Option<PathBuf>,
     /// Least time for which each stimulus must be felt (human)
     #[arg(long, default_value = "0.5s", value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
     least_time: f64,

@@ -15,7 +15,7 @@ use flotor_study::apparatus::rig::TrialFiles;
 use flotor_study::apparatus::{Apparatus, Kinematics};
 use flotor_study::conduct::Ending;
 use flotor_study::dataset::{Dataset, DatasetError, Progress};
-use flotor_study::log::{Begin, Event, FORMAT};
+use flotor_study::log::{Begin, Event, FORMAT, digest};
 use flotor_study::protocol::{Protocol, SubjectNumber};
 use flotor_study::screen::Attended;
 use serde_json::json;
@@ -56,6 +56,11 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let consent = common.consent.iter().filter(|_| !has_begun);
     let texts =
         consent.chain(&common.instructions).map(|path| text_of(path)).collect::<Result<Vec<_>, _>>()?;
+    let screen_texts = common.texts.as_deref().map(text_of).transpose()?;
+    if screen_texts.is_some() && common.screen != ScreenOption::Viewer {
+        let why = "--texts is for the viewer's window; leave it out, or --screen";
+        return Err(CommandError::Usage(why.to_owned()));
+    }
     let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
     let presented = earlier.as_ref().map_or(0, |log| log.trials.len());
     // A track may take longer than most do: a trial in any case.
@@ -83,6 +88,10 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let text = format!("white noise: {}", noise.as_ref().map_or("none", WhiteNoise::player));
     log.write(&Event::Note { text }).map_err(failed)?;
 
+    if let Some(texts) = screen_texts {
+        log.write(&Event::Note { text: format!("texts of the screens: SHA-256 {}", digest(&texts)) })
+            .map_err(failed)?;
+    }
     let least = Least { time_s: common.least_time, way_m: common.least_movement_mm * 1.0e-3 };
     let text = format!("least time {} s, least movement {} mm", least.time_s, common.least_movement_mm);
     log.write(&Event::Note { text }).map_err(failed)?;
@@ -153,7 +162,7 @@ impl Front {
     fn open(common: &Common, rig: &RealTimeRig<'_>) -> Result<Self, CommandError> {
         match common.screen {
             ScreenOption::Viewer => match rig.unseen() {
-                None => Ok(Self::Window(Window::open(common.stop_key)?)),
+                None => Ok(Self::Window(Window::open(common.stop_key, common.texts.as_deref())?)),
                 Some(why) => Err(CommandError::Failed(format!("the viewer cannot show the session: {why}"))),
             },
             ScreenOption::Terminal => Terminal::listen().map(Self::Terminal).map_err(failed),

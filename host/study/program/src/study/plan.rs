@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// What the name of a study file ends with.
 const ENDING: &str = ".study.toml";
 /// Options whose values are files or folders: relative to that of the study file.
-const PATHS: [&str; 5] = ["out", "scene", "consent", "instructions", "plugin-path"];
+const PATHS: [&str; 6] = ["out", "scene", "consent", "instructions", "texts", "plugin-path"];
 /// Options that decide how `study run` goes on; a file has no say in them.
 const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
 

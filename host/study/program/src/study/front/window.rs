@@ -7,6 +7,7 @@ use flotor_live::process_number;
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::spawn_unblocked;
 use std::io::BufReader;
+use std::path::Path;
 use std::process::{ChildStdin, Stdio};
 use std::time::Duration;
 
@@ -25,10 +26,16 @@ impl Window {
     ///
     /// # Errors
     /// There is no viewer, or it cannot open a window and has said why.
-    pub(in crate::study) fn open(stop_key: StopKeyOption) -> Result<Self, CommandError> {
+    pub(in crate::study) fn open(
+        stop_key: StopKeyOption,
+        texts: Option<&Path>,
+    ) -> Result<Self, CommandError> {
         let mut command = SeparateProgram::VIEWER.command()?;
         command.arg("--sitting").arg("--run").arg(process_number().to_string());
         command.arg("--stop-key").arg(stop_key.word());
+        if let Some(texts) = texts {
+            command.arg("--texts").arg(texts);
+        }
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let failed =
             |cause| CommandError::file(SeparateProgram::VIEWER.program.as_ref(), "cannot be started", cause);
