@@ -1,6 +1,6 @@
 //! What a command line chooses of what is shown: the same in a window, a picture and a file of traces.
 
-use crate::quantity::Quantity;
+use flotor_history::quantity::Quantity;
 
 /// The choices; what is not chosen is as it is without them.
 #[derive(Clone, Debug, Default, PartialEq)]

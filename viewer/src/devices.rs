@@ -1,9 +1,9 @@
 //! The devices of a run: what has been seen of each, and which one numbers and traces are of.
 
-use crate::history::{History, Sample};
 use crate::scene::ArrowScale;
 use crate::tally::Tally;
 use flotor_core::trace::{Events, TickRecord};
+use flotor_history::{History, Sample};
 
 /// What has been seen of the devices of a run, in the scene's order. There is always one.
 #[derive(Clone, Debug)]

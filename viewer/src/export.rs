@@ -1,16 +1,16 @@
 //! Traces as files: numbers, lines, pixels.
 
-use crate::derived::ForcePosition;
-use crate::history::History;
 use crate::palette::{Look, Palette};
 use crate::picture::{PictureError, draw_without_window, write_png};
-use crate::quantity::Quantity;
 use crate::ui::force_position::said;
 use crate::ui::plot_stack::{ExportFormat, PlotStack, TooLow};
 use crate::ui::readout::{subtitle_of, title_of};
 use crate::ui::view3d::pixels;
 use egui::{UiBuilder, vec2};
 use flotor_core::trace::Events;
+use flotor_history::History;
+use flotor_history::derived::ForcePosition;
+use flotor_history::quantity::Quantity;
 use flotor_plot::{Axis, Figure, Mark, Panel, Paper, Series, Spans};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

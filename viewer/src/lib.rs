@@ -3,11 +3,10 @@
 //! A program of its own, so that no graphics driver can delay a servo (docs/src/adr/0008-viewer-process.md). It
 //! shows a running host or a recording: the bodies of its models in 3D, what was felt as traces, and panels to change it.
 //!
-//! - [`history`]: what has been seen of a run; [`feed`] reads it from a running host, [`player`] says which moment is shown,
-//!   [`tally`] counts what happened, [`panel`] is what can be set.
+//! - [`feed`] reads the history of a running host (`flotor-history`), [`player`] says which moment is shown, [`tally`] counts events,
+//!   [`panel`] is what can be set.
 //! - [`devices`]: the devices of a run, one of which is looked at.
-//! - [`derived`]: stiffness felt, force over position. [`quantity`]: what can be plotted, [`decimate`] with how few points, [`trace`] from picture to picture, [`export`] as files,
-//!   [`chosen`] on a command line.
+//! - [`trace`]: the points of a plot from picture to picture; [`export`] of traces as files, [`chosen`] on a command line.
 //! - [`shape`]: where the bodies of the models are; [`scene`] makes triangles of them with `flotor-drawing`, [`placing`] says where devices stand.
 //! - [`canvas`]: the 3D view in the interface, drawn on a GPU or the processor; [`picture`] a whole picture without a window, whose
 //!   interface [`flat`] draws.
@@ -22,15 +21,12 @@ pub mod app;
 pub mod canvas;
 pub mod chosen;
 pub mod cost;
-pub mod decimate;
-pub mod derived;
 pub mod devices;
 pub mod experiment;
 pub mod export;
 pub mod feed;
 pub mod flat;
 pub mod guide;
-pub mod history;
 pub mod palette;
 pub mod panel;
 pub mod picture;
@@ -38,7 +34,6 @@ pub mod placing;
 mod platform;
 pub mod player;
 pub mod pointer_order;
-pub mod quantity;
 pub mod remembered;
 pub mod scene;
 pub mod shape;

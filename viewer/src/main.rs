@@ -4,6 +4,8 @@
 use clap::Parser;
 use flotor_core::terminal::{escaped, escaped_arguments};
 use flotor_drawing::camera::View;
+use flotor_history::History;
+use flotor_history::quantity::Quantity;
 use flotor_live::Directory;
 use flotor_study::screen::{Screen, Told};
 use flotor_viewer::app::{Start, Viewer, Wanted};
@@ -13,13 +15,11 @@ use flotor_viewer::experiment::texts::Texts;
 use flotor_viewer::experiment::wire::at_standard_streams;
 use flotor_viewer::experiment::{Prompt, StopKey};
 use flotor_viewer::export::{self, ExportError};
-use flotor_viewer::history::History;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{
     PictureError, PictureOptions, draw_without_window, has_moment, least_height_px, number_of, picture,
     write_png,
 };
-use flotor_viewer::quantity::Quantity;
 use flotor_viewer::shape::shapes_of;
 use flotor_viewer::ui::plot_stack::{ExportFormat, PlotStack, Window};
 use flotor_viewer::window::{WindowError, WindowOptions, open};

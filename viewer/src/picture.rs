@@ -4,9 +4,7 @@ use crate::canvas::Canvas;
 use crate::chosen::Chosen;
 use crate::devices::Devices;
 use crate::flat::FlatRasterizer;
-use crate::history::History;
 use crate::palette::{Look, Palette};
-use crate::quantity::Units;
 use crate::scene::{SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use crate::ui::overlay::Overlay;
@@ -15,6 +13,8 @@ use crate::ui::view3d::{Subject, View3d};
 use crate::ui::{legend, readout, style};
 use egui::{ColorImage, Context, RawInput, Rect, Ui, pos2, vec2};
 use flotor_drawing::camera::{Camera, View};
+use flotor_history::History;
+use flotor_history::quantity::Units;
 use std::path::{Path, PathBuf};
 
 /// How a picture is to be made.

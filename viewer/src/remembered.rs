@@ -6,8 +6,8 @@
 
 use crate::palette::Look;
 use crate::platform::settings_folder;
-use crate::quantity::{Quantity, Units};
 use crate::ui::plot_stack::FIRST_TRACES;
+use flotor_history::quantity::{Quantity, Units};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,5 @@
 //! The 3D scene: bodies at the pose of the handle, on a ground, with what the hand feels as arrows.
 
-use crate::history::Sample;
 use crate::palette::{Palette, strain_color};
 use crate::placing::{Placing, round_below};
 use crate::shape::{Posed, Rest, Shape};
@@ -11,6 +10,7 @@ use flotor_drawing::geometry::{
 };
 use flotor_drawing::light;
 use flotor_hal::{DVec3, Part, Pose, ScalarField, Wrench};
+use flotor_history::Sample;
 
 /// Lengths of arrows.
 #[derive(Clone, Copy, Debug, PartialEq)]

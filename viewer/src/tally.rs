@@ -1,8 +1,8 @@
 //! What has happened in a run so far: counts of events, and the largest wrench.
 
-use crate::history::Sample;
 use crate::scene::ArrowScale;
 use flotor_core::trace::Events;
+use flotor_history::Sample;
 
 /// Counts since the beginning of what was seen.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,10 +1,10 @@
 //! A quantity over time in as few points as can be seen, kept from picture to picture: of a run that goes on, a picture looks
 //! at the samples that are new, and at no other.
 
-use crate::decimate::{Buckets, bucket_width_s};
-use crate::history::History;
-use crate::quantity::Quantity;
 use egui_plot::PlotPoint;
+use flotor_history::History;
+use flotor_history::decimate::{Buckets, bucket_width_s};
+use flotor_history::quantity::Quantity;
 use std::ops::Range;
 
 /// The traces of a quantity's components.
@@ -100,8 +100,8 @@ impl Trace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::{Keep, unknown_run};
     use flotor_core::trace::{RECORD_WORDS, TickRecord};
+    use flotor_history::{Keep, unknown_run};
     use flotor_sync::Words;
 
     const BUCKETS: usize = 100;

@@ -251,7 +251,7 @@ fn one_line(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quantity::Quantity;
+    use flotor_history::quantity::Quantity;
 
     #[test]
     fn what_a_command_line_says_is_for_this_time_only() {

@@ -6,7 +6,7 @@ mod support;
 mod window;
 
 use flotor_core::trace::Events;
-use flotor_viewer::history::{History, Keep};
+use flotor_history::{History, Keep};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use support::{spring_run, tick};
 use window::{live, until};

@@ -292,7 +292,7 @@ impl Stroke {
         self.scripted = scripted;
     }
 
-    /// The motion that the hand means at the end of the stroke: where a guide begins. Without a grip, the motion of the handle.
+    /// Returns the intended motion of the hand at the end of the stroke, where a guide begins. Without a grip, the motion of the handle.
     fn follower(&self, state: &State) -> Follower {
         self.drawn(self.end_ns).map_or_else(
             || Follower::of(state),

@@ -51,6 +51,8 @@ enum Role {
     Plot,
     /// Triangles and pictures of them, without a window.
     Drawing,
+    /// Samples of a run over time.
+    History,
     /// What the programs share: options, output, errors.
     Command,
     /// Judges models and devices.
@@ -119,7 +121,8 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
     ("host", Host, &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Plugin]),
     ("viewer/drawing", Drawing, &[Contract]),
-    ("viewer", Viewer, &[Contract, Sync, Core, Record, Live, Plot, Drawing, Study]),
+    ("viewer/history", History, &[Contract, Core, Record, Plot]),
+    ("viewer", Viewer, &[Contract, Sync, Core, Record, Live, Plot, Drawing, History, Study]),
     (
         "tests",
         Tests,
@@ -147,6 +150,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
             Emulator,
             Host,
             Drawing,
+            History,
             Viewer,
             Fixture,
             DropIn,
@@ -522,6 +526,7 @@ const PORTED: &[&str] = &[
     "host/sync/src/",
     "models/",
     "viewer/drawing/src/",
+    "viewer/history/src/",
     "viewer/src/",
 ];
 

@@ -1,13 +1,13 @@
 //! The pointer as the hand: handles that can be dragged, and the requests that come of it.
 
 use super::Viewer;
-use crate::history::Sample;
 use crate::palette::Palette;
 use crate::player::Motion;
 use crate::scene::handle_m;
 use crate::ui::handle::{Handle, handle};
 use egui::{Rect, Ui};
 use flotor_drawing::geometry::MM_PER_M;
+use flotor_history::Sample;
 use flotor_live::ChangeMessage;
 use std::time::{Duration, Instant};
 

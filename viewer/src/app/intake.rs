@@ -5,12 +5,12 @@ use super::{Audience, Heading, Source, Viewer, Wanted};
 use crate::devices::Devices;
 use crate::feed::{Arrivals, FeedState, STALE_AFTER};
 use crate::guide::Guide;
-use crate::history::{History, Keep};
 use crate::panel::Panel;
 use crate::player::Player;
 use crate::scene::SceneBuilder;
 use egui::Context;
 use flotor_core::trace::Events;
+use flotor_history::{History, Keep};
 use flotor_live::{ChangeMessage, Outcome, Subject};
 use std::time::{Duration, Instant};
 

@@ -10,7 +10,6 @@
 use super::words::State;
 use super::{Audience, Source, VIEW_PARTS, Viewer};
 use crate::export::export;
-use crate::history::Sample;
 use crate::palette::Palette;
 use crate::scene::SceneBuilder;
 use crate::ui::messages::{Extent, Messages};
@@ -24,6 +23,7 @@ use egui::{
     Align, Button, CursorIcon, Frame, Layout, Margin, Panel as Edge, Rect, RichText, Role, ScrollArea, Sense,
     Ui, WidgetInfo, vec2,
 };
+use flotor_history::Sample;
 use flotor_live::{Ask, SetValue};
 use std::time::Instant;
 

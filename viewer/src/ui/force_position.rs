@@ -1,12 +1,12 @@
 //! Force over position: the curve that a hand feels, its slope, and the area of its loop.
 
-use crate::derived::ForcePosition;
-use crate::history::History;
 use crate::palette::Palette;
-use crate::quantity::{Quantity, Units};
 use crate::ui::plots::{marks, plain, short, y_axis};
 use egui::{Color32, RichText, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
+use flotor_history::History;
+use flotor_history::derived::ForcePosition;
+use flotor_history::quantity::{Quantity, Units};
 
 /// Narrower, the choice of the axis has the row alone, points.
 const ROOM_FOR_NAME_PT: f32 = 230.0;

@@ -1,11 +1,11 @@
 //! Events as marks over the time: bars at its foot where a limit acted, ticks were missed or a parameter changed, and a line with a
 //! cross over the traces for each fault.
 
-use crate::decimate::bucket_width_s;
-use crate::history::History;
 use crate::palette::Palette;
 use egui::{Color32, CornerRadius, Rect, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use flotor_core::trace::Events;
+use flotor_history::History;
+use flotor_history::decimate::bucket_width_s;
 use std::collections::VecDeque;
 
 /// Number of intervals, at most, into which the time shown is divided.
@@ -135,8 +135,8 @@ fn names(events: Events) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::{Keep, unknown_run};
     use flotor_core::trace::{RECORD_WORDS, TickRecord};
+    use flotor_history::{Keep, unknown_run};
     use flotor_sync::Words;
 
     #[test]

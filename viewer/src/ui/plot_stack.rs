@@ -4,16 +4,16 @@ mod choices;
 
 use crate::chosen::Chosen;
 use crate::export::ExportOptions;
-use crate::history::History;
 use crate::palette::Palette;
 use crate::player::Motion;
-use crate::quantity::{Quantity, Units};
 use crate::trace::Trace;
 use crate::ui::force_position::ForcePositionPlot;
 use crate::ui::marks::Marks;
 use crate::ui::plots::{Maximise, PlotView, plot};
 use crate::ui::zoom::{Wheel, ZoomRequest};
 use egui::{Rect, Ui, UiBuilder};
+use flotor_history::History;
+use flotor_history::quantity::{Quantity, Units};
 use std::collections::BTreeMap;
 use std::path::Path;
 

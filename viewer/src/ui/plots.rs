@@ -1,14 +1,14 @@
 //! Traces over time.
 
-use crate::history::History;
 use crate::palette::Palette;
-use crate::quantity::{Quantity, Units};
 use crate::trace::Trace;
 use crate::ui::overlay::{shortened, width_pt};
 use crate::ui::style::quiet;
 use crate::ui::zoom::{Wheel, ZoomRequest, requested};
 use egui::{Align, Layout, Stroke, TextStyle, Ui, vec2};
 use egui_plot::{AxisHints, GridMark, HPlacement, Line, Plot, PlotPoints, VLine};
+use flotor_history::History;
+use flotor_history::quantity::{Quantity, Units};
 
 /// How a plot is shown.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,6 @@
 //! Texts of a moment: title, numbers, warnings.
 
-use crate::history::Sample;
 use crate::palette::Palette;
-use crate::quantity::{Quantity, Units};
 use crate::scene::SceneFacts;
 use crate::ui::overlay::{Corner, GAP_PT, MARGIN_PT, Overlay, shortened};
 use crate::ui::plots::digits;
@@ -10,6 +8,8 @@ use crate::ui::style::{BODY_PT, SMALL_PT, TITLE_PT};
 use egui::{Align2, Color32, FontId, vec2};
 use flotor_core::Clock;
 use flotor_core::trace::Events;
+use flotor_history::Sample;
+use flotor_history::quantity::{Quantity, Units};
 use flotor_record::RunDescription;
 
 /// Part of the width of the view that rows of numbers may take: beyond it they would cover the body.

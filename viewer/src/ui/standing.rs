@@ -1,8 +1,6 @@
 //! How close to the limits the run is, and what has happened in it so far.
 
-use crate::history::Sample;
 use crate::palette::Palette;
-use crate::quantity::{Quantity, Units};
 use crate::tally::Tally;
 use crate::ui::overlay::width_pt;
 use crate::ui::plots::short;
@@ -11,6 +9,8 @@ use egui::{
     Align, CollapsingHeader, CornerRadius, FontId, Layout, Rect, RichText, Role, Sense, Ui, WidgetInfo, vec2,
 };
 use flotor_core::trace::Events;
+use flotor_history::Sample;
+use flotor_history::quantity::{Quantity, Units};
 use flotor_live::WrenchLimits;
 
 /// Shows how much of each limit is used.

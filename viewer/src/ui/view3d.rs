@@ -1,7 +1,6 @@
 //! The 3D view and what a person does with it: orbit, zoom, incline, reset.
 
 use crate::canvas::Canvas;
-use crate::history::Sample;
 use crate::palette::{Look, Palette};
 use crate::scene::{ArrowScale, SceneBuilder, SceneFacts};
 use crate::shape::Shape;
@@ -9,6 +8,7 @@ use crate::ui::key::pressed_alone;
 use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2};
 use flotor_drawing::camera::{Camera, Extent};
 use flotor_hal::Pose;
+use flotor_history::Sample;
 
 /// Turn for a drag over a point of the screen, rad.
 const ORBIT_RAD_PER_POINT: f64 = 0.008;

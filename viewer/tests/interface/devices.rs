@@ -6,9 +6,9 @@ use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
+use flotor_history::{History, Keep};
 use flotor_record::{Role as PluginRole, RunDescription};
 use flotor_viewer::app::Start;
-use flotor_viewer::history::{History, Keep};
 
 /// Two devices without a model, the second of which is pressed twice as hard.
 fn two_hands() -> Vec<History> {

@@ -5,8 +5,8 @@ use crate::support::{plugin_file, spring_run, tick};
 use egui::{Key, vec2};
 use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
+use flotor_history::{History, Keep};
 use flotor_viewer::app::Start;
-use flotor_viewer::history::{History, Keep};
 use std::time::Duration;
 
 /// What has not changed is not made again: while the mouse moves, no sample is looked at and no corner of a triangle is made;

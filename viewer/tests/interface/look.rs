@@ -5,9 +5,9 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use flotor_history::quantity::Units;
 use flotor_viewer::app::Viewer;
 use flotor_viewer::palette::Look;
-use flotor_viewer::quantity::Units;
 
 #[test]
 fn the_view_turns_zooms_and_comes_back() {

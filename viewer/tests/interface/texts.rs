@@ -7,13 +7,13 @@ use egui::{FullOutput, Rect, Vec2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
+use flotor_history::quantity::Quantity;
+use flotor_history::{History, Keep};
 use flotor_live::{Ask, EndKind};
 use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::chosen::Chosen;
-use flotor_viewer::history::{History, Keep};
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureOptions, interface, least_height_px};
-use flotor_viewer::quantity::Quantity;
 
 /// Widths and heights of windows, pixels.
 const SIZES: [[f32; 2]; 6] =

@@ -5,9 +5,9 @@ use egui::accesskit::Role;
 use egui::{Key, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use flotor_history::quantity::Quantity;
 use flotor_viewer::app::Viewer;
 use flotor_viewer::palette::Look;
-use flotor_viewer::quantity::Quantity;
 
 const FORCE: &str = "Force over time, N";
 

@@ -5,9 +5,9 @@ use egui::vec2;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use flotor_core::trace::Events;
+use flotor_history::{History, Keep};
 use flotor_live::Ask;
 use flotor_viewer::app::{Start, Viewer, Wanted};
-use flotor_viewer::history::{History, Keep};
 use flotor_viewer::palette::Look;
 use std::time::{Duration, Instant};
 

@@ -2,11 +2,11 @@
 
 use super::{ExportFormat, PlotRequest, PlotStack, Window};
 use crate::palette::Palette;
-use crate::quantity::{Quantity, Units};
 use crate::ui::overlay::width_pt;
 use crate::ui::style::SMALL_PT;
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Color32, ComboBox, FontId, PopupCloseBehavior, RichText, Role, Ui, WidgetInfo};
+use flotor_history::quantity::{Quantity, Units};
 
 /// Lengths of time that can be shown, s.
 const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];

@@ -1,6 +1,6 @@
 //! What follows from several samples: the stiffness felt along the motion, and force over position with its hysteresis.
 
-use crate::history::Sample;
+use crate::Sample;
 use flotor_hal::DVec3;
 
 /// Least displacement of the handle from which a stiffness is computed, m: ten steps of a common position sensor.

@@ -1,4 +1,14 @@
-//! What has been seen of a run: its description, and samples of its ticks in order.
+//! The history of a run: its description, and samples of its ticks in order.
+//!
+//! - [`quantity`]: quantities of a sample that can be plotted.
+//! - [`derived`]: stiffness felt, force over position.
+//! - [`decimate`]: few points for many.
+//!
+//! Not real-time.
+
+pub mod decimate;
+pub mod derived;
+pub mod quantity;
 
 use crate::derived::felt_stiffness_n_per_m;
 use flotor_core::Clock;
@@ -8,7 +18,7 @@ use flotor_record::{Note, ReadError, Recording, RunDescription};
 use std::collections::VecDeque;
 use std::path::Path;
 
-/// What the viewer keeps of a tick. Less than half the size of the record: pictures need no more than `f32` of most of it.
+/// A tick, for pictures. Less than half the size of the record: pictures need no more than `f32` of most of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Scheduled time since the loop started, ns.
@@ -292,7 +302,8 @@ impl History {
     }
 }
 
-/// Seconds of nanoseconds.
-pub(crate) fn seconds(time_ns: u64) -> f64 {
+/// Converts ns to s.
+#[must_use]
+pub fn seconds(time_ns: u64) -> f64 {
     time_ns as f64 * 1.0e-9
 }

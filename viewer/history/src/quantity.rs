@@ -1,6 +1,6 @@
 //! What can be plotted, and in which units people read it.
 
-use crate::history::Sample;
+use crate::Sample;
 use flotor_hal::DVec3;
 use serde::{Deserialize, Serialize};
 
