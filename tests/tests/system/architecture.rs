@@ -121,7 +121,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
     ("host", Host, &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Plugin]),
     ("viewer/drawing", Drawing, &[Contract]),
-    ("viewer/history", History, &[Contract, Core, Record, Plot]),
+    ("viewer/history", History, &[Contract, Sync, Core, Record, Plot]),
     ("viewer", Viewer, &[Contract, Sync, Core, Record, Live, Plot, Drawing, History, Study]),
     (
         "tests",

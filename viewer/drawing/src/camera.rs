@@ -193,7 +193,8 @@ mod tests {
             let camera = Camera::fitting(extent, aspect);
             let on_screen =
                 |x: f64| camera.on_screen(DVec3::new(x, 0.0, -10.0), aspect).expect("before the eye");
-            let [left, right] = [-1.0, 1.0].map(|side| on_screen(side * (0.5 * extent.width_mm + 6.0))[0]);
+            let half_mm = 0.5 * extent.width_mm + HALF_BODY * extent.height_mm;
+            let [left, right] = [-1.0, 1.0].map(|side| on_screen(side * half_mm)[0]);
             assert!(left > 0.0 && right < 1.0, "{bodies} bodies at {aspect}: {left} to {right}");
             let is_near = camera.distance_mm < 1.1 * Camera::experimenter(25.0).distance_mm;
             assert!(is_near || right - left > 0.6, "{bodies} bodies at {aspect}: {left} to {right}");

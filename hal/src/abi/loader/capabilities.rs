@@ -256,6 +256,6 @@ mod tests {
         assert_eq!(check_unchanged(&HELD, &HELD), Ok(()));
         let more = Capabilities { max_force_n: [20.0; 3], ..HELD };
         let reason = check_unchanged(&HELD, &more).expect_err("it changed").reason;
-        assert!(reason.contains("capabilities changed") && reason.contains("20.0"), "{reason}");
+        assert!(reason.contains("capabilities changed") && reason.contains("[20, 20, 20]"), "{reason}");
     }
 }
