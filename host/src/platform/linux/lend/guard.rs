@@ -55,7 +55,7 @@ pub(super) struct ProgramEnd {
 }
 
 impl ProgramEnd {
-    /// Reads the report of a guard that has ended; nothing if it was not written.
+    /// Reads the result of a guard that has ended; nothing if it was not written.
     pub(super) fn read(file: &Path) -> Option<Self> {
         serde_json::from_slice(&std::fs::read(file).ok()?).ok()
     }
