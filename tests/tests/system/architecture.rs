@@ -76,7 +76,7 @@ enum Role {
 
 use Role::{
     Analysis, Calibration, Command, Compat, Container, Contract, Core, Coupling, Drawing, DropIn, Emulator,
-    Fixture, Guard, Host, Judge, Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record,
+    Fixture, Guard, History, Host, Judge, Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record,
     SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
 };
 
