@@ -334,7 +334,8 @@ fn a_handle_dragged_a_millimetre_into_a_wall_reads_two_newtons_and_is_released_s
         std::thread::sleep(Duration::from_secs(1));
         (twin.row("Position")?.get(2)? < &1.0).then_some(())
     });
-    let is_deep = |depth_mm: f64| (depth_mm - 1.0).abs() < 0.015;
+    // A pixel moves the handle by 0.09 mm.
+    let is_deep = |depth_mm: f64| (depth_mm - 1.0).abs() < 0.05;
     patiently("the handle is a millimetre deep", || {
         std::thread::sleep(Duration::from_millis(800));
         let depth_mm = -*twin.row("Position")?.get(2)?;
