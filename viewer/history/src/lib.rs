@@ -1,4 +1,4 @@
-//! The history of a run: its description, and samples of its ticks in order.
+//! History of a run: its description, and samples of its ticks in order.
 //!
 //! - [`quantity`]: quantities of a sample that can be plotted.
 //! - [`derived`]: stiffness felt, force over position.

@@ -419,8 +419,8 @@ const LAST_PATIENCE: Duration = Duration::from_millis(1300);
 /// Pause between two looks at it.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Waits for the guard of the program. The terminal asks the program to end as well; if the program goes on, or has been asked by
-/// nobody else, this sends SIGTERM and at last kills it.
+/// Waits for the guard of the program. After a request to stop, sends SIGTERM to the guard, and kills it if it does not end. A terminal
+/// sends its own signal to the program.
 fn wait(mut child: Child, stop: &StopSwitch) -> ExitStatus {
     let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
     let send = |signal| process.map(|process| kill_process(process, signal));

@@ -81,7 +81,7 @@ pub(super) struct PosteriorDensity {
     pub(super) log_threshold: Density,
     /// Of the root of the lapse, where it is not known.
     pub(super) root_lapse: Option<Density>,
-    /// Means of the logarithm of the threshold, of that of sigma, of the criterion, and of the lapse.
+    /// Posterior means: logarithms of threshold and sigma, criterion, lapse.
     pub(super) mean_log_threshold: f64,
     pub(super) mean_log_sigma: f64,
     pub(super) mean_criterion: f64,
