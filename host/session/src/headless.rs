@@ -44,6 +44,7 @@ pub fn run(
     let recording = RunRecording::new(recorder);
     let mut watchers = Watchers { tally: Tally::default(), digest: TraceDigest::new(), recording, demand };
     let ran = session.run(&mut watchers, &StopSwitch::default());
+    let asked = watchers.demand();
     let Watchers { tally, digest, mut recording, .. } = watchers;
     // Also that of a run which did not end well.
     let recorded = recording.finish(&[]);
@@ -57,6 +58,7 @@ pub fn run(
         seed,
         rate_hz: scene.rate_hz,
         plugins: &plugins,
+        asked,
         couplings: &scene.couplings,
         carried: &[],
         trace_digest: digest.finish(),

@@ -8,7 +8,7 @@ use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_coupling::Hearing;
-use flotor_hal::{DVec3, EnergyLedger};
+use flotor_hal::{DVec3, Demand, EnergyLedger};
 use flotor_servo::RunEnd;
 use flotor_servo::{
     CouplingOutcome, EnvelopeEffects, ModelHealth, Overrun, Percentiles, Stage, StageEffect, Timing,
@@ -145,6 +145,15 @@ impl NotComputed {
     fn observe(&mut self, record: &TickRecord) {
         self.torque |= record.model.torque().is_none();
         self.energy |= record.model.energy_j().is_none();
+    }
+
+    /// Adds the outputs that were computed, if at all, for clients alone: when a client comes and goes is not the run's.
+    fn beyond(&self, needed: Demand) -> Self {
+        let is_absent = |absent: bool, output| absent || !needed.contains(output);
+        Self {
+            torque: is_absent(self.torque, Demand::TORQUE),
+            energy: is_absent(self.energy, Demand::ENERGY),
+        }
     }
 
     fn names(&self) -> Vec<&'static str> {
@@ -402,6 +411,8 @@ pub struct RunFacts<'a> {
     pub rate_hz: f64,
     /// Plugins.
     pub plugins: &'a [PluginReport],
+    /// Outputs of the models that the run's own observer asked for; clients that watched are left out.
+    pub asked: Demand,
     /// What holds devices together.
     pub couplings: &'a [CouplingDescription],
     /// Counts of messages between hosts, by name of the coupling.
@@ -478,6 +489,9 @@ impl RunSummary {
         let events = Events::NAMES.iter().copied().zip(tally.event_ticks());
         let ledgers = || outcome.devices.iter().filter_map(|device| device.ledger);
         let elapsed_s = outcome.elapsed_ns as f64 * 1.0e-9;
+        let needed = (facts.plugins.iter().zip(&tally.devices))
+            .fold(Demand::ALL, |all, (device, _)| all.limited_to(device.felt.with(facts.asked)));
+        let not_computed = tally.not_computed.beyond(needed).names();
         Self {
             title: facts.title.to_owned(),
             end: match outcome.end {
@@ -517,7 +531,7 @@ impl RunSummary {
                     .map(relative_residual)
                     .max_by(|a, b| a.abs().total_cmp(&b.abs())),
                 device_peak_j: ledgers().map(|ledger| ledger.peak_j).max_by(f64::total_cmp),
-                loop_generated_j: tally.generated_peak_j(),
+                loop_generated_j: tally.generated_peak_j().filter(|_| not_computed.is_empty()),
                 port_lowest_j: tally.port_lowest_j,
                 port_end_j: tally.devices.iter().map(DeviceTally::port_energy_j).sum(),
             },
@@ -532,7 +546,7 @@ impl RunSummary {
                 .collect(),
             events: events.filter(|(_, count)| *count > 0).collect(),
             trace_digest: facts.trace_digest,
-            not_computed: tally.not_computed.names(),
+            not_computed,
             dropped_records: outcome.dropped_records,
             wall_s: outcome.wall_s,
             warnings: outcome.warnings.clone(),

@@ -170,6 +170,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let latch = session.latch().cloned();
     let outcome = session.run(&mut watched, &stop);
     drop(keys);
+    let asked = watched.demand();
     let Watched { observer: Watchers { tally, digest, mut recording, plot, progress, .. }, publication } =
         watched;
     progress.finish_and_clear();
@@ -186,6 +187,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
                         seed: arguments.seed,
                         rate_hz: scene.rate_hz,
                         plugins: &plugins,
+                        asked,
                         couplings: &[],
                         carried: &[],
                         trace_digest: digest.finish(),
@@ -210,6 +212,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         seed: arguments.seed,
         rate_hz: scene.rate_hz,
         plugins: &plugins,
+        asked,
         couplings: &scene.couplings,
         carried: &carried,
         trace_digest: digest.finish(),

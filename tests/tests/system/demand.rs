@@ -11,6 +11,7 @@ use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
+use flotor_session::summary::{RunFacts, RunSummary, Tally};
 use flotor_session::telemetry::{Watched, publish};
 use flotor_session::{Observer, RunOptions, Session, headless};
 use flotor_tests::library::plugin_file;
@@ -260,6 +261,52 @@ fn a_scene_has_one_digest_bare_observed_recorded_and_watched() {
         assert_eq!(watched, bare, "{}: watched", scene.title);
         assert!(computed.contains(&all));
         assert!(computed.iter().any(|demand| *demand != Demand::ALL), "{}: watched for a while", scene.title);
+    }
+}
+
+/// The summary, without wall times, of a run on `axes` that clients watch from before the first tick to the last.
+fn summary_with_clients(axes: &str, clients: usize) -> Value {
+    let scratch = Scratch::default();
+    let directory = Directory::at(scratch.path().join("runs"));
+    let scene = Scene::parse(Path::new("scene.toml"), &scene(axes, "none")).expect("it is right");
+    let (session, stop) = (session(&scene), StopSwitch::default());
+    let (plugins, observers) = (session.plugins().to_vec(), session.observers());
+    let description = describe(&scene, &OPTIONS, &plugins);
+    let publication = publish(&directory, &scene, &description, &session, &stop).expect("it is published");
+    let observer = Asking::for_outputs(Demand::FORCE);
+    let mut watched = Watched { observer, publication: Some(publication) };
+    let watching: Vec<Client> = (0..clients).map(|_| client(&directory)).collect();
+    until_asked(&observers, if clients > 0 { Demand::ALL } else { Demand::FORCE });
+    let mut lockstep = session.into_lockstep().expect("it starts");
+    while lockstep.advance(&mut watched, &stop).is_none() {}
+    drop(watching);
+    let mut tally = Tally::default();
+    watched.observer.records.iter().for_each(|record| tally.observe(record));
+    let facts = RunFacts {
+        title: &scene.title,
+        clock: "virtual",
+        seed: OPTIONS.seed,
+        rate_hz: scene.rate_hz,
+        plugins: &plugins,
+        asked: watched.observer.demand,
+        couplings: &[],
+        carried: &[],
+        trace_digest: String::new(),
+    };
+    let summary = RunSummary::new(facts, &lockstep.finish(), &tally);
+    let mut summary = serde_json::to_value(summary).expect("it is JSON");
+    for measured in ["compute_ns", "stages_ns", "wall_s"] {
+        summary[measured].take();
+    }
+    summary
+}
+
+#[test]
+fn a_client_that_watches_from_the_first_tick_to_the_last_changes_nothing_in_the_summary() {
+    for (axes, names) in [("six", vec!["energy"]), ("three", vec!["torque", "energy"])] {
+        let bare = summary_with_clients(axes, 0);
+        assert_eq!(bare["not_computed"], Value::from(names), "{bare}");
+        assert_eq!(summary_with_clients(axes, 2), bare, "{axes} axes");
     }
 }
 

@@ -5,7 +5,7 @@
 //! the spring turns it. Everything here is compared with a closed form.
 
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::{DVec3, EnergyLedger, Input, Output, Pose};
+use flotor_hal::{DVec3, Demand, EnergyLedger, Input, Output, Pose};
 use flotor_servo::RunEnd;
 use flotor_session::Observer;
 use flotor_session::registry::load_file;
@@ -162,6 +162,7 @@ fn the_hold_puts_out_exactly_the_energy_a_held_spring_must() {
         seed: 1,
         rate_hz: 1.0 / PERIOD_S,
         plugins: &[],
+        asked: Demand::ALL,
         couplings: &[],
         carried: &[],
         trace_digest: String::new(),

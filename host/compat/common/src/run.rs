@@ -50,7 +50,7 @@ const DRAFT_LOOK: u64 = 64;
 
 impl Draft {
     /// Writes it, whole or not at all, if it is time.
-    fn update(&mut self, record: &TickRecord, asked: &[Asked], tally: &Tally, digest: &TraceDigest) {
+    fn update(&mut self, record: &TickRecord, asked: &[Asked], run: Measured<'_>) {
         let is_fresh = |written: Instant| written.elapsed() < DRAFT_PERIOD;
         if !record.tick.is_multiple_of(DRAFT_LOOK) || self.written.is_some_and(is_fresh) {
             return;
@@ -68,8 +68,7 @@ impl Draft {
         if let Some(path) = settings.json.as_deref().filter(|path| path.as_os_str() != "-") {
             let here = Stuck { tick: record.tick, place: Place::Waiting };
             let outcome = Outcome::of_hung_loop(here, record.time_ns);
-            let mut summary =
-                serde_json::to_value(self.facts.summary(&outcome, tally, digest)).unwrap_or_default();
+            let mut summary = serde_json::to_value(self.facts.summary(&outcome, &run)).unwrap_or_default();
             summary["end"] = "not ended".into();
             replace(&so_far(path), &summary.to_string());
         }
@@ -96,9 +95,8 @@ impl Observer for Watchers {
         self.recording.change(change);
     }
 
-    /// Force and torque that the program asks for, and what the recording stores.
     fn demand(&self) -> Demand {
-        Demand::WRENCH.with(self.recording.demand())
+        demand(&self.recording)
     }
 
     fn observe(&mut self, record: &TickRecord) {
@@ -116,9 +114,22 @@ impl Observer for Watchers {
             asked.applied_nm = asked.applied_nm.max(record.commanded.torque().length());
         }
         if let (0, Some(draft)) = (record.device, &mut self.draft) {
-            draft.update(record, &self.asked, &self.tally, &self.digest);
+            let demand = demand(&self.recording);
+            draft.update(record, &self.asked, Measured { tally: &self.tally, digest: &self.digest, demand });
         }
     }
+}
+
+/// Returns force and torque, which the program asks for, and the outputs that a recording stores.
+fn demand(recording: &RunRecording) -> Demand {
+    Demand::WRENCH.with(recording.demand())
+}
+
+/// Numbers of a run so far, of which a summary is made.
+struct Measured<'a> {
+    tally: &'a Tally,
+    digest: &'a TraceDigest,
+    demand: Demand,
 }
 
 /// Length of a vector, also of one that is too long to be squared.
@@ -210,24 +221,26 @@ impl LockstepRun {
 
 impl Facts {
     /// Returns the summary of a run that ended so, or has come so far.
-    fn summary(&self, outcome: &Outcome, tally: &Tally, digest: &TraceDigest) -> RunSummary {
+    fn summary(&self, outcome: &Outcome, run: &Measured<'_>) -> RunSummary {
         let facts = RunFacts {
             title: &self.scene.title,
             clock: if self.settings.pace == Pace::Real { "real" } else { "virtual" },
             seed: self.seed,
             rate_hz: self.scene.rate_hz,
             plugins: &self.plugins,
+            asked: run.demand,
             couplings: &self.scene.couplings,
             carried: &[],
-            trace_digest: digest.finish(),
+            trace_digest: run.digest.finish(),
         };
-        RunSummary::new(facts, outcome, tally)
+        RunSummary::new(facts, outcome, run.tally)
     }
 
     /// Finishes the recording and writes the summary where it is wanted.
     fn report(self, watched: Watched<Watchers>, outcome: Outcome, stations: &[Station]) {
         let Watched { observer: Watchers { tally, digest, mut recording, asked, .. }, publication } = watched;
-        let summary = self.summary(&outcome, &tally, &digest);
+        let run = Measured { tally: &tally, digest: &digest, demand: demand(&recording) };
+        let summary = self.summary(&outcome, &run);
         let settings = &self.settings;
         let mut lines: Vec<String> =
             stations.iter().zip(&asked).map(|(station, asked)| line(station, *asked)).collect();
