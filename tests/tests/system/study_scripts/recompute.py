@@ -105,7 +105,7 @@ def check_effect(what, line, known):
     close(f"{what} p", line["p"], stats.f.sf(f, df, error_df), 1e-6)
     close(f"{what} partial eta squared", line["partial_eta_squared"], squares / (squares + error), 1e-9)
     total, omega = df + error_df + 1.0, line["partial_omega_squared"]
-    close(f"{what} omega", omega["value"], max(df * (f - 1.0), 0.0) / (max(df * (f - 1.0), 0.0) + total), 1e-8)
+    close(f"{what} omega", omega["value"], max(df * (f - 1.0), 0.0) / (max(df * (f - 1.0), 0.0) + total), 1e-9)
     shifts = [noncentral(f, df, error_df, below) for below in (0.975, 0.025)]
     if np.all(np.isfinite(shifts)):
         interval(f"{what} omega", omega["interval"], [shift / (shift + total) for shift in shifts], 1e-6)
