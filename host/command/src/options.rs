@@ -21,8 +21,10 @@ use std::str::FromStr;
 const LEAST_STACK_BYTES: u64 = 1 << 20;
 
 /// The arguments of this process. A negative number is the value of its option, whose parser says what is legal: without
-/// this, clap takes it for another option. Ends the process where its stack is too small for them. Not real-time.
+/// this, clap takes it for another option. Ends the process where its stack is too small for them. Restores the default
+/// action of interrupts first: a shell ignores them for its commands in the background. Not real-time.
 pub fn arguments<T: Parser>() -> T {
+    crate::platform::accept_interrupts();
     if let Some(bytes) = crate::platform::stack_limit_bytes().filter(|bytes| *bytes < LEAST_STACK_BYTES) {
         let (has, least) = (bytes >> 10, LEAST_STACK_BYTES >> 10);
         crate::print_error_line(format_args!(

@@ -9,6 +9,8 @@ use flotor_tests::{TestSize, workspace_root};
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// A folder with a scene of a model that hangs in tick 70, and a test of it.
@@ -27,7 +29,9 @@ impl Hanging {
         let scene = format!(
             "duration_s = 0.2\n[device]\nplugin = \"simulated\"\n[[model]]\nname = \"jelly\"\nplugin = {model:?}\n"
         );
+        let felt = format!("{scene}[[model]]\nplugin = \"spring\"\n");
         let _ = folder.file("scene.toml", scene);
+        let _ = folder.file("felt.toml", felt);
         let _ = folder.file("program.sh", PROGRAM);
         let _ = folder.file(
             "hangs.test.toml",
@@ -100,12 +104,13 @@ impl End {
 const PROGRAM: &str = "trap '' TERM INT HUP\n(while :; do sleep 600; done) &\nwhile :; do :; done\n";
 
 /// Each would go on for minutes.
-const COMMANDS: [&[&str]; 5] = [
+const COMMANDS: [&[&str]; 6] = [
     &["lend", "--api", "ml-api", "--listen", "127.0.0.1:0", "--", "sh", "program.sh"],
     &["run", "scene.toml", "--clock", "virtual"],
     &["test", "hangs.test.toml"],
     &["validate", "MODEL", "--timeout", "600s"],
     &["stress", "--model", "MODEL", "--timeout", "600s"],
+    &["study", "jnd", "--scene", "felt.toml", "--out", "data"],
 ];
 
 /// A spin, and a wait.
@@ -116,11 +121,11 @@ fn nothing_is_left_of_a_command_that_is_killed_while_a_model_hangs() {
     if !required(Tool::Cc) {
         return;
     }
+    take_interrupts();
     let kills = TestSize::of_this_run().pick(6, 200);
     let hanging = HANGS.map(Hanging::by);
-    let mut slowest = Duration::ZERO;
     for command in COMMANDS {
-        let mut most = 0;
+        let (mut most, mut slowest) = (0, Duration::ZERO);
         for number in 0..kills {
             let end = [End::Kill, End::Term, End::Interrupt][number % 3];
             let scene = &hanging[number / 3 % 2];
@@ -133,10 +138,54 @@ fn nothing_is_left_of_a_command_that_is_killed_while_a_model_hangs() {
             slowest = slowest.max(scene.is_left(&format!("{command:?} {end:?} after {share}")));
             let ended = started.wait();
             assert_ne!(ended.code, Some(exit_code::CONFIGURATION), "{ended:?}");
+            let _ = std::fs::remove_dir_all(scene.path().join("data"));
         }
         assert!(most > 1, "{command:?} never had a process of its own");
+        let name = command[0];
+        println!("{name}: 0 of {kills} kills left a process; the last one ended after {slowest:.2?} at most");
     }
-    println!("{kills} kills of each command: the last process ended after {slowest:.2?} at most");
+}
+
+/// Lets commands of this process take SIGINT, which it may have inherited as ignored itself: `exec` restores the default action of a
+/// signal that has a handler.
+fn take_interrupts() {
+    let end = Arc::new(AtomicBool::new(true));
+    signal_hook::flag::register_conditional_shutdown(Signal::INT.as_raw(), 130, end).expect("a handler");
+}
+
+/// A shell starts its commands in the background so.
+#[test]
+fn an_interrupt_ends_a_command_that_was_started_with_interrupts_ignored() {
+    let scratch = Scratch::default();
+    for command in [
+        &["study", "jnd", "--out", "data"][..],
+        &["stress", "--model", "spring"],
+        &["bench"],
+        &["run", "--clock", "virtual", "--duration", "10h"],
+    ] {
+        let flotor = Flotor::with(command).through_shell("trap '' INT\nexec \"$@\"");
+        let mut started = flotor.inside(scratch.path()).leading_a_group().start();
+        soon("interrupts are taken", || !ignores_interrupts(&started));
+        End::Interrupt.bring_about(&started);
+        soon(&format!("{command:?} has ended"), || started.try_wait().expect("it is ours").is_some());
+    }
+}
+
+fn ignores_interrupts(process: &Running) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", process.pid().as_raw_nonzero()));
+    let status = status.expect("it runs");
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).expect("a line");
+    let ignored = u64::from_str_radix(ignored.trim(), 16).expect("a set of signals");
+    ignored >> (Signal::INT.as_raw() - 1) & 1 == 1
+}
+
+/// Waits until it is so.
+fn soon(what: &str, mut is_so: impl FnMut() -> bool) {
+    let since = Instant::now();
+    while !is_so() {
+        assert!(since.elapsed() < FOR_EVER, "not so: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
 }
 
 /// A daemon is meant to go on; whoever ends the program has to know of it.

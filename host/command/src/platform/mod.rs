@@ -13,8 +13,8 @@ use unix as system;
 use windows as system;
 
 pub(crate) use system::{
-    INTERRUPTED, KeyTerminal, Requests, ask_to_end, become_program, die_by, divide, is_orphaned,
-    outlive_requests, results_apart, stack_limit_bytes,
+    INTERRUPTED, KeyTerminal, Requests, accept_interrupts, ask_to_end, become_program, die_by, divide,
+    is_orphaned, outlive_requests, results_apart, stack_limit_bytes,
 };
 
 /// What asks a run to end.

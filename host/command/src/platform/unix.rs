@@ -20,7 +20,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-pub(crate) use supervision::{die_by, divide, is_orphaned};
+pub(crate) use supervision::{accept_interrupts, die_by, divide, is_orphaned};
 
 /// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as shells have it.
 pub(crate) const INTERRUPTED: i32 = 130;

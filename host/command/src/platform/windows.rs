@@ -22,6 +22,9 @@ pub(crate) fn stack_limit_bytes() -> Option<u64> {
     None
 }
 
+/// Does nothing: Windows has no signals that a process inherits as ignored.
+pub(crate) const fn accept_interrupts() {}
+
 /// Leaves this process undivided: Windows cannot copy a process.
 ///
 /// # Errors

@@ -3,14 +3,14 @@
 use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
 use clap::Args;
 use flotor_command::options::{JsonOption, PluginPathOption, core, duration_s, rate_hz, svg_file};
-use flotor_command::stopping::stop_on_signals;
+use flotor_command::stopping::stop_run_on_signals;
 use flotor_command::tables::table;
 use flotor_command::{CommandError, note, print_result, progress_bar, style, write_text};
 use flotor_plot::{Axis, Bin, Figure, Panel, Series};
 use flotor_servo::{Clock, Core};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
-use flotor_session::{RunError, RunOptions, Session};
+use flotor_session::{RunError, RunOptions, Session, stop_waits_with};
 use std::path::PathBuf;
 
 /// Measure the timing of the servo on this machine, compared with a bare loop.
@@ -39,6 +39,9 @@ pub(crate) struct JitterArguments {
 }
 
 pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
+    // Before there are threads of plugins, which would take the signals.
+    let stop = stop_run_on_signals()?;
+    stop_waits_with(&stop);
     let mut scene = Scene::demo().map_err(RunError::Scene)?;
     scene.rate_hz = arguments.rate;
     arguments.plugin_path.put_before_those_of(&mut scene);
@@ -50,7 +53,6 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let slices = ((arguments.duration / 2.0).ceil() as u64).max(1);
     let progress = progress_bar(slices, "{percent:>3} %  pair {pos} of {len}");
-    let stop = stop_on_signals()?;
     let report = measure(session, slices, &stop, |done| progress.set_position(done))?;
     progress.finish_and_clear();
 

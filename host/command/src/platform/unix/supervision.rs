@@ -17,13 +17,26 @@ use std::time::{Duration, Instant};
 
 /// Poll interval of the supervisor; signals and the end of the child wake it at once.
 const POLL: libc::timespec = libc::timespec { tv_sec: 1, tv_nsec: 0 };
+const AT_ONCE: libc::timespec = libc::timespec { tv_sec: 0, tv_nsec: 0 };
 /// Time that the child may take from its report to its end: functions that plugins have registered with `atexit` run meanwhile.
 const END_PATIENCE: Duration = Duration::from_secs(5);
 /// Signals of the terminal that suspend a process in the background.
 const SUSPENDING: [c_int; 3] = [libc::SIGTSTP, libc::SIGTTIN, libc::SIGTTOU];
 
+/// Signals by which a person or a process manager ends a process, and which a shell ignores for its commands in the background.
+const INTERRUPTS: [c_int; 3] = [libc::SIGINT, libc::SIGQUIT, libc::SIGTERM];
+
 /// Number of the supervisor in its child; 0 in a process without one.
 static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
+
+/// Restores the default action of the signals that end a process, where this process has inherited that they are ignored. A hangup stays
+/// ignored: `nohup` is for that. Not real-time.
+pub(crate) fn accept_interrupts() {
+    for signal in INTERRUPTS {
+        // SAFETY: the default action.
+        unsafe { libc::signal(signal, libc::SIG_DFL) };
+    }
+}
 
 /// Divides this process, which has one thread. The parent returns once the child has ended. Process 1 stays whole: in a container
 /// its end kills all processes at once, the watchdog process too, and only the descriptors of process 1 are closed before. As process
@@ -85,25 +98,32 @@ pub(crate) fn die_by(signal: c_int) -> ! {
 /// Forwards signals to the child and waits for its end.
 fn supervise(child: Pid, report: &AtomicU32) -> End {
     enter_guard_priority();
+    // A signal of the terminal that arrived before the fork has not reached the child.
+    while let Some(info) = next_signal(AT_ONCE) {
+        if info.si_signo != libc::SIGCHLD {
+            send(child, &info);
+        }
+    }
     let mut reported: Option<Instant> = None;
     loop {
-        if let Some(info) = next_signal() {
-            forward(child, &info);
-        }
         while let Ok(Some((_, status))) = waitpid(Some(child), WaitOptions::NOHANG | WaitOptions::UNTRACED) {
             match status.stopping_signal() {
                 Some(signal) => suspend_with(child, signal),
                 None => return end_of(status, ReportedEnd::read(report)),
             }
         }
-        let Some(end) = ReportedEnd::read(report) else { continue };
-        if reported.get_or_insert_with(Instant::now).elapsed() > END_PATIENCE {
+        if let Some(end) = ReportedEnd::read(report)
+            && reported.get_or_insert_with(Instant::now).elapsed() > END_PATIENCE
+        {
             let _ = kill_process(child, Signal::KILL);
             let _ = waitpid(Some(child), WaitOptions::empty());
             return match end {
                 ReportedEnd::Code(code) => End::Reported(code),
                 ReportedEnd::Signal => End::Killed(libc::SIGKILL),
             };
+        }
+        if let Some(info) = next_signal(POLL) {
+            forward(child, &info);
         }
     }
 }
@@ -175,12 +195,12 @@ fn shared_word() -> io::Result<&'static AtomicU32> {
     Ok(unsafe { &*address.cast::<AtomicU32>() })
 }
 
-/// Waits for a signal, for the poll interval at most.
-fn next_signal() -> Option<siginfo_t> {
-    let (every, poll) = (every_signal(), POLL);
+/// Waits for a signal, until the timeout.
+fn next_signal(timeout: libc::timespec) -> Option<siginfo_t> {
+    let every = every_signal();
     let mut info = MaybeUninit::<siginfo_t>::zeroed();
     // SAFETY: an initialised set and time, and memory that is there for the call.
-    let signal = unsafe { libc::sigtimedwait(&raw const every, info.as_mut_ptr(), &raw const poll) };
+    let signal = unsafe { libc::sigtimedwait(&raw const every, info.as_mut_ptr(), &raw const timeout) };
     // SAFETY: plain data, all of whose bits may be zero, and written where there was a signal.
     (signal > 0).then(|| unsafe { info.assume_init() })
 }

@@ -350,9 +350,8 @@ pub fn wait_for_signal(signals: &[i32], patience: Duration) -> Option<i32> {
     (signal > 0).then_some(signal)
 }
 
-/// Lets every signal that this process ignores end it again: whoever started it, a shell in the background or `nohup`, ignored
-/// some, and a program inherits that. For a process that runs nothing but a plugin: a signal the plugin sends ends it, wherever
-/// it was started. Not real-time.
+/// Restores the default action of every signal that this process has inherited as ignored, as in the background of a shell: for a
+/// process that runs nothing but a plugin, which a signal of the plugin then ends. Not real-time.
 pub fn ignore_no_signal() {
     let ends = |signal: &c_int| !HARMLESS.contains(signal) && *signal != libc::SIGPIPE; // which Rust programs ignore
     for signal in (1..).take(SIGNALS - 1).filter(ends) {
