@@ -1,6 +1,7 @@
 //! Bounded queues between the loop and other threads ([`rtrb`]): one sender, one receiver, and neither waits for the other.
 
-use rtrb::{Consumer, Producer, RingBuffer};
+pub use rtrb::Consumer;
+use rtrb::{Producer, RingBuffer};
 use std::mem::MaybeUninit;
 
 /// A queue for `capacity` records, whose memory is touched here: a loop that may not lock its memory would otherwise pay

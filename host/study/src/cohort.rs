@@ -52,9 +52,9 @@ pub enum CohortError {
     },
 }
 
-/// Makes what presents the stimuli to one subject.
+/// Starts the presenter of one subject; `None` if a request to stop came first.
 pub type PresenterFactory<'a> =
-    dyn Fn(SubjectNumber) -> Result<Box<dyn Presenter + 'a>, OutsideError> + Sync + 'a;
+    dyn Fn(SubjectNumber) -> Result<Option<Box<dyn Presenter + 'a>>, OutsideError> + Sync + 'a;
 
 /// One subject's turn.
 struct Turn {
@@ -161,7 +161,8 @@ impl Cohort {
     ) -> Result<(), CohortError> {
         let Turn { subject, earlier, mut sitting, mut log } = turn;
         let failed = |cause| CohortError::Sitting { subject, cause };
-        let mut presenter = presenter(subject).map_err(|cause| failed(ConductError::Outside(cause)))?;
+        let presenter = presenter(subject).map_err(|cause| failed(ConductError::Outside(cause)))?;
+        let Some(mut presenter) = presenter else { return Ok(()) };
         // An apparatus has a past: presented with the same trials it comes to where it was, and what follows is, to
         // the bit, what would have followed.
         for trial in &earlier {
@@ -169,7 +170,9 @@ impl Cohort {
                 return Ok(());
             }
             let in_trial = |cause| failed(ConductError::Trial { trial: trial.number, cause });
-            presenter.present(trial).map_err(in_trial)?;
+            if presenter.present(trial).map_err(in_trial)?.is_none() {
+                return Ok(());
+            }
         }
         let simulated = self.subject(subject);
         conduct(&mut sitting, &mut log, presenter.as_mut(), &simulated, watch, stop).map_err(failed)?;

@@ -11,11 +11,11 @@ pub type OutsideError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Presents the stimuli of a trial, one after the other, and says what happened.
 pub trait Presenter {
-    /// Presents a trial. Not real-time.
+    /// Presents a trial; `None` if a request to stop ended the presentation: the trial counts as never presented. Not real-time.
     ///
     /// # Errors
     /// What the apparatus said; the trial counts as never presented.
-    fn present(&mut self, trial: &Trial) -> Result<Exploration, OutsideError>;
+    fn present(&mut self, trial: &Trial) -> Result<Option<Exploration>, OutsideError>;
 }
 
 /// Presents nothing: simulated observers who need no apparatus.
@@ -23,8 +23,8 @@ pub trait Presenter {
 pub struct Nothing;
 
 impl Presenter for Nothing {
-    fn present(&mut self, _trial: &Trial) -> Result<Exploration, OutsideError> {
-        Ok(Exploration::default())
+    fn present(&mut self, _trial: &Trial) -> Result<Option<Exploration>, OutsideError> {
+        Ok(Some(Exploration::default()))
     }
 }
 
@@ -75,7 +75,9 @@ pub fn conduct(
 ) -> Result<Ending, ConductError> {
     while let Some(trial) = sitting.next() {
         let outside = |cause| ConductError::Trial { trial: trial.number, cause };
-        let exploration = presenter.present(&trial).map_err(outside)?;
+        let Some(exploration) = presenter.present(&trial).map_err(outside)? else {
+            return Ok(Ending::Stopped);
+        };
         if stop.load(Ordering::Relaxed) {
             return Ok(Ending::Stopped);
         }

@@ -188,6 +188,21 @@ fn soon(what: &str, mut is_so: impl FnMut() -> bool) {
     }
 }
 
+/// A stimulus may be felt for as long as one likes.
+#[test]
+fn a_request_to_stop_ends_a_study_in_the_middle_of_a_trial() {
+    let scratch = Scratch::default();
+    let study = ["study", "jnd", "--subjects", "1", "--feel", "1000000s", "--out", "data"];
+    let mut started = Flotor::with(study).inside(scratch.path()).leading_a_group().start();
+    let log = scratch.path().join("data/sourcedata");
+    soon("the study has begun", || log.exists());
+    started.signal(Signal::TERM);
+    soon("the study has ended", || started.try_wait().expect("it is ours").is_some());
+    let ran = started.wait();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(ran.stdout.contains("continue with --resume"), "{ran:?}");
+}
+
 /// A daemon is meant to go on; whoever ends the program has to know of it.
 #[test]
 fn a_process_that_leaves_the_group_of_a_lent_program_is_named() {
@@ -271,6 +286,18 @@ fn a_test_and_the_judges_name_a_step_that_does_not_return() {
     let stressed = ran(&["stress", "--model", "MODEL"]);
     assert_eq!(stressed.code, Some(exit_code::PLUGIN_REFUSED), "{stressed:#?}");
     assert!(stressed.stdout.contains("`step` did not return in tick"), "{}", stressed.stdout);
+}
+
+#[test]
+fn a_study_names_a_step_that_does_not_return() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    let hanging = Hanging::by(HANGS[0]);
+    let study = ["study", "jnd", "--subjects", "1", "--scene", "felt.toml", "--out", "data"];
+    let ran = hanging.flotor(&study).env("FLOTOR_STEP_LIMIT_S", "0.1").run();
+    assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
+    assert!(named(&ran, "0.1 s of processor time"), "{ran:#?}");
 }
 
 /// As Python runs a scene.

@@ -6,6 +6,7 @@
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeSubject};
 use flotor_record::Recording;
+use flotor_servo::StopSwitch;
 use flotor_session::Observer;
 use flotor_session::scene::Scene;
 use flotor_study::apparatus::rig::{Rig, TrialFiles};
@@ -101,7 +102,9 @@ fn stimuli_change_without_a_step_of_force() {
         let model = stimulus.split_once('.').unwrap().0;
         let apparatus = Apparatus::check(scene(model, &[set]), &protocol).unwrap();
         assert_eq!(apparatus.swaps_models(), model == "wall");
-        let mut rig = Rig::start(&apparatus, (1, subject(1)), Kinematics::Summary, None, 0.5).unwrap();
+        let mut rig =
+            Rig::start(&apparatus, (1, subject(1)), Kinematics::Summary, None, 0.5, &StopSwitch::default())
+                .unwrap();
         let mut steepness = Steepness::default();
         for (number, value) in [values[2], values[0], values[2], values[1]].into_iter().enumerate() {
             let trial = one(u32::try_from(number).unwrap(), value);
@@ -122,7 +125,9 @@ fn stimuli_change_without_a_step_of_force() {
 fn the_hand_feels_the_stiffness_that_was_set() {
     let protocol = Protocol::Magnitude(MagnitudeProtocol::default());
     let apparatus = Apparatus::check(scene("spring", &[]), &protocol).unwrap();
-    let mut rig = Rig::start(&apparatus, (3, subject(2)), Kinematics::Summary, None, 4.0).unwrap();
+    let mut rig =
+        Rig::start(&apparatus, (3, subject(2)), Kinematics::Summary, None, 4.0, &StopSwitch::default())
+            .unwrap();
     let felt: Vec<_> = [12.0, 24.0, 48.0]
         .map(|gamma_n| {
             let exploration = rig.present_watched(&one(1, gamma_n), &mut Steepness::default()).unwrap();
@@ -148,7 +153,9 @@ fn a_trial_can_be_kept_tick_by_tick() {
     let files = TrialFiles::make(scratch.path().join("motion"), "sub-01_task-magnitude".to_owned()).unwrap();
     let file = files.of(&one(7, 20.0));
     assert!(file.ends_with("sub-01_task-magnitude_trial-0007_motion.mcap"));
-    let mut rig = Rig::start(&apparatus, (3, subject(1)), Kinematics::Full, Some(files), 0.5).unwrap();
+    let mut rig =
+        Rig::start(&apparatus, (3, subject(1)), Kinematics::Full, Some(files), 0.5, &StopSwitch::default())
+            .unwrap();
     rig.present_watched(&one(7, 20.0), &mut Steepness::default()).unwrap();
     let recording = Recording::open(&file).unwrap();
     assert_eq!(recording.run().rate_hz, 1000.0);
@@ -877,7 +884,9 @@ fn a_fitted_spring_is_felt_as_stiff_as_the_real_one() {
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let scene = Scene::load(&path("real.toml")).unwrap();
     let apparatus = Apparatus::check(scene, &magnitude_of("spring.gamma_n", [15.0, 17.0, 19.0])).unwrap();
-    let mut rig = Rig::start(&apparatus, (3, subject(2)), Kinematics::Summary, None, 4.0).unwrap();
+    let mut rig =
+        Rig::start(&apparatus, (3, subject(2)), Kinematics::Summary, None, 4.0, &StopSwitch::default())
+            .unwrap();
     let felt = rig.present_watched(&one(1, 17.0), &mut Steepness::default()).unwrap();
     let found = felt.kinematics[0].felt_stiffness_n_per_m.unwrap();
     // As above: a tenth of what people can tell.

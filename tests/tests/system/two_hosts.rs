@@ -9,8 +9,7 @@ use flotor_core::peer::Dispatch;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_coupling::{Cut, Line};
 use flotor_hal::{DVec3, Fault};
-use flotor_servo::CouplingOutcome;
-use flotor_servo::RunEnd;
+use flotor_servo::{CouplingOutcome, RunEnd, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
 use flotor_session::telemetry::Pairing;
@@ -59,7 +58,8 @@ impl Observer for Kept {
 impl Host {
     fn start(registry: &Registry, scene: &str, run: u64) -> Self {
         let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
-        let mut steps = Steps::prepare(&scene, registry, 1).unwrap_or_else(|error| panic!("{error}"));
+        let mut steps = Steps::prepare(&scene, registry, 1, &StopSwitch::default())
+            .unwrap_or_else(|error| panic!("{error}"));
         let mut lines = steps.take_lines();
         let (name, line) = lines.pop().expect("the scene has a coupling");
         assert_eq!((name.as_str(), lines.len()), ("pair", 0));
@@ -69,7 +69,7 @@ impl Host {
 
     fn advance(&mut self) {
         if self.end.is_none() {
-            self.end = self.steps.advance(&mut self.records).err();
+            self.end = self.steps.advance(1, &mut self.records).expect("no call hangs");
         }
     }
 

@@ -130,6 +130,12 @@ pub enum RunError {
 }
 
 impl RunError {
+    /// True if a request to stop came before the run.
+    #[must_use]
+    pub const fn is_stopped(&self) -> bool {
+        matches!(self, Self::Calls(CallError::Stopped) | Self::Lookup(LookupError::Calls(CallError::Stopped)))
+    }
+
     /// True if the scene or the command line is wrong, not a plugin.
     #[must_use]
     pub fn is_configuration(&self) -> bool {

@@ -1,38 +1,33 @@
 //! A run on the virtual clock that somebody else advances: for experiments, which decide between ticks what comes next.
 
-use super::prepare::activate;
-use super::{ChangeLog, Controls, Observer, RunError, RunOptions, Session};
+use super::virtual_loop::VirtualLoop;
+use super::{Controls, Observer, RunError, RunOptions, Session};
 use crate::registry::Registry;
 use crate::scene::Scene;
-use flotor_core::demand::DemandRequest;
 use flotor_coupling::Line;
-use flotor_hal::Demand;
-use flotor_hal::abi::loader::Stopper;
-use flotor_servo::{Clock, CouplingOutcome, Loop, RunEnd, Schedule, StopSwitch};
+use flotor_servo::{Clock, CouplingOutcome, RunEnd, StopSwitch};
 
 /// A run that goes on when it is told to. When it is dropped the devices are stopped.
 pub struct Steps {
-    runner: Loop,
+    ticks: VirtualLoop,
     controls: Controls,
-    changes: ChangeLog,
-    asked: DemandRequest,
-    stop: StopSwitch,
-    stoppers: Vec<Stopper>,
     lines: Vec<(String, Line)>,
 }
 
 impl Steps {
-    /// Loads, checks, opens and activates everything a scene names. Not real-time.
+    /// Loads, checks, opens and activates everything a scene names; `stop` ends the run. Not real-time.
     ///
     /// # Errors
     /// [`RunError`]; nothing is energised before this has succeeded.
-    pub fn prepare(scene: &Scene, registry: &Registry, seed: u64) -> Result<Self, RunError> {
-        let session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
-        let Session { standby, controls, changes, period_ns, duration_ns, lines, plugins, .. } = session;
-        let stoppers = standby.stoppers();
-        let asked = standby.observers().request(Demand::FORCE);
-        let runner = Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
-        Ok(Self { runner, controls, changes, asked, stop: StopSwitch::default(), stoppers, lines })
+    pub fn prepare(
+        scene: &Scene,
+        registry: &Registry,
+        seed: u64,
+        stop: &StopSwitch,
+    ) -> Result<Self, RunError> {
+        let mut session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
+        let (controls, lines) = (session.controls(), session.take_lines());
+        Ok(Self { ticks: VirtualLoop::start(session, stop)?, controls, lines })
     }
 
     /// The handle by which parameters, weights and models of the run are changed.
@@ -50,26 +45,22 @@ impl Steps {
     /// What has become of each coupling so far, in the scene's order. Not real-time.
     #[must_use]
     pub fn couplings(&mut self) -> Vec<CouplingOutcome> {
-        self.runner.servo().forces().coupling_outcomes()
+        self.ticks.couplings()
     }
 
-    /// One tick; the observer is told of it and of what changed before it. Not real-time: the observer is not.
+    /// Ticks `ticks` times, or until the run ends; returns how it ended, if it did. The observer is told of each tick and of what changed
+    /// before it. Not real-time: the observer is not.
     ///
     /// # Errors
-    /// How the run ended, if it did; then there was no tick.
-    pub fn advance(&mut self, observer: &mut dyn Observer) -> Result<(), RunEnd> {
-        let Self { runner, changes, asked, stop, .. } = self;
-        asked.change_to(observer.demand());
-        runner.advance(stop, |record| {
-            changes.up_to(record.tick, |change| observer.change(change));
-            observer.observe(record);
-        });
-        self.runner.end().map_or(Ok(()), Err)
+    /// [`RunError::Hung`] if a call of a plugin does not return: there are no ticks any more.
+    pub fn advance(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<Option<RunEnd>, RunError> {
+        self.ticks.advance(ticks, observer)?;
+        Ok(self.ticks.end())
     }
 }
 
 impl Drop for Steps {
     fn drop(&mut self) {
-        self.stoppers.iter().for_each(Stopper::safe_stop);
+        self.ticks.stop_devices();
     }
 }

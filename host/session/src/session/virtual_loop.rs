@@ -1,13 +1,19 @@
 //! The loop on the virtual clock, on a thread of its own: a call of a plugin that does not return is named, and left behind.
 
 use super::prepare::activate;
-use super::{Finished, Observer, RunError, Session, TapEnds, hung, publish_to};
+use super::{ChangeLog, Finished, Observer, PluginReport, RunError, Session, TapEnds, hung, publish_to};
 use crate::calls::leave_behind;
 use crate::long_call::{Exceeded, LongCall, step_limit};
 use crate::platform::ThreadClock;
 use flotor_core::MOST_DEVICES;
+use flotor_core::demand::DemandRequest;
+use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_hal::abi::loader::Stopper;
-use flotor_servo::{Heartbeat, Loop, RealTimeReport, Schedule, StopSwitch, Stuck, drain, queue};
+use flotor_servo::{
+    Consumer, CouplingOutcome, Heartbeat, Loop, RealTimeReport, RunEnd, Schedule, StopSwitch, Stuck, drain,
+    queue,
+};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
@@ -15,10 +21,13 @@ use std::time::Duration;
 const BATCH: usize = 1024;
 /// Interval between two looks at a batch that takes long.
 const LOOK: Duration = Duration::from_millis(20);
+
 /// The loop and its publishers, which go to its thread for a batch and come back.
 struct Batch {
     runner: Loop,
     taps: TapEnds,
+    /// Ticks until the batch ends, if it is not full before.
+    ticks: u64,
 }
 
 impl Session {
@@ -28,41 +37,109 @@ impl Session {
         observer: &mut dyn Observer,
         stop: &StopSwitch,
     ) -> Result<Finished, RunError> {
-        let Session { standby, controls, mut changes, taps, period_ns, duration_ns, plugins, .. } = self;
+        let controls = self.controls.clone();
+        let mut ticks = VirtualLoop::start(self, stop)?;
+        while ticks.end().is_none() {
+            ticks.batch(u64::MAX, observer)?;
+            controls.sweep();
+        }
+        ticks.finish()
+    }
+}
+
+/// The loop of a run whose devices are energised.
+pub(super) struct VirtualLoop {
+    thread: LoopThread,
+    /// None once a call has not returned.
+    batch: Option<Batch>,
+    records: Consumer<TickRecord>,
+    changes: ChangeLog,
+    asked: DemandRequest,
+    stop: StopSwitch,
+    stoppers: Vec<Stopper>,
+    heart: Heartbeat,
+    plugins: Vec<PluginReport>,
+}
+
+impl VirtualLoop {
+    /// Energises the devices of a session; `stop` ends the run. Not real-time.
+    ///
+    /// # Errors
+    /// [`RunError`]; nothing is energised then.
+    pub(super) fn start(session: Session, stop: &StopSwitch) -> Result<Self, RunError> {
+        let Session { standby, changes, taps, period_ns, duration_ns, plugins, .. } = session;
         let (stoppers, heart) = (standby.stoppers(), standby.heart());
-        let mut asked = standby.observers().request(observer.demand());
+        let asked = standby.observers().request(Demand::FORCE);
         // The last tick of a batch may leave a record for each device.
-        let (mut sender, mut receiver) = queue(BATCH + usize::from(MOST_DEVICES));
+        let (mut sender, records) = queue(BATCH + usize::from(MOST_DEVICES));
         let loop_stop = stop.clone();
-        let thread = LoopThread::start(move |Batch { runner, taps }| {
+        let thread = LoopThread::start(move |Batch { runner, taps, ticks }| {
             let mut records = 0;
-            while records < BATCH && runner.end().is_none() {
+            while records < BATCH && *ticks > 0 && runner.end().is_none() {
                 runner.advance(&loop_stop, |record| {
                     publish_to(taps, record);
                     records += usize::from(sender.push(*record).is_ok());
                 });
+                *ticks -= 1;
             }
         })?;
         let servo = activate(standby, &plugins)?;
-        let mut batch =
-            Batch { runner: Loop::new(servo, Schedule::start_virtual(period_ns), duration_ns), taps };
-        while batch.runner.end().is_none() {
-            asked.change_to(observer.demand());
-            let ticked = thread.tick(batch, &heart, stop);
-            if !matches!(&ticked, Ok(batch) if batch.runner.end().is_none()) {
-                stoppers.iter().for_each(Stopper::safe_stop);
-                heart.finish();
-            }
-            drain(&mut receiver, |record| {
-                changes.up_to(record.tick, |change| observer.change(change));
-                observer.observe(&record);
-            });
-            controls.sweep();
-            batch = ticked.map_err(|lost| match lost {
-                Lost::Stuck(stuck, limit) => hung(stuck, &plugins, limit),
-                Lost::Thread => RunError::Thread("panicked"),
-            })?;
+        let runner = Loop::new(servo, Schedule::start_virtual(period_ns), duration_ns);
+        let batch = Some(Batch { runner, taps, ticks: 0 });
+        Ok(Self { thread, batch, records, changes, asked, stop: stop.clone(), stoppers, heart, plugins })
+    }
+
+    /// How the run ended, once it has.
+    pub(super) fn end(&self) -> Option<RunEnd> {
+        self.batch.as_ref().and_then(|batch| batch.runner.end())
+    }
+
+    /// Ticks `ticks` times, or until the run ends; the observer is told of each and of what changed before it. Not real-time.
+    ///
+    /// # Errors
+    /// [`RunError::Hung`] if a call does not return; then there are no ticks any more.
+    pub(super) fn advance(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<(), RunError> {
+        let mut left = ticks;
+        while left > 0 && self.end().is_none() {
+            left = self.batch(left, observer)?;
         }
+        Ok(())
+    }
+
+    /// Ticks `ticks` times, or until the batch is full or the run ends; returns the ticks that are left.
+    fn batch(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<u64, RunError> {
+        let batch = self.batch.take().ok_or(RunError::Thread("did not come back"))?;
+        self.asked.change_to(observer.demand());
+        let ticked = self.thread.tick(Batch { ticks, ..batch }, &self.heart, &self.stop);
+        if !matches!(&ticked, Ok(batch) if batch.runner.end().is_none()) {
+            self.stop_devices();
+            self.heart.finish();
+        }
+        let changes = &mut self.changes;
+        drain(&mut self.records, |record| {
+            changes.up_to(record.tick, |change| observer.change(change));
+            observer.observe(&record);
+        });
+        let batch = ticked.map_err(|lost| match lost {
+            Lost::Stuck(stuck, limit) => hung(stuck, &self.plugins, limit),
+            Lost::Thread => RunError::Thread("panicked"),
+        })?;
+        Ok(self.batch.insert(batch).ticks)
+    }
+
+    /// Returns what has become of each coupling so far, in the scene's order. Not real-time.
+    pub(super) fn couplings(&mut self) -> Vec<CouplingOutcome> {
+        self.batch.as_mut().map_or_else(Vec::new, |batch| batch.runner.servo().forces().coupling_outcomes())
+    }
+
+    /// Stops the devices. Not real-time.
+    pub(super) fn stop_devices(&self) {
+        self.stoppers.iter().for_each(Stopper::safe_stop);
+    }
+
+    /// Ends the run. Not real-time.
+    fn finish(mut self) -> Result<Finished, RunError> {
+        let batch = self.batch.take().ok_or(RunError::Thread("did not come back"))?;
         Ok(Finished::of(batch.runner, 0, RealTimeReport::not_asked()))
     }
 }

@@ -24,8 +24,8 @@ use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, command_line, progress_bar, style};
 use flotor_servo::RunEnd;
-use flotor_session::RunError;
 use flotor_session::scene::Scene;
+use flotor_session::{RunError, stop_waits_with};
 use flotor_study::apparatus::rig::{Rig, RunEnded, TrialFiles};
 use flotor_study::apparatus::{Apparatus, ApparatusError, Kinematics};
 use flotor_study::cohort::{Cohort, CohortError};
@@ -516,18 +516,23 @@ fn simulate(
     };
     let about = u64::from(common.subjects) * cohort.protocol.presentations_about();
     let progress = progress_bar(about, "{wide_bar} {pos} of about {len} presentations  {elapsed}");
-    let stop = stop_on_signals()?.stop_flag();
+    let stop = stop_on_signals()?;
+    stop_waits_with(&stop);
     let jobs = common.jobs.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
     let dataset = Dataset::at(&common.out);
     let kinematics = common.kinematics.unwrap_or(Kinematics::Summary);
     let task = cohort.protocol.task();
-    let presenter = |subject: SubjectNumber| -> Result<Box<dyn Presenter + '_>, OutsideError> {
-        let Some(apparatus) = apparatus else { return Ok(Box::new(Nothing)) };
+    let presenter = |subject: SubjectNumber| -> Result<Option<Box<dyn Presenter + '_>>, OutsideError> {
+        let Some(apparatus) = apparatus else { return Ok(Some(Box::new(Nothing))) };
         let folder = dataset.source_folder(subject).join("motion");
         let files = (kinematics == Kinematics::Full)
             .then(|| TrialFiles::make(folder, format!("{subject}_task-{task}")))
             .transpose()?;
-        Ok(Box::new(Rig::start(apparatus, (common.seed, subject), kinematics, files, common.feel)?))
+        let person = (common.seed, subject);
+        match Rig::start(apparatus, person, kinematics, files, common.feel, &stop) {
+            Err(error) if error.is_stopped() => Ok(None),
+            started => Ok(Some(Box::new(started?))),
+        }
     };
     let first = Once::new();
     let watch = || {
@@ -540,7 +545,7 @@ fn simulate(
             }
         });
     };
-    let result = cohort.run(&dataset, jobs, &presenter, &watch, &stop);
+    let result = cohort.run(&dataset, jobs, &presenter, &watch, &stop.stop_flag());
     progress.finish_and_clear();
     result.map_err(refused)?;
     tell(&dataset)
@@ -582,26 +587,30 @@ fn tell(dataset: &Dataset) -> Result<(), CommandError> {
 fn refused(error: CohortError) -> CommandError {
     match error {
         CohortError::Dataset(error) => crate::of_dataset(error),
-        CohortError::Sitting {
-            cause: ConductError::Outside(ref cause) | ConductError::Trial { ref cause, .. },
-            ..
-        } => outside(cause.as_ref(), &error),
+        CohortError::Sitting { subject, cause: ConductError::Outside(cause) } => {
+            let message = format!("{subject}: {cause}");
+            outside(cause, message)
+        }
+        CohortError::Sitting { subject, cause: ConductError::Trial { trial, cause } } => {
+            let message = format!("{subject}: trial {trial}: {cause}");
+            outside(cause, message)
+        }
         sitting => CommandError::Failed(sitting.to_string()),
     }
 }
 
-/// An error of an apparatus, with the exit code of a device fault where it was one. The note above it names subject and
-/// trial, which an error of the device lacks.
-fn outside(
-    cause: &(dyn std::error::Error + Send + Sync + 'static),
-    message: &dyn std::fmt::Display,
-) -> CommandError {
+/// Returns the error of an apparatus, with the exit code of its cause. A note above the error of a run has the `message`, which names
+/// subject and trial.
+fn outside(cause: OutsideError, message: String) -> CommandError {
     let error = match cause.downcast_ref::<RunEnded>() {
         Some(RunEnded(RunEnd::DeviceFault(fault))) => CommandError::DeviceFault(*fault),
         Some(RunEnded(RunEnd::EmergencyStop(source))) => CommandError::EmergencyStop(*source),
         Some(RunEnded(RunEnd::Watchdog(stuck))) => CommandError::Watchdog(*stuck),
         Some(RunEnded(RunEnd::Oscillation)) => CommandError::Oscillation,
-        _ => return CommandError::Failed(message.to_string()),
+        _ => {
+            let error = cause.downcast().map(|error| CommandError::Run(*error));
+            return error.unwrap_or(CommandError::Failed(message));
+        }
     };
     flotor_command::note(message);
     error

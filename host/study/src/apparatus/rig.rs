@@ -17,8 +17,7 @@ use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_hal::Demand;
 use flotor_record::Recorder;
-use flotor_servo::Clock;
-use flotor_servo::RunEnd;
+use flotor_servo::{Clock, RunEnd, StopSwitch};
 use flotor_session::scene::Scene;
 use flotor_session::summary::end_cause;
 use flotor_session::{ControlError, Observer, RunError, RunRecording, Steps};
@@ -83,7 +82,7 @@ pub struct Rig<'a> {
 }
 
 impl<'a> Rig<'a> {
-    /// Everything loaded and active; the object is there. Every stimulus will be felt for `feel_s`.
+    /// Everything loaded and active; the object is there. Every stimulus will be felt for `feel_s`; `stop` ends the run.
     ///
     /// # Errors
     /// [`RunError`].
@@ -93,11 +92,12 @@ impl<'a> Rig<'a> {
         kinematics: Kinematics,
         files: Option<TrialFiles>,
         feel_s: f64,
+        stop: &StopSwitch,
     ) -> Result<Self, RunError> {
         let scene = apparatus.scene_with_hand(seed, subject);
         // Subjects differ in their tremor, too.
         let seed = seed.wrapping_mul(u64::from(SubjectNumber::MOST) + 1).wrapping_add(subject.get().into());
-        let steps = Steps::prepare(&scene, apparatus.registry(), seed)?;
+        let steps = Steps::prepare(&scene, apparatus.registry(), seed, stop)?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // minutes at most
         let ticks = |seconds: f64| (seconds * scene.rate_hz).ceil() as u64;
         Ok(Self {
@@ -160,15 +160,18 @@ impl<'a> Rig<'a> {
         self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change).into()))
     }
 
-    fn advance(&mut self, ticks: u64, also: &mut dyn Observer) -> Result<(), RunEnded> {
-        let mut both = Both(&mut self.watch, also);
-        (0..ticks).try_for_each(|_| self.steps.advance(&mut both)).map_err(RunEnded)
+    fn advance(&mut self, ticks: u64, also: &mut dyn Observer) -> Result<(), OutsideError> {
+        let end = self.steps.advance(ticks, &mut Both(&mut self.watch, also))?;
+        end.map_or(Ok(()), |end| Err(RunEnded(end).into()))
     }
 }
 
 impl Presenter for Rig<'_> {
-    fn present(&mut self, trial: &Trial) -> Result<Exploration, OutsideError> {
-        self.present_watched(trial, &mut Nobody)
+    fn present(&mut self, trial: &Trial) -> Result<Option<Exploration>, OutsideError> {
+        match self.present_watched(trial, &mut Nobody) {
+            Err(error) if matches!(error.downcast_ref(), Some(RunEnded(RunEnd::Stopped))) => Ok(None),
+            presented => presented.map(Some),
+        }
     }
 }
 

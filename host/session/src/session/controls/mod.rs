@@ -14,6 +14,7 @@ pub(super) use swaps::Settled;
 pub(super) use versions::ChosenBy;
 
 use super::prepare::prepare_model_while;
+use crate::calls::is_to_begin;
 use crate::registry::Registry;
 use crate::scene::{Location, ModelUse};
 use flotor_hal::abi::loader::SettingError;
@@ -227,8 +228,8 @@ impl Controls {
             if plugin.is_some() {
                 other.plugin.location = Location { file: "--plugin".into(), line: 0 };
             }
-            // After the end of a run nothing waits for the code of a plugin.
-            let is_wanted = || !self.shared.changes().is_abandoned();
+            // After the end of a run, or a request for it, nothing waits for the code of a plugin.
+            let is_wanted = || !self.shared.changes().is_abandoned() && is_to_begin();
             prepare_model_while(registry, &other, config, *clock, is_wanted).map_err(refused)
         };
         // Without the lock: the run goes on meanwhile, and may end.

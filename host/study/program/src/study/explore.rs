@@ -5,7 +5,7 @@ use super::front::lines_of;
 use clap::Args;
 use flotor_command::options::{ControlGroupOption, PluginKeyValue, PluginPathOption, StrengthOption};
 use flotor_command::say;
-use flotor_command::stopping::stop_on_signals;
+use flotor_command::stopping::stop_run_on_signals;
 use flotor_command::{CommandError, note, style};
 use flotor_core::Change;
 use flotor_hal::{Parameter, ParameterKind};
@@ -16,7 +16,7 @@ use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::telemetry::{Watched, publish};
-use flotor_session::{ControlError, Controls, NewValue, RunError, RunOptions, Session};
+use flotor_session::{ControlError, Controls, NewValue, RunError, RunOptions, Session, stop_waits_with};
 use flotor_study::apparatus::watch::Shared;
 use flotor_study::kinematics::{KinematicsMeter, StimulusKinematics};
 use std::io::{BufReader, stdin};
@@ -59,7 +59,8 @@ pub(super) struct ExploreArguments {
 }
 
 pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
-    let stop = stop_on_signals()?;
+    let stop = stop_run_on_signals()?;
+    stop_waits_with(&stop);
     let scene = scene(arguments)?;
     let registry = Registry::search(&scene.plugin_folders);
     let options = RunOptions { clock: Clock::Real, seed: 0 };

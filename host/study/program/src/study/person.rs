@@ -6,14 +6,15 @@ use super::space::{self, Need};
 use super::{Common, NoiseOption};
 use crate::of_dataset;
 use flotor_command::say;
-use flotor_command::stopping::stop_on_signals;
+use flotor_command::stopping::stop_run_on_signals;
 use flotor_command::{CommandError, note};
 use flotor_hal::read_text;
+use flotor_session::stop_waits_with;
 use flotor_study::apparatus::attend::{FrontEnd, Least, attend};
 use flotor_study::apparatus::real_time_rig::RealTimeRig;
 use flotor_study::apparatus::rig::TrialFiles;
 use flotor_study::apparatus::{Apparatus, Kinematics};
-use flotor_study::conduct::Ending;
+use flotor_study::conduct::{Ending, OutsideError};
 use flotor_study::dataset::{Dataset, DatasetError, Progress};
 use flotor_study::log::{Begin, Event, FORMAT, digest};
 use flotor_study::protocol::{Protocol, SubjectNumber};
@@ -67,10 +68,10 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let trials = protocol.presentations_about().saturating_sub(presented as u64).max(1) as f64;
     let bytes_per_s = if kinematics == Kinematics::Full { apparatus.recording_bytes_per_s() } else { 0.0 };
     space::check(&common.out, Need { stimuli: trials * protocol.stimuli_in_a_trial(), bytes_per_s })?;
-    let stop = stop_on_signals()?;
+    let stop = stop_run_on_signals()?;
+    stop_waits_with(&stop);
     let noise = noise(common)?;
-    let mut rig = RealTimeRig::start(apparatus, kinematics, &stop)
-        .map_err(|error| super::outside(error.as_ref(), &error))?;
+    let mut rig = RealTimeRig::start(apparatus, kinematics, &stop).map_err(outside)?;
     rig.warnings().iter().for_each(note);
     let mut front = Front::open(common, &rig)?;
 
@@ -113,7 +114,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let tables = dataset.write_tables();
     let ended = ending.and_then(|ending| rig.finish_after(ending)).map_err(|error| {
         note(broken_off(subject, &attended));
-        super::outside(error.as_ref(), &error)
+        outside(error)
     });
     let ending = ended?;
     tables.map_err(of_dataset)?;
@@ -140,6 +141,12 @@ fn text_of(path: &Path) -> Result<String, CommandError> {
         return Err(CommandError::Usage(format!("{}: the file is empty", path.display())));
     }
     Ok(text)
+}
+
+/// Returns the error of the apparatus.
+fn outside(cause: OutsideError) -> CommandError {
+    let message = cause.to_string();
+    super::outside(cause, message)
 }
 
 /// How far a sitting came, and how it goes on.
