@@ -59,14 +59,19 @@ const METHODS: [(&str, Method); 4] = [
 pub(crate) struct Error {
     method: usize,
     step_ns: u64,
-    error_rad: f64,
+    pub(crate) error_rad: f64,
 }
 
 impl Error {
+    /// Returns the name of the method and the step, s.
+    pub(crate) fn case(&self) -> (&'static str, f64) {
+        (METHODS[self.method].0, self.step_ns as f64 * 1.0e-9)
+    }
+
     /// Returns the line of the table without the time.
     pub(crate) fn line(&self) -> String {
-        let (name, _) = METHODS[self.method];
-        format!("\"{name}\",{},{:.1e}", self.step_ns as f64 * 1.0e-9, self.error_rad)
+        let (name, step_s) = self.case();
+        format!("\"{name}\",{step_s},{:.1e}", self.error_rad)
     }
 }
 

@@ -8,6 +8,7 @@ use flotor_solid::law::{Body, Description, LINEAR_TETRAHEDRA, Law, RESOLUTIONS, 
 use flotor_solid::punch::{Bond, Outline};
 use flotor_solid::remainder::{Face, Remainder, Size};
 use flotor_solid::table::Table;
+use std::f64::consts::TAU;
 
 const STANDARD: usize = 1;
 const CUBE: Size = Size { half_x_m: 0.04, half_y_m: 0.04, height_m: 0.08 };
@@ -209,4 +210,62 @@ fn linear_tetrahedra_are_half_as_soft() {
     // -49.3 % for six tetrahedra a cell, by another program on the same grid with an even load; the plate stiffens it a little.
     assert!((linear / quadratic - 0.507).abs() < 0.03, "{linear} {quadratic}");
     assert!(error > 0.2, "{error}");
+}
+
+/// Poses of `flotor bench` in 30 s: the hand 4 mm below home.
+fn poses_of_the_bench() -> impl Iterator<Item = (DVec3, DQuat)> {
+    let sines = |time_s: f64, size: DVec3, rate_hz: DVec3| size * (rate_hz * TAU * time_s).map(f64::sin);
+    (0..30_000).map(move |tick| {
+        let time_s = f64::from(tick) * 1.0e-3;
+        let swing_m = sines(time_s, DVec3::new(1.5e-3, 1.2e-3, 3.0e-3), DVec3::new(1.37, 2.11, 1.03));
+        let turn_rad = sines(time_s, DVec3::new(0.030, 0.025, 0.035), DVec3::new(1.71, 2.53, 2.97));
+        (swing_m - DVec3::Z * 4.0e-3, orientation_from_rotation_vector(turn_rad))
+    })
+}
+
+/// The errors that `flotor bench` prints of a plate on a beam, against finite elements of another program on the same elements
+/// (`tests/generators/beam.py`).
+#[test]
+fn errors_against_the_finest_beam_are_those_of_an_independent_program() {
+    if crate::leaves_out_long_tests() {
+        return;
+    }
+    let body = Body::Beam { size_m: [0.2, 0.04, 0.04] };
+    let patch = |resolution| {
+        let description = Description { body, tool: Tool::Plate, poisson_ratio: 0.3, resolution };
+        let Ok((Law::Bonded(patch), _)) = description.solve() else { panic!("a rigid patch") };
+        patch
+    };
+    let (modulus_pa, fine) = (1.0e4, patch(2));
+    let table = rows("bench_beam.csv");
+    assert_eq!(table.len(), 3);
+    for row in &table {
+        let resolution = match row.text("case") {
+            "quick" => 0,
+            "standard" => STANDARD,
+            _ => LINEAR_TETRAHEDRA,
+        };
+        let (case, mut largest, mut squares) = (patch(resolution), [0.0_f64; 2], [0.0; 2]);
+        for (position_m, orientation) in poses_of_the_bench() {
+            let [own, best] =
+                [&case, &fine].map(|patch| patch.answer(position_m, orientation, Demand::ALL).0);
+            let off = [(own.force() - best.force()).length(), (own.torque() - best.torque()).length()];
+            for ((largest, squares), off) in largest.iter_mut().zip(&mut squares).zip(off) {
+                *largest = largest.max(off * modulus_pa);
+                *squares += (off * modulus_pa).powi(2);
+            }
+        }
+        let rms = squares.map(|sum: f64| (sum / 30_000.0).sqrt());
+        let columns = ["force_max_n", "force_rms_n", "torque_max_nm", "torque_rms_nm"];
+        for (column, found) in columns.into_iter().zip([largest[0], rms[0], largest[1], rms[1]]) {
+            // The same elements have the same solution. The table has five digits; a difference of two stiffnesses that agree to 1e-4
+            // loses four of sixteen.
+            let expected = row.number(column);
+            assert!(
+                (found / expected - 1.0).abs() < 1.0e-3,
+                "{} {column}: {found}, not {expected}",
+                row.text("case")
+            );
+        }
+    }
 }

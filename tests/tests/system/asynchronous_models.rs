@@ -11,6 +11,7 @@ use flotor_tests::field_error::{FieldError, Swing, field_error};
 use flotor_tests::printed::assert_chapter_prints;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::tables::{number, table};
 use flotor_tests::watched::{watch, watch_on};
 use flotor_tests::workspace_root;
 use serde_json::Value;
@@ -71,6 +72,35 @@ fn a_field_is_nearer_to_the_membrane_than_a_force_that_is_held() {
     assert!(field[1] < field[0] && field[2] < field[0], "{field:?}");
     // Extrapolated by its slope the field is not late by more than the period it was computed for.
     assert!(errors[2].delay_s <= 0.005, "{} s", errors[2].delay_s);
+}
+
+/// The table is of a program of its own, `tests/generators/scenes.py`: sheet, hand, slopes and fading in, with the same steps.
+#[test]
+fn errors_and_steps_of_the_local_linear_model_are_those_of_an_independent_simulation() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let rows = table("local_linear_model.csv");
+    assert_eq!(rows.len(), 3);
+    for row in rows {
+        let rate_hz = number(&row, "rate_hz");
+        let seen = field_error(rate_hz, FAST, NO_LIMIT_N_PER_S, 2.0);
+        for (column, found) in [
+            ("local_rms", seen.rms_n / seen.peak_n),
+            ("held_rms", seen.held_rms_n / seen.peak_n),
+            ("local_step_n", seen.largest_step_n),
+            ("sheet_step_n", seen.direct_step_n),
+            ("held_step_n", seen.held_step_n),
+        ] {
+            // The simulated hand draws its intention straight over a tick: 5e-6 of the way. A mass that comes into contact a tick earlier or
+            // later moves a difference of forces by more than that, and none of the three digits that are printed.
+            let expected = number(&row, column);
+            assert!(
+                (found / expected - 1.0).abs() < 1.0e-3,
+                "{column} at {rate_hz} Hz: {found}, not {expected}"
+            );
+        }
+    }
 }
 
 #[test]

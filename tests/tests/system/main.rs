@@ -25,6 +25,7 @@ mod examples;
 #[cfg(feature = "drop-ins")]
 mod falcon;
 mod force_sensor;
+mod gallery;
 mod golden;
 mod hand_recording;
 mod haply;

@@ -92,6 +92,16 @@ impl Loop {
     }
 }
 
+/// The stiffness at which the handle's discrete state, under a force held over a period, has a determinant of 1: Jury's limit without
+/// delay and without virtual damping.
+fn limit_without_delay_n_per_m(damping_ns_per_m: f64, period_s: f64) -> f64 {
+    let left = (-damping_ns_per_m * period_s / MASS_KG).exp();
+    let way_s = (1.0 - left) * MASS_KG / damping_ns_per_m;
+    // Way and velocity after a period, per newton.
+    let [way, velocity] = [(period_s - way_s) / damping_ns_per_m, (1.0 - left) / damping_ns_per_m];
+    (1.0 - left) / (way_s * velocity - left * way)
+}
+
 /// Cases that the chapter on the wall prints, the first ones.
 const PRINTED: usize = 2;
 
@@ -112,6 +122,11 @@ fn the_stiffest_quiet_wall_is_the_one_theory_names() {
         let plant = Plant { mass_kg: MASS_KG, damping_ns_per_m: *damping_ns_per_m, stiffness_n_per_m: 0.0 };
         let rendering = Rendering { period_s, delay_ticks: 0, virtual_damping_ns_per_m: 0.0 };
         let theory = exact_limit_n_per_m(&plant, &rendering);
+        let closed_form = limit_without_delay_n_per_m(*damping_ns_per_m, period_s);
+        assert!(
+            (theory / closed_form - 1.0).abs() < 1.0e-6,
+            "{theory} N/m, by the closed form {closed_form} N/m"
+        );
         let measured = Loop {
             device: load("flotor-simulated"),
             wall: load("flotor-wall"),

@@ -176,6 +176,35 @@ fn better_estimators_find_the_threshold() {
     }
 }
 
+/// The table is of an independent simulation, `tests/generators/estimators.py`.
+#[test]
+fn estimators_err_as_an_independent_simulation_does() {
+    let table = include_str!("../../../../tests/data/cases/estimators.csv");
+    let runs = match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
+        Ok("full") => 10_000,
+        Ok("daily") => 150,
+        _ => 60,
+    };
+    let lines: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    assert_eq!(lines.len(), 7 * Method::ALL.len());
+    for observer in lines.chunks(Method::ALL.len()) {
+        let number = |line: &[&str], column: usize| line[column].parse::<f64>().unwrap();
+        let (criterion, threshold) = (number(&observer[0], 0), number(&observer[0], 1));
+        let found = rows(&observer_of(threshold, criterion), 2, runs, 19);
+        for (line, row) in observer.iter().zip(found) {
+            assert_eq!(line[2], row.method.word());
+            let [estimates, bias, deviation, trials] = [3, 4, 5, 6].map(|column| number(line, column));
+            // Four standard errors of a difference of means, and of a ratio of deviations; the length of a track scatters by a third.
+            let counts = 1.0 / f64::from(runs) + 1.0 / estimates;
+            assert!((row.bias - bias).abs() <= 4.0 * deviation * counts.sqrt(), "{bias}: {row:?}");
+            let ratio = (row.deviation / deviation).ln();
+            assert!(ratio.abs() <= 4.0 * (0.5 * counts).sqrt(), "{deviation}: {row:?}");
+            let length = (row.trials / trials - 1.0).abs();
+            assert!(length <= 4.0 / 3.0 * (0.5 * counts).sqrt(), "{trials}: {row:?}");
+        }
+    }
+}
+
 /// Every printed p is one: with equal observers in both modalities a paired test and the comparisons after Holm's correction
 /// say yes in 5 % of the studies.
 #[test]
