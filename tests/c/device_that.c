@@ -20,6 +20,9 @@ FLOTOR_METADATA("kind = \"device\"\nid = \"fixture-c-device-that\"\nname = \"Dev
 #ifndef IN_READ
 #define IN_READ (void)0;
 #endif
+#ifndef IN_WRITE
+#define IN_WRITE (void)0;
+#endif
 #ifndef IN_STOP
 #define IN_STOP (void)0;
 #endif
@@ -107,6 +110,7 @@ static FlotorCycleCode read_handle(FlotorInstance instance, const FlotorTick *ti
 static FlotorCycleCode write_handle(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
     (void)tick;
     Handle *handle = instance;
+    IN_WRITE
     handle->held = *wrench;
     return FLOTOR_CYCLE_FRESH;
 }

@@ -1,9 +1,8 @@
 //! The wall at the edge of a device's range: spring and damper that push back what has left it, and never pull.
 //!
-//! The range is an ellipsoid of positions and one of rotation vectors; equal semi-axes make it the sphere of the
-//! thesis's boundary (section 3.2). The spring pushes along the normal at the nearest point of the ellipsoid, by the distance
-//! from it: its force is a gradient, and no lap gains energy. Nearly every tick is inside, so that is seen first, without a
-//! root or an arc.
+//! The range is an ellipsoid of positions and one of rotation vectors; equal semi-axes make it the sphere of the thesis's boundary
+//! (section 3.2). The spring pushes along the normal at the nearest point of the ellipsoid, by the distance from it: its force is a
+//! gradient, and no lap gains energy. Nearly every tick is inside, so that is seen first, without a root or an arc.
 //!
 //! Stiffness and place of the wall are those of a [`RenderedBoundary`].
 
@@ -35,8 +34,7 @@ impl BoundaryWall {
         }
     }
 
-    /// The push of the wall; `None` inside, and where nobody knows where the handle is. Real-time: bounded, no
-    /// allocation.
+    /// The push of the wall; `None` inside, and where nobody knows where the handle is. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn push(&self, state: &DeviceState) -> Option<Wrench> {
         if self.surely_holds(state) { None } else { self.push_outside(state) }

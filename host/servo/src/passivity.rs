@@ -1,5 +1,4 @@
-//! The envelope's stage for energy: the energy balance of a device's port, and the passivity controller that a scene
-//! may add.
+//! The envelope's stage for energy: the energy balance of a device's port, and the passivity controller that a scene may add.
 //!
 //! The energy at a port, and the controller that ports and couplings share: [`flotor_coupling::port_energy`].
 
@@ -7,8 +6,7 @@ use flotor_core::coupling::PassivityMode;
 use flotor_coupling::port_energy::{Controller, Displacement};
 use flotor_hal::{DVec3, DeviceState, Twist, Wrench};
 
-/// Acceleration of a handle from rest that the reserve is for, m/s²: 40 N on 0.58 kg are 69 m/s², and a hand in between takes most
-/// of it.
+/// Acceleration of a handle from rest that the reserve is for, m/s²: 40 N on 0.58 kg are 69 m/s², and a hand in between takes most of it.
 const RESERVE_ACCELERATION_M_PER_S2: f64 = 50.0;
 /// Stiffness that the reserve is for, N/m.
 const RESERVE_STIFFNESS_N_PER_M: f64 = 100.0;
@@ -50,8 +48,7 @@ impl Passivity {
         self.change.take().map_or(0.0, |change| -moved.work_j(&change))
     }
 
-    /// Returns the energy that the hand has put into the port so far less what it has received, J. Real-time: bounded, no
-    /// allocation.
+    /// Returns the energy that the hand has put into the port so far less what it has received, J. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn energy_j(&self) -> f64 {
         self.energy_j

@@ -84,8 +84,7 @@ impl Loop {
         Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
     }
 
-    /// Waits for and runs the next tick, or sets `end`; `leave` gets what it leaves behind. Real-time: bounded, no
-    /// allocation.
+    /// Waits for and runs the next tick, or sets `end`; `leave` gets what it leaves behind. Real-time: bounded, no allocation.
     #[inline]
     pub fn advance(&mut self, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
         if self.schedule.next_time_ns() >= self.duration_ns {
@@ -132,8 +131,7 @@ impl Loop {
         &mut self.servo
     }
 
-    /// Waits for the end of the last tick's period: what is left of the servo, how it ended, and how long it ran, ns. Not
-    /// real-time.
+    /// Waits for the end of the last tick's period: what is left of the servo, how it ended, and how long it ran, ns. Not real-time.
     #[must_use]
     pub fn finish(self) -> (Servo, RunEnd, u64) {
         (self.servo, self.end.unwrap_or(RunEnd::Stopped), self.schedule.finish())

@@ -3,7 +3,7 @@
 use super::platform::clock;
 use super::state::EmergencySource;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Ends a run from any thread or signal handler. Clones are the same switch.
@@ -15,6 +15,8 @@ pub struct StopSwitch {
     by_signal: Arc<AtomicBool>,
     /// First other source of the emergency stop: its place in [`EmergencySource::ALL`], from 1; 0: none.
     pressed: Arc<AtomicU32>,
+    /// Time of that source on the monotonic clock, ns; 0: none.
+    pressed_ns: Arc<AtomicU64>,
 }
 
 impl StopSwitch {
@@ -28,6 +30,9 @@ impl StopSwitch {
     pub fn press(&self, source: EmergencySource) {
         let place = EmergencySource::ALL.iter().position(|other| *other == source);
         let code = place.and_then(|place| u32::try_from(place + 1).ok()).unwrap_or(1);
+        if self.pressed_ns.load(Ordering::Relaxed) == 0 {
+            self.pressed_ns.store(clock::monotonic_ns(), Ordering::Relaxed);
+        }
         let _ = self.pressed.compare_exchange(0, code, Ordering::Relaxed, Ordering::Relaxed);
         clock::wake_all(&self.pressed);
     }
@@ -52,6 +57,12 @@ impl StopSwitch {
         let place = (self.pressed.load(Ordering::Relaxed) as usize).checked_sub(1);
         let by_signal = || self.by_signal.load(Ordering::Relaxed).then_some(EmergencySource::Signal);
         place.and_then(|place| EmergencySource::ALL.get(place).copied()).or_else(by_signal)
+    }
+
+    /// Returns the time of the first [`StopSwitch::press`] on the monotonic clock, ns. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn pressed_ns(&self) -> Option<u64> {
+        Some(self.pressed_ns.load(Ordering::Relaxed)).filter(|pressed_ns| *pressed_ns > 0)
     }
 
     /// The flag a signal handler sets for an orderly end.

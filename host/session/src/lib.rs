@@ -43,6 +43,6 @@ pub use plugin_process::PluginProcess;
 pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, Guardian, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue,
-    Observer, Outcome, PluginReport, Remains, RunError, RunOptions, Session, Steps, StopReach,
+    Observer, Outcome, PluginReport, Remains, RunError, RunOptions, Session, Steps, StopReach, StopTime,
     StopWithoutHost, Strength, StrongDevice, Tap, WatchdogStart, prepare_model, start_watchdog_process,
 };

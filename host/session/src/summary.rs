@@ -3,7 +3,7 @@
 use crate::feel::Feel;
 use crate::scene::Isolation;
 use crate::telemetry::LinkCounts;
-use crate::{DeviceOutcome, Misbehaved, Observer, Outcome, PluginReport};
+use crate::{Misbehaved, Observer, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
 use flotor_core::trace::{Events, TickRecord};
@@ -255,6 +255,9 @@ pub struct DeviceSummary {
     pub port_end_j: f64,
     /// Effects of its passivity controller and slew limit.
     pub envelope: EnvelopeSummary,
+    /// Time from the request of the emergency stop to the device without force, ms; absent without one, and on the virtual clock.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_ms: Option<f64>,
 }
 
 /// Effects of the stages of the envelope that change the energy at a port.
@@ -539,7 +542,7 @@ impl RunSummary {
                 .map(|device| EnvelopeSummary::of(device.effects))
                 .fold(EnvelopeSummary::default(), EnvelopeSummary::sum),
             devices: (facts.plugins.iter().zip(&tally.devices).enumerate())
-                .map(|(number, device)| device_summary(device, outcome.devices.get(number)))
+                .map(|(number, device)| device_summary(device, number, outcome))
                 .collect(),
             couplings: (facts.couplings.iter().zip(&outcome.couplings))
                 .map(|(coupling, outcome)| coupling_summary(coupling, outcome, facts.carried))
@@ -603,6 +606,9 @@ impl RunSummary {
             [self.energy.port_lowest_j, self.energy.port_end_j].map(|joule| joule * 1.0e3);
         row("port", format!("{end_mj:+.3} mJ at the end, {lowest_mj:+.3} mJ at the lowest"));
         self.envelope.rows().for_each(|(stage, text)| row(stage, text));
+        if let Some(longest_ms) = self.devices.iter().filter_map(|device| device.stop_ms).reduce(f64::max) {
+            row("stop", format!("{longest_ms:.1} ms from the request to no force"));
+        }
         if self.devices.len() > 1 {
             for DeviceSummary { name, peak_force_n, peak_torque_nm, port_lowest_j, port_end_j, .. } in
                 &self.devices
@@ -665,15 +671,19 @@ fn relative_residual(ledger: EnergyLedger) -> f64 {
 
 fn device_summary(
     (plugin, tally): (&PluginReport, &DeviceTally),
-    outcome: Option<&DeviceOutcome>,
+    number: usize,
+    outcome: &Outcome,
 ) -> DeviceSummary {
+    let effects = outcome.devices.get(number).map(|device| device.effects);
+    let stop_time = outcome.stop_time.as_ref().and_then(|time| time.of_device(number));
     DeviceSummary {
         name: plugin.name.clone(),
         peak_force_n: tally.peak_force_n,
         peak_torque_nm: tally.peak_torque_nm,
         port_lowest_j: tally.port_lowest_j,
         port_end_j: tally.port_energy_j(),
-        envelope: outcome.map(|device| EnvelopeSummary::of(device.effects)).unwrap_or_default(),
+        envelope: effects.map(EnvelopeSummary::of).unwrap_or_default(),
+        stop_ms: stop_time.map(|time| time.as_secs_f64() * 1.0e3),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::board::{Board, PAST, Where, dies, run_on};
 use flotor_tests::TestSize;
-use flotor_tests::program::exit_code;
+use flotor_tests::program::{Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tools;
 use rustix::process::Signal;
@@ -14,6 +14,17 @@ use std::time::{Duration, Instant};
 enum Disk {
     WithRoom,
     Full,
+}
+
+/// Time of the stop in the summary of a run, ms, which names a stop that took longer than the bound.
+fn reported_ms(ran: &Ran) -> f64 {
+    let row = ran.stdout.lines().find_map(|line| line.trim_start().strip_prefix("stop "));
+    let ms = row.and_then(|row| row.split_whitespace().next()?.parse().ok());
+    let ms = ms.unwrap_or_else(|| panic!("the summary has no time of the stop: {ran:?}"));
+    let is_named = ran.stdout.contains("the emergency stop took longer than 20.0 ms");
+    // A row has one digit after the point.
+    assert!(is_named == (ms > 20.0) || ms == 20.0, "{ran:?}");
+    ms
 }
 
 /// Stops the first of two runs whose folder is on a disk of its own; returns the time from the stop to the first command without force
@@ -45,6 +56,11 @@ fn stop_times(disk: Disk) -> [Duration; 2] {
     let all = "all runs of this machine are stopped, and none starts until `flotor release`";
     assert!(first.stderr.contains(all), "{first:?}");
     assert_eq!(second.code, Some(exit_code::DEVICE_FAULT), "{second:?}");
+    println!(
+        "{disk:?}: own run {} ms, other run {} ms by their summaries",
+        reported_ms(&first),
+        reported_ms(&second)
+    );
     times
 }
 

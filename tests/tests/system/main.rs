@@ -63,6 +63,7 @@ mod scene_test;
 mod services;
 mod simulated;
 mod stop_delivery;
+mod stop_time;
 mod study;
 mod study_claims;
 mod study_file;

@@ -27,8 +27,7 @@ pub struct ModelHealth {
     pub late_ticks: u64,
     /// The first of them.
     pub first_late: Option<u64>,
-    /// Ticks without an answer in time from a process of its own. Alone they are no fault: its time budget says how many
-    /// are borne.
+    /// Ticks without an answer in time from a process of its own. Alone they are no fault: its time budget says how many are borne.
     pub late_answers: u64,
     /// How it was too slow, if it was taken out for that.
     pub overrun: Option<Overrun>,
@@ -322,8 +321,7 @@ impl Layer {
 }
 
 impl Object {
-    /// The box in the device frame in which it can act; `None` if that is everywhere. Real-time: bounded, no
-    /// allocation.
+    /// The box in the device frame in which it can act; `None` if that is everywhere. Real-time: bounded, no allocation.
     fn bounds(&mut self) -> Option<Bounds> {
         let region = self.model.active_region();
         let half_sides_m = match region.shape() {

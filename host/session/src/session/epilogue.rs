@@ -22,7 +22,7 @@ impl Epilogue {
     pub(super) fn conclude(self, finished: Finished) -> Outcome {
         let Self { started, mut warnings, heart, names, controls, reserve } = self;
         let mut calls = reserve.begin();
-        let Finished { servo, end, elapsed_ns, dropped_records, real_time, warning } = finished;
+        let Finished { servo, end, elapsed_ns, dropped_records, real_time, stop_time, warning } = finished;
         warnings.extend(warning);
         let known_before = warnings.len();
         let Dismantled { devices, last_stop, forces, swaps, timing } = servo.dismantle();
@@ -48,6 +48,7 @@ impl Epilogue {
         let remains = Remains::new(closing, layers, last_stop, calls);
         let wall_s = started.elapsed().as_secs_f64();
         warnings.extend(controls.warnings());
+        warnings.extend(stop_time.as_ref().and_then(|time| time.warning(&names)));
         let taken = heart.signals_taken();
         if !taken.is_none() {
             warnings.push(format!(
@@ -63,6 +64,7 @@ impl Epilogue {
             wall_s,
             dropped_records,
             real_time,
+            stop_time,
             devices: told,
             couplings,
             models,

@@ -9,7 +9,7 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// Purpose of the thread without which nothing is energised.
 pub(super) const WATCH: &str = "the emergency stop of the machine";
@@ -111,6 +111,11 @@ impl LatchGuard {
     #[must_use]
     pub fn reach(&self) -> Option<StopReach> {
         self.reach.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Returns the time of the press that is not released. Not real-time.
+    pub(super) fn pressed_at(&self) -> Option<SystemTime> {
+        self.latch.state().pressed.map(|pressed| pressed.at)
     }
 
     /// Checks once, and watches until the watch is dropped: for what moves a device without [`Session::run`](super::Session::run).

@@ -9,6 +9,7 @@ mod lockstep;
 mod prepare;
 mod remains;
 mod steps;
+mod stop_time;
 mod stop_without_host;
 mod unguarded;
 mod virtual_loop;
@@ -20,6 +21,7 @@ pub use lockstep::Lockstep;
 pub use prepare::prepare_model;
 pub use remains::Remains;
 pub use steps::Steps;
+pub use stop_time::StopTime;
 pub use stop_without_host::{StopWithoutHost, WatchdogStart, start_watchdog_process};
 pub use unguarded::Guardian;
 
@@ -57,6 +59,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use stop_time::StopTimer;
 
 /// How a scene is to be run.
 #[derive(Clone, Debug)]
@@ -284,6 +287,8 @@ pub struct Outcome {
     pub dropped_records: u64,
     /// What the system granted.
     pub real_time: RealTimeReport,
+    /// Time of the emergency stop, if there was one (real clock only).
+    pub stop_time: Option<StopTime>,
     /// What the devices say at the end, in the scene's order.
     pub devices: Vec<DeviceOutcome>,
     /// What has become of each coupling, in the scene's order.
@@ -320,6 +325,7 @@ impl Outcome {
             wall_s: elapsed_ns as f64 * 1.0e-9,
             dropped_records: 0,
             real_time: RealTimeReport::not_asked(),
+            stop_time: None,
             devices: Vec::new(),
             couplings: Vec::new(),
             models: Vec::new(),
@@ -727,13 +733,15 @@ impl Session {
             let mut runner = Loop::new(servo, schedule, duration_ns).releasing();
             // Without a watchdog nothing is moved.
             // A full queue drops records and counts them: observers never delay the loop.
-            let mut dropped_records = 0;
+            let (mut dropped_records, mut tick_ns) = (0, 0);
             while watchdog.is_ok() && runner.end().is_none() {
                 runner.advance(&loop_stop, |record| {
                     publish_to(&mut taps, record);
+                    tick_ns = record.compute_ns;
                     dropped_records += u64::from(sender.push(*record).is_err())
                 });
             }
+            let mut timer = StopTimer::start(Duration::from_nanos(tick_ns));
             // A button, or the device itself: for the latch, whatever becomes of `safe_stop`.
             if let Some(RunEnd::EmergencyStop(source)) = runner.end() {
                 loop_stop.press(source);
@@ -742,6 +750,7 @@ impl Session {
             for (number, stopper) in (1..).zip(&stoppers) {
                 loop_stopping.store(number, Ordering::Relaxed);
                 stopper.safe_stop();
+                timer.stopped();
             }
             loop_stopping.store(0, Ordering::Relaxed);
             runner.servo().heart().finish();
@@ -751,7 +760,10 @@ impl Session {
                 wait_for_end_of(watchdog);
             }
             watchdog.map_err(|_| RunError::NoThread("the watchdog"))?;
-            Ok::<_, RunError>(Finished::of(runner, dropped_records, real_time))
+            let finished = Finished::of(runner, dropped_records, real_time);
+            let is_emergency = matches!(finished.end, RunEnd::EmergencyStop(_));
+            let stop_time = is_emergency.then(|| timer.since_request(&loop_stop, loop_latch.as_ref()));
+            Ok::<_, RunError>(Finished { stop_time, ..finished })
         });
         let servo_thread = servo_thread.map_err(|_| RunError::NoThread("the loop"))?;
         let mut bitten = None;
@@ -822,6 +834,8 @@ struct Finished {
     elapsed_ns: u64,
     dropped_records: u64,
     real_time: RealTimeReport,
+    /// Of an emergency stop on the real clock.
+    stop_time: Option<StopTime>,
     /// What people should know, and were told.
     warning: Option<String>,
 }
@@ -829,6 +843,6 @@ struct Finished {
 impl Finished {
     fn of(ended: Loop, dropped_records: u64, real_time: RealTimeReport) -> Self {
         let (servo, end, elapsed_ns) = ended.finish();
-        Self { servo, end, elapsed_ns, dropped_records, real_time, warning: None }
+        Self { servo, end, elapsed_ns, dropped_records, real_time, stop_time: None, warning: None }
     }
 }

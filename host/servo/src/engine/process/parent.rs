@@ -160,8 +160,7 @@ impl Worker {
         )
     }
 
-    /// Where the model can act; everywhere while it is at a request whose answer may change that. Real-time: bounded, no
-    /// allocation.
+    /// Where the model can act; everywhere while it is at a request whose answer may change that. Real-time: bounded, no allocation.
     pub fn active_region(&self) -> ActiveRegion {
         if self.is_behind { ActiveRegion::EVERYWHERE } else { self.memory.region() }
     }
@@ -316,8 +315,7 @@ fn with_advice(error: io::Error) -> io::Error {
     }
 }
 
-/// The program that can be a worker: this one, or, for a program that only uses the library, `flotor` beside it or
-/// in the folder above.
+/// The program that can be a worker: this one, or, for a program that only uses the library, `flotor` beside it or in the folder above.
 pub(crate) fn program() -> io::Result<PathBuf> {
     if let Some(program) = crate::guest::program() {
         return Ok(program.clone());
