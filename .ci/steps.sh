@@ -275,6 +275,17 @@ bridge() {
     cargo clippy --release --all-targets --manifest-path host/bridge/Cargo.toml --target-dir target/bridge -- -D warnings
 }
 
+# Every kind of picture that a command draws, and those of the book, by four renderers. The sheets show them side by side.
+pictures() {
+    local folder=target/ci/pictures
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    cargo build --release
+    cargo build --release -p flotor-viewer
+    PATH=$PWD/target/release:$PWD/target/sweep/release:$PATH FLOTOR_PLUGIN_PATH=$PWD/target/release tests/pictures/make "$folder/made"
+    /usr/bin/python3 tests/pictures/draw.py "$folder/made" "$folder/sheets"
+}
+
 # The archive of a release, unpacked into an empty folder: the demo and the scenes of the repository, and a picture by the viewer,
 # without a network; on this machine, and on a Debian with nothing but its base system, where nothing may be written outside that
 # folder. The wheel, in a Python of its own: the demo, with the plugins that it contains.

@@ -231,7 +231,7 @@ def picture(rows):
     x = lambda s: left + inner_w * (math.log10(s) + 8) / 7  # 10 ns to 0.1 s
     y = lambda e: top + inner_h * (0.5 - math.log10(min(max(e, 3.2e-4), 3.1))) / 4  # 316 % to 0.03 %
     out = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="DejaVu Sans, sans-serif" font-size="12">',
         f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
     ]
     for power in range(-8, 0):

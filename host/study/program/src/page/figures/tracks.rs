@@ -33,8 +33,8 @@ pub(in super::super) fn tracks(record: &SubjectRecord, stimulus: &Stimulus) -> F
         .fold(1.0, f64::max);
     let figure = Figure::new(format!("Adaptive tracks of {}", record.subject), Axis::linear("Trial of the track", ""))
         .subtitle(
-            "Filled in colour: right; cross: wrong; orange triangle: \"I don't know\"; ring: reversal; dashed: threshold. Thresholds \
-             of the procedure",
+            "Difference in % of the base. Filled in colour: right; cross: wrong; orange triangle: \"I don't know\"; ring: reversal; \
+             dashed: threshold of the procedure",
         )
         .columns(3)
         .panel_height_px(110.0);
@@ -76,7 +76,8 @@ fn panel(track: &TrackResult, answers: &[Answer], unit: &str, largest: f64) -> P
     let of =
         |judgement: Judgement| answers.iter().filter(move |answer| answer.judgement == judgement).map(place);
     let reversals = answers.iter().filter(|answer| answer.is_reversal).map(place);
-    let panel = Panel::new(Axis::linear("", "%").range(0.0, 1.08 * largest))
+    // The unit is in the subtitle: a heading of this width has no room for it.
+    let panel = Panel::new(Axis::linear("", "").range(0.0, 1.08 * largest))
         .title(format!("{} {unit}, {name}, track {}", track.base, track.track))
         .series(Series::line("", answers.iter().map(place)).slot(slot).faint())
         .series(Series::points("", of(Judgement::Correct)).slot(slot))
