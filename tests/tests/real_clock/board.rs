@@ -14,8 +14,10 @@ use flotor_tests::workspace_root;
 use rustix::process::Pid;
 use serialport::{SerialPort, TTYPort};
 use std::ffi::OsStr;
+use std::fs::Permissions;
 use std::io::{Read, Write};
 use std::ops::Deref;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -55,6 +57,11 @@ impl Board {
             }
         });
         Self { path, log, is_over }
+    }
+
+    /// Lets every user of this machine open the port.
+    pub(crate) fn admit_all_users(&self) {
+        std::fs::set_permissions(&self.path, Permissions::from_mode(0o666)).expect("it is ours");
     }
 }
 

@@ -4,6 +4,7 @@
 use crate::board::{Board, PAST, Where, dies, run_on, run_with, wait_until};
 use crate::emulated::{EMULATED, Emulated};
 use crate::post::Post;
+use crate::scarcity::{become_stranger, may_be_another_user};
 use flotor_tests::TestSize;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -182,12 +183,40 @@ fn enter_without_a_way_out() -> Option<Enclosed> {
 fn a_device_that_only_the_watchdog_process_stops_needs_consent_to_a_shared_control_group() {
     let _turn = crate::alone();
     let Some(enter) = enter_without_a_way_out() else { return };
+    assert_consent_is_needed(|_, _| enter.script.clone());
+}
+
+/// A user who may write to no control group and has no systemd: neither root's rights nor a bus.
+#[test]
+fn a_user_without_systemd_is_asked_for_consent_to_a_shared_control_group() {
+    if !may_be_another_user() {
+        return;
+    }
+    let _turn = crate::alone();
+    let Some(group) = ControlGroup::in_each_hierarchy().pop() else {
+        let _ =
+            writeln!(std::io::stderr(), "skipped: a user without systemd: root may make no control group");
+        return;
+    };
+    assert_consent_is_needed(|board, scratch| {
+        board.admit_all_users();
+        let user = become_stranger(scratch);
+        format!("echo $$ > {} && unset DBUS_SESSION_BUS_ADDRESS && {user} \"$@\"", group.list().display())
+    });
+}
+
+/// Runs a device that only the watchdog process stops in a control group without a way out, without consent and with it. `enter` makes the
+/// script that enters the group.
+#[track_caller]
+fn assert_consent_is_needed(enter: impl Fn(&Board, &Scratch) -> String) {
     let ends = |limits: &str| {
         let (board, scratch) = (Board::start(), Scratch::default());
         let limits = format!("watchdog_ms = 60000\n{limits}");
-        let running = run_with(&board, &scratch, dies(), Where::InTheHost, &limits)
-            .through_shell(&enter.script)
-            .start();
+        let model = scratch.path().join("libdies.so");
+        std::fs::copy(dies(), &model).expect("a scratch folder takes a library");
+        let script = enter(&board, &scratch);
+        let running =
+            run_with(&board, &scratch, &model, Where::InTheHost, &limits).through_shell(&script).start();
         if !limits.contains("accept") {
             return running.wait();
         }

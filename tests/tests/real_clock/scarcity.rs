@@ -64,23 +64,28 @@ fn limit_of_stranger(process: Pid) {
     assert!(status.success(), "{status}");
 }
 
-/// The program as a user who may have so many processes and threads.
-fn as_a_user_with(threads: u32, arguments: &[&str]) -> (Scratch, Flotor) {
-    let scratch = Scratch::default();
+/// Gives a folder to the stranger; returns the start of a script that carries out a command there as this user.
+pub(crate) fn become_stranger(scratch: &Scratch) -> String {
     let folder = scratch.path().display().to_string();
     chown(scratch.path(), Some(STRANGER), Some(STRANGER)).expect("root may");
     std::fs::set_permissions(scratch.path(), std::fs::Permissions::from_mode(0o700)).expect("root may");
-    let flotor = Flotor::with(arguments).through_shell(&format!(
-        "cd {folder} && export XDG_RUNTIME_DIR={folder} && exec setpriv --reuid {STRANGER} --regid {STRANGER} --clear-groups \
-         prlimit --nproc={threads} \"$@\""
-    ));
+    format!(
+        "cd {folder} && export XDG_RUNTIME_DIR={folder} && exec setpriv --reuid {STRANGER} --regid {STRANGER} --clear-groups"
+    )
+}
+
+/// The program as a user who may have so many processes and threads.
+fn as_a_user_with(threads: u32, arguments: &[&str]) -> (Scratch, Flotor) {
+    let scratch = Scratch::default();
+    let user = become_stranger(&scratch);
+    let flotor = Flotor::with(arguments).through_shell(&format!("{user} prlimit --nproc={threads} \"$@\""));
     (scratch, flotor)
 }
 
-fn may_be_another_user() -> bool {
+pub(crate) fn may_be_another_user() -> bool {
     let may = geteuid().is_root();
     if !may {
-        let _ = writeln!(std::io::stderr(), "skipped: a user without room for threads: needs root");
+        let _ = writeln!(std::io::stderr(), "skipped: a command as another user: needs root");
     }
     may
 }
