@@ -83,7 +83,7 @@ pub enum StatisticsError {
     #[error("no variation between subjects to test it against")]
     NoError,
     /// Responses from which scaling has removed an effect and its error.
-    #[error("nothing of it is left in the responses")]
+    #[error("scaling of the responses removes the effect")]
     NothingLeft,
     /// A design of an analysis of variance that cannot be analysed.
     #[error("analysis of variance: {0}")]

@@ -105,7 +105,7 @@ fn jnd_page(
         Estimator::Map => "the most likely observer given all answers of a subject at a base",
     };
     page.paragraph(&format!(
-        "{} subjects compared {:.1} pairs each. The Weber fraction was {} with vision and haptics and {} with haptics \
+        "{} subjects compared {:.1} pairs each on average. The Weber fraction was {} with vision and haptics and {} with haptics \
          alone, {}. Thresholds are {how}.",
         analysis.subjects,
         analysis.pairs_per_subject,
