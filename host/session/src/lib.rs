@@ -44,5 +44,6 @@ pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, Guardian, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue,
     Observer, Outcome, PluginReport, Remains, RunError, RunOptions, Session, Steps, StopReach, StopTime,
-    StopWithoutHost, Strength, StrongDevice, Tap, WatchdogStart, prepare_model, start_watchdog_process,
+    StopWithoutHost, Strength, StrongDevice, Tap, WatchdogStart, check_plugins, prepare_model,
+    start_watchdog_process,
 };

@@ -479,6 +479,11 @@ fn what_cannot_be_lent_is_said_in_one_line_with_what_helps() {
     let broken =
         scratch.file("broken.toml", "[device]\nplugin = \"simulated\"\nspeed = 3\n").display().to_string();
     cases.push((vec![&broken, "--", &program], "broken.toml:3"));
+    let unknown = scratch.file("unknown.toml", "[device]\nplugin = \"simulatd\"\n").display().to_string();
+    cases.push((
+        vec![&unknown, "--", &program],
+        "unknown.toml:2: no device plugin `simulatd`; did you mean `simulated`?",
+    ));
     let small = scratch.path().join("small");
     std::fs::write(&small, b"\x7fELF\x01\x01\x01").expect("there is room");
     std::fs::set_permissions(&small, std::fs::Permissions::from_mode(0o755)).expect("it is ours");

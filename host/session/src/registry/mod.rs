@@ -48,6 +48,16 @@ struct Loaded {
     plugin: Plugin,
 }
 
+/// The place of a plugin.
+enum Located<'a> {
+    /// This program.
+    Linked(&'a Plugin),
+    /// A file of a searched folder.
+    Found(&'a Metadata),
+    /// A file that was named by its path.
+    Given(&'a Path),
+}
+
 /// Why no plugin answers to an id.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -206,15 +216,36 @@ impl Registry {
         self.find(id, None)
     }
 
+    /// Checks that a plugin answers to an id (or a path to a file), and runs no code of it. Not real-time.
+    ///
+    /// # Errors
+    /// [`LookupError`]: unknown, with the nearest known id, or no plugin of this kind.
+    pub fn check(&self, id: &str, kind: PluginKind) -> Result<(), LookupError> {
+        match self.locate(id, Some(kind))? {
+            Located::Linked(_) | Located::Found(_) => Ok(()),
+            Located::Given(path) => Ok(check_kind(&read_metadata(path)?, Some(kind))?),
+        }
+    }
+
     fn find(&self, id: &str, kind: Option<PluginKind>) -> Result<Plugin, LookupError> {
+        match self.locate(id, kind)? {
+            Located::Linked(linked) => Ok(linked.clone()),
+            Located::Found(found) => self.open(&found.path),
+            Located::Given(path) => {
+                let plugin = self.open(path)?;
+                check_kind(plugin.metadata(), kind)?;
+                Ok(plugin)
+            }
+        }
+    }
+
+    fn locate<'a>(&'a self, id: &'a str, kind: Option<PluginKind>) -> Result<Located<'a>, LookupError> {
         if id.contains(std::path::is_separator) {
-            let plugin = self.open(Path::new(id))?;
-            check_kind(plugin.metadata(), kind)?;
-            return Ok(plugin);
+            return Ok(Located::Given(Path::new(id)));
         }
         let fits = |plugin: &Metadata| plugin.id == id && kind.is_none_or(|kind| plugin.kind == kind);
         if let Some(linked) = self.linked.iter().find(|plugin| fits(plugin.metadata())) {
-            return Ok(linked.clone());
+            return Ok(Located::Linked(linked));
         }
         let found = self.found.iter().find(|known| known.id == id).ok_or_else(|| self.unknown(id, kind))?;
         check_kind(found, kind)?;
@@ -222,7 +253,7 @@ impl Registry {
             let (one, other) = (one.path.clone(), other.path.clone());
             return Err(LookupError::Ambiguous { id: id.to_owned(), one, other });
         }
-        self.open(&found.path)
+        Ok(Located::Found(found))
     }
 
     /// That no plugin (of a kind) has an id, with the nearest that one has.

@@ -18,7 +18,7 @@ pub use ceiling::{Strength, StrongDevice};
 pub use controls::{ControlError, Controls, Misbehaved, NewValue};
 pub use latch::{LatchGuard, LatchWatch, StopReach};
 pub use lockstep::Lockstep;
-pub use prepare::prepare_model;
+pub use prepare::{check_plugins, prepare_model};
 pub use remains::Remains;
 pub use steps::Steps;
 pub use stop_time::StopTime;

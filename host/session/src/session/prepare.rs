@@ -7,7 +7,7 @@ use super::{PluginReport, RunError};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::calls::{Call, Progress, attended_while, is_to_begin, keeping_machine, limit};
 use crate::estimates;
-use crate::registry::{Registry, is_installed};
+use crate::registry::{LookupError, Registry, is_installed};
 use crate::scene::{
     Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
     ParameterText, PluginUse, Scene, SceneError,
@@ -30,10 +30,26 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
-    registry.load(&plugin.plugin, kind).map_err(|error| match RunError::from(error) {
+    registry.load(&plugin.plugin, kind).map_err(|error| not_found(plugin, error))
+}
+
+/// Checks that the plugins of a scene are there, and runs no code of them. Not real-time.
+///
+/// # Errors
+/// [`RunError`], with the line of the scene.
+pub fn check_plugins(scene: &Scene, registry: &Registry) -> Result<(), RunError> {
+    let devices = scene.devices.iter().map(|device| (&device.plugin, PluginKind::Device));
+    let models = scene.models.iter().map(|model| (&model.plugin, PluginKind::Model));
+    devices.chain(models).try_for_each(|(plugin, kind)| {
+        registry.check(&plugin.plugin, kind).map_err(|error| not_found(plugin, error))
+    })
+}
+
+fn not_found(plugin: &PluginUse, error: LookupError) -> RunError {
+    match RunError::from(error) {
         wrong if wrong.is_configuration() => plugin.location.problem(wrong.to_string()).into(),
         refused => refused,
-    })
+    }
 }
 
 /// A plugin that said no.

@@ -12,9 +12,9 @@ use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, note};
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::spawn_unblocked;
-use flotor_session::RunError;
-use flotor_session::registry::PATH_VARIABLE;
+use flotor_session::registry::{PATH_VARIABLE, Registry};
 use flotor_session::scene::Scene;
+use flotor_session::{RunError, check_plugins};
 use guard::{KILL_GROUP, ProgramEnd};
 use outcome::Runs;
 use program::Program;
@@ -336,7 +336,7 @@ fn end_as(runs: &Runs<'_>, json: Option<&Path>, folder: Folder, service: i32) ->
     }
 }
 
-/// Reads the scene before the program starts: a program would see a device that is not there.
+/// Reads the scene and looks for its plugins before the program starts: a program would see a device that is not there.
 fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
     let Some(file) = &arguments.scene else { return Ok(()) };
     if file.is_dir() || !file.exists() {
@@ -345,7 +345,9 @@ fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
             file.display()
         )));
     }
-    let scene = Scene::load(file).map_err(RunError::Scene)?;
+    let mut scene = Scene::load(file).map_err(RunError::Scene)?;
+    arguments.plugin_path.put_before_those_of(&mut scene);
+    check_plugins(&scene, &Registry::search(&scene.plugin_folders))?;
     if scene.duration_s != Scene::DURATION_S {
         note(format_args!(
             "`{}`: `duration_s` does not apply; the run lasts as long as the program",
