@@ -30,10 +30,13 @@ mod _flotor {
     use crate::run::{plugins, run_scene};
     #[pymodule_export]
     use crate::sweep::Sweep;
+    use flotor_core::trace::Events;
     use pyo3::prelude::*;
+    use pyo3::types::PyTuple;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("__version__", env!("CARGO_PKG_VERSION"))
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("EVENTS", PyTuple::new(module.py(), Events::NAMES)?)
     }
 }

@@ -34,6 +34,20 @@ pub(crate) struct Parameter {
     choices: Vec<String>,
 }
 
+#[pymethods]
+impl Parameter {
+    fn __repr__(&self) -> String {
+        let Self { id, unit, min, max, default, choices, .. } = self;
+        let range = match (min, max) {
+            (Some(min), Some(max)) => format!(", {min} to {max} {unit}").trim_end().to_owned(),
+            _ if choices.is_empty() => String::new(),
+            _ => format!(", one of {}", choices.join(", ")),
+        };
+        let default = if default.is_empty() { String::new() } else { format!(", default {default}") };
+        format!("Parameter({id}{range}{default})")
+    }
+}
+
 /// Forces, torques, energies and statuses of many poses.
 type Columns<'py> =
     (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Vec<&'static str>);

@@ -89,6 +89,21 @@ def test_same_bits_as_the_command(variant, tmp_path):
         assert line["status"] == status
 
 
+def test_answers_are_a_table_with_the_columns_of_the_command():
+    pytest.importorskip("pandas")
+    result = flotor.Model("spring").evaluate(poses())
+    table = result.to_pandas()
+    assert list(table.columns) == ["fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm", "energy_j", "status"]
+    assert table["fz_n"].tolist() == result.force_n[:, 2].tolist()
+
+
+def test_a_parameter_says_what_it_is():
+    parameters = flotor.Model("spring").parameters
+    gamma, variant = parameters["gamma_n"], parameters["variant"]
+    assert repr(gamma) == f"Parameter(gamma_n, {gamma.min:g} to {gamma.max:g} N, default {gamma.default})"
+    assert repr(variant).startswith(f"Parameter(variant, one of {variant.choices[0]}, ")
+
+
 def test_a_batch_is_stepped_where_it_lies():
     model = flotor.Model("spring")
     inputs = model.inputs(poses())

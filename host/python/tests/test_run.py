@@ -18,6 +18,50 @@ def test_equal_arguments_equal_runs():
     assert other["trace_digest"] != first["trace_digest"]
 
 
+def test_settings_may_be_grouped_by_plugin():
+    flat = flotor.run(duration_s=0.5, settings={"spring.gamma_n": 20, "device.preset": "full"})
+    grouped = flotor.run(duration_s=0.5, settings={"spring": {"gamma_n": 20}, "device": {"preset": "full"}})
+    assert grouped["trace_digest"] == flat["trace_digest"]
+
+
+def scene_of(tmp_path, habit):
+    """A scene with a model in C that does something else in a step."""
+    compiler = shutil.which("cc") or pytest.skip("no C compiler")
+    root, library, scene = Path(__file__).parents[3], tmp_path / "libhabit.so", tmp_path / "scene.toml"
+    source = root / "tests" / "c" / "model_that.c"
+    include = root / "hal" / "include"
+    subprocess.run([compiler, "-shared", "-fPIC", "-I", include, f"-DIN_STEP={habit}", source, "-o", library], check=True)
+    scene.write_text(
+        f'duration_s = 0.2\n[device]\nplugin = "simulated"\n[[model]]\nname = "jelly"\nplugin = "{library}"\n'
+    )
+    return scene
+
+
+def test_a_run_with_a_model_that_fails_is_an_error_with_the_summary(tmp_path):
+    scene = scene_of(tmp_path, "if (input->tick >= 70) { output->wrench.force_n[0] = NAN; return FlotorCallStatus_Ok; }")
+    with pytest.raises(flotor.RunFailed, match="`jelly` .* not finite") as failed:
+        flotor.run(scene)
+    assert failed.value.summary["ticks"] == 200
+    assert failed.value.summary["plugins"][1]["health"] != "ok"
+
+
+def test_events_have_names(tmp_path):
+    file = tmp_path / "run.mcap"
+    flotor.run(duration_s=0.5, record=file)
+    recording = flotor.read_recording(file)
+    ramping = recording.event("ramping")
+    assert ramping[0] and not ramping[-1]
+    with pytest.raises(flotor.FlotorError, match="no event 'ramp'; the events are stale_sample, "):
+        recording.event("ramp")
+
+
+def test_remedies_are_python(tmp_path):
+    with pytest.raises(flotor.FlotorError, match=r"`flotor\.plugins\(\)` lists all"):
+        flotor.Model("sprung-mattress")
+    with pytest.raises(flotor.FlotorError, match=r"`flotor\.Model\(ID\)\.parameters` lists them"):
+        flotor.Model("spring", zzzzzz=3)
+
+
 def test_a_recording_comes_back_as_a_table(tmp_path):
     file = tmp_path / "run.mcap"
     summary = flotor.run(duration_s=0.5, record=file)
@@ -43,14 +87,7 @@ def test_what_is_wrong_is_said(tmp_path):
 
 
 def test_a_step_that_does_not_return_is_an_error_with_its_plugin_and_tick(tmp_path):
-    compiler = shutil.which("cc") or pytest.skip("no C compiler")
-    root, library, scene = Path(__file__).parents[3], tmp_path / "libhangs.so", tmp_path / "scene.toml"
-    habit = "-DIN_STEP=if (input->tick == 70) for (;;) {}"
-    source = root / "tests" / "c" / "model_that.c"
-    subprocess.run([compiler, "-shared", "-fPIC", "-I", root / "hal" / "include", habit, source, "-o", library], check=True)
-    scene.write_text(
-        f'duration_s = 0.2\n[device]\nplugin = "simulated"\n[[model]]\nname = "jelly"\nplugin = "{library}"\n'
-    )
+    scene = scene_of(tmp_path, "if (input->tick == 70) for (;;) {}")
     # In a process of its own: its thread is left behind.
     program = [sys.executable, "-c", "import flotor, sys; flotor.run(sys.argv[1])", scene]
     ran = subprocess.run(program, capture_output=True, text=True, timeout=60)

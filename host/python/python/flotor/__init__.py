@@ -14,20 +14,21 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from . import _flotor
-from ._flotor import FlotorError, Parameter, __version__
+from ._flotor import EVENTS, FlotorError, Parameter, __version__
 
 __all__ = [
     "DEMAND_ALL",
     "DEMAND_ENERGY",
     "DEMAND_FORCE",
     "DEMAND_TORQUE",
+    "EVENTS",
     "INPUT",
     "OUTPUT",
     "STATUS",
@@ -37,6 +38,7 @@ __all__ = [
     "Parameter",
     "PluginInfo",
     "Recording",
+    "RunFailed",
     "__version__",
     "plugins",
     "read_recording",
@@ -69,6 +71,15 @@ def _text(value: object) -> str:
     return repr(float(value))
 
 
+class RunFailed(FlotorError):
+    """A run that ended by a fault, or in which a model failed: ``flotor run`` has another exit code than 0 then."""
+
+    def __init__(self, problem: str, summary: dict[str, object]) -> None:
+        super().__init__(problem)
+        #: What :func:`run` returns of a run without a failure.
+        self.summary = summary
+
+
 class PluginInfo(NamedTuple):
     """A plugin that was found; it has not been opened."""
 
@@ -85,6 +96,14 @@ class Evaluation(NamedTuple):
     torque_nm: np.ndarray  #: torque on the hand, (n, 3), N m
     energy_j: np.ndarray  #: stored energy, (n,), J; NaN where the model has none
     status: list[str]  #: n words of :data:`STATUS`
+
+    def to_pandas(self):
+        """A ``pandas.DataFrame`` with the columns of ``flotor eval``, one row a pose."""
+        import pandas
+
+        forces = dict(zip(("fx_n", "fy_n", "fz_n"), self.force_n.T))
+        torques = dict(zip(("tx_nm", "ty_nm", "tz_nm"), self.torque_nm.T))
+        return pandas.DataFrame({**forces, **torques, "energy_j": self.energy_j, "status": self.status})
 
 
 class Model:
@@ -227,8 +246,11 @@ def run(
 ) -> dict[str, object]:
     """Runs a scene (the demo if None) in virtual time; the summary, with the keys of ``flotor run --json``.
 
-    ``settings`` are parameters by plugin and id: ``{"spring.variant": "closed-form", "device.preset": "full"}``.
-    Equal arguments give an equal ``trace_digest``.
+    ``settings`` are parameters by plugin and id: ``{"spring.variant": "closed-form", "device.preset": "full"}``, or
+    ``{"spring": {"variant": "closed-form"}}``. Equal arguments give an equal ``trace_digest``.
+
+    Raises :class:`FlotorError` for what is refused, and :class:`RunFailed`, which has the summary, where a model failed or the run ended
+    by a fault.
     """
     summary = _flotor.run_scene(
         None if scene is None else Path(scene),
@@ -236,10 +258,32 @@ def run(
         duration_s=duration_s,
         rate_hz=rate_hz,
         seed=seed,
-        settings=[f"{key}={_text(value)}" for key, value in (settings or {}).items()],
+        settings=[f"{key}={_text(value)}" for key, value in _by_plugin_and_id(settings or {})],
         recording=None if record is None else Path(record),
     )
-    return json.loads(summary)
+    summary = json.loads(summary)
+    problem = _problem(summary)
+    if problem is not None:
+        raise RunFailed(problem, summary)
+    return summary
+
+
+def _by_plugin_and_id(settings: Mapping[str, object]) -> Iterator[tuple[str, object]]:
+    """Each setting as ``plugin.id`` and its value; settings may be grouped by plugin."""
+    for key, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from ((f"{key}.{id}", each) for id, each in value.items())
+        else:
+            yield key, value
+
+
+def _problem(summary: dict[str, object]) -> str | None:
+    """The first model that failed in a run, or the fault by which the run ended; None if there was neither."""
+    for plugin in summary["plugins"]:
+        if plugin["kind"] == "model" and plugin["health"] != "ok":
+            return f"`{plugin['name']}` {plugin['health']}"
+    end = summary["end"]
+    return None if end in ("finished", "stopped") else f"the run ended by a fault: {end}"
 
 
 class Recording:
@@ -255,6 +299,12 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.columns["tick"])
+
+    def event(self, name: str) -> np.ndarray:
+        """The ticks with an event, as booleans (n,): ``recording.event("force_limited")``; the names are :data:`EVENTS`."""
+        if name not in EVENTS:
+            raise FlotorError(f"no event {name!r}; the events are {', '.join(EVENTS)}")
+        return self.columns["events"] & np.uint32(1 << EVENTS.index(name)) != 0
 
     def flat(self) -> dict[str, np.ndarray]:
         """Columns of one number each: ``position_m`` becomes ``position_m_x``, ``_y``, ``_z``."""

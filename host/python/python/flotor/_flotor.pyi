@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 __version__: str
+EVENTS: tuple[str, ...]
 
 class FlotorError(Exception): ...
 
