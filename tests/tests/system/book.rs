@@ -13,6 +13,7 @@
 //! - `<!-- test: skip, needs hardware: a GPU -->`: no test can run it; the reasons for commands are those of [`REASONS`];
 //! - `<!-- test: full, takes a minute -->`: it runs with `FLOTOR_TEST_SIZE=full` only;
 //! - `<!-- test: build, takes a minute -->`: likewise, in the root of the repository and the profile of these tests;
+//! - `<!-- test: step NAME -->`: this step of `.ci/full` runs the commands;
 //! - `<!-- test: numbers, real clock -->`: they and digests differ from run to run, and only words are compared;
 //! - `<!-- test: columns mean | p99, times -->`: in tables, the columns of these headings differ from run to run; all others and
 //!   all other numbers are compared;
@@ -32,6 +33,7 @@ use rayon::prelude::*;
 use std::fmt::Write;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Environment variable: a Python interpreter that has the wheel and its extras for tests.
 const PYTHON: &str = "FLOTOR_PYTHON";
@@ -49,21 +51,13 @@ const REASONS: [&str; 4] = [
 ];
 /// Chapters with commands that no test runs yet for another reason, and their number.
 const NOT_YET: &[(&str, usize)] = &[
-    ("README.md", 1),
     ("docs/src/bench.md", 1),
-    ("docs/src/bridge.md", 1),
-    ("docs/src/ci.md", 1),
-    ("docs/src/devices/falcon.md", 1),
     ("docs/src/devices/haply.md", 1),
-    ("docs/src/devices/maglev-200.md", 4),
-    ("docs/src/devices/maglev-calibration.md", 1),
-    ("docs/src/devices/maglev.md", 1),
-    ("docs/src/experiments.md", 1),
-    ("docs/src/programs.md", 5),
+    ("docs/src/devices/maglev-200.md", 1),
     ("docs/src/python.md", 2),
     ("docs/src/releasing.md", 1),
     ("docs/src/solid.md", 2),
-    ("docs/src/viewer.md", 3),
+    ("docs/src/viewer.md", 2),
 ];
 
 /// What a comment before a block asks for.
@@ -72,6 +66,7 @@ enum Mark {
     Skip(String),
     Full(String),
     Build(String),
+    Step(String),
     Numbers,
     Columns(Vec<String>),
     Run(String),
@@ -89,6 +84,7 @@ impl Mark {
             "skip," if rest.starts_with("needs ") => Ok(Some(Self::Skip(rest))),
             "full," if rest.starts_with("takes ") => Ok(Some(Self::Full(rest))),
             "build," if rest.starts_with("takes ") => Ok(Some(Self::Build(rest))),
+            "step" if is_step(&rest) => Ok(Some(Self::Step(rest))),
             "numbers," if !rest.is_empty() => Ok(Some(Self::Numbers)),
             "columns" if rest.contains(", ") => {
                 let headings = rest.split(", ").next().unwrap_or_default().split(" | ");
@@ -97,10 +93,17 @@ impl Mark {
             "run" if !rest.is_empty() => Ok(Some(Self::Run(rest))),
             "file" if !rest.is_empty() => Ok(Some(Self::File(rest))),
             _ => Err(format!(
-                "`{said}`: a marker is `skip, needs ...`, `full, takes ...`, `build, takes ...`, `numbers, WHY`, `columns A | B, WHY`, `run ...`, `file ...`"
+                "`{said}`: a marker is `skip, needs ...`, `full, takes ...`, `build, takes ...`, `step NAME` of .ci/full, `numbers, WHY`, `columns A | B, WHY`, `run ...`, `file ...`"
             )),
         }
     }
+}
+
+/// Whether `.ci/full` has a step of this name.
+fn is_step(name: &str) -> bool {
+    let full = std::fs::read_to_string(workspace_root().join(".ci/full")).expect("it is there");
+    full.lines()
+        .any(|line| line.strip_prefix("step ").is_some_and(|step| step.split(' ').next() == Some(name)))
 }
 
 /// A folder in which a command runs.
@@ -126,6 +129,7 @@ impl Block {
     fn left_out(&self, size: TestSize) -> Option<&str> {
         self.marks.iter().find_map(|mark| match mark {
             Mark::Skip(why) => Some(why.as_str()),
+            Mark::Step(_) => Some("runs in a step of .ci/full"),
             Mark::Full(why) | Mark::Build(why) if size < TestSize::Full => Some(why),
             _ => None,
         })
@@ -353,6 +357,10 @@ impl Chapter {
             symlink(workspace_root().join(part), scratch.path().join(part))
                 .expect("an empty folder takes links");
         }
+        // Emulators listen at fixed ports: those of one chapter at a time.
+        static EMULATORS: Mutex<()> = Mutex::new(());
+        let emulates = self.steps.iter().any(|step| step.command.starts_with("flotor emulate"));
+        let _turn = emulates.then(|| EMULATORS.lock().unwrap_or_else(PoisonError::into_inner));
         let script = self.given.join("script");
         std::fs::write(&script, self.script(scratch.path())).expect("a scratch folder can be written to");
         let ran = Flotor::with([&script])
@@ -448,10 +456,10 @@ fn every_block_of_the_book_does_what_the_book_says() {
     for line in &left_out {
         println!("{line}");
     }
-    let (full, never): (Vec<&String>, Vec<&String>) =
-        left_out.iter().partition(|line| line.contains(": takes "));
+    let is_of_full = |line: &&&String| line.contains(": takes ") || line.contains(": runs in ");
+    let (full, never): (Vec<&String>, Vec<&String>) = left_out.iter().partition(is_of_full);
     skipped(&format!(
-        "{commands} commands of the book ran; {} blocks run at full size only, and no test can run {}",
+        "{commands} commands of the book ran; {} blocks run in .ci/full only, and no test can run {}",
         full.len(),
         never.len()
     ));
@@ -553,6 +561,7 @@ fn a_comment_that_means_nothing_is_refused() {
         "skip",
         "skip, later",
         "full, needs a GPU",
+        "step painting",
         "build, needs a GPU",
         "skipped, needs a GPU",
         "numbers,",
