@@ -11,7 +11,7 @@
 //! - [`canvas`]: the 3D view in the interface, drawn on a GPU or the processor; [`picture`] a whole picture without a window, whose
 //!   interface [`flat`] draws.
 //! - [`ui`], [`palette`]: the parts of the interface; [`app`] puts them together. [`sound`] warns the ear.
-//! - [`window`]: opens it, or says why there is none; [`cost`] is what it takes of the machine.
+//! - [`window`]: opens it, or says why there is none; [`cost`] is what it takes of the machine, [`frame_rate`] its pictures a second.
 //! - [`remembered`]: what a person has chosen about the window, from one time to the next.
 //! - [`experiment`]: a sitting of a perception experiment, and its screens.
 //!
@@ -26,6 +26,7 @@ pub mod experiment;
 pub mod export;
 pub mod feed;
 pub mod flat;
+pub mod frame_rate;
 pub mod guide;
 pub mod palette;
 pub mod panel;

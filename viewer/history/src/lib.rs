@@ -264,8 +264,19 @@ impl History {
         (age_s >= 0.0 && (is_last || age_s <= self.gap_s())).then_some(sample)
     }
 
+    /// Returns the ticks a second that the loop made in the second up to a time, Hz: a missed tick does not count, a tick without a
+    /// sample does. None before the second tick.
+    #[must_use]
+    pub fn tick_rate_hz(&self, now_s: f64) -> Option<f64> {
+        const OVER_S: f64 = 1.0;
+        let mut samples = self.between(now_s - OVER_S, now_s);
+        let (first, last) = (samples.next()?, samples.next_back()?);
+        let span_s = last.time_s() - first.time_s();
+        (span_s > 0.0).then(|| (last.tick - first.tick) as f64 / span_s)
+    }
+
     /// Samples between two times, both included.
-    pub fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Sample> {
+    pub fn between(&self, from_s: f64, to_s: f64) -> impl DoubleEndedIterator<Item = &Sample> {
         let start = self.samples.partition_point(|sample| sample.time_s() < from_s);
         let end = self.index_after(to_s).max(start);
         self.samples.range(start..end)
@@ -306,4 +317,26 @@ impl History {
 #[must_use]
 pub fn seconds(time_ns: u64) -> f64 {
     time_ns as f64 * 1.0e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_core::trace::RECORD_WORDS;
+    use flotor_sync::Words;
+
+    #[test]
+    fn the_rate_counts_ticks_without_a_sample_and_leaves_out_missed_ones() {
+        // Of a loop of 2 kHz every second tick has a sample, and after each eight ticks two are missed.
+        let mut history = History::new(unknown_run(), Keep::All);
+        for tick in (0..8000).step_by(2) {
+            let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
+            (record.tick, record.time_ns) = (tick, (tick + tick / 8 * 2) * 500_000);
+            history.push(&record);
+        }
+        let rate_hz = history.tick_rate_hz(4.0).expect("there are many ticks");
+        // The second begins anywhere among ten periods, so two ticks may be missing.
+        assert!((rate_hz - 1600.0).abs() <= 2.0, "{rate_hz} Hz");
+        assert_eq!([history.tick_rate_hz(-1.0), history.tick_rate_hz(0.0)], [None; 2]);
+    }
 }

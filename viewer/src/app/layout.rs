@@ -177,7 +177,11 @@ impl Viewer {
     fn texts(&mut self, ui: &mut Ui, view: Rect, sample: &Sample, palette: &Palette) {
         let mut overlay = Overlay::new(ui.painter(), view);
         let (units, camera) = (self.plots.units, self.view.camera);
-        let rows = readout::rows(sample, units, palette);
+        let mut rows = readout::rows(sample, units, palette);
+        if self.source.is_running() {
+            let haptic_hz = self.devices.history().tick_rate_hz(sample.time_s());
+            rows.extend(readout::rates(haptic_hz, self.frame_rate.hz(), palette));
+        }
         readout::numbers(&mut overlay, sample.time_s(), &rows, units, palette);
         legend::paint(&mut overlay, view, &self.facts, &camera, palette);
         legend::axes(&mut overlay, &self.facts, &camera, palette);

@@ -18,6 +18,7 @@ use crate::chosen::Chosen;
 use crate::devices::Devices;
 use crate::experiment::Prompt;
 use crate::guide::Guide;
+use crate::frame_rate::FrameRate;
 use crate::palette::{Look, Palette};
 use crate::panel::Panel;
 use crate::player::{Motion, Player};
@@ -115,6 +116,7 @@ enum Audience {
     Experimenter,
     Subject,
 }
+    frame_rate: FrameRate,
 
 impl Viewer {
     /// A window on a device; without one, the 3D view is drawn on the processor.
@@ -183,6 +185,7 @@ impl Viewer {
         }
     }
 
+            frame_rate: FrameRate::default(),
     /// The moment shown.
     #[must_use]
     pub fn player(&self) -> &Player {
@@ -285,6 +288,10 @@ impl Viewer {
         self.player.advance(elapsed_s, self.devices.history().span_s());
         if self.player.motion == Motion::Play {
             ui.ctx().request_repaint_after(self.frame);
+        // Further passes lay the same picture out again.
+        if ui.ctx().current_pass_index() == 0 {
+            self.frame_rate.count(Instant::now());
+        }
         }
         let plain = |x: i8, y: i8| Frame::new().fill(palette.panel).inner_margin(Margin::symmetric(x, y));
         let is_low = ui.available_height() < LOW_PT;

@@ -5,7 +5,7 @@
 //!
 //! 1. in a picture, title and warnings ([`crate::ui::readout`]); a window has the bar and the row of messages for them,
 //! 2. the clock and the rows of numbers ([`crate::ui::readout::numbers`]): a new number is one more
-//!    [`crate::ui::readout::NumberRow`] at the end of [`crate::ui::readout::rows`],
+//!    [`crate::ui::readout::NumberRow`] at the end of the rows,
 //! 3. scales and axes ([`crate::ui::legend`]),
 //! 4. names of devices ([`crate::ui::legend::names`]) and buttons.
 

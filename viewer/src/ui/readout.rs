@@ -22,7 +22,7 @@ const NAME_PT: f32 = 66.0;
 /// Characters of the name of a device in a warning, at most.
 const MOST_OF_NAME: usize = 20;
 
-/// The energy of models of which one does not give its own.
+/// A number that is not known: the energy of models of which one does not give its own, a rate before the second tick.
 const NOT_GIVEN: &str = "not given";
 
 /// Events of the loop: they concern all devices.
@@ -106,6 +106,16 @@ pub fn rows(sample: &Sample, units: Units, palette: &Palette) -> Vec<NumberRow> 
         NumberRow { name: quantity.name(), values: (0..count).map(value).collect(), unit }
     };
     shown.into_iter().map(row).collect()
+}
+
+/// Returns the rows of the haptic and the graphic rate of a running session, Hz.
+#[must_use]
+pub fn rates(haptic_hz: Option<f64>, graphic_hz: Option<f64>, palette: &Palette) -> [NumberRow; 2] {
+    let row = |name: &'static str, rate_hz: Option<f64>| {
+        let text = rate_hz.map_or_else(|| NOT_GIVEN.to_owned(), |rate_hz| format!("{rate_hz:.1}"));
+        NumberRow { name, values: vec![(text, palette.text)], unit: "Hz" }
+    };
+    [row("Haptics", haptic_hz), row("Graphics", graphic_hz)]
 }
 
 /// Paints the time, s, and rows of numbers into the upper right, as far as there is room.

@@ -1,6 +1,7 @@
 //! A running host: how it stands, what warns, what stops it, and its parameters: what is pulled reaches the host, and what the
 //! loop took is what is shown.
 
+use super::texts::texts;
 use super::window::{Window, live, until, until_fresh, window};
 use crate::support::FakeHost;
 use egui::Key;
@@ -55,6 +56,19 @@ fn warnings_say_what_and_what_to_do_and_stay_in_sight_a_while() {
     // Nothing comes any more, and the host has not said that it ended.
     until(&mut window, |window| window.query_by_label("no ticks come").is_some());
     window.get_by_label_contains("Stale data");
+}
+
+/// The ticks of the host carry the times of a loop of 1 kHz, however late they come.
+#[test]
+fn the_rates_of_the_loop_and_of_the_pictures_are_numbers_of_a_running_session() {
+    let has =
+        |window: &Window<'_>, wanted: &str| texts(window.output()).iter().any(|text| text.words == wanted);
+    let (mut window, mut host, _folder) = live(&[]);
+    host.run_ticks(1, Events::NONE);
+    until_fresh(&mut window, &mut host, |window| has(window, "Haptics"));
+    assert!(has(&window, "Graphics") && has(&window, "1000.0"));
+    host.end("the duration is over");
+    until(&mut window, |window| !has(window, "Haptics") && !has(window, "Graphics"));
 }
 
 /// A slider that goes down under the pointer leaves it on another one.

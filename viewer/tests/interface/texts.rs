@@ -44,8 +44,8 @@ const WARNINGS: Events = Events::from_bits(
 );
 
 /// A text of a picture, points.
-struct Text {
-    words: String,
+pub(super) struct Text {
+    pub(super) words: String,
     /// Bounds of its letters.
     letters: Rect,
     /// What can be seen of them.
@@ -54,7 +54,7 @@ struct Text {
 }
 
 /// The texts of which something can be seen.
-fn texts(output: &FullOutput) -> Vec<Text> {
+pub(super) fn texts(output: &FullOutput) -> Vec<Text> {
     let mut texts = Vec::new();
     for ClippedShape { clip_rect, shape, .. } in &output.shapes {
         add_texts(shape, *clip_rect, &mut texts);
