@@ -4,6 +4,7 @@ use crate::palette::{Palette, strain_color};
 use crate::placing::{Placing, round_below};
 use crate::shape::{Posed, Rest, Shape};
 use flotor_drawing::camera::{Camera, Extent};
+use flotor_drawing::contact::{append_contact, contact};
 use flotor_drawing::geometry::{
     Body, Color, Curve, Detail, Ground, LocalStrain, MM_PER_M, Mesh, Section, Shadow, Strain,
     append_primitive, append_surface, append_tube, contact_strain, force_arrow, plate, torque_arrow,
@@ -91,6 +92,8 @@ pub struct SceneFacts {
     pub axes: [DVec3; 3],
     /// How long arrows are; none where none are drawn.
     pub arrows: Option<ArrowKey>,
+    /// The deepest contact of a handle with a body of simple form, m; none without a contact, and where no arrows are drawn.
+    pub contact_depth_m: Option<f64>,
 }
 
 /// How long arrows are.
@@ -251,6 +254,17 @@ impl SceneBuilder {
         for solid in solids() {
             let opacity = if solid.surface.triangles.is_empty() { u8::MAX } else { SEEN_THROUGH };
             self.primitives(solid, Part::Tool, with_opacity(palette.plates[0], opacity));
+        }
+        if facts.arrows.is_some() {
+            for (shape, posed) in drawn() {
+                let Posed::Solid(solid) = posed else { continue };
+                let handle_m = shape.mapping().pose_to_model(&sample.pose).position();
+                let Some(contact) = contact(solid, handle_m) else { continue };
+                append_contact(&mut self.mesh, &contact, height_m, palette.contact);
+                let deepest_m =
+                    facts.contact_depth_m.map_or(contact.depth_m, |depth_m| depth_m.max(contact.depth_m));
+                facts.contact_depth_m = Some(deepest_m);
+            }
         }
         // Where a lifted body stood: its lower plate, seen through.
         for (shape, posed) in drawn() {

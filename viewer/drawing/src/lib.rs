@@ -2,6 +2,7 @@
 //!
 //! - [`geometry`] makes the triangles: wires, primitives, surfaces, arrows, ground.
 //! - A [`camera`] sees them in a [`light`].
+//! - [`contact`]: where a handle touches a body.
 //! - [`drag`] moves a point of the scene with a pointer.
 //! - [`gpu`] draws them on a GPU or a software adapter, into a texture; [`raster`] on the processor, without an adapter.
 //!
@@ -10,6 +11,7 @@
 //! Nothing here is real-time.
 
 pub mod camera;
+pub mod contact;
 pub mod drag;
 pub mod geometry;
 pub mod gpu;

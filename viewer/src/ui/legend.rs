@@ -19,8 +19,8 @@ const MOST_OF_WIDTH: f64 = 0.3;
 /// A torque that is not above this was never there, N·m.
 const LEAST_TORQUE_NM: f64 = 1.0e-5;
 
-/// Paints what the colours of bodies and of the arrows mean into the lower left, and the distance of the lines of the ground into the
-/// lower right.
+/// Paints what the colours of bodies, of the arrows and of a contact mean into the lower left, and the distance of the lines of the
+/// ground into the lower right.
 pub fn paint(overlay: &mut Overlay, area: Rect, facts: &SceneFacts, camera: &Camera, palette: &Palette) {
     if let Some(scale) = facts.scale
         && let Some(rect) = overlay.take(Corner::LeftBottom, SCALE + vec2(0.0, 2.0 * LINE_PT))
@@ -49,6 +49,12 @@ pub fn paint(overlay: &mut Overlay, area: Rect, facts: &SceneFacts, camera: &Cam
         if let Some(line) = sign(overlay, Corner::LeftBottom, &words, 18.0, palette) {
             let stroke = Stroke::new(2.5, opaque(palette.torque));
             overlay.painter().circle_stroke(line + vec2(5.0, 0.0), 5.0, stroke);
+        }
+    }
+    if let Some(depth_m) = facts.contact_depth_m {
+        let words = format!("point of contact and normal, depth {:.3} mm", 1.0e3 * depth_m);
+        if let Some(line) = sign(overlay, Corner::LeftBottom, &words, 18.0, palette) {
+            overlay.painter().circle_filled(line + vec2(5.0, 0.0), 4.0, opaque(palette.contact));
         }
     }
 }

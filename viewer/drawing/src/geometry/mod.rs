@@ -12,6 +12,7 @@ mod mesh;
 mod primitive;
 mod revolve;
 mod strain;
+mod surface_point;
 mod tube;
 
 #[cfg(test)]
@@ -26,4 +27,5 @@ pub use mesh::{Color, MM_PER_M, Mesh, Vertex};
 pub use primitive::{append_primitive, append_surface};
 pub use revolve::{Frame, plate, revolve};
 pub use strain::{LocalStrain, Strain, contact_strain};
+pub use surface_point::{SurfacePoint, closest_surface_point};
 pub use tube::append_tube;

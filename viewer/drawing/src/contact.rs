@@ -1,0 +1,89 @@
+//! The contact of a handle with the bodies of a model, and its mark: a dot at the point of contact and an arrow along the normal.
+
+use crate::geometry::{Color, Mesh, SurfacePoint, append_primitive, closest_surface_point, force_arrow};
+use flotor_hal::glam::DQuat;
+use flotor_hal::{DVec3, Part, Pose, Primitive, Shape};
+
+/// Radius of the dot, and radius and length of the arrow, parts of the height of the scene.
+const DOT: f64 = 0.025;
+const SHAFT: f64 = 0.009;
+const LENGTH: f64 = 0.3;
+
+/// Distance from the surface up to which a tool lies on it, m: far above rounding, far below what can be seen.
+const ON_SURFACE_M: f64 = 1.0e-9;
+
+/// Returns the contact of a handle inside a body of simple form; the depth is that of the handle. If the handle is inside several, the
+/// deepest contact counts.
+///
+/// The point of contact is the proxy, if the model draws one on the surface: with friction the proxy stays behind, and at a box it is
+/// on the face through which the handle came. Without a proxy it is the closest point of the surface.
+#[must_use]
+pub fn contact(shape: &Shape, handle_m: DVec3) -> Option<SurfacePoint> {
+    let bodies = shape.primitives.iter().filter(|primitive| primitive.part() == Part::Body);
+    let inside = bodies.filter_map(|body| Some((body, closest_surface_point(body, handle_m)?)));
+    let inside = inside.filter(|(_, closest)| closest.depth_m > 0.0);
+    let (body, closest) = inside.max_by(|(_, one), (_, other)| one.depth_m.total_cmp(&other.depth_m))?;
+    let tools = shape.primitives.iter().filter(|primitive| primitive.part() == Part::Tool);
+    let mut on_surface = tools
+        .filter_map(|tool| closest_surface_point(body, tool.pose().position()))
+        .filter(|point| point.depth_m.abs() <= ON_SURFACE_M);
+    let depth_m = |proxy: &SurfacePoint| (proxy.position_m - handle_m).dot(proxy.normal);
+    Some(on_surface.next().map_or(closest, |proxy| SurfacePoint { depth_m: depth_m(&proxy), ..proxy }))
+}
+
+/// Adds the mark of a contact to a scene of a height, m.
+pub fn append_contact(mesh: &mut Mesh, contact: &SurfacePoint, height_m: f64, color: Color) {
+    let place = Pose::new(contact.position_m, DQuat::IDENTITY);
+    append_primitive(mesh, &Primitive::sphere(Part::Tool, place, DOT * height_m), color);
+    let along_m = contact.normal * (LENGTH * height_m);
+    force_arrow(mesh, contact.position_m, along_m, SHAFT * height_m, color);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flotor_hal::Form;
+
+    fn shape(primitives: Vec<Primitive>) -> Shape {
+        Shape { primitives, ..Shape::default() }
+    }
+
+    fn tool(at_m: DVec3) -> Primitive {
+        Primitive::sphere(Part::Tool, Pose::new(at_m, DQuat::IDENTITY), 0.0015)
+    }
+
+    #[test]
+    fn a_handle_touches_the_body_in_which_it_is_deepest_and_none_from_outside() {
+        let ball = |x_m: f64| Primitive::sphere(Part::Body, Pose::new(DVec3::X * x_m, DQuat::IDENTITY), 0.01);
+        let handle_m = DVec3::X * 0.009;
+        let solid = shape(vec![ball(0.0), ball(0.008), tool(handle_m)]);
+        let found = contact(&solid, handle_m).expect("it is in both");
+        assert!((found.depth_m - 0.009).abs() < 1.0e-12 && found.normal == DVec3::X, "{found:?}");
+        assert_eq!(contact(&solid, DVec3::Z * 0.02), None);
+    }
+
+    #[test]
+    fn the_proxy_of_a_model_is_the_point_of_contact() {
+        let plane = Primitive::new(Form::Plane, Part::Body, Pose::HOME, [0.03, 0.03, 0.0]);
+        let (handle_m, proxy_m) = (DVec3::new(0.002, 0.0, -0.001), DVec3::new(0.0005, 0.0, 0.0));
+        let found = contact(&shape(vec![plane, tool(handle_m), tool(proxy_m)]), handle_m).expect("inside");
+        assert_eq!((found.position_m, found.normal), (proxy_m, DVec3::Z));
+        assert!((found.depth_m - 0.001).abs() < 1.0e-15, "{found:?}");
+        // Through the upper face of a cube, and by now nearer to a side.
+        let cube = Primitive::new(Form::Box, Part::Body, Pose::HOME, [0.01; 3]);
+        let (handle_m, proxy_m) = (DVec3::new(0.009, 0.0, 0.005), DVec3::new(0.009, 0.0, 0.01));
+        let found = contact(&shape(vec![cube, tool(handle_m), tool(proxy_m)]), handle_m).expect("inside");
+        assert_eq!(found.normal, DVec3::Z);
+        assert!((found.depth_m - 0.005).abs() < 1.0e-15, "{found:?}");
+    }
+
+    #[test]
+    fn the_arrow_of_the_normal_ends_outside_the_body() {
+        let plane = Primitive::new(Form::Plane, Part::Body, Pose::HOME, [0.03, 0.03, 0.0]);
+        let found = contact(&shape(vec![plane]), DVec3::new(0.002, 0.0, -0.001)).expect("inside");
+        let mut mesh = Mesh::default();
+        append_contact(&mut mesh, &found, 0.02, [255; 4]);
+        let highest_mm = mesh.vertices.iter().map(|vertex| vertex.position_mm[2]).fold(f32::MIN, f32::max);
+        assert!((highest_mm - 6.0).abs() < 1.0e-4, "{highest_mm} mm of 0.3 times 20 mm");
+    }
+}
