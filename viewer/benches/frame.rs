@@ -15,7 +15,7 @@ use flotor_history::quantity::Quantity;
 use flotor_history::{History, Keep, unknown_run};
 use flotor_record::{PluginDescription, Role, RunDescription};
 use flotor_sync::Words;
-use flotor_viewer::app::{Start, Viewer};
+use flotor_viewer::app::{Recorded, Start, Viewer};
 use flotor_viewer::canvas::Canvas;
 use flotor_viewer::palette::{Look, Palette};
 use flotor_viewer::scene::{ArrowScale, SceneBuilder};
@@ -181,7 +181,10 @@ fn two_devices() -> RunDescription {
 /// The whole picture but its rasterising: interface, six traces of ten seconds, 3D scene, and egui's triangles of it all.
 fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let context = egui::Context::default();
-    let start = Start::Recording(vec![history()], Some(0.0), vec![library("spring")]);
+    let start = Start::Recording(Recorded {
+        at_s: Some(0.0),
+        ..Recorded::new(vec![history()], vec![library("spring")])
+    });
     // Drawn by an adapter, whose threads are not this one; without any, by this one.
     let state =
         std::panic::catch_unwind(|| create_render_state(default_wgpu_setup(), Default::default())).ok();
@@ -235,7 +238,8 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
             history.push(&TickRecord { device, ..record });
         }
     }
-    let start = Start::Recording(histories, Some(0.0), vec![library("solid")]);
+    let start =
+        Start::Recording(Recorded { at_s: Some(0.0), ..Recorded::new(histories, vec![library("solid")]) });
     let mut viewer = Viewer::new(&context, state.as_ref(), start, Look::Dark);
     picture(&mut viewer, Vec::new());
     picture(&mut viewer, vec![space(true), space(false)]);

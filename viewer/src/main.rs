@@ -8,7 +8,7 @@ use flotor_history::History;
 use flotor_history::quantity::Quantity;
 use flotor_live::Directory;
 use flotor_study::screen::{Screen, Told};
-use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::app::{Recorded, Start, Viewer, Wanted};
 use flotor_viewer::chosen::Chosen;
 use flotor_viewer::devices::Devices;
 use flotor_viewer::experiment::texts::Texts;
@@ -181,7 +181,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         (Some(history), Some(out)) => screenshot(arguments, history, chosen, out),
         (history, _) => {
             let start = match history {
-                Some(history) => Start::Recording(history, arguments.at, arguments.plugins.clone()),
+                Some(histories) => Start::Recording(recorded(arguments, histories)),
                 None => live(arguments)?,
             };
             let cost = open(start, chosen, arguments.request)?;
@@ -220,9 +220,16 @@ fn chosen(arguments: &Arguments, histories: &[History]) -> Result<Chosen, Pictur
     Ok(chosen.with_arrow_force(arguments.arrow_force))
 }
 
+/// Returns the recording of the command line at its moment.
+fn recorded(arguments: &Arguments, histories: Vec<History>) -> Recorded {
+    let (file, at_s) = (arguments.recording.clone(), arguments.at);
+    Recorded { file, at_s, ..Recorded::new(histories, arguments.plugins.clone()) }
+}
+
 /// A running host: for an experimenter, or in front of a person in a sitting.
 fn live(arguments: &Arguments) -> Result<Start, Failure> {
-    let wanted = Wanted { directory: Directory::of_this_user(), process: arguments.run };
+    let (directory, process) = (Directory::of_this_user(), arguments.run);
+    let wanted = Wanted { directory, process, plugins: arguments.plugins.clone() };
     if !arguments.sitting {
         return Ok(Start::Live(wanted));
     }
@@ -240,7 +247,7 @@ fn whole_window(
     out: &Path,
 ) -> Result<(), Failure> {
     let (look, size, scale) = of_picture(arguments.request);
-    let start = Start::Recording(history, arguments.at, arguments.plugins.clone());
+    let start = Start::Recording(recorded(arguments, history));
     let mut viewer = Viewer::new(&egui::Context::default(), None, start, look);
     viewer.choose(chosen);
     // The experiment's end of the way to the screen stays open while it is drawn.

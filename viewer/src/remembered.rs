@@ -31,6 +31,8 @@ pub struct Remembered {
     pub size_pt: [f32; 2],
     /// Size of text and lines: pixels per point over those of the display.
     pub zoom: f32,
+    /// The recordings opened last, the newest first.
+    pub latest: Vec<PathBuf>,
 }
 
 impl Default for Remembered {
@@ -44,6 +46,7 @@ impl Default for Remembered {
             view_part: None,
             size_pt: [1280.0, 800.0],
             zoom: 1.0,
+            latest: Vec::new(),
         }
     }
 }
@@ -100,6 +103,7 @@ mod tests {
             view_part: Some(0.5),
             size_pt: [1600.0, 900.0],
             zoom: 1.5,
+            latest: vec![PathBuf::from("/data/run.mcap")],
         };
         chosen.save(&file).unwrap();
         assert_eq!(Remembered::load(&file), chosen);

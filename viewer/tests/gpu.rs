@@ -12,7 +12,7 @@ use flotor_drawing::gpu::GpuScene;
 use flotor_drawing::raster::{Image, Rasterizer};
 use flotor_hal::Pose;
 use flotor_history::{History, Keep, Sample};
-use flotor_viewer::app::{Start, Viewer};
+use flotor_viewer::app::{Recorded, Start, Viewer};
 use flotor_viewer::palette::{Look, Palette};
 use flotor_viewer::picture::{draw_without_window, write_png};
 use flotor_viewer::scene::{ArrowScale, SceneBuilder};
@@ -107,7 +107,10 @@ fn an_adapter_and_the_processor_draw_the_same_scene() {
 fn start(at_s: f64) -> Start {
     let mut history = History::new(spring_run(&[]).0, Keep::All);
     (0..3000).for_each(|number| history.push(&tick(number, Events::NONE)));
-    Start::Recording(vec![history], Some(at_s), vec![plugin_file("spring")])
+    Start::Recording(Recorded {
+        at_s: Some(at_s),
+        ..Recorded::new(vec![history], vec![plugin_file("spring")])
+    })
 }
 
 fn by_processor(at_s: f64, look: Look) -> Vec<u8> {

@@ -100,17 +100,19 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
             "{what} needs a recording: `flotor record zenoh/NAME --out FILE.mcap` makes one"
         )));
     }
+    let registry = arguments.plugin_path.registry();
     if let Some(file) = file {
         // Opened here as well: an error in the file is reported before another program starts.
         let recording = Recording::open(file)?;
-        plugin_files(&recording, &arguments.plugin_path.registry())
-            .into_iter()
-            .for_each(|plugin| add("--plugin", plugin.into()));
+        plugin_files(&recording, &registry).into_iter().for_each(|plugin| add("--plugin", plugin.into()));
         let written =
             [(&arguments.screenshot, "the picture shows"), (&arguments.export, "the traces are of")];
         if let Some((_, what)) = written.iter().find(|(out, _)| out.is_some()) {
             tell_damage(file, recording, what);
         }
+    } else {
+        // The window may open a recording of any of them.
+        registry.found().iter().for_each(|plugin| add("--plugin", plugin.path.clone().into()));
     }
     let options = [
         ("--at", &arguments.at),

@@ -271,21 +271,22 @@ impl Viewer {
         self.facts = self.view.show(ui, area, self.look, Subject { shapes, version, samples, scale });
     }
 
-    /// There is nothing to show: what to do.
-    fn nothing(&self, ui: &mut Ui, area: Rect, palette: &Palette) {
+    /// Says that there is nothing to show and what to do; while there is no run, offers recordings.
+    fn nothing(&mut self, ui: &mut Ui, area: Rect, palette: &Palette) {
         let (first, second) = match &self.source {
             Source::Waiting(_) => ("Waiting for a run", "Start one in a terminal:  flotor run"),
             _ => ("No ticks yet", "They appear as soon as the loop runs"),
         };
-        self.words(ui, area, first, second, palette);
-    }
-
-    /// A line and what to do about it, in the middle of an area.
-    fn words(&self, ui: &mut Ui, area: Rect, first: &str, second: &str, palette: &Palette) {
-        let layout = egui::Layout::top_down(egui::Align::Center);
-        let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(area).layout(layout));
-        inner.add_space(0.42 * area.height());
+        let inside = area.shrink2(vec2(16.0, 0.0));
+        let layout = Layout::top_down(Align::Center);
+        let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(inside).layout(layout));
+        inner.add_space(0.3 * area.height());
         inner.label(RichText::new(first).size(style::TITLE_PT));
         inner.label(RichText::new(second).color(palette.faint));
+        if matches!(self.source, Source::Waiting(_)) {
+            inner.add_space(8.0);
+            let chosen = self.opening.show(&mut inner, palette);
+            chosen.iter().for_each(|file| self.open(file));
+        }
     }
 }

@@ -7,6 +7,7 @@ mod hand;
 mod intake;
 mod keys;
 mod layout;
+mod opening;
 mod sitting;
 mod source;
 mod words;
@@ -17,8 +18,8 @@ use crate::canvas::Canvas;
 use crate::chosen::Chosen;
 use crate::devices::Devices;
 use crate::experiment::Prompt;
-use crate::guide::Guide;
 use crate::frame_rate::FrameRate;
+use crate::guide::Guide;
 use crate::palette::{Look, Palette};
 use crate::panel::Panel;
 use crate::player::{Motion, Player};
@@ -32,10 +33,11 @@ use crate::ui::view3d::View3d;
 use crate::ui::{help, playback, readout, style};
 use eframe::egui_wgpu::RenderState;
 use egui::{CentralPanel, Context, Frame, Margin, Panel as Edge, Ui};
-use flotor_history::{History, Sample};
+use flotor_history::History;
 use flotor_live::{Ask, WrenchLimits};
 use flotor_record::RunDescription;
-use source::{FRAME, FRAME_OF_WORDS, FRAME_ON_CPU, Parts};
+use opening::Opening;
+use source::{FRAME, FRAME_OF_WORDS, FRAME_ON_CPU};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -48,6 +50,8 @@ pub(super) const VIEW_PARTS: std::ops::RangeInclusive<f32> = 0.15..=0.85;
 const ROOM_FOR_PANEL_PT: f32 = 900.0;
 /// Width of a window below which the panel takes the room of view and traces, points.
 const ROOM_BESIDE_PANEL_PT: f32 = 560.0;
+/// Time that the traces of a running host show first, s.
+const LIVE_WINDOW_S: f64 = 10.0;
 /// Height of a window below which its bars are lower, points.
 const LOW_PT: f32 = 480.0;
 
@@ -57,8 +61,28 @@ pub enum Start {
     Live(Wanted),
     /// A run, in front of a subject.
     Sitting(Wanted, Box<Prompt>),
-    /// A recording, of each device, at a moment, with the files of its plugins.
-    Recording(Vec<History>, Option<f64>, Vec<PathBuf>),
+    /// A recording.
+    Recording(Recorded),
+}
+
+/// A recording to be shown.
+pub struct Recorded {
+    /// The file, if the recording comes from one.
+    pub file: Option<PathBuf>,
+    /// The samples of each device.
+    pub histories: Vec<History>,
+    /// The first moment shown, s; without one, that of the largest force.
+    pub at_s: Option<f64>,
+    /// Files of the plugins whose bodies can be drawn.
+    pub plugins: Vec<PathBuf>,
+}
+
+impl Recorded {
+    /// Shows the samples of each device at the moment of the largest force.
+    #[must_use]
+    pub fn new(histories: Vec<History>, plugins: Vec<PathBuf>) -> Self {
+        Self { file: None, histories, at_s: None, plugins }
+    }
 }
 
 /// The window's state.
@@ -80,6 +104,7 @@ pub struct Viewer {
     guide: Guide,
     drag: Option<Drag>,
     plots: PlotStack,
+    opening: Opening,
     look: Look,
     /// What was chosen, if anything was.
     shows_panel: Option<bool>,
@@ -91,6 +116,7 @@ pub struct Viewer {
     /// Whether the list of keys is in sight.
     shows_keys: bool,
     bell: Bell,
+    frame_rate: FrameRate,
     last_look: Option<Instant>,
     frame: Duration,
     pace: Pace,
@@ -116,7 +142,6 @@ enum Audience {
     Experimenter,
     Subject,
 }
-    frame_rate: FrameRate,
 
 impl Viewer {
     /// A window on a device; without one, the 3D view is drawn on the processor.
@@ -126,49 +151,32 @@ impl Viewer {
         let on_cpu =
             device.is_some_and(|state| state.adapter.get_info().device_type == wgpu::DeviceType::Cpu);
         let frame = if on_cpu { FRAME_ON_CPU } else { FRAME };
-        let (start, sitting) = match start {
+        let (source, plugins, recorded, sitting) = match start {
+            Start::Live(wanted) => (Source::Waiting(wanted.clone()), wanted.plugins, None, None),
             Start::Sitting(wanted, mut prompt) => {
                 prompt.open(context);
-                (Start::Live(wanted), Some(*prompt))
+                (Source::Waiting(wanted), Vec::new(), None, Some(*prompt))
             }
-            other => (other, None),
+            Start::Recording(recorded) => (Source::Recording, Vec::new(), Some(recorded), None),
         };
-        let (source, devices, parts, player, window) = match start {
-            Start::Live(wanted) | Start::Sitting(wanted, _) => {
-                let parts = Parts { shapes: Vec::new(), panels: Vec::new(), missing: Vec::new() };
-                (
-                    Source::Waiting(wanted),
-                    Devices::new(Vec::new()),
-                    parts,
-                    Player::live(),
-                    Window::Newest(10.0),
-                )
-            }
-            Start::Recording(histories, at_s, files) => {
-                let devices = Devices::new(histories);
-                let history = devices.history();
-                let parts = Parts::of_recording(history.run(), &files);
-                let moment_s = at_s.or_else(|| history.strongest().map(Sample::time_s)).unwrap_or(0.0);
-                (Source::Recording, devices, parts, Player::at(moment_s), Window::Whole)
-            }
-        };
-        let extent = SceneBuilder::extent(&parts.shapes, devices.count());
-        Self {
+        let devices = Devices::new(Vec::new());
+        let mut viewer = Self {
             source,
             heading: Heading::of(devices.history().run()),
             devices,
-            shapes: parts.shapes,
+            shapes: Vec::new(),
             shape_version: 0,
-            panels: parts.panels,
+            panels: Vec::new(),
             limits: WrenchLimits::default(),
-            missing: parts.missing,
-            player,
-            view: View3d::new(Canvas::new(device), extent),
+            missing: Vec::new(),
+            player: Player::live(),
+            view: View3d::new(Canvas::new(device), SceneBuilder::extent(&[], 1)),
             arrow_force_n: None,
             facts: SceneFacts::default(),
             guide: Guide::new(&[]),
             drag: None,
-            plots: PlotStack::new(window),
+            plots: PlotStack::new(Window::Newest(LIVE_WINDOW_S)),
+            opening: Opening::with_plugins(plugins),
             look,
             shows_panel: None,
             side_pt: SIDE_PT,
@@ -177,15 +185,17 @@ impl Viewer {
             done: None,
             shows_keys: false,
             bell: Bell::default(),
+            frame_rate: FrameRate::default(),
             last_look: None,
             frame,
             pace: Pace::of(frame),
             audience: if sitting.is_some() { Audience::Subject } else { Audience::Experimenter },
             sitting,
-        }
+        };
+        recorded.into_iter().for_each(|recorded| viewer.show_recording(recorded));
+        viewer
     }
 
-            frame_rate: FrameRate::default(),
     /// The moment shown.
     #[must_use]
     pub fn player(&self) -> &Player {
@@ -255,13 +265,15 @@ impl Viewer {
             shows_panel: self.shows_panel,
             side_pt: self.side_pt.round(),
             view_part: self.view_part,
+            latest: self.opening.latest().to_vec(),
             ..Remembered::default()
         }
     }
 
     /// Makes the window what it was the last time.
     pub fn recall(&mut self, context: &Context, remembered: &Remembered) {
-        let Remembered { look, units, traces, shows_panel, side_pt, view_part, .. } = remembered;
+        let Remembered { look, units, traces, shows_panel, side_pt, view_part, latest, .. } = remembered;
+        self.opening.recall(latest);
         self.look = *look;
         style::apply(context, *look);
         self.plots.units = *units;
@@ -276,6 +288,10 @@ impl Viewer {
     /// Shows everything.
     pub fn show(&mut self, ui: &mut Ui) {
         let palette = Palette::of(self.look);
+        // Further passes lay the same picture out again.
+        if ui.ctx().current_pass_index() == 0 {
+            self.frame_rate.count(Instant::now());
+        }
         self.take_in(ui.ctx());
         self.pace.set(if self.is_moving() { self.frame } else { FRAME_OF_WORDS });
         if self.sitting.is_some() {
@@ -283,15 +299,12 @@ impl Viewer {
             self.sit(ui, &palette);
             return;
         }
+        self.open_dropped(ui);
         self.keys(ui);
         let elapsed_s = f64::from(ui.input(|input| input.stable_dt)).min(0.1);
         self.player.advance(elapsed_s, self.devices.history().span_s());
         if self.player.motion == Motion::Play {
             ui.ctx().request_repaint_after(self.frame);
-        // Further passes lay the same picture out again.
-        if ui.ctx().current_pass_index() == 0 {
-            self.frame_rate.count(Instant::now());
-        }
         }
         let plain = |x: i8, y: i8| Frame::new().fill(palette.panel).inner_margin(Margin::symmetric(x, y));
         let is_low = ui.available_height() < LOW_PT;

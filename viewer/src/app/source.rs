@@ -47,13 +47,15 @@ pub struct Wanted {
     pub directory: Directory,
     /// The process that runs it; without one, the newest.
     pub process: Option<u32>,
+    /// Files of the plugins whose bodies are drawn if the window opens a recording instead.
+    pub plugins: Vec<PathBuf>,
 }
 
 impl Wanted {
     /// The newest run of a folder.
     #[must_use]
     pub fn newest(directory: Directory) -> Self {
-        Self { directory, process: None }
+        Self { directory, process: None, plugins: Vec::new() }
     }
 }
 

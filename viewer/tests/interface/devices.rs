@@ -8,7 +8,7 @@ use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
 use flotor_history::{History, Keep};
 use flotor_record::{Role as PluginRole, RunDescription};
-use flotor_viewer::app::Start;
+use flotor_viewer::app::{Recorded, Start};
 
 /// Two devices without a model, the second of which is pressed twice as hard.
 fn two_hands() -> Vec<History> {
@@ -37,7 +37,8 @@ fn histories(run: &RunDescription) -> Vec<History> {
 
 #[test]
 fn each_of_two_devices_has_its_name_and_can_be_looked_at() {
-    let mut window = window(Start::Recording(two_hands(), Some(0.5), Vec::new()));
+    let mut window =
+        window(Start::Recording(Recorded { at_s: Some(0.5), ..Recorded::new(two_hands(), Vec::new()) }));
     window.run_steps(3);
     let force_n = |window: &super::window::Window<'_>| {
         let viewer = window.state();

@@ -6,7 +6,7 @@ use egui::{Key, vec2};
 use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
 use flotor_history::{History, Keep};
-use flotor_viewer::app::Start;
+use flotor_viewer::app::{Recorded, Start};
 use std::time::Duration;
 
 /// What has not changed is not made again: while the mouse moves, no sample is looked at and no corner of a triangle is made;
@@ -49,7 +49,10 @@ fn a_picture_makes_what_is_new_and_nothing_else() {
         resting.commanded = tick(250, Events::NONE).commanded;
         history.push(&resting);
     }
-    let mut window = window::window(Start::Recording(vec![history], Some(0.0), vec![plugin_file("spring")]));
+    let mut window = window::window(Start::Recording(Recorded {
+        at_s: Some(0.0),
+        ..Recorded::new(vec![history], vec![plugin_file("spring")])
+    }));
     window.run_steps(3);
     let before = work(&window);
     window.key_press(Key::Space);

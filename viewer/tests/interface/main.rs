@@ -6,6 +6,7 @@ mod effort;
 mod hand;
 mod live;
 mod look;
+mod opening;
 mod recording;
 mod sitting;
 #[path = "../support/mod.rs"]

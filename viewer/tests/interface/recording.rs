@@ -5,7 +5,7 @@ use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
 use flotor_history::quantity::Quantity;
-use flotor_viewer::app::Start;
+use flotor_viewer::app::{Recorded, Start};
 use flotor_viewer::chosen::Chosen;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureError, PictureOptions, has_moment, least_height_px, picture};
@@ -173,7 +173,9 @@ fn what_a_command_line_chooses_holds_in_a_window_and_in_a_picture() {
     assert!(window.query_by_label("Position over time, mm").is_none());
 
     let drawn = |chosen, size_px| {
-        let Start::Recording(histories, ..) = recorded(1000, None) else { panic!("it is a recording") };
+        let Start::Recording(Recorded { histories, .. }) = recorded(1000, None) else {
+            panic!("it is a recording")
+        };
         let (scale, look) = (1.0, Look::Dark);
         picture(histories, &mut [], &PictureOptions { size_px, scale, look, view: None, chosen, at_s: None })
     };
@@ -191,7 +193,9 @@ fn what_a_command_line_chooses_holds_in_a_window_and_in_a_picture() {
 
 #[test]
 fn a_moment_outside_the_recording_is_refused_with_its_ends() {
-    let Start::Recording(histories, ..) = recorded(1000, None) else { panic!("it is a recording") };
+    let Start::Recording(Recorded { histories, .. }) = recorded(1000, None) else {
+        panic!("it is a recording")
+    };
     assert!(has_moment(&histories, 0.5).is_ok() && has_moment(&histories, 1.0).is_ok());
     for at_s in [99.0, -1.0, f64::NAN] {
         let said = has_moment(&histories, at_s).expect_err("it is outside").to_string();
@@ -240,7 +244,9 @@ fn a_view_that_was_turned_has_a_button_that_resets_it() {
 #[test]
 fn arrows_of_a_chosen_force_are_equally_long_in_every_run() {
     let of_run = |ticks, arrow_force_n| {
-        let Start::Recording(histories, ..) = recorded(ticks, None) else { panic!("it is a recording") };
+        let Start::Recording(Recorded { histories, .. }) = recorded(ticks, None) else {
+            panic!("it is a recording")
+        };
         let chosen = Chosen::default().with_arrow_force(arrow_force_n);
         let (size_px, scale, look, at_s) = ([320, 540], 1.0, Look::Dark, Some(0.1));
         let image =

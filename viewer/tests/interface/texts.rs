@@ -14,6 +14,7 @@ use flotor_viewer::app::{Start, Viewer, Wanted};
 use flotor_viewer::chosen::Chosen;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureOptions, interface, least_height_px};
+use flotor_viewer::remembered::Remembered;
 
 /// Widths and heights of windows, pixels.
 const SIZES: [[f32; 2]; 6] =
@@ -189,6 +190,29 @@ fn no_texts_overlap_with_three_devices() {
 fn no_texts_overlap_with_four_devices() {
     live(&SHORT, TITLES[1], Look::Light);
     live(&LONG, TITLES[0], Look::Dark);
+}
+
+/// The window without a run, which offers recordings.
+#[test]
+fn no_texts_of_an_empty_window_overlap() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let start = Start::Live(Wanted::newest(flotor_live::Directory::at(folder.path())));
+    let harness = Harness::builder().with_size(vec2(640.0, 400.0));
+    let mut window: Window<'_> =
+        harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, Look::Dark));
+    let context = window.ctx.clone();
+    let latest = LONG.iter().chain(&SHORT[..1]).map(|name| format!("/recordings/{name}.mcap").into());
+    let remembered = Remembered { latest: latest.collect(), ..Remembered::default() };
+    window.state_mut().recall(&context, &remembered);
+    for size in SIZES {
+        for scale in SCALES {
+            let points = Vec2::from(size) / scale;
+            window.set_size(points).set_pixels_per_point(scale);
+            window.run_steps(3);
+            assert_apart(&texts(window.output()), points, None, &format!("empty, {size:?} px at {scale}"));
+        }
+    }
+    window.get_by_label(&format!("{}.mcap", LONG[0]));
 }
 
 /// The picture of `--screenshot`.

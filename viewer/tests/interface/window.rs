@@ -7,7 +7,7 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use flotor_core::trace::Events;
 use flotor_history::{History, Keep};
 use flotor_live::Ask;
-use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::app::{Recorded, Start, Viewer, Wanted};
 use flotor_viewer::palette::Look;
 use std::time::{Duration, Instant};
 
@@ -28,7 +28,7 @@ pub(crate) fn recorded(ticks: u64, at_s: Option<f64>) -> Start {
     let (run, _) = spring_run(&[]);
     let mut history = History::new(run, Keep::All);
     (0..ticks).for_each(|number| history.push(&tick(number, Events::NONE)));
-    Start::Recording(vec![history], at_s, vec![plugin_file("spring")])
+    Start::Recording(Recorded { at_s, ..Recorded::new(vec![history], vec![plugin_file("spring")]) })
 }
 
 /// A window on three seconds of a recording.

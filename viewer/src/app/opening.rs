@@ -1,0 +1,151 @@
+//! Recordings that are opened in the window: dropped on it, named by a path, or one of the latest.
+
+use super::source::{Parts, Source};
+use super::{Heading, Recorded, Viewer};
+use crate::devices::Devices;
+use crate::guide::Guide;
+use crate::palette::Palette;
+use crate::player::Player;
+use crate::scene::SceneBuilder;
+use crate::ui::plot_stack::Window;
+use crate::ui::style::SMALL_PT;
+use egui::{Button, Key, RichText, Role, TextEdit, Ui, WidgetInfo};
+use flotor_history::{History, Sample};
+use flotor_live::WrenchLimits;
+use std::path::{Path, PathBuf};
+
+/// Number of recordings that are offered again, at most.
+const MOST_LATEST: usize = 5;
+/// Width of the field for a path, and of the button beside it, points.
+const FIELD_PT: f32 = 340.0;
+const BUTTON_PT: f32 = 70.0;
+/// Height of a row with the gap beneath, points.
+const ROW_PT: f32 = 26.0;
+/// Name of the field for a path.
+const FIELD: &str = "Path of a recording";
+
+/// The recordings that can be opened.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Opening {
+    /// Text of the field.
+    typed: String,
+    /// The recordings opened last, the newest first.
+    latest: Vec<PathBuf>,
+    /// Files of the plugins whose bodies can be drawn.
+    plugins: Vec<PathBuf>,
+}
+
+impl Opening {
+    /// Draws bodies with the plugins of these files.
+    pub(super) fn with_plugins(plugins: Vec<PathBuf>) -> Self {
+        Self { plugins, ..Self::default() }
+    }
+
+    /// Returns the recordings opened last, the newest first.
+    pub(super) fn latest(&self) -> &[PathBuf] {
+        &self.latest
+    }
+
+    /// Adds the recordings of earlier windows after those of this one.
+    pub(super) fn recall(&mut self, earlier: &[PathBuf]) {
+        let others: Vec<PathBuf> =
+            earlier.iter().filter(|file| !self.latest.contains(file)).cloned().collect();
+        self.latest.extend(others);
+        self.latest.truncate(MOST_LATEST);
+    }
+
+    /// Puts a recording first among the latest.
+    fn remember(&mut self, file: &Path) {
+        let file = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
+        self.latest.retain(|known| *known != file);
+        self.latest.insert(0, file);
+        self.latest.truncate(MOST_LATEST);
+    }
+
+    /// Shows a field for a path and the latest recordings, as many as have room, and returns the file that was chosen.
+    pub(super) fn show(&mut self, ui: &mut Ui, palette: &Palette) -> Option<PathBuf> {
+        let has_room = |ui: &Ui| ui.available_height() >= ROW_PT;
+        let quiet = |text: String| RichText::new(text).size(SMALL_PT);
+        let mut chosen = None;
+        if !has_room(ui) {
+            return None;
+        }
+        let row_pt = (FIELD_PT + BUTTON_PT).min(ui.available_width());
+        ui.allocate_ui(egui::vec2(row_pt, ROW_PT), |ui| {
+            ui.horizontal(|ui| {
+                let width_pt = row_pt - BUTTON_PT;
+                let field = TextEdit::singleline(&mut self.typed).hint_text(FIELD).desired_width(width_pt);
+                let field = ui.add(field);
+                field.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, FIELD));
+                let is_entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+                let typed = self.typed.trim();
+                if (ui.button("Open").clicked() || is_entered) && !typed.is_empty() {
+                    chosen = Some(PathBuf::from(typed));
+                }
+            });
+        });
+        if has_room(ui) {
+            ui.label(quiet("or drop a recording (.mcap) on this window".to_owned()).color(palette.faint));
+        }
+        for file in &self.latest {
+            if !has_room(ui) {
+                break;
+            }
+            let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
+            let button = ui.add(Button::new(quiet(name)).frame(false).truncate());
+            if button.on_hover_text(file.display().to_string()).clicked() {
+                chosen = Some(file.clone());
+            }
+        }
+        chosen
+    }
+}
+
+impl Viewer {
+    /// Opens a recording that was dropped on the window, except during a session: its emergency stop stays in sight.
+    pub(super) fn open_dropped(&mut self, ui: &Ui) {
+        let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_path_buf()));
+        let Some(file) = dropped else { return };
+        if self.source.is_running() {
+            self.say("A running session is shown; stop it before you open a recording");
+        } else {
+            self.open(&file);
+        }
+    }
+
+    /// Shows a recording in place of what is shown, or a warning why the file cannot be read.
+    pub(super) fn open(&mut self, file: &Path) {
+        match History::read(file) {
+            Ok(histories) => {
+                let plugins = self.opening.plugins.clone();
+                self.opening.typed.clear();
+                self.show_recording(Recorded {
+                    file: Some(file.into()),
+                    ..Recorded::new(histories, plugins)
+                });
+            }
+            Err(error) => self.say(error.to_string()),
+        }
+    }
+
+    /// Shows a recording, at the moment of the largest force unless another is given.
+    pub(super) fn show_recording(&mut self, recorded: Recorded) {
+        let Recorded { histories, at_s, plugins, file } = recorded;
+        self.devices = Devices::new(histories);
+        let run = self.devices.history().run();
+        let parts = Parts::of_recording(run, &plugins);
+        self.heading = Heading::of(run);
+        self.opening.plugins = plugins;
+        file.iter().for_each(|file| self.opening.remember(file));
+        let strongest_s = self.devices.history().strongest().map(Sample::time_s);
+        self.player = Player::at(at_s.or(strongest_s).unwrap_or(0.0));
+        self.plots.window = Window::Whole;
+        self.plots.start_over();
+        self.view.reset(SceneBuilder::extent(&parts.shapes, self.devices.count()));
+        (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);
+        self.shape_version += 1;
+        (self.guide, self.drag) = (Guide::new(&[]), None);
+        self.limits = WrenchLimits::default();
+        self.source = Source::Recording;
+    }
+}
