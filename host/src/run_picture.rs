@@ -2,6 +2,7 @@
 
 use crate::peak_bounds::{BoundedPeaks, PeakBound};
 use crate::timing_picture::panels;
+use flotor_core::guidance::is_guidance;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome};
 use flotor_hal::{Demand, rotation_vector};
@@ -93,7 +94,7 @@ impl RunPicture {
 
 impl Observer for RunPicture {
     fn change(&mut self, change: &Change) {
-        if change.outcome == ChangeOutcome::Applied {
+        if change.outcome == ChangeOutcome::Applied && !is_guidance(&change.parameter) {
             self.changes.add(change);
         }
     }

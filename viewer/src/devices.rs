@@ -115,6 +115,11 @@ impl Devices {
         }
     }
 
+    /// Adds a change of a parameter at a time, ns, to what has been seen of each device.
+    pub fn push_change(&mut self, time_ns: u64, parameter: &str) {
+        self.seen.iter_mut().for_each(|seen| seen.history.push_change(time_ns, parameter));
+    }
+
     /// So many ticks found no room on the way.
     pub fn set_dropped(&mut self, dropped: u64) {
         self.seen.iter_mut().for_each(|seen| seen.tally.dropped = dropped);

@@ -3,15 +3,12 @@
 //! The device declares four live parameters: the number of the client that guides, and the target. It releases the hand when a
 //! client has been silent for a second, so a target is repeated while it stays.
 
+use flotor_core::guidance::{GUIDE, TARGET_MM, is_guidance};
 use flotor_hal::DVec3;
 use flotor_live::{Ask, ChangeMessage, Outcome, PanelPlugin, SetValue};
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::{Duration, Instant};
 
-/// The parameter with the number of the client that guides; 0 releases the hand.
-const GUIDE: &str = "hand_guide";
-/// The parameters with the target: x, y, z of the device frame, mm.
-const TARGET: [&str; 3] = ["hand_target_x_mm", "hand_target_y_mm", "hand_target_z_mm"];
 /// Largest coordinate of a target, mm.
 const FARTHEST_MM: f64 = 50.0;
 /// Time after which a target that stays is repeated.
@@ -80,7 +77,7 @@ impl Guide {
         let held = self.held.as_mut()?;
         let (device, target_mm, sent) = (held.device, held.target_mm, held.sent);
         let is_new = |axis: usize| sent.is_none_or(|(sent_mm, _)| sent_mm[axis] != target_mm[axis]);
-        let moved: Vec<usize> = (0..TARGET.len()).filter(|axis| is_new(*axis)).collect();
+        let moved: Vec<usize> = (0..TARGET_MM.len()).filter(|axis| is_new(*axis)).collect();
         let is_old = sent.is_none_or(|(_, at)| now.duration_since(at) >= REPEATED_AFTER);
         if moved.is_empty() && !is_old {
             return None;
@@ -88,7 +85,7 @@ impl Guide {
         held.sent = Some((target_mm, now));
         let mut values = vec![self.value(device, GUIDE, self.number.to_string())];
         values.extend(
-            moved.iter().map(|axis| self.value(device, TARGET[*axis], format!("{:.5}", target_mm[*axis]))),
+            moved.iter().map(|axis| self.value(device, TARGET_MM[*axis], format!("{:.5}", target_mm[*axis]))),
         );
         Some(Ask::Set { values })
     }
@@ -113,13 +110,13 @@ impl Guide {
 /// declares.
 fn has_hand(plugin: &PanelPlugin) -> bool {
     let has = |id: &str| plugin.parameters.iter().any(|parameter| parameter.live && parameter.id == id);
-    plugin.is_simulated && has(GUIDE) && TARGET.iter().all(|id| has(id))
+    plugin.is_simulated && has(GUIDE) && TARGET_MM.iter().all(|id| has(id))
 }
 
 /// Whether a parameter of a plugin is one with which its hand is guided, and not for a panel.
 #[must_use]
 pub fn is_for_guides(plugin: &PanelPlugin, parameter: &str) -> bool {
-    plugin.is_simulated && (parameter == GUIDE || TARGET.contains(&parameter))
+    plugin.is_simulated && is_guidance(parameter)
 }
 
 #[cfg(test)]
@@ -143,7 +140,7 @@ mod tests {
             id: "simulated".to_owned(),
             file: "".into(),
             is_simulated,
-            parameters: [GUIDE].iter().chain(&TARGET).map(|id| parameter(id)).collect(),
+            parameters: [GUIDE].iter().chain(&TARGET_MM).map(|id| parameter(id)).collect(),
         }
     }
 
@@ -172,10 +169,13 @@ mod tests {
         guide.take(0, DVec3::new(0.0, 0.001, -0.002));
         let first = sent(guide.due(start));
         assert_eq!(first[0], (GUIDE.to_owned(), number.clone()));
-        assert_eq!(first[3], (TARGET[2].to_owned(), "-2.00000".to_owned()));
+        assert_eq!(first[3], (TARGET_MM[2].to_owned(), "-2.00000".to_owned()));
         guide.move_by(DVec3::new(0.0, 0.0, -0.0005));
         let next = sent(guide.due(start));
-        assert_eq!(next, [(GUIDE.to_owned(), number.clone()), (TARGET[2].to_owned(), "-2.50000".to_owned())]);
+        assert_eq!(
+            next,
+            [(GUIDE.to_owned(), number.clone()), (TARGET_MM[2].to_owned(), "-2.50000".to_owned())]
+        );
         assert_eq!(guide.due(start + REPEATED_AFTER / 2), None);
         assert_eq!(sent(guide.due(start + REPEATED_AFTER)), [(GUIDE.to_owned(), number)]);
         guide.move_by(DVec3::Z * 1.0e3);

@@ -6,6 +6,7 @@
 //!   a device, in a loop; [`region`]: the vectors that limits allow.
 //! - [`plausibility`]: whether a sample can be true.
 //! - [`coupling`]: two devices held together; [`peer`]: what the two ends tell each other.
+//! - [`guidance`]: the parameters that guide a simulated hand.
 //! - [`terminal`]: text without control characters.
 //! - [`Change`]: a parameter that changed while the loop ran.
 //!
@@ -16,6 +17,7 @@ mod change;
 mod clock;
 pub mod coupling;
 pub mod demand;
+pub mod guidance;
 pub mod limits;
 pub mod mapping;
 pub mod oscillation;

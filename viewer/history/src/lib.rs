@@ -11,8 +11,9 @@ pub mod derived;
 pub mod quantity;
 
 use crate::derived::felt_stiffness_n_per_m;
-use flotor_core::Clock;
+use flotor_core::guidance::is_guidance;
 use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{ChangeOutcome, Clock};
 use flotor_hal::{DVec3, Pose, rotation_vector};
 use flotor_record::{Note, ReadError, Recording, RunDescription};
 use std::collections::VecDeque;
@@ -122,6 +123,8 @@ pub struct History {
     forgotten: u64,
     keep: Keep,
     notes: Vec<Note>,
+    /// Times of the changes of parameters, s, in order.
+    changes_s: VecDeque<f64>,
     device: u16,
 }
 
@@ -138,7 +141,7 @@ impl History {
     pub fn new(run: RunDescription, keep: Keep) -> Self {
         let capacity = if let Keep::Newest(count) = keep { count } else { 0 };
         let samples = VecDeque::with_capacity(capacity);
-        Self { run, samples, forgotten: 0, keep, notes: Vec::new(), device: 0 }
+        Self { run, samples, forgotten: 0, keep, notes: Vec::new(), changes_s: VecDeque::new(), device: 0 }
     }
 
     /// Of each device of a run of which nothing has been seen.
@@ -156,11 +159,18 @@ impl History {
         let mut recording = Recording::open(path)?;
         let mut histories = Self::of_each_device(recording.run(), Keep::All);
         let (mut damage, mut last_ns) = (None, None);
-        for tick in recording.by_ref() {
+        while let Some(tick) = recording.next() {
             match tick {
                 Ok(record) => {
                     last_ns = Some(record.time_ns);
                     histories.iter_mut().for_each(|history| history.push(&record));
+                    let changes = recording.take_changes();
+                    let applied = changes.iter().filter(|change| change.outcome == ChangeOutcome::Applied);
+                    for change in applied {
+                        histories
+                            .iter_mut()
+                            .for_each(|history| history.push_change(change.time_ns, &change.parameter));
+                    }
                 }
                 Err(error) if last_ns.is_none() => return Err(error),
                 Err(error) => damage = Some(error.to_string()),
@@ -207,6 +217,25 @@ impl History {
         let stiffness = felt_stiffness_n_per_m(earlier, &sample) as f32;
         sample.stiffness_n_per_m = stiffness;
         self.samples.push_back(sample);
+    }
+
+    /// Adds a change of a parameter, not earlier than those before it. Changes that guide a hand are left out: there is one with every
+    /// motion of a pointer.
+    pub fn push_change(&mut self, time_ns: u64, parameter: &str) {
+        let [first_s, _] = self.span_s();
+        while self.keep != Keep::All && self.changes_s.front().is_some_and(|time_s| *time_s < first_s) {
+            self.changes_s.pop_front();
+        }
+        if !is_guidance(parameter) {
+            self.changes_s.push_back(seconds(time_ns));
+        }
+    }
+
+    /// Returns the times of the changes of parameters between two times, s, both included; those that guide a hand are left out.
+    pub fn changes_between_s(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = f64> {
+        let start = self.changes_s.partition_point(|time_s| *time_s < from_s);
+        let end = self.changes_s.partition_point(|time_s| *time_s <= to_s).max(start);
+        self.changes_s.range(start..end).copied()
     }
 
     /// How the run was set up.
@@ -338,5 +367,20 @@ mod tests {
         // The second begins anywhere among ten periods, so two ticks may be missing.
         assert!((rate_hz - 1600.0).abs() <= 2.0, "{rate_hz} Hz");
         assert_eq!([history.tick_rate_hz(-1.0), history.tick_rate_hz(0.0)], [None; 2]);
+    }
+
+    #[test]
+    fn changes_that_guide_a_hand_are_left_out_and_those_of_forgotten_ticks_go() {
+        let mut history = History::new(unknown_run(), Keep::Newest(1000));
+        for tick in 0..3000 {
+            let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
+            (record.tick, record.time_ns) = (tick, tick * 1_000_000);
+            history.push(&record);
+            let parameter = if tick % 500 == 0 { "gamma_n" } else { "hand_target_z_mm" };
+            history.push_change(record.time_ns, parameter);
+        }
+        assert_eq!(history.changes_between_s(0.0, 3.0).collect::<Vec<_>>(), [2.0, 2.5]);
+        assert_eq!(history.changes_between_s(2.0, 2.4).collect::<Vec<_>>(), [2.0]);
+        assert_eq!(history.changes_between_s(2.6, 2.1).count(), 0);
     }
 }

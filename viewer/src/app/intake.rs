@@ -86,6 +86,9 @@ impl Viewer {
         for change in &arrivals.changes {
             self.panels.iter_mut().for_each(|panel| panel.take_in(change));
             self.take_in_guide(change);
+            if change.outcome == Outcome::Applied {
+                self.devices.push_change(change.time_ns, &change.parameter);
+            }
         }
         to_draw(&arrivals.changes).into_iter().for_each(|change| self.follow(change));
         for answer in arrivals.answers {

@@ -11,8 +11,10 @@ use std::collections::VecDeque;
 /// Number of intervals, at most, into which the time shown is divided.
 const INTERVALS: usize = 400;
 
-/// Classes of events, the gravest first; each has its colour.
-const RANKS: [Events; 3] = [Events::FAULTS, Events::LIMITS, Events::PARAMETER_CHANGED];
+/// Classes of events of ticks, the gravest first; each has its colour. Changes of parameters are marked from the changes themselves.
+const RANKS: [Events; 2] = [Events::FAULTS, Events::LIMITS];
+/// Name of the mark of a change.
+const CHANGE: &str = "parameter changed";
 
 /// Half the size of the cross of a fault, and how far its middle lies below the top of a trace, points.
 const CROSS_PT: f32 = 4.5;
@@ -85,18 +87,35 @@ impl Marks {
         let strip = Rect::from_min_max(egui::pos2(frame.left(), frame.bottom() - 7.0), frame.max);
         let response = ui.interact(strip, ui.scope_id().with("marks"), Sense::hover());
         let pointed = response.hover_pos().map(|at| at.x);
-        let (mut said, mut all) = (Vec::new(), Events::NONE);
-        for (number, events) in &self.kept {
+        let area = |number: f64| {
             let (from, to) = (x(number * self.width_s), x((number + 1.0) * self.width_s));
-            let area = Rect::from_x_y_ranges(from.max(frame.left())..=to.min(frame.right()), strip.y_range());
-            let Some(rank) = rank(*events) else { continue };
-            all.insert(*events);
-            ui.painter().rect_filled(area, CornerRadius::ZERO, color(rank, palette));
-            if pointed.is_some_and(|at| area.x_range().contains(at)) {
-                said = names(*events);
+            Rect::from_x_y_ranges(from.max(frame.left())..=to.min(frame.right()), strip.y_range())
+        };
+        let is_pointed = |area: Rect| pointed.is_some_and(|at| area.x_range().contains(at));
+        let (mut said, mut has_changes) = (Vec::new(), false);
+        let mut last = f64::NAN;
+        for time_s in history.changes_between_s(span_s[0], span_s[1]) {
+            let number = (time_s / self.width_s).floor();
+            if number == last {
+                continue;
+            }
+            (last, has_changes) = (number, true);
+            ui.painter().rect_filled(area(number), CornerRadius::ZERO, palette.cursor);
+            if is_pointed(area(number)) {
+                said = vec![CHANGE.to_owned()];
             }
         }
-        let all = names(all);
+        let mut all = Events::NONE;
+        for (number, events) in &self.kept {
+            let Some(rank) = rank(*events) else { continue };
+            all.insert(*events);
+            ui.painter().rect_filled(area(*number), CornerRadius::ZERO, color(rank, palette));
+            if is_pointed(area(*number)) {
+                said.extend(names(*events));
+            }
+        }
+        let mut all = names(all);
+        all.extend(has_changes.then(|| CHANGE.to_owned()));
         if !all.is_empty() {
             let label = format!("Marked on the time axis: {}", all.join(", "));
             response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &label));
@@ -122,8 +141,7 @@ fn rank(events: Events) -> Option<usize> {
 fn color(rank: usize, palette: &Palette) -> Color32 {
     match rank {
         0 => palette.fault,
-        1 => palette.warning,
-        _ => palette.cursor,
+        _ => palette.warning,
     }
 }
 

@@ -131,3 +131,23 @@ fn a_recording_and_a_run_that_is_looked_back_at_have_nothing_to_drag() {
     assert!(window.query_by_label(DRAG).is_none());
     host.run_ticks(1, Events::NONE);
 }
+
+/// While a handle is dragged, each picture changes up to four parameters; marks of all would cover the others.
+#[test]
+fn a_drag_makes_no_marks_on_the_time_axis_and_another_change_does() {
+    let (mut window, mut host, _folder) = live(&[]);
+    let change = |host: &mut FakeHost, plugin: &str, parameter: &str| {
+        let [plugin, parameter] = [plugin, parameter].map(str::to_owned);
+        host.changed(&SetValue { plugin, parameter, value: "5.0".to_owned() }, Outcome::Applied);
+        host.run_ticks(10, Events::PARAMETER_CHANGED);
+    };
+    let is_marked =
+        |window: &Window<'_>| window.query_by_label("Marked on the time axis: parameter changed").is_some();
+    change(&mut host, "device", "hand_guide");
+    change(&mut host, "device", "hand_target_z_mm");
+    until(&mut window, |window| window.state().history().len() >= 1520);
+    window.run_steps(2);
+    assert!(!is_marked(&window));
+    change(&mut host, "spring", "gamma_n");
+    until(&mut window, is_marked);
+}
