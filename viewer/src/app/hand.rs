@@ -17,9 +17,8 @@ const HOLDING: Duration = Duration::from_millis(50);
 impl Viewer {
     /// The handles of the newest moment in an area with the 3D view.
     pub(super) fn handles(&mut self, ui: &Ui, area: Rect, samples: &[Sample], palette: &Palette) {
-        let is_now = self.source.is_running() && self.player.motion == Motion::Follow;
         for (device, sample) in samples.iter().enumerate() {
-            if !is_now || !self.guide.has_hand(device) {
+            if !self.can_drag(device) {
                 continue;
             }
             let shape = self.shapes.iter().find(|shape| shape.device() == device);
@@ -51,6 +50,16 @@ impl Viewer {
         if let Some(request) = request {
             self.ask(request);
         }
+    }
+
+    /// Returns whether the handle of a device can be dragged: its hand can be guided, and the newest moment of a session is shown.
+    fn can_drag(&self, device: usize) -> bool {
+        self.source.is_running() && self.player.motion == Motion::Follow && self.guide.has_hand(device)
+    }
+
+    /// Returns whether a hint tells how a handle is dragged: none is, and one can be.
+    pub(super) fn wants_drag_hint(&self) -> bool {
+        self.drag.is_none() && (0..self.devices.count()).any(|device| self.can_drag(device))
     }
 
     /// Hears of a change of the hand: another client may guide it.

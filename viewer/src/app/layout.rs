@@ -12,6 +12,7 @@ use super::{Audience, Source, VIEW_PARTS, Viewer};
 use crate::export::export;
 use crate::palette::Palette;
 use crate::scene::SceneBuilder;
+use crate::ui::handle::HINT;
 use crate::ui::messages::{Extent, Messages};
 use crate::ui::overlay::{Corner, Overlay};
 use crate::ui::plot_stack::{PlotRequest, PlotStack};
@@ -186,6 +187,9 @@ impl Viewer {
         legend::paint(&mut overlay, view, &self.facts, &camera, palette);
         legend::axes(&mut overlay, &self.facts, &camera, palette);
         self.reset_button(ui, &mut overlay);
+        if self.wants_drag_hint() {
+            readout::hint(&mut overlay, HINT, palette);
+        }
         let names = (self.devices.names(), self.devices.chosen());
         legend::names(&mut overlay, view, &self.facts, &camera, names, palette);
     }

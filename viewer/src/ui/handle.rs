@@ -11,6 +11,8 @@ use flotor_hal::DVec3;
 
 /// What the handle is called, with how it is moved.
 pub const DRAG: &str = "Drag the handle; the wheel, Q and E move it nearer and away, Shift ten times finer";
+/// Hint over the view while no handle is dragged.
+pub const HINT: &str = "Drag the handle; wheel, Q, E for its depth, Shift for fine motion";
 /// Distance from the handle at which it can be taken, points.
 const REACH_PT: f32 = 22.0;
 /// Depth for a point of the wheel and for a press of a key, mm.

@@ -68,6 +68,11 @@ pub fn paint_warnings(overlay: &mut Overlay, warnings: &[String], palette: &Pale
     warnings.iter().for_each(|warning| line(overlay, &format!("⚠ {warning}"), BODY_PT, palette.warning));
 }
 
+/// Paints a hint for the experimenter, shortened, into the upper left.
+pub fn hint(overlay: &mut Overlay, text: &str, palette: &Palette) {
+    line(overlay, text, SMALL_PT, palette.faint);
+}
+
 /// Paints a line, shortened to the width of the view, into the upper left.
 fn line(overlay: &mut Overlay, text: &str, size_pt: f32, color: Color32) {
     let width_pt = overlay.inside().width();

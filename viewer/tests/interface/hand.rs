@@ -1,12 +1,13 @@
 //! The pointer as the hand of a simulated device.
 
+use super::texts::texts;
 use super::window::{Window, live, recording, until};
 use crate::support::FakeHost;
 use egui::{Event, Modifiers, MouseWheelUnit, PointerButton, Pos2, vec2};
 use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
 use flotor_live::{Ask, Outcome, SetValue};
-use flotor_viewer::ui::handle::DRAG;
+use flotor_viewer::ui::handle::{DRAG, HINT};
 
 fn button(pos: Pos2, pressed: bool) -> Event {
     Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE }
@@ -123,12 +124,14 @@ fn a_hand_that_another_window_guides_is_left_alone_and_that_is_said() {
 
 #[test]
 fn a_recording_and_a_run_that_is_looked_back_at_have_nothing_to_drag() {
-    assert!(recording().query_by_label(DRAG).is_none());
+    let has_hint = |window: &Window<'_>| texts(window.output()).iter().any(|text| text.words == HINT);
+    let recording = recording();
+    assert!(recording.query_by_label(DRAG).is_none() && !has_hint(&recording));
     let (mut window, mut host, _folder) = live(&[]);
-    assert!(window.query_by_label(DRAG).is_some());
+    assert!(window.query_by_label(DRAG).is_some() && has_hint(&window));
     window.key_press(egui::Key::ArrowLeft);
     window.run_steps(2);
-    assert!(window.query_by_label(DRAG).is_none());
+    assert!(window.query_by_label(DRAG).is_none() && !has_hint(&window));
     host.run_ticks(1, Events::NONE);
 }
 
