@@ -1,8 +1,9 @@
 //! Force over position: the curve that a hand feels, its slope, and the area of its loop.
 
 use crate::palette::Palette;
+use crate::ui::overlay::shortened;
 use crate::ui::plots::{marks, plain, short, y_axis};
-use egui::{Color32, RichText, Ui};
+use egui::{Color32, RichText, TextStyle, Ui, Vec2};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use flotor_history::History;
 use flotor_history::derived::ForcePosition;
@@ -10,6 +11,8 @@ use flotor_history::quantity::{Quantity, Units};
 
 /// Narrower, the choice of the axis has the row alone, points.
 const ROOM_FOR_NAME_PT: f32 = 230.0;
+/// Height of the plot for which the text above it gives way, points.
+const LEAST_PLOT_PT: f32 = 90.0;
 /// Points drawn at most.
 const MOST_POINTS: usize = 2000;
 
@@ -73,16 +76,22 @@ impl ForcePositionPlot {
         self.axis = Some(axis);
         let Some(curve) = self.curve(history, span_s) else { return };
         let said = said(curve, units);
-        ui.weak(&said);
+        text_above(ui, &said);
         let points: Vec<[f64; 2]> = curve.thinned(MOST_POINTS).map(|[x, force]| [x * per_m, force]).collect();
         let name = Quantity::Position.components()[axis];
         let x_axis =
             AxisHints::new_x().formatter(|mark, _| short(mark.value)).label(format!("{name}, {length}"));
         let plot = Plot::new(("force over position", axis))
+            .min_size(Vec2::ZERO)
+            .height(ui.available_height())
             .custom_x_axes(vec![x_axis])
             .custom_y_axes(vec![y_axis(44.0).label("N")])
             .x_grid_spacer(|grid| marks(grid.bounds));
-        let shown = plain(plot, palette).show(ui, |plot| {
+        let least = |quantity: Quantity| quantity.least_range(units);
+        let [along, across] = least_ranges(&points, [least(Quantity::Position), least(Quantity::Force)]);
+        let plot = along.into_iter().fold(plain(plot, palette), Plot::include_x);
+        let plot = across.into_iter().fold(plot, Plot::include_y);
+        let shown = plot.show(ui, |plot| {
             let line = Line::new("curve", PlotPoints::from(points)).allow_band(false);
             plot.line(line.color(palette.components[axis]).width(1.4));
             if let Some(sample) = history.seen_at(cursor_s) {
@@ -93,6 +102,28 @@ impl ForcePositionPlot {
         });
         let label = format!("Force over position, N and {length}: {said}");
         shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &label));
+    }
+}
+
+/// Returns, for each axis of some points, the ends of a range about their middle that is as wide as the least range of the axis:
+/// smaller differences are rounding.
+fn least_ranges(points: &[[f64; 2]], least: [f64; 2]) -> [[f64; 2]; 2] {
+    std::array::from_fn(|axis| {
+        let values = points.iter().map(|point| point[axis]);
+        let ends = values.fold([f64::MAX, f64::MIN], |[low, high], value| [low.min(value), high.max(value)]);
+        let middle = if points.is_empty() { 0.0 } else { 0.5 * (ends[0] + ends[1]) };
+        [-0.5, 0.5].map(|part| middle + part * least[axis])
+    })
+}
+
+/// Shows slopes and area above the plot, as far as the plot keeps its room: in several lines, in one with "…", or not.
+fn text_above(ui: &mut Ui, text: &str) {
+    let (font, color) = (TextStyle::Body.resolve(ui.style()), ui.visuals().weak_text_color());
+    let (width_pt, room_pt) = (ui.available_width(), ui.available_height() - LEAST_PLOT_PT);
+    let whole = ui.painter().layout(text.to_owned(), font.clone(), color, width_pt);
+    let line = shortened(ui.painter(), text, font, color, width_pt);
+    if let Some(galley) = [whole, line].into_iter().find(|galley| galley.size().y <= room_pt) {
+        ui.label(galley).on_hover_text(text);
     }
 }
 
@@ -111,4 +142,18 @@ pub fn said(curve: &ForcePosition, units: Units) -> String {
     });
     let parts: Vec<String> = contact.into_iter().chain(all).chain(area).collect();
     if parts.is_empty() { "the handle rests".to_owned() } else { parts.join("  ·  ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_that_differ_by_rounding_are_in_the_middle_of_the_least_range() {
+        let points = [[-20.0, 3.0], [-20.0 + 1.0e-12, 3.0 - 1.0e-12]];
+        let [along, across] = least_ranges(&points, [1.0e-3, 1.0e-3]);
+        assert!((along[0] + 20.0005).abs() < 1.0e-9 && (along[1] + 19.9995).abs() < 1.0e-9, "{along:?}");
+        assert!((across[0] - 2.9995).abs() < 1.0e-9 && (across[1] - 3.0005).abs() < 1.0e-9, "{across:?}");
+        assert_eq!(least_ranges(&[], [2.0, 4.0]), [[-1.0, 1.0], [-2.0, 2.0]]);
+    }
 }

@@ -113,17 +113,27 @@ fn panel(window: &Window<'_>, size: Vec2) -> Option<Rect> {
     Some(Rect::from_min_max(egui::pos2(left, 70.0), egui::pos2(left, 0.0) + size))
 }
 
-/// Goes through all sizes and scales; before each picture, `prepare` is called.
+/// Gives a window a size, pixels, at a scale, and returns its size, points. The picture of a new scale keeps the size of the one before, so the
+/// size comes after it.
+fn resize(window: &mut Window<'_>, size: [f32; 2], scale: f32) -> Vec2 {
+    let points = Vec2::from(size) / scale;
+    window.set_pixels_per_point(scale);
+    window.run_steps(1);
+    window.set_size(points);
+    window.run_steps(1);
+    let shown = window.ctx.content_rect().size();
+    assert!((shown - points).length() < 0.1, "{shown:?} in place of {size:?} px at {scale}");
+    points
+}
+
+/// Goes through all sizes and scales; before each size, `prepare` is called.
 fn in_all_sizes(window: &mut Window<'_>, case: &str, mut prepare: impl FnMut(&mut Window<'_>)) {
     for size in SIZES {
         for scale in SCALES {
-            let points = Vec2::from(size) / scale;
-            window.set_size(points).set_pixels_per_point(scale);
+            prepare(window);
+            let points = resize(window, size, scale);
             // Bounds of plots and widths of panels are those of the picture before.
-            for _ in 0..3 {
-                prepare(window);
-                window.run_steps(1);
-            }
+            window.run_steps(2);
             let case = format!("{case}, {size:?} px at {scale}");
             let texts = texts(window.output());
             assert_apart(&texts, points, panel(window, points), &case);
@@ -206,8 +216,7 @@ fn no_texts_of_an_empty_window_overlap() {
     window.state_mut().recall(&context, &remembered);
     for size in SIZES {
         for scale in SCALES {
-            let points = Vec2::from(size) / scale;
-            window.set_size(points).set_pixels_per_point(scale);
+            let points = resize(&mut window, size, scale);
             window.run_steps(3);
             assert_apart(&texts(window.output()), points, None, &format!("empty, {size:?} px at {scale}"));
         }
