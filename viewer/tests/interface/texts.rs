@@ -150,11 +150,16 @@ fn in_all_sizes(window: &mut Window<'_>, case: &str, mut prepare: impl FnMut(&mu
     }
 }
 
-/// A window on a run of devices: quiet, with warnings, and after a fault.
-fn live(names: &[&str], title: &str, look: Look) {
+/// A window on a run of devices without a model.
+fn devices(names: &[&str], title: &str, look: Look) {
     let count = u16::try_from(names.len()).expect("a handful");
     let folder = tempfile::tempdir().expect("a scratch folder");
-    let mut host = FakeHost::of_devices(&folder, title, names);
+    let host = FakeHost::of_devices(&folder, title, names);
+    live(host, count, look, &format!("{} devices called {}.., {look:?}", names.len(), names[0]));
+}
+
+/// A window on a run of so many devices: quiet, with warnings, and after a fault.
+fn live(mut host: FakeHost, count: u16, look: Look, case: &str) {
     let mut window = host.welcome(|directory| {
         let start = Start::Live(Wanted::newest(directory.clone()));
         let harness = Harness::builder().with_size(vec2(640.0, 400.0));
@@ -163,7 +168,6 @@ fn live(names: &[&str], title: &str, look: Look) {
     assert_eq!(host.request(None), Ask::Watch { every: 1 });
     host.run_ticks_of(count, 1200, Events::NONE);
     until(&mut window, |window| window.state().history().len() >= 1200);
-    let case = format!("{} devices called {}.., {look:?}", names.len(), names[0]);
     in_all_sizes(&mut window, &format!("{case}, quiet"), |_| host.run_ticks_of(count, 1, Events::NONE));
     in_all_sizes(&mut window, &format!("{case}, warned"), |_| host.run_ticks_of(count, 1, WARNINGS));
     let four = vec![Quantity::Force, Quantity::Torque, Quantity::Velocity, Quantity::Lateness];
@@ -180,26 +184,33 @@ fn live(names: &[&str], title: &str, look: Look) {
 
 #[test]
 fn no_texts_overlap_with_one_device() {
-    live(&SHORT[..1], TITLES[1], Look::Dark);
-    live(&LONG[..1], TITLES[0], Look::Light);
+    devices(&SHORT[..1], TITLES[1], Look::Dark);
+    devices(&LONG[..1], TITLES[0], Look::Light);
 }
 
 #[test]
 fn no_texts_overlap_with_two_devices() {
-    live(&SHORT[..2], TITLES[0], Look::Light);
-    live(&LONG[..2], TITLES[1], Look::Dark);
+    devices(&SHORT[..2], TITLES[0], Look::Light);
+    devices(&LONG[..2], TITLES[1], Look::Dark);
 }
 
 #[test]
 fn no_texts_overlap_with_three_devices() {
-    live(&SHORT[..3], TITLES[0], Look::Dark);
-    live(&LONG[..3], TITLES[1], Look::Light);
+    devices(&SHORT[..3], TITLES[0], Look::Dark);
+    devices(&LONG[..3], TITLES[1], Look::Light);
 }
 
 #[test]
 fn no_texts_overlap_with_four_devices() {
-    live(&SHORT, TITLES[1], Look::Light);
-    live(&LONG, TITLES[0], Look::Dark);
+    devices(&SHORT, TITLES[1], Look::Light);
+    devices(&LONG, TITLES[0], Look::Dark);
+}
+
+/// A handle in a wall has its contact, and a hint how it is dragged.
+#[test]
+fn no_texts_overlap_with_a_contact_and_a_hand() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    live(FakeHost::of_model(&folder, "wall", &[]), 1, Look::Dark, "a hand at a wall");
 }
 
 /// The window without a run, which offers recordings.

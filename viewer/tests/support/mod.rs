@@ -38,15 +38,20 @@ pub(crate) fn plugin_file(name: &str) -> PathBuf {
 
 /// A run of a spring that nobody computes: what `flotor run` would say of it.
 pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<PanelPlugin>) {
-    let file = plugin_file("spring");
-    let plugin = flotor_viewer::shape::load_file(&file).expect("the spring loads");
+    model_run("spring", settings)
+}
+
+/// A run of a model that nobody computes: what `flotor run` would say of it.
+pub(crate) fn model_run(id: &str, settings: &[(&str, &str)]) -> (RunDescription, Vec<PanelPlugin>) {
+    let file = plugin_file(id);
+    let plugin = flotor_viewer::shape::load_file(&file).expect("the model loads");
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     let settings: Vec<(String, String)> = settings.iter().map(owned).collect();
     let parse = |(key, value): &(String, String)| {
         flotor_hal::abi::loader::Setting::parse(plugin.parameters(), key, value).expect("a legal setting")
     };
     let parsed: Vec<_> = settings.iter().map(parse).collect();
-    let mut model = plugin.create_model(&parsed).expect("a legal spring");
+    let mut model = plugin.create_model(&parsed).expect("a legal model");
     let schema = plugin.parameters();
     let in_force = schema.iter().enumerate().map(|(index, parameter)| {
         let number = model.parameter(index);
@@ -80,15 +85,14 @@ pub(crate) fn spring_run(settings: &[(&str, &str)]) -> (RunDescription, Vec<Pane
         scene_toml: "title = \"A spring under test\"\n".to_owned(),
         plugins: vec![
             description("device", Role::Device, Vec::new(), Vec::new()),
-            description("spring", Role::Model(MappingConfig::default()), settings, parameters.clone()),
+            description(id, Role::Model(MappingConfig::default()), settings, parameters.clone()),
         ],
         couplings: Vec::new(),
     };
     let number = |(_, value): &(String, String)| value.parse().unwrap_or(f64::NAN);
     let values = parameters.iter().map(number);
     let soft: Vec<_> = schema.iter().zip(values).map(|(one, value)| SoftRange::around(one, value)).collect();
-    let panels =
-        vec![guided_device(), PanelPlugin::new("spring", "spring", file, schema, &parameters, &soft)];
+    let panels = vec![guided_device(), PanelPlugin::new(id, id, file, schema, &parameters, &soft)];
     (run, panels)
 }
 
@@ -145,9 +149,14 @@ pub(crate) struct FakeHost {
 impl FakeHost {
     /// Listens in a folder of its own.
     pub(crate) fn new(folder: &tempfile::TempDir, settings: &[(&str, &str)]) -> Self {
+        Self::of_model(folder, "spring", settings)
+    }
+
+    /// Listens in a folder of its own, for a run of a simulated device with a model.
+    pub(crate) fn of_model(folder: &tempfile::TempDir, id: &str, settings: &[(&str, &str)]) -> Self {
         let directory = Directory::at(folder.path().join("runs"));
         let listener = directory.listen().expect("a scratch folder takes a socket");
-        let (run, plugins) = spring_run(settings);
+        let (run, plugins) = model_run(id, settings);
         let greeting = Greeting {
             protocol: PROTOCOL,
             flotor_version: "0.1.0".to_owned(),
