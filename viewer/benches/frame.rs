@@ -18,7 +18,7 @@ use flotor_sync::Words;
 use flotor_viewer::app::{Recorded, Start, Viewer};
 use flotor_viewer::canvas::Canvas;
 use flotor_viewer::palette::{Look, Palette};
-use flotor_viewer::scene::{ArrowScale, SceneBuilder};
+use flotor_viewer::scene::{ArrowScale, Moment, SceneBuilder};
 use flotor_viewer::shape::shapes_of;
 use flotor_viewer::trace::Trace;
 use std::hint::black_box;
@@ -126,8 +126,15 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
             bench.iter(|| {
                 moment_s = (moment_s + 0.016) % 10.0;
                 let sample = history.at(moment_s).expect("ten seconds");
-                let (mesh, facts) =
-                    builder.build(&mut shapes, &[*sample], &palette, &camera, HEIGHT_PX, scale, true);
+                let (mesh, facts) = builder.build(
+                    &mut shapes,
+                    Moment::of(&[*sample]),
+                    &palette,
+                    &camera,
+                    HEIGHT_PX,
+                    scale,
+                    true,
+                );
                 black_box((mesh.indices.len(), facts))
             });
         });
@@ -143,7 +150,7 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
             let sample = *history.at(moment_s).expect("ten seconds");
             let samples = [sample, sample];
             let (mesh, facts) =
-                builder.build(&mut shapes, &samples, &palette, &camera, HEIGHT_PX, scale, true);
+                builder.build(&mut shapes, Moment::of(&samples), &palette, &camera, HEIGHT_PX, scale, true);
             black_box((mesh.indices.len(), facts))
         });
     });
@@ -199,8 +206,15 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let (palette, scale) = (Palette::of(Look::Dark), ArrowScale::fitting(run.samples()));
     let sample = run.at(0.2).expect("ten seconds");
     let mut builder = SceneBuilder::default();
-    let (mesh, _) =
-        builder.build(&mut shapes, &[*sample], &palette, &camera, SCENE_PX[1] as f64, scale, true);
+    let (mesh, _) = builder.build(
+        &mut shapes,
+        Moment::of(&[*sample]),
+        &palette,
+        &camera,
+        SCENE_PX[1] as f64,
+        scale,
+        true,
+    );
     let mut canvas = Canvas::new(None);
     criterion.bench_function("3D scene drawn on the processor", |bench| {
         bench.iter(|| black_box(canvas.draw(&context, mesh, &camera, palette.backdrop, SCENE_PX)));
@@ -263,7 +277,8 @@ fn scene_by_adapter(criterion: &mut Criterion) {
     let scale = ArrowScale::fitting(history.samples());
     let sample = *history.at(0.2).expect("ten seconds");
     let mut builder = SceneBuilder::default();
-    let (mesh, _) = builder.build(&mut shapes, &[sample], &palette, &camera, HEIGHT_PX, scale, true);
+    let (mesh, _) =
+        builder.build(&mut shapes, Moment::of(&[sample]), &palette, &camera, HEIGHT_PX, scale, true);
     let mut scene = GpuScene::new(&state.device, &state.queue);
     criterion.bench_function(
         &format!("3D scene at 1280x800 drawn by {} ({})", info.name, info.backend),

@@ -5,7 +5,7 @@
 //!
 //! - [`feed`] reads the history of a running host (`flotor-history`), [`player`] says which moment is shown, [`tally`] counts events,
 //!   [`panel`] is what can be set.
-//! - [`devices`]: the devices of a run, one of which is looked at.
+//! - [`devices`]: the devices of a run, one of which is looked at; [`compared`]: a second recording over them.
 //! - [`trace`]: the points of a plot from picture to picture; [`export`] of traces as files, [`chosen`] on a command line.
 //! - [`shape`]: where the bodies of the models are; [`scene`] makes triangles of them with `flotor-drawing`, [`placing`] says where devices stand.
 //! - [`canvas`]: the 3D view in the interface, drawn on a GPU or the processor; [`picture`] a whole picture without a window, whose
@@ -20,6 +20,7 @@
 pub mod app;
 pub mod canvas;
 pub mod chosen;
+pub mod compared;
 pub mod cost;
 pub mod devices;
 pub mod experiment;

@@ -10,6 +10,7 @@ use flotor_live::Directory;
 use flotor_study::screen::{Screen, Told};
 use flotor_viewer::app::{Recorded, Start, Viewer, Wanted};
 use flotor_viewer::chosen::Chosen;
+use flotor_viewer::compared::Compared;
 use flotor_viewer::devices::Devices;
 use flotor_viewer::experiment::texts::Texts;
 use flotor_viewer::experiment::wire::at_standard_streams;
@@ -32,8 +33,9 @@ use std::sync::mpsc::channel;
 #[derive(Parser)]
 #[command(name = "flotor-viewer", version, about, max_term_width = 110)]
 struct Arguments {
-    /// Recording to show; without one, the newest running host
-    recording: Option<PathBuf>,
+    /// Recording to show, and a second one over it, dashed; without one, the newest running host
+    #[arg(value_name = "FILE.mcap", num_args = 0..=2)]
+    recording: Vec<PathBuf>,
     /// File of a plugin whose shape may be drawn (repeatable)
     #[arg(long = "plugin", value_name = "PLUGIN.so")]
     plugins: Vec<PathBuf>,
@@ -171,7 +173,13 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     fits_file(arguments).map_err(Failure::usage)?;
     let read = |path: &PathBuf| History::read(path).map_err(Failure::usage);
-    let history = arguments.recording.as_ref().map(read).transpose()?;
+    let is_file = arguments.export.is_some() || arguments.screenshot.is_some() && !arguments.window;
+    if arguments.recording.len() > 1 && is_file {
+        return Err(Failure::usage(
+            "a second recording is shown in the window and in a picture of it: name one, or `--screenshot` with `--window`",
+        ));
+    }
+    let history = arguments.recording.first().map(read).transpose()?;
     let chosen = chosen(arguments, history.as_deref().unwrap_or_default()).map_err(Failure::usage)?;
     match (history, &arguments.screenshot) {
         (Some(history), None) if arguments.export.is_some() => traces(arguments, history, &chosen),
@@ -181,7 +189,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         (Some(history), Some(out)) => screenshot(arguments, history, chosen, out),
         (history, _) => {
             let start = match history {
-                Some(histories) => Start::Recording(recorded(arguments, histories)),
+                Some(histories) => Start::Recording(recorded(arguments, histories)?),
                 None => live(arguments)?,
             };
             let cost = open(start, chosen, arguments.request)?;
@@ -220,10 +228,12 @@ fn chosen(arguments: &Arguments, histories: &[History]) -> Result<Chosen, Pictur
     Ok(chosen.with_arrow_force(arguments.arrow_force))
 }
 
-/// Returns the recording of the command line at its moment.
-fn recorded(arguments: &Arguments, histories: Vec<History>) -> Recorded {
-    let (file, at_s) = (arguments.recording.clone(), arguments.at);
-    Recorded { file, at_s, ..Recorded::new(histories, arguments.plugins.clone()) }
+/// Returns the recording of the command line at its moment, with the second one.
+fn recorded(arguments: &Arguments, histories: Vec<History>) -> Result<Recorded, Failure> {
+    let (file, at_s) = (arguments.recording.first().cloned(), arguments.at);
+    let second = arguments.recording.get(1).map(|file| Compared::read(file));
+    let compared = second.transpose().map_err(Failure::usage)?;
+    Ok(Recorded { file, at_s, compared, ..Recorded::new(histories, arguments.plugins.clone()) })
 }
 
 /// A running host: for an experimenter, or in front of a person in a sitting.
@@ -247,7 +257,7 @@ fn whole_window(
     out: &Path,
 ) -> Result<(), Failure> {
     let (look, size, scale) = of_picture(arguments.request);
-    let start = Start::Recording(recorded(arguments, history));
+    let start = Start::Recording(recorded(arguments, history)?);
     let mut viewer = Viewer::new(&egui::Context::default(), None, start, look);
     viewer.choose(chosen);
     // The experiment's end of the way to the screen stays open while it is drawn.

@@ -5,10 +5,10 @@ use crate::chosen::Chosen;
 use crate::devices::Devices;
 use crate::flat::FlatRasterizer;
 use crate::palette::{Look, Palette};
-use crate::scene::{SceneBuilder, SceneFacts};
+use crate::scene::{Moment, SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use crate::ui::overlay::Overlay;
-use crate::ui::plot_stack::{PlotStack, TooLow, Window};
+use crate::ui::plot_stack::{PlotStack, Seen, TooLow, Window};
 use crate::ui::view3d::{Subject, View3d};
 use crate::ui::{legend, readout, style};
 use egui::{ColorImage, Context, RawInput, Rect, Ui, pos2, vec2};
@@ -167,7 +167,7 @@ pub fn interface(
         let (heading, below_heading) =
             view.split_top_bottom_at_y(view.top() + readout::heading_pt(warnings.len()));
         let body = if warnings.is_empty() { view } else { below_heading };
-        let subject = Subject { shapes, version: 0, samples: &samples, scale };
+        let subject = Subject { shapes, version: 0, moment: Moment::of(&samples), scale };
         facts = view3d.show(ui, body, look, subject);
         let mut overlay = Overlay::new(ui.painter(), if warnings.is_empty() { view } else { heading });
         readout::title(&mut overlay, devices.history().run(), &palette);
@@ -184,7 +184,8 @@ pub fn interface(
         legend::names(&mut overlay, body, &facts, &camera, names, &palette);
         let below = Rect::from_min_max(view.left_bottom() + vec2(14.0, 8.0), area.max - vec2(4.0, 4.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below));
-        plots.still(&mut ui, (devices.history(), devices.name()), sample.time_s(), &palette);
+        let seen = Seen { history: devices.history(), device: devices.name(), compared: None };
+        plots.still(&mut ui, seen, sample.time_s(), &palette);
     })
 }
 

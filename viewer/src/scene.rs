@@ -10,7 +10,7 @@ use flotor_drawing::geometry::{
     append_primitive, append_surface, append_tube, contact_strain, force_arrow, plate, torque_arrow,
 };
 use flotor_drawing::light;
-use flotor_hal::{DVec3, Part, Pose, ScalarField, Wrench};
+use flotor_hal::{DVec3, Part, Pose, Primitive, ScalarField, Wrench};
 use flotor_history::Sample;
 
 /// Lengths of arrows.
@@ -55,6 +55,23 @@ impl ArrowScale {
 
 /// The largest force has an arrow so much shorter than the body: at rest, too, its tip is in sight of the experimenter's view.
 const FULL_FORCE: f64 = 3.6;
+
+/// What a scene shows of a moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a> {
+    /// The sample of each device.
+    pub samples: &'a [Sample],
+    /// The pose of each handle of a second recording in its device frame, drawn seen through.
+    pub compared: &'a [Option<Pose>],
+}
+
+impl<'a> Moment<'a> {
+    /// Shows samples without a second recording.
+    #[must_use]
+    pub const fn of(samples: &'a [Sample]) -> Self {
+        Self { samples, compared: &[] }
+    }
+}
 
 /// A scene being put together; keeps its memory from frame to frame.
 #[derive(Default)]
@@ -150,12 +167,12 @@ impl SceneBuilder {
         Extent { height_mm, width_mm: MM_PER_M * placing.width_m() }
     }
 
-    /// Puts together the scene at a sample of each device, seen at a height of so many pixels.
+    /// Puts together the scene at a moment, seen at a height of so many pixels.
     #[allow(clippy::too_many_arguments)] // one call site for each, and no two belong together
     pub fn build(
         &mut self,
         shapes: &mut [Shape],
-        samples: &[Sample],
+        Moment { samples, compared }: Moment<'_>,
         palette: &Palette,
         camera: &Camera,
         height_px: f64,
@@ -187,12 +204,16 @@ impl SceneBuilder {
             let place_m = placing.place_m(device);
             let first = shapes.iter().find(|shape| shape.device() == device);
             let handle = in_scene_frame(first, sample);
+            let compared = compared.get(device).copied().flatten().map(|pose| Handle::of(first, &pose));
             all_shadows.extend(
                 shadows(&ground, palette, plate_radius_m, handle.0.position())
                     .map(|shadow| Shadow { center_m: shadow.center_m + place_m.truncate(), ..shadow }),
             );
             let start = self.mesh.vertices.len();
             self.bodies(shapes, (device, sample), palette, pixels_per_mm, &mut facts);
+            compared
+                .iter()
+                .for_each(|handle| self.compared_handle(handle, palette, height_m, plate_radius_m));
             if shows_arrows {
                 self.arrows(handle, palette, scale, height_m, plate_radius_m);
             }
@@ -324,6 +345,24 @@ impl SceneBuilder {
         plate(&mut self.mesh, &section, radius_m, PLATE_THICKNESS * radius_m, 1.0, palette.plates[0]);
     }
 
+    /// Adds the handle of a second recording, seen through.
+    fn compared_handle(&mut self, handle: &Handle, palette: &Palette, height_m: f64, plate_radius_m: f64) {
+        /// Radius of a ball, part of the height of the scene.
+        const BALL: f64 = 0.06;
+        let color = with_opacity(palette.plates[1], SEEN_THROUGH);
+        match *handle {
+            Handle::Plate(pose) => {
+                let section = Section { center_m: pose.position(), orientation: pose.orientation() };
+                let depth_m = PLATE_THICKNESS * plate_radius_m;
+                plate(&mut self.mesh, &section, plate_radius_m, depth_m, 1.0, color);
+            }
+            Handle::Ball(pose) => {
+                let ball = Primitive::sphere(Part::Tool, pose, BALL * height_m);
+                append_primitive(&mut self.mesh, &ball, color);
+            }
+        }
+    }
+
     fn arrows(
         &mut self,
         (handle, wrench): (Pose, Wrench),
@@ -347,6 +386,23 @@ impl SceneBuilder {
             0.7 * shaft_m,
             palette.torque,
         );
+    }
+}
+
+/// The handle of a second recording in the frame of the scene: the plate at the end of a slender body, else a ball.
+enum Handle {
+    Plate(Pose),
+    Ball(Pose),
+}
+
+impl Handle {
+    /// Places the handle of a device with this first shape at a pose of the device frame.
+    fn of(first: Option<&Shape>, pose: &Pose) -> Self {
+        match first.map(|shape| (shape.rest(), shape.mapping().pose_to_model(pose))) {
+            Some((Rest::Slender(_), pose)) => Self::Plate(pose),
+            Some((Rest::Solid(_), pose)) => Self::Ball(pose),
+            None => Self::Ball(*pose),
+        }
     }
 }
 
@@ -496,7 +552,10 @@ mod tests {
     fn build(builder: &mut SceneBuilder, sample: &Sample, shows_arrows: bool) -> Mesh {
         let (palette, camera) = (Palette::of(Look::Dark), Camera::experimenter(SceneBuilder::height_mm(&[])));
         let scale = ArrowScale::fitting([sample].into_iter());
-        builder.build(&mut [], &[*sample], &palette, &camera, 400.0, scale, shows_arrows).0.clone()
+        builder
+            .build(&mut [], Moment::of(&[*sample]), &palette, &camera, 400.0, scale, shows_arrows)
+            .0
+            .clone()
     }
 
     #[test]

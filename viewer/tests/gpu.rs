@@ -15,7 +15,7 @@ use flotor_history::{History, Keep, Sample};
 use flotor_viewer::app::{Recorded, Start, Viewer};
 use flotor_viewer::palette::{Look, Palette};
 use flotor_viewer::picture::{draw_without_window, write_png};
-use flotor_viewer::scene::{ArrowScale, SceneBuilder};
+use flotor_viewer::scene::{ArrowScale, Moment, SceneBuilder};
 use flotor_viewer::shape::shapes_of;
 use std::time::Duration;
 use support::tools::{Tool, lacks};
@@ -91,7 +91,8 @@ fn an_adapter_and_the_processor_draw_the_same_scene() {
         let palette = Palette::of(look);
         let (camera, size) = (Camera::experimenter(SceneBuilder::height_mm(&shapes)), [641, 400]);
         let (mut builder, scale) = (SceneBuilder::default(), ArrowScale::fitting([&sample].into_iter()));
-        let (mesh, _) = builder.build(&mut shapes, &[sample], &palette, &camera, 400.0, scale, true);
+        let (mesh, _) =
+            builder.build(&mut shapes, Moment::of(&[sample]), &palette, &camera, 400.0, scale, true);
         let drawn = read(&state, gpu.draw(mesh, &camera, palette.backdrop, size).texture());
         let expected = Rasterizer::default().draw(mesh, &camera, palette.backdrop, size, 4);
         assert_eq!(drawn.size, expected.size);

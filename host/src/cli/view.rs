@@ -17,6 +17,7 @@ use std::process::Stdio;
     flotor view                                   the session in another terminal\n  \
     flotor view zenoh/lab                         a session on another machine (`flotor bridge`)\n  \
     flotor run --clock virtual --record run.mcap && flotor view run.mcap\n  \
+    flotor view before.mcap after.mcap            two recordings over each other\n  \
     flotor view --screenshot run.png run.mcap     a picture, without display or GPU\n  \
     flotor view --screenshot run.png --at 2.5 --look light --size 1920x1200 --scale 1.5 run.mcap\n  \
     flotor view --screenshot run.png --view 80,5,1.5 run.mcap\n  \
@@ -25,6 +26,9 @@ pub(crate) struct ViewArguments {
     /// Recording, or zenoh/NAME for a remote session (default: the running host)
     #[arg(value_name = "FILE.mcap | zenoh/NAME")]
     file: Option<PathBuf>,
+    /// Second recording, over the first: dashed traces, and the handle seen through
+    #[arg(value_name = "FILE.mcap", conflicts_with_all = ["export", "screen"])]
+    second: Option<PathBuf>,
     /// Write a picture of one moment; needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "file")]
     screenshot: Option<PathBuf>,
@@ -110,6 +114,9 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         if let Some((_, what)) = written.iter().find(|(out, _)| out.is_some()) {
             tell_damage(file, recording, what);
         }
+        if let Some(second) = &arguments.second {
+            Recording::open(second)?;
+        }
     } else {
         // The window may open a recording of any of them.
         registry.found().iter().for_each(|plugin| add("--plugin", plugin.path.clone().into()));
@@ -142,7 +149,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         add("--screenshot", screenshot.into());
     }
     for_viewer.extend(arguments.window.then(|| "--window".into()));
-    for_viewer.extend(file.map(|file| file.into()));
+    for_viewer.extend(file.into_iter().chain(&arguments.second).map(|file| file.into()));
     match remote {
         None => SeparateProgram::VIEWER.become_with(&for_viewer),
         Some(name) => view_remote(&arguments.way.arguments("attach", name.as_os_str()), for_viewer),
@@ -173,6 +180,7 @@ fn of_recordings_only(arguments: &ViewArguments) -> Option<&'static str> {
         (arguments.export.is_some(), "a file of traces"),
         (arguments.device.is_some(), "`--device`"),
         (arguments.at.is_some(), "`--at`"),
+        (arguments.second.is_some(), "a second recording"),
     ];
     all.into_iter().find_map(|(is_wanted, what)| is_wanted.then_some(what))
 }

@@ -69,6 +69,7 @@ impl Viewer {
         self.limits = feed.greeting().limits;
         (self.guide, self.drag) = (Guide::new(&feed.greeting().plugins), None);
         self.player = Player::live();
+        self.compared = None;
         self.plots.start_over();
         self.view.reset(SceneBuilder::extent(&parts.shapes, self.devices.count()));
         (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);

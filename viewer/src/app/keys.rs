@@ -79,8 +79,8 @@ impl Viewer {
         if pressed(Key::F1) || ui.input(|input| input.events.contains(&egui::Event::Text("?".to_owned()))) {
             self.shows_keys = !self.shows_keys;
         }
-        if self.shows_keys && pressed(Key::Escape) {
-            self.shows_keys = false;
+        if pressed(Key::Escape) && !std::mem::take(&mut self.shows_keys) {
+            self.compared = None;
         }
         if pressed(Key::L) {
             self.switch_look(ui.ctx());

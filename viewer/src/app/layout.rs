@@ -9,13 +9,14 @@
 
 use super::words::State;
 use super::{Audience, Source, VIEW_PARTS, Viewer};
+use crate::compared::Compared;
 use crate::export::export;
 use crate::palette::Palette;
-use crate::scene::SceneBuilder;
+use crate::scene::{Moment, SceneBuilder};
 use crate::ui::handle::HINT;
 use crate::ui::messages::{Extent, Messages};
 use crate::ui::overlay::{Corner, Overlay};
-use crate::ui::plot_stack::{PlotRequest, PlotStack};
+use crate::ui::plot_stack::{PlotRequest, PlotStack, Seen};
 use crate::ui::style::SMALL_PT;
 use crate::ui::top_bar::{PanelSwitch, STOP, Stop, TopBar, TopBarRequest};
 use crate::ui::view3d::Subject;
@@ -100,7 +101,8 @@ impl Viewer {
     pub(super) fn messages(&mut self, ui: &mut Ui, palette: &Palette) {
         const MARGIN_PT: i8 = 16;
         let warnings = self.warnings();
-        let otherwise = self.done().unwrap_or_else(|| self.heading.subtitle.clone());
+        let compared = || self.compared.as_ref().map(Compared::text);
+        let otherwise = self.done().or_else(compared).unwrap_or_else(|| self.heading.subtitle.clone());
         let is_over = matches!(self.source, Source::Live { .. }) && !self.source.is_running();
         let extent = if is_over {
             Extent::Lines { most_pt: MOST_OF_HEIGHT * ui.available_height() }
@@ -211,7 +213,8 @@ impl Viewer {
     fn traces(&mut self, ui: &mut Ui, area: Rect, palette: &Palette) {
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(area).id_salt("plots"));
         let motion = self.player.motion;
-        let seen = (self.devices.history(), self.devices.name());
+        let compared = self.compared.as_ref().and_then(|compared| compared.history(self.devices.chosen()));
+        let seen = Seen { history: self.devices.history(), device: self.devices.name(), compared };
         let requests = self.plots.show(&mut ui, seen, self.player.now_s, motion, palette);
         for request in requests {
             match request {
@@ -272,7 +275,9 @@ impl Viewer {
     pub(super) fn scene(&mut self, ui: &mut Ui, area: Rect, samples: &[Sample]) {
         let (shapes, version, scale) =
             (&mut self.shapes, self.shape_version, self.devices.scale().with_chosen(self.arrow_force_n));
-        self.facts = self.view.show(ui, area, self.look, Subject { shapes, version, samples, scale });
+        let handles = self.compared.as_ref().map(|compared| compared.handles(self.player.now_s));
+        let moment = Moment { samples, compared: handles.as_deref().unwrap_or_default() };
+        self.facts = self.view.show(ui, area, self.look, Subject { shapes, version, moment, scale });
     }
 
     /// Says that there is nothing to show and what to do; while there is no run, offers recordings.

@@ -16,6 +16,7 @@ pub use source::{Pace, Source, Wanted, connect};
 
 use crate::canvas::Canvas;
 use crate::chosen::Chosen;
+use crate::compared::Compared;
 use crate::devices::Devices;
 use crate::experiment::Prompt;
 use crate::frame_rate::FrameRate;
@@ -75,13 +76,15 @@ pub struct Recorded {
     pub at_s: Option<f64>,
     /// Files of the plugins whose bodies can be drawn.
     pub plugins: Vec<PathBuf>,
+    /// A second recording over this one.
+    pub compared: Option<Compared>,
 }
 
 impl Recorded {
     /// Shows the samples of each device at the moment of the largest force.
     #[must_use]
     pub fn new(histories: Vec<History>, plugins: Vec<PathBuf>) -> Self {
-        Self { file: None, histories, at_s: None, plugins }
+        Self { file: None, histories, at_s: None, plugins, compared: None }
     }
 }
 
@@ -105,6 +108,8 @@ pub struct Viewer {
     drag: Option<Drag>,
     plots: PlotStack,
     opening: Opening,
+    /// The recording over the run that is shown.
+    compared: Option<Compared>,
     look: Look,
     /// What was chosen, if anything was.
     shows_panel: Option<bool>,
@@ -177,6 +182,7 @@ impl Viewer {
             drag: None,
             plots: PlotStack::new(Window::Newest(LIVE_WINDOW_S)),
             opening: Opening::with_plugins(plugins),
+            compared: None,
             look,
             shows_panel: None,
             side_pt: SIDE_PT,
@@ -213,6 +219,12 @@ impl Viewer {
         self.look_at(chosen.device);
         self.arrow_force_n = chosen.arrow_force_n;
         self.plots.choose(chosen);
+    }
+
+    /// The recording over the run that is shown.
+    #[must_use]
+    pub fn compared(&self) -> Option<&Compared> {
+        self.compared.as_ref()
     }
 
     /// The devices.

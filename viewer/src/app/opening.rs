@@ -2,6 +2,7 @@
 
 use super::source::{Parts, Source};
 use super::{Heading, Recorded, Viewer};
+use crate::compared::Compared;
 use crate::devices::Devices;
 use crate::guide::Guide;
 use crate::palette::Palette;
@@ -9,10 +10,11 @@ use crate::player::Player;
 use crate::scene::SceneBuilder;
 use crate::ui::plot_stack::Window;
 use crate::ui::style::SMALL_PT;
-use egui::{Button, Key, RichText, Role, TextEdit, Ui, WidgetInfo};
+use egui::{Button, DroppedFile, Key, RichText, Role, TextEdit, Ui, WidgetInfo};
 use flotor_history::{History, Sample};
 use flotor_live::WrenchLimits;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Number of recordings that are offered again, at most.
 const MOST_LATEST: usize = 5;
@@ -102,14 +104,28 @@ impl Opening {
 }
 
 impl Viewer {
-    /// Opens a recording that was dropped on the window, except during a session: its emergency stop stays in sight.
+    /// Opens a recording that was dropped on an empty window, or lays it over what is shown: a session and its emergency stop stay in
+    /// sight.
     pub(super) fn open_dropped(&mut self, ui: &Ui) {
-        let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_path_buf()));
-        let Some(file) = dropped else { return };
-        if self.source.is_running() {
-            self.say("A running session is shown; stop it before you open a recording");
-        } else {
-            self.open(&file);
+        let path = |file: &Arc<dyn DroppedFile + Send + Sync>| file.path().to_path_buf();
+        let dropped: Vec<PathBuf> = ui.input(|input| input.raw.dropped_files.iter().map(path).collect());
+        for file in dropped {
+            if matches!(self.source, Source::Waiting(_)) {
+                self.open(&file);
+            } else {
+                self.lay_over(&file);
+            }
+        }
+    }
+
+    /// Lays a recording over what is shown, or shows a warning why the file cannot be read.
+    fn lay_over(&mut self, file: &Path) {
+        match Compared::read(file) {
+            Ok(compared) => {
+                self.compared = Some(compared);
+                self.plots.forget_compared();
+            }
+            Err(error) => self.say(error.to_string()),
         }
     }
 
@@ -130,12 +146,12 @@ impl Viewer {
 
     /// Shows a recording, at the moment of the largest force unless another is given.
     pub(super) fn show_recording(&mut self, recorded: Recorded) {
-        let Recorded { histories, at_s, plugins, file } = recorded;
+        let Recorded { histories, at_s, plugins, file, compared } = recorded;
         self.devices = Devices::new(histories);
         let run = self.devices.history().run();
         let parts = Parts::of_recording(run, &plugins);
         self.heading = Heading::of(run);
-        self.opening.plugins = plugins;
+        (self.opening.plugins, self.compared) = (plugins, compared);
         file.iter().for_each(|file| self.opening.remember(file));
         let strongest_s = self.devices.history().strongest().map(Sample::time_s);
         self.player = Player::at(at_s.or(strongest_s).unwrap_or(0.0));

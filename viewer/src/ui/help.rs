@@ -3,7 +3,7 @@
 use egui::{Context, Grid, RichText, ScrollArea, Window};
 
 /// Key and what it does.
-const KEYS: [(&str, &str); 27] = [
+const KEYS: [(&str, &str); 28] = [
     ("Space", "emergency stop; of a recording: play"),
     ("Enter", "takes a typed number; Escape leaves it"),
     ("Ctrl+Z", "the value before the last change"),
@@ -29,6 +29,7 @@ const KEYS: [(&str, &str); 27] = [
     ("P", "parameters"),
     ("L", "light or dark"),
     ("Ctrl +  Ctrl -", "larger, smaller"),
+    ("Escape", "puts a second recording away"),
     ("F11", "full screen"),
     ("F1  ?", "these keys"),
 ];

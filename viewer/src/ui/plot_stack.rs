@@ -9,7 +9,7 @@ use crate::player::Motion;
 use crate::trace::Trace;
 use crate::ui::force_position::ForcePositionPlot;
 use crate::ui::marks::Marks;
-use crate::ui::plots::{Maximise, PlotView, plot};
+use crate::ui::plots::{Lines, Maximise, PlotView, plot};
 use crate::ui::zoom::{Wheel, ZoomRequest};
 use egui::{Rect, Ui, UiBuilder};
 use flotor_history::History;
@@ -102,6 +102,17 @@ pub struct TooLow {
     pub height_px: usize,
 }
 
+/// What traces are drawn of.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// The samples of a device.
+    pub history: &'a History,
+    /// Name of the device, where there are several.
+    pub device: Option<&'a str>,
+    /// The samples of the same device in a second recording, dashed beneath the others.
+    pub compared: Option<&'a History>,
+}
+
 /// The traces shown.
 #[derive(Clone, Debug)]
 pub struct PlotStack {
@@ -123,6 +134,8 @@ pub struct PlotStack {
     unzoomed: Window,
     /// What has been made of the history, for each quantity shown so far.
     traces: BTreeMap<Quantity, Trace>,
+    /// The same of the second recording.
+    compared: BTreeMap<Quantity, Trace>,
     /// What happened, beneath the traces.
     marks: Marks,
     /// End of a window that is shorter than the run, s; the newest while none has been shown.
@@ -151,6 +164,7 @@ impl PlotStack {
             values: BTreeMap::new(),
             unzoomed: window,
             traces: BTreeMap::new(),
+            compared: BTreeMap::new(),
             marks: Marks::default(),
             end_s: f64::INFINITY,
             hover_s: None,
@@ -196,14 +210,9 @@ impl PlotStack {
     }
 
     /// Draws the traces, and force over position, into all of the room there is: a picture, in which nothing can be pressed.
-    pub fn still(
-        &mut self,
-        ui: &mut Ui,
-        (history, device): (&History, Option<&str>),
-        cursor_s: f64,
-        palette: &Palette,
-    ) {
-        let span_s = self.span_s(history);
+    pub fn still(&mut self, ui: &mut Ui, seen: Seen<'_>, cursor_s: f64, palette: &Palette) {
+        let Seen { history, device, .. } = seen;
+        let span_s = self.span_of_both_s(seen);
         let mut left = ui.available_rect_before_wrap();
         if self.force_position.axis.is_some() {
             let beside;
@@ -230,7 +239,10 @@ impl PlotStack {
                 maximise: Maximise::No,
                 wheel: Wheel::Zooms,
             };
-            let drawn = plot(&mut ui, history, &mut Trace::of(*quantity), view, palette);
+            let mut traces = [Trace::of(*quantity), Trace::of(*quantity)];
+            let [trace, compared] = &mut traces;
+            let compared = seen.compared.map(|history| Lines { history, trace: compared });
+            let drawn = plot(&mut ui, Lines { history, trace }, compared, view, palette);
             self.marks.show_faults(&ui, history, span_s, drawn.frame, palette);
             if time_axis {
                 self.marks.show(&mut ui, history, span_s, drawn.frame, palette);
@@ -255,8 +267,14 @@ impl PlotStack {
     /// Another device of the same run is shown from now on.
     pub fn look_at_another(&mut self) {
         self.traces.clear();
+        self.forget_compared();
         self.marks = Marks::default();
         self.force_position.start_over();
+    }
+
+    /// Another second recording is shown from now on, or none.
+    pub fn forget_compared(&mut self) {
+        self.compared.clear();
     }
 
     /// The traces in sight, from the top.
@@ -331,26 +349,34 @@ impl PlotStack {
         }
     }
 
-    /// Shows the row of choices and the traces of what has been seen of a device, with its name where there are several; says what was
-    /// requested.
+    /// Returns first and last time shown, s: of all, those of both recordings.
+    fn span_of_both_s(&self, seen: Seen<'_>) -> [f64; 2] {
+        let span_s = self.span_s(seen.history);
+        match (self.window, seen.compared.map(History::span_s)) {
+            (Window::Whole, Some([first_s, last_s])) => [span_s[0].min(first_s), span_s[1].max(last_s)],
+            _ => span_s,
+        }
+    }
+
+    /// Shows the row of choices and the traces; says what was requested.
     pub fn show(
         &mut self,
         ui: &mut Ui,
-        seen: (&History, Option<&str>),
+        seen: Seen<'_>,
         now_s: f64,
         motion: Motion,
         palette: &Palette,
     ) -> Vec<PlotRequest> {
-        self.end_s = self.end_of_window(seen.0.span_s(), now_s, motion);
+        self.end_s = self.end_of_window(seen.history.span_s(), now_s, motion);
         let mut requests = Vec::new();
         self.choices(ui, palette, &mut requests);
-        let (span_s, cursor_s) = (self.span_s(seen.0), self.hover_s.unwrap_or(now_s));
+        let (span_s, cursor_s) = (self.span_of_both_s(seen), self.hover_s.unwrap_or(now_s));
         if self.force_position.axis.is_some() && ui.available_width() < ROOM_BESIDE_PT {
-            self.force_position.show(ui, (seen.0, cursor_s), span_s, self.units, palette);
+            self.force_position.show(ui, (seen.history, cursor_s), span_s, self.units, palette);
         } else if self.force_position.axis.is_some() {
             let (left, beside) = split_for_force_position(ui.available_rect_before_wrap(), 12.0);
             let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
-            self.force_position.show(&mut right, (seen.0, cursor_s), span_s, self.units, palette);
+            self.force_position.show(&mut right, (seen.history, cursor_s), span_s, self.units, palette);
             let mut left = ui.new_child(UiBuilder::new().max_rect(left).id_salt("over time"));
             self.over_time(&mut left, seen, now_s, palette, &mut requests);
         } else {
@@ -363,7 +389,7 @@ impl PlotStack {
     fn over_time(
         &mut self,
         ui: &mut Ui,
-        seen: (&History, Option<&str>),
+        seen: Seen<'_>,
         now_s: f64,
         palette: &Palette,
         requests: &mut Vec<PlotRequest>,
@@ -405,12 +431,13 @@ impl PlotStack {
     fn stack(
         &mut self,
         ui: &mut Ui,
-        (history, device): (&History, Option<&str>),
+        seen: Seen<'_>,
         now_s: f64,
         (shown, height_pt, wheel): (&[Quantity], f32, Wheel),
         palette: &Palette,
     ) -> Vec<PlotRequest> {
-        let span_s = self.span_s(history);
+        let Seen { history, device, .. } = seen;
+        let span_s = self.span_of_both_s(seen);
         let cursor_s = self.hover_s.unwrap_or(now_s);
         let maximise = match (self.alone, self.shown.len()) {
             (Some(_), _) => Maximise::Done,
@@ -436,7 +463,11 @@ impl PlotStack {
                 wheel,
             };
             let trace = self.traces.entry(quantity).or_insert_with(|| Trace::of(quantity));
-            let answer = plot(ui, history, trace, view, palette);
+            let compared = seen.compared.map(|history| {
+                let trace = self.compared.entry(quantity).or_insert_with(|| Trace::of(quantity));
+                Lines { history, trace }
+            });
+            let answer = plot(ui, Lines { history, trace }, compared, view, palette);
             self.marks.show_faults(ui, history, span_s, answer.frame, palette);
             if time_axis {
                 self.marks.show(ui, history, span_s, answer.frame, palette);

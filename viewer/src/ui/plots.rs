@@ -6,7 +6,7 @@ use crate::ui::overlay::{shortened, width_pt};
 use crate::ui::style::quiet;
 use crate::ui::zoom::{Wheel, ZoomRequest, requested};
 use egui::{Align, Layout, Stroke, TextStyle, Ui, vec2};
-use egui_plot::{AxisHints, GridMark, HPlacement, Line, Plot, PlotPoints, VLine};
+use egui_plot::{AxisHints, GridMark, HPlacement, Line, LineStyle, Plot, PlotPoints, VLine};
 use flotor_history::History;
 use flotor_history::quantity::{Quantity, Units};
 
@@ -59,11 +59,20 @@ pub struct PlotAnswer {
     pub frame: egui::Rect,
 }
 
-/// Shows one quantity over time. The components' names and values at the cursor stand above.
+/// Samples, and the trace of a quantity made of them so far.
+pub struct Lines<'a> {
+    /// The samples.
+    pub history: &'a History,
+    /// The trace.
+    pub trace: &'a mut Trace,
+}
+
+/// Shows one quantity over time, and dashed beneath it the same of a second recording. The components' names and values at the cursor
+/// stand above.
 pub fn plot(
     ui: &mut Ui,
-    history: &History,
-    trace: &mut Trace,
+    Lines { history, trace }: Lines<'_>,
+    compared: Option<Lines<'_>>,
     view: PlotView<'_>,
     palette: &Palette,
 ) -> PlotAnswer {
@@ -75,6 +84,7 @@ pub fn plot(
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // points
     let buckets = ui.available_width().max(50.0) as usize;
     let traces = trace.points(history, span_s, buckets, per_si);
+    let compared = compared.map(|Lines { history, trace }| trace.points(history, span_s, buckets, per_si));
 
     // The mark at the end of the values has room for its number.
     #[allow(clippy::cast_possible_truncation)] // a part
@@ -99,6 +109,14 @@ pub fn plot(
         plot.set_plot_bounds_x(span_s[0]..=span_s[1]);
         if let Some([low, high]) = values {
             plot.set_plot_bounds_y(low..=high);
+        }
+        for (component, stretches) in compared.iter().flat_map(|traces| traces.iter().enumerate()) {
+            for points in stretches {
+                // As wide and pale as to be seen beside a line on top of it.
+                let line = Line::new("", PlotPoints::Borrowed(points)).allow_band(false);
+                let color = palette.components[component % 3].gamma_multiply(0.6);
+                plot.line(line.color(color).width(3.2).style(LineStyle::dashed_dense()));
+            }
         }
         for (component, stretches) in traces.iter().enumerate() {
             let name = quantity.components()[component];

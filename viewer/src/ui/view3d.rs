@@ -2,13 +2,12 @@
 
 use crate::canvas::Canvas;
 use crate::palette::{Look, Palette};
-use crate::scene::{ArrowScale, SceneBuilder, SceneFacts};
+use crate::scene::{ArrowScale, Moment, SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use crate::ui::key::pressed_alone;
 use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2};
 use flotor_drawing::camera::{Camera, Extent};
 use flotor_hal::Pose;
-use flotor_history::Sample;
 
 /// Turn for a drag over a point of the screen, rad.
 const ORBIT_RAD_PER_POINT: f64 = 0.008;
@@ -26,8 +25,8 @@ pub struct Subject<'a> {
     pub shapes: &'a mut [Shape],
     /// Raised whenever a body changes otherwise than by the pose.
     pub version: u64,
-    /// The moment, of each device.
-    pub samples: &'a [Sample],
+    /// The moment.
+    pub moment: Moment<'a>,
     /// Lengths of arrows.
     pub scale: ArrowScale,
 }
@@ -51,6 +50,7 @@ pub struct View3d {
 #[derive(Clone, Debug, PartialEq)]
 struct Look3d {
     handles: Vec<(Pose, [f32; 6])>,
+    compared: Vec<Option<Pose>>,
     version: u64,
     camera: Camera,
     shows_arrows: bool,
@@ -109,7 +109,7 @@ impl View3d {
 
     /// Shows the scene in a rectangle, follows the mouse, and says what is in the picture.
     pub fn show(&mut self, ui: &mut Ui, area: Rect, look: Look, subject: Subject<'_>) -> SceneFacts {
-        let extent = SceneBuilder::extent(subject.shapes, subject.samples.len());
+        let extent = SceneBuilder::extent(subject.shapes, subject.moment.samples.len());
         self.fit(area);
         let response = ui.interact(area, ui.scope_id().with("3d view"), Sense::click_and_drag());
         if response.dragged_by(PointerButton::Primary) {
@@ -153,11 +153,12 @@ impl View3d {
     }
 
     fn picture(&mut self, ui: &Ui, size: Vec2, look: Look, subject: Subject<'_>) -> (TextureId, SceneFacts) {
-        let Subject { shapes, version, samples, scale } = subject;
+        let Subject { shapes, version, moment, scale } = subject;
         let (camera, shows_arrows) = (self.camera, self.shows_arrows);
         let size = pixels(size * ui.ctx().pixels_per_point());
         let wanted = Look3d {
-            handles: samples.iter().map(|sample| (sample.pose, sample.commanded)).collect(),
+            handles: moment.samples.iter().map(|sample| (sample.pose, sample.commanded)).collect(),
+            compared: moment.compared.to_vec(),
             version,
             camera,
             shows_arrows,
@@ -171,7 +172,7 @@ impl View3d {
                 let palette = Palette::of(look);
                 let height_px = size[1] as f64;
                 let (mesh, facts) =
-                    self.builder.build(shapes, samples, &palette, &camera, height_px, scale, shows_arrows);
+                    self.builder.build(shapes, moment, &palette, &camera, height_px, scale, shows_arrows);
                 let texture = self.canvas.draw(ui.ctx(), mesh, &camera, palette.backdrop, size);
                 self.drawn = Some((wanted, texture, facts));
                 (texture, facts)

@@ -5,6 +5,7 @@ use crate::support::display::alone;
 use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
+use flotor_history::History;
 use flotor_viewer::app::{Start, Wanted};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -53,6 +54,16 @@ fn a_recording_dropped_on_an_empty_window_is_opened_and_offered_by_the_next_wind
     drop_on(&mut window, &file);
     assert_eq!(window.state().history().len(), 500);
     window.get_by_label("recording");
+    // A second recording lies over the first.
+    assert!(window.state().compared().is_none());
+    drop_on(&mut window, &file);
+    let compared = window.state().compared().and_then(|compared| compared.history(0));
+    assert_eq!(compared.map(History::len), Some(500));
+    window.get_by_label_contains("Dashed: run.mcap, 1000 Hz, 0.499 s");
+    assert_eq!(window.state().history().len(), 500);
+    window.key_press(Key::Escape);
+    window.run_steps(2);
+    assert!(window.state().compared().is_none());
     let remembered = window.state().remembered();
     assert_eq!(remembered.latest, [file]);
     let mut next = empty(folder.path());
@@ -93,6 +104,6 @@ fn a_running_session_stays_in_sight_whatever_is_dropped() {
     until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
     drop_on(&mut window, &file);
     assert!(window.state().history().len() >= 1500);
-    window.get_by_label_contains("stop it before you open a recording");
+    assert!(window.state().compared().is_some(), "it lies over the session");
     window.get_by_label("EMERGENCY STOP");
 }

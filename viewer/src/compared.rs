@@ -1,0 +1,49 @@
+//! A second recording, laid over the run that is shown.
+
+use flotor_hal::Pose;
+use flotor_history::History;
+use flotor_record::ReadError;
+use std::path::Path;
+
+/// A recording whose traces and handles are shown with those of another run. The times of both count from the start of their runs, and
+/// devices belong together by their order in the scenes.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    name: String,
+    histories: Vec<History>,
+}
+
+impl Compared {
+    /// Reads a recording.
+    ///
+    /// # Errors
+    /// [`ReadError`]: nothing of the file can be used.
+    pub fn read(file: &Path) -> Result<Self, ReadError> {
+        let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
+        Ok(Self { name, histories: History::read(file)? })
+    }
+
+    /// Returns the samples of a device by its number; none if the recording has fewer devices.
+    #[must_use]
+    pub fn history(&self, device: usize) -> Option<&History> {
+        self.histories.get(device)
+    }
+
+    /// Returns the pose of each handle in its device frame at a time, s; none where the recording has no sample.
+    #[must_use]
+    pub fn handles(&self, now_s: f64) -> Vec<Option<Pose>> {
+        let pose = |history: &History| history.seen_at(now_s).map(|sample| sample.pose);
+        self.histories.iter().map(pose).collect()
+    }
+
+    /// Returns name, rate and length of the recording in a line.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let (rate_hz, [_, last_s]) =
+            self.histories.first().map_or((0.0, [0.0; 2]), |first| (first.run().rate_hz, first.span_s()));
+        format!(
+            "Dashed: {}, {rate_hz} Hz, {last_s:.3} s; both times from the start of the run; Escape puts it away",
+            self.name
+        )
+    }
+}
