@@ -62,6 +62,24 @@ impl Course {
     }
 }
 
+/// Counts, for each of some lines in the order of drawing, the later lines that cover it, at most 3. A line is unbroken runs of points in
+/// pixels, in a frame between two columns.
+#[must_use]
+pub fn covering_lines(lines: &[Vec<Vec<(f64, f64)>>], [left, right]: [f64; 2]) -> Vec<usize> {
+    let frame = Rect { left, top: 0.0, width: right - left, height: 0.0 };
+    let courses: Vec<Course> = lines.iter().map(|runs| Course::of(runs, &frame)).collect();
+    let covers = |lower: usize| courses.iter().skip(lower + 1).filter(|upper| courses[lower].is_under(upper));
+    (0..courses.len()).map(|lower| covers(lower).count().min(MOST_COVERS)).collect()
+}
+
+/// Returns the width of a line under so many others, in widths of a line, and its opacity.
+#[must_use]
+pub const fn covered_style(covers: usize) -> (f64, f64) {
+    /// A covered line is seen by so much on both sides together, in widths of a line.
+    const BESIDE: f64 = 2.125;
+    if covers == 0 { (1.0, 1.0) } else { (1.0 + BESIDE * covers as f64, 0.45) }
+}
+
 /// Counts, for each line of a panel, the later lines that cover it.
 pub(super) fn count_covers(drawings: &mut [Option<Drawing>]) {
     for lower in 0..drawings.len() {
@@ -92,6 +110,15 @@ mod tests {
             (0..=1600).map(|i| (80.0 + 0.5 * f64::from(i), 10.0 + 0.05 * f64::from(i))).collect();
         let fine = course(&fine);
         assert!(coarse.is_under(&fine) && fine.is_under(&coarse));
+    }
+
+    #[test]
+    fn of_three_lines_over_one_another_the_lowest_is_the_widest() {
+        let line = |y: f64| vec![vec![(80.0, y), (880.0, y + 50.0)]];
+        let covers = covering_lines(&[line(10.0), line(10.0), line(30.0), line(10.0)], [80.0, 880.0]);
+        assert_eq!(covers, [2, 1, 0, 0]);
+        let [lowest, upper, alone] = [2, 1, 0].map(|covers| covered_style(covers).0);
+        assert!(lowest > upper && upper > alone && alone == 1.0);
     }
 
     #[test]

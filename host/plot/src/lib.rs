@@ -55,6 +55,7 @@ mod vector;
 mod tests;
 
 pub use axis::Axis;
+pub use cover::{covered_style, covering_lines};
 pub use mark::Mark;
 pub use quantity::Quantity;
 pub use series::{Bin, ErrorBar, Series};

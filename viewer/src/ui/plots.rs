@@ -6,9 +6,12 @@ use crate::ui::overlay::{shortened, width_pt};
 use crate::ui::style::quiet;
 use crate::ui::zoom::{Wheel, ZoomRequest, requested};
 use egui::{Align, Layout, Stroke, TextStyle, Ui, vec2};
-use egui_plot::{AxisHints, GridMark, HPlacement, Line, LineStyle, Plot, PlotPoints, VLine};
+use egui_plot::{
+    AxisHints, GridMark, HPlacement, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotUi, VLine,
+};
 use flotor_history::History;
 use flotor_history::quantity::{Quantity, Units};
+use flotor_plot::{covered_style, covering_lines};
 
 /// How a plot is shown.
 #[derive(Clone, Copy, Debug)]
@@ -118,12 +121,17 @@ pub fn plot(
                 plot.line(line.color(color).width(3.2).style(LineStyle::dashed_dense()));
             }
         }
-        for (component, stretches) in traces.iter().enumerate() {
+        let covers = covers(plot, traces);
+        for ((component, stretches), covers) in traces.iter().enumerate().zip(covers) {
             let name = quantity.components()[component];
+            let (width, opacity) = covered_style(covers);
+            #[allow(clippy::cast_possible_truncation)] // points, and a part
+            let (width, opacity) = (LINE_PT * width as f32, opacity as f32);
             for points in stretches {
                 // Two points a bucket are few enough: joined they are as wide everywhere.
                 let line = Line::new(name, PlotPoints::Borrowed(points)).allow_band(false);
-                plot.line(line.color(palette.components[component % 3]).width(1.6));
+                let color = palette.components[component % 3].gamma_multiply(opacity);
+                plot.line(line.color(color).width(width));
             }
         }
         if cursor_s.is_finite() {
@@ -144,6 +152,22 @@ pub fn plot(
         switches_maximised,
         frame: *shown.transform.frame(),
     }
+}
+
+/// Width of a trace, points.
+const LINE_PT: f32 = 1.6;
+
+/// Counts, for each component, the later ones whose trace covers its own, as a picture of lines does.
+fn covers(plot: &PlotUi<'_>, traces: &[Vec<Vec<PlotPoint>>]) -> Vec<usize> {
+    let on_screen = |point: &PlotPoint| {
+        let at = plot.screen_from_plot(*point);
+        (f64::from(at.x), f64::from(at.y))
+    };
+    let run = |points: &Vec<PlotPoint>| points.iter().map(on_screen).collect::<Vec<_>>();
+    let lines: Vec<Vec<Vec<(f64, f64)>>> =
+        traces.iter().map(|stretches| stretches.iter().map(run).collect()).collect();
+    let frame = plot.transform().frame();
+    covering_lines(&lines, [frame.left(), frame.right()].map(f64::from))
 }
 
 /// A plot that only shows: what the mouse does is read from it, and nothing is drawn but lines and grid.

@@ -2,6 +2,7 @@
 
 use super::window::{Window, recorded, recording};
 use egui::accesskit::Role;
+use egui::epaint::Shape;
 use egui::{Key, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -158,4 +159,24 @@ fn one_trace_takes_the_room_of_all_and_gives_it_back() {
     window.key_press(Key::M);
     window.run_steps(2);
     assert!(window.query_by_label("Position over time, mm").is_none());
+}
+
+/// The widths of the lines of a picture, points.
+fn line_widths(shape: &Shape, widths: &mut Vec<f32>) {
+    match shape {
+        Shape::Vec(shapes) => shapes.iter().for_each(|shape| line_widths(shape, widths)),
+        Shape::Path(path) => widths.push(path.stroke.width),
+        _ => {}
+    }
+}
+
+/// The force is along z alone, so the traces of x and y lie over one another: the lower one is seen beside the upper one.
+#[test]
+fn a_covered_trace_is_wider_than_the_one_that_covers_it() {
+    let window = recording();
+    let mut widths = Vec::new();
+    window.output().shapes.iter().for_each(|clipped| line_widths(&clipped.shape, &mut widths));
+    let count = |wanted: f32| widths.iter().filter(|width| (*width - wanted).abs() < 1.0e-3).count();
+    // Force and position: x under y, and y and z in the width of a trace.
+    assert!(count(5.0) == 2 && count(1.6) >= 4, "{widths:?}");
 }
