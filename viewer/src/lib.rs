@@ -3,11 +3,10 @@
 //! A program of its own, so that no graphics driver can delay a servo (docs/src/adr/0008-viewer-process.md). It
 //! shows a running host or a recording: the bodies of its models in 3D, what was felt as traces, and panels to change it.
 //!
-//! - [`feed`] reads the history of a running host (`flotor-history`), [`player`] says which moment is shown, [`tally`] counts events,
-//!   [`panel`] is what can be set.
-//! - [`devices`]: the devices of a run, one of which is looked at; [`compared`]: a second recording over them.
+//! - [`feed`] reads the history of a running host (`flotor-history`), [`tally`] counts events, [`panel`] is what can be set.
+//! - [`devices`]: the devices of a run, one of which is looked at.
 //! - [`trace`]: the points of a plot from picture to picture; [`export`] of traces as files, [`chosen`] on a command line.
-//! - [`shape`]: where the bodies of the models are; [`scene`] makes triangles of them with `flotor-drawing`, [`placing`] says where devices stand.
+//! - [`shape`]: where the bodies of the models are; [`scene`] makes triangles of them with `flotor-drawing`.
 //! - [`canvas`]: the 3D view in the interface, drawn on a GPU or the processor; [`picture`] a whole picture without a window, whose
 //!   interface [`flat`] draws.
 //! - [`ui`], [`palette`]: the parts of the interface; [`app`] puts them together. [`sound`] warns the ear.
@@ -20,7 +19,6 @@
 pub mod app;
 pub mod canvas;
 pub mod chosen;
-pub mod compared;
 pub mod cost;
 pub mod devices;
 pub mod experiment;
@@ -32,9 +30,7 @@ pub mod guide;
 pub mod palette;
 pub mod panel;
 pub mod picture;
-pub mod placing;
 mod platform;
-pub mod player;
 pub mod pointer_order;
 pub mod remembered;
 pub mod scene;

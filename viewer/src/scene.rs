@@ -1,7 +1,6 @@
 //! The 3D scene: bodies at the pose of the handle, on a ground, with what the hand feels as arrows.
 
 use crate::palette::{Palette, strain_color};
-use crate::placing::{Placing, round_below};
 use crate::shape::{Posed, Rest, Shape};
 use flotor_drawing::camera::{Camera, Extent};
 use flotor_drawing::contact::{append_contact, contact};
@@ -10,6 +9,7 @@ use flotor_drawing::geometry::{
     append_primitive, append_surface, append_tube, contact_strain, force_arrow, plate, torque_arrow,
 };
 use flotor_drawing::light;
+use flotor_drawing::placing::{Placing, round_below};
 use flotor_hal::{DVec3, Part, Pose, Primitive, ScalarField, Wrench};
 use flotor_history::Sample;
 

@@ -3,6 +3,7 @@
 //! - [`geometry`] makes the triangles: wires, primitives, surfaces, arrows, ground.
 //! - A [`camera`] sees them in a [`light`].
 //! - [`contact`]: where a handle touches a body.
+//! - [`placing`]: the places of several devices.
 //! - [`drag`] moves a point of the scene with a pointer.
 //! - [`gpu`] draws them on a GPU or a software adapter, into a texture; [`raster`] on the processor, without an adapter.
 //!
@@ -16,4 +17,5 @@ pub mod drag;
 pub mod geometry;
 pub mod gpu;
 pub mod light;
+pub mod placing;
 pub mod raster;

@@ -3,11 +3,14 @@
 //! - [`quantity`]: quantities of a sample that can be plotted.
 //! - [`derived`]: stiffness felt, force over position.
 //! - [`decimate`]: few points for many.
+//! - [`player`]: the moment that is shown; [`compared`]: a second recording over a run.
 //!
 //! Not real-time.
 
+pub mod compared;
 pub mod decimate;
 pub mod derived;
+pub mod player;
 pub mod quantity;
 
 use crate::derived::felt_stiffness_n_per_m;

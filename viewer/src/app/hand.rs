@@ -2,12 +2,12 @@
 
 use super::Viewer;
 use crate::palette::Palette;
-use crate::player::Motion;
 use crate::scene::handle_m;
 use crate::ui::handle::{Handle, handle};
 use egui::{Rect, Ui};
 use flotor_drawing::geometry::MM_PER_M;
 use flotor_history::Sample;
+use flotor_history::player::Motion;
 use flotor_live::ChangeMessage;
 use std::time::{Duration, Instant};
 

@@ -1,11 +1,11 @@
 //! What keys do in the window of an experimenter.
 
 use super::Viewer;
-use crate::player::Motion;
 use crate::scene::SceneBuilder;
 use crate::ui::key::pressed_alone;
 use crate::ui::style;
 use egui::{Context, Key, Ui};
+use flotor_history::player::Motion;
 use flotor_live::Ask;
 
 impl Viewer {

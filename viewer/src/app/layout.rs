@@ -9,7 +9,6 @@
 
 use super::words::State;
 use super::{Audience, Source, VIEW_PARTS, Viewer};
-use crate::compared::Compared;
 use crate::export::export;
 use crate::palette::Palette;
 use crate::scene::{Moment, SceneBuilder};
@@ -26,6 +25,7 @@ use egui::{
     Ui, WidgetInfo, vec2,
 };
 use flotor_history::Sample;
+use flotor_history::compared::Compared;
 use flotor_live::{Ask, SetValue};
 use std::time::Instant;
 

@@ -2,15 +2,15 @@
 
 use super::source::{Parts, Source};
 use super::{Heading, Recorded, Viewer};
-use crate::compared::Compared;
 use crate::devices::Devices;
 use crate::guide::Guide;
 use crate::palette::Palette;
-use crate::player::Player;
 use crate::scene::SceneBuilder;
 use crate::ui::plot_stack::Window;
 use crate::ui::style::SMALL_PT;
 use egui::{Button, DroppedFile, Key, RichText, Role, TextEdit, Ui, WidgetInfo};
+use flotor_history::compared::Compared;
+use flotor_history::player::Player;
 use flotor_history::{History, Sample};
 use flotor_live::WrenchLimits;
 use std::path::{Path, PathBuf};

@@ -2,10 +2,10 @@
 
 use super::{Source, Viewer};
 use crate::feed::FeedState;
-use crate::player::Motion;
 use crate::ui::readout;
 use crate::ui::top_bar::RunStatus;
 use flotor_core::trace::Events;
+use flotor_history::player::Motion;
 use flotor_live::EndKind;
 use flotor_record::Severity;
 use std::time::Duration;

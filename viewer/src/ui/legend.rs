@@ -1,12 +1,12 @@
 //! What the colours of the 3D view mean.
 
 use crate::palette::{Palette, strain_color};
-use crate::placing::round_below;
 use crate::scene::{ArrowKey, ColorScale, SceneFacts, field_color};
 use crate::ui::overlay::{Corner, Overlay, shortened, width_pt};
 use crate::ui::style::{BODY_PT, SMALL_PT};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, vec2};
 use flotor_drawing::camera::Camera;
+use flotor_drawing::placing::round_below;
 use flotor_hal::DVec3;
 
 /// Size of the scale of strain, points, and the height of a line of text with it.

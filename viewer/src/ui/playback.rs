@@ -1,9 +1,9 @@
 //! The bar beneath everything: where in time, going or standing, how fast.
 
 use crate::palette::Palette;
-use crate::player::{Motion, Player, SPEEDS};
 use crate::ui::style::SMALL_PT;
 use egui::{Align, ComboBox, Layout, RichText, Role, Slider, Ui, WidgetInfo};
+use flotor_history::player::{Motion, Player, SPEEDS};
 use flotor_history::{History, Sample};
 
 /// Narrower, the bar has the button, the clock and the slider only, points.

@@ -4,12 +4,12 @@ use super::window::{Window, recorded, recording, window};
 use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
+use flotor_history::player::Motion;
 use flotor_history::quantity::Quantity;
 use flotor_viewer::app::{Recorded, Start};
 use flotor_viewer::chosen::Chosen;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureError, PictureOptions, has_moment, least_height_px, picture};
-use flotor_viewer::player::Motion;
 use flotor_viewer::ui::plot_stack::ExportFormat;
 
 #[test]

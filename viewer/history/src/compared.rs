@@ -1,7 +1,7 @@
 //! A second recording, laid over the run that is shown.
 
+use crate::History;
 use flotor_hal::Pose;
-use flotor_history::History;
 use flotor_record::ReadError;
 use std::path::Path;
 
