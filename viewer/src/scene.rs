@@ -61,7 +61,7 @@ const FULL_FORCE: f64 = 3.6;
 pub struct Moment<'a> {
     /// The sample of each device.
     pub samples: &'a [Sample],
-    /// The pose of each handle of a second recording in its device frame, drawn seen through.
+    /// The pose of each handle of a second recording in its device frame, drawn as a ball, seen through.
     pub compared: &'a [Option<Pose>],
 }
 
@@ -204,16 +204,16 @@ impl SceneBuilder {
             let place_m = placing.place_m(device);
             let first = shapes.iter().find(|shape| shape.device() == device);
             let handle = in_scene_frame(first, sample);
-            let compared = compared.get(device).copied().flatten().map(|pose| Handle::of(first, &pose));
+            let in_scene = |pose: Pose| first.map_or(pose, |shape| shape.mapping().pose_to_model(&pose));
+            let compared = compared.get(device).copied().flatten().map(in_scene);
             all_shadows.extend(
                 shadows(&ground, palette, plate_radius_m, handle.0.position())
                     .map(|shadow| Shadow { center_m: shadow.center_m + place_m.truncate(), ..shadow }),
             );
             let start = self.mesh.vertices.len();
+            // Before the bodies that are seen through.
+            compared.iter().for_each(|pose| self.compared_handle(*pose, palette, height_m));
             self.bodies(shapes, (device, sample), palette, pixels_per_mm, &mut facts);
-            compared
-                .iter()
-                .for_each(|handle| self.compared_handle(handle, palette, height_m, plate_radius_m));
             if shows_arrows {
                 self.arrows(handle, palette, scale, height_m, plate_radius_m);
             }
@@ -345,22 +345,12 @@ impl SceneBuilder {
         plate(&mut self.mesh, &section, radius_m, PLATE_THICKNESS * radius_m, 1.0, palette.plates[0]);
     }
 
-    /// Adds the handle of a second recording, seen through.
-    fn compared_handle(&mut self, handle: &Handle, palette: &Palette, height_m: f64, plate_radius_m: f64) {
-        /// Radius of a ball, part of the height of the scene.
-        const BALL: f64 = 0.06;
-        let color = with_opacity(palette.plates[1], SEEN_THROUGH);
-        match *handle {
-            Handle::Plate(pose) => {
-                let section = Section { center_m: pose.position(), orientation: pose.orientation() };
-                let depth_m = PLATE_THICKNESS * plate_radius_m;
-                plate(&mut self.mesh, &section, plate_radius_m, depth_m, 1.0, color);
-            }
-            Handle::Ball(pose) => {
-                let ball = Primitive::sphere(Part::Tool, pose, BALL * height_m);
-                append_primitive(&mut self.mesh, &ball, color);
-            }
-        }
+    /// Adds the handle of a second recording: a ball, seen through.
+    fn compared_handle(&mut self, pose: Pose, palette: &Palette, height_m: f64) {
+        /// Radius, part of the height of the scene.
+        const RADIUS: f64 = 0.06;
+        let ball = Primitive::sphere(Part::Tool, pose, RADIUS * height_m);
+        append_primitive(&mut self.mesh, &ball, with_opacity(palette.plates[1], SEEN_THROUGH));
     }
 
     fn arrows(
@@ -386,23 +376,6 @@ impl SceneBuilder {
             0.7 * shaft_m,
             palette.torque,
         );
-    }
-}
-
-/// The handle of a second recording in the frame of the scene: the plate at the end of a slender body, else a ball.
-enum Handle {
-    Plate(Pose),
-    Ball(Pose),
-}
-
-impl Handle {
-    /// Places the handle of a device with this first shape at a pose of the device frame.
-    fn of(first: Option<&Shape>, pose: &Pose) -> Self {
-        match first.map(|shape| (shape.rest(), shape.mapping().pose_to_model(pose))) {
-            Some((Rest::Slender(_), pose)) => Self::Plate(pose),
-            Some((Rest::Solid(_), pose)) => Self::Ball(pose),
-            None => Self::Ball(*pose),
-        }
     }
 }
 

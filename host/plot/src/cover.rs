@@ -68,8 +68,10 @@ impl Course {
 pub fn covering_lines(lines: &[Vec<Vec<(f64, f64)>>], [left, right]: [f64; 2]) -> Vec<usize> {
     let frame = Rect { left, top: 0.0, width: right - left, height: 0.0 };
     let courses: Vec<Course> = lines.iter().map(|runs| Course::of(runs, &frame)).collect();
-    let covers = |lower: usize| courses.iter().skip(lower + 1).filter(|upper| courses[lower].is_under(upper));
-    (0..courses.len()).map(|lower| covers(lower).count().min(MOST_COVERS)).collect()
+    let covers = |(lower, course): (usize, &Course)| {
+        courses.iter().skip(lower + 1).filter(|upper| course.is_under(upper)).count().min(MOST_COVERS)
+    };
+    courses.iter().enumerate().map(covers).collect()
 }
 
 /// Returns the width of a line under so many others, in widths of a line, and its opacity.

@@ -26,7 +26,7 @@ pub(crate) struct ViewArguments {
     /// Recording, or zenoh/NAME for a remote session (default: the running host)
     #[arg(value_name = "FILE.mcap | zenoh/NAME")]
     file: Option<PathBuf>,
-    /// Second recording, over the first: dashed traces, and the handle seen through
+    /// Second recording, over the first: dashed traces, and the handle as a ball, seen through
     #[arg(value_name = "FILE.mcap", conflicts_with_all = ["export", "screen"])]
     second: Option<PathBuf>,
     /// Write a picture of one moment; needs no display and no GPU

@@ -1,11 +1,13 @@
-//! The contact of a handle with the bodies of a model, and its mark: a dot at the point of contact and an arrow along the normal.
+//! The contact of a handle with the bodies of a model, and its mark: a disc at the point of contact and an arrow along the normal.
 
-use crate::geometry::{Color, Mesh, SurfacePoint, append_primitive, closest_surface_point, force_arrow};
+use crate::geometry::{Color, Mesh, Section, SurfacePoint, closest_surface_point, force_arrow, plate};
 use flotor_hal::glam::DQuat;
-use flotor_hal::{DVec3, Part, Pose, Primitive, Shape};
+use flotor_hal::{DVec3, Part, Shape};
 
-/// Radius of the dot, and radius and length of the arrow, parts of the height of the scene.
-const DOT: f64 = 0.025;
+/// Radius and thickness of the disc, and radius and length of the arrow, parts of the height of the scene: the disc is seen around the
+/// arrow of the force and a proxy.
+const DISC: f64 = 0.09;
+const THICKNESS: f64 = 0.004;
 const SHAFT: f64 = 0.009;
 const LENGTH: f64 = 0.3;
 
@@ -33,8 +35,9 @@ pub fn contact(shape: &Shape, handle_m: DVec3) -> Option<SurfacePoint> {
 
 /// Adds the mark of a contact to a scene of a height, m.
 pub fn append_contact(mesh: &mut Mesh, contact: &SurfacePoint, height_m: f64, color: Color) {
-    let place = Pose::new(contact.position_m, DQuat::IDENTITY);
-    append_primitive(mesh, &Primitive::sphere(Part::Tool, place, DOT * height_m), color);
+    let orientation = DQuat::from_rotation_arc(DVec3::Z, contact.normal);
+    let section = Section { center_m: contact.position_m, orientation };
+    plate(mesh, &section, DISC * height_m, THICKNESS * height_m, 1.0, color);
     let along_m = contact.normal * (LENGTH * height_m);
     force_arrow(mesh, contact.position_m, along_m, SHAFT * height_m, color);
 }
@@ -42,7 +45,7 @@ pub fn append_contact(mesh: &mut Mesh, contact: &SurfacePoint, height_m: f64, co
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_hal::Form;
+    use flotor_hal::{Form, Pose, Primitive};
 
     fn shape(primitives: Vec<Primitive>) -> Shape {
         Shape { primitives, ..Shape::default() }

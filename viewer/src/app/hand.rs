@@ -57,7 +57,7 @@ impl Viewer {
         self.source.is_running() && self.player.motion == Motion::Follow && self.guide.has_hand(device)
     }
 
-    /// Returns whether a hint tells how a handle is dragged: none is, and one can be.
+    /// Returns whether the hint for dragging is shown: no handle is dragged, and one can be.
     pub(super) fn wants_drag_hint(&self) -> bool {
         self.drag.is_none() && (0..self.devices.count()).any(|device| self.can_drag(device))
     }

@@ -2,6 +2,7 @@
 
 use super::window::{Window, live, until_fresh, window};
 use crate::support::display::alone;
+use crate::support::plugin_file;
 use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
@@ -41,7 +42,8 @@ pub(super) fn drop_on(window: &mut Window<'_>, file: &Path) {
 
 /// A window without a run.
 fn empty<'a>(folder: &Path) -> Window<'a> {
-    let mut window = window(Start::Live(Wanted::newest(flotor_live::Directory::at(folder))));
+    let wanted = Wanted::newest(flotor_live::Directory::at(folder));
+    let mut window = window(Start::Live(Wanted { plugins: vec![plugin_file("spring")], ..wanted }));
     window.run_steps(2);
     window
 }
