@@ -10,7 +10,7 @@ use egui::{UiBuilder, vec2};
 use flotor_core::trace::Events;
 use flotor_history::History;
 use flotor_history::derived::ForcePosition;
-use flotor_history::quantity::Quantity;
+use flotor_history::quantity::{Quantity, Units};
 use flotor_plot::{Axis, Figure, Mark, Panel, Paper, Series, Spans};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -183,15 +183,23 @@ pub fn svg(history: &History, device: Option<&str>, plots: &PlotStack) -> String
         Look::Light => Paper::Light,
         Look::Dark => Paper::Dark,
     };
+    let run = subtitle_of(history.run());
+    let curve =
+        plots.force_position.axis.map(|axis| (axis, ForcePosition::of(history.between(from_s, to_s), axis)));
+    let subtitle = match &curve {
+        // A heading of a panel is one line.
+        Some((_, curve)) => format!("{run}. Force over position: {}", said(curve, plots.units)),
+        None => run,
+    };
     let figure =
         Figure::new(plots.export.title(history, device), Axis::linear("Time", "s").range(from_s, to_s))
-            .subtitle(subtitle_of(history.run()))
+            .subtitle(subtitle)
             .size_px(plots.export.size_px.map(|length| length / f64::from(SCALE)))
             .scale(f64::from(SCALE))
             .paper(paper);
     let figure = plots.in_sight().iter().map(panel).fold(figure, Figure::panel);
-    match plots.force_position.axis {
-        Some(axis) => figure.panel(force_position(history, plots, axis)),
+    match curve {
+        Some((axis, curve)) => figure.panel(force_position(&curve, plots.units, axis)),
         None => figure,
     }
     .to_svg()
@@ -217,17 +225,14 @@ fn with_events(history: &History, [from_s, to_s]: [f64; 2], panel: Panel) -> Pan
     panel.limited(limited)
 }
 
-/// Force over position along an axis, with slope and area.
-fn force_position(history: &History, plots: &PlotStack, axis: usize) -> Panel {
-    let [from_s, to_s] = plots.span_s(history);
-    let curve = ForcePosition::of(history.between(from_s, to_s), axis);
-    let (unit, per_m) = Quantity::Position.unit(plots.units);
+/// Returns the panel of force over position along an axis.
+fn force_position(curve: &ForcePosition, units: Units, axis: usize) -> Panel {
+    let (unit, per_m) = Quantity::Position.unit(units);
     let name = Quantity::Position.components().get(axis).copied().unwrap_or_default();
     let points = curve.points.iter().map(|[x, force]| (x * per_m, *force));
-    let position = Axis::linear(format!("Position {name}"), unit)
-        .least_range(Quantity::Position.least_range(plots.units));
+    let position =
+        Axis::linear(format!("Position {name}"), unit).least_range(Quantity::Position.least_range(units));
     Panel::with_x(position, Axis::of("Force on the hand", flotor_plot::Quantity::Force))
-        .title(said(&curve, plots.units))
         .series(Series::line("", points).axis(axis))
 }
 
