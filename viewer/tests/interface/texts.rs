@@ -126,26 +126,45 @@ fn resize(window: &mut Window<'_>, size: [f32; 2], scale: f32) -> Vec2 {
     points
 }
 
-/// Goes through all sizes and scales; before each size, `prepare` is called.
-fn in_all_sizes(window: &mut Window<'_>, case: &str, mut prepare: impl FnMut(&mut Window<'_>)) {
-    for size in SIZES {
-        for scale in SCALES {
-            prepare(window);
-            let points = resize(window, size, scale);
-            // Bounds of plots and widths of panels are those of the picture before.
-            window.run_steps(2);
-            let case = format!("{case}, {size:?} px at {scale}");
-            let texts = texts(window.output());
-            assert_apart(&texts, points, panel(window, points), &case);
-            let is_whole =
-                |text: &&Text| !text.is_shortened && text.visible.expand(0.6).contains_rect(text.letters);
-            let state = texts.iter().filter(is_whole).find(|text| STATES.contains(&text.words.as_str()));
-            let state = state.unwrap_or_else(|| panic!("{case}: no state"));
-            if !["ended", "failed", "stopped"].contains(&state.words.as_str()) {
-                let stop =
-                    texts.iter().filter(is_whole).find(|text| text.words.starts_with("EMERGENCY STOP"));
-                assert!(stop.is_some(), "{case}: no emergency stop");
-            }
+/// States of a window on a run.
+#[derive(Clone, Copy, Debug)]
+enum Shown {
+    Quiet,
+    Warned,
+    FourTraces,
+    Failed,
+}
+
+impl Shown {
+    /// The sizes and scales of this state: all at full size, else every fourth, so that the four states together have all.
+    fn sizes(self) -> impl Iterator<Item = ([f32; 2], f32)> {
+        let every = if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { 1 } else { 4 };
+        let all = SIZES.into_iter().flat_map(|size| SCALES.map(|scale| (size, scale)));
+        all.skip(self as usize % every).step_by(every)
+    }
+}
+
+/// Goes through the sizes and scales of a state; before each size, `prepare` is called.
+fn in_all_sizes(
+    window: &mut Window<'_>,
+    (shown, case): (Shown, &str),
+    mut prepare: impl FnMut(&mut Window<'_>),
+) {
+    for (size, scale) in shown.sizes() {
+        prepare(window);
+        let points = resize(window, size, scale);
+        // Bounds of plots and widths of panels are those of the picture before.
+        window.run_steps(2);
+        let case = format!("{case}, {shown:?}, {size:?} px at {scale}");
+        let texts = texts(window.output());
+        assert_apart(&texts, points, panel(window, points), &case);
+        let is_whole =
+            |text: &&Text| !text.is_shortened && text.visible.expand(0.6).contains_rect(text.letters);
+        let state = texts.iter().filter(is_whole).find(|text| STATES.contains(&text.words.as_str()));
+        let state = state.unwrap_or_else(|| panic!("{case}: no state"));
+        if !["ended", "failed", "stopped"].contains(&state.words.as_str()) {
+            let stop = texts.iter().filter(is_whole).find(|text| text.words.starts_with("EMERGENCY STOP"));
+            assert!(stop.is_some(), "{case}: no emergency stop");
         }
     }
 }
@@ -168,18 +187,16 @@ fn live(mut host: FakeHost, count: u16, look: Look, case: &str) {
     assert_eq!(host.request(None), Ask::Watch { every: 1 });
     host.run_ticks_of(count, 1200, Events::NONE);
     until(&mut window, |window| window.state().history().len() >= 1200);
-    in_all_sizes(&mut window, &format!("{case}, quiet"), |_| host.run_ticks_of(count, 1, Events::NONE));
-    in_all_sizes(&mut window, &format!("{case}, warned"), |_| host.run_ticks_of(count, 1, WARNINGS));
+    in_all_sizes(&mut window, (Shown::Quiet, case), |_| host.run_ticks_of(count, 1, Events::NONE));
+    in_all_sizes(&mut window, (Shown::Warned, case), |_| host.run_ticks_of(count, 1, WARNINGS));
     let four = vec![Quantity::Force, Quantity::Torque, Quantity::Velocity, Quantity::Lateness];
     window.state_mut().choose(&Chosen::new(0, four, Some(2)));
-    in_all_sizes(&mut window, &format!("{case}, four traces and F(x)"), |_| {
-        host.run_ticks_of(count, 1, WARNINGS)
-    });
+    in_all_sizes(&mut window, (Shown::FourTraces, case), |_| host.run_ticks_of(count, 1, WARNINGS));
     let reason = "tick 1234 exceeded the time limit, and the watchdog stopped the device; check the machine with `flotor doctor`, which \
                   says what keeps a loop from its time, and how to mend that on this kind of machine";
     host.end_as(reason, EndKind::Failed);
     until(&mut window, |window| window.query_by_label_contains(reason).is_some());
-    in_all_sizes(&mut window, &format!("{case}, failed"), |_| ());
+    in_all_sizes(&mut window, (Shown::Failed, case), |_| ());
 }
 
 #[test]
