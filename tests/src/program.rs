@@ -105,6 +105,9 @@ impl Flotor {
                 None => shell.env_remove(name),
             };
         }
+        if let Some(folder) = self.command.get_current_dir() {
+            shell.current_dir(folder);
+        }
         self.command = shell;
         self
     }

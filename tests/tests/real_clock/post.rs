@@ -55,7 +55,7 @@ impl Post {
     /// A command whose devices log here.
     pub(crate) fn flotor(&self, arguments: &[&str]) -> Flotor {
         let (name, value) = self.variable();
-        Flotor::with(arguments).env(name, &value)
+        Flotor::with(arguments).env(name, &value).inside(self.scratch.path())
     }
 
     /// A calibration that pushes with 4 N, and waits for a handle that never comes.
