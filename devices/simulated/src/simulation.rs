@@ -228,8 +228,10 @@ impl Simulation {
             }
         }
         let end_ns = tick_end_ns.min(self.stroke.end_ns);
-        let planned_ns = if self.stroke.is_guided { None } else { trajectory.release_ns() };
-        let release_ns = planned_ns.unwrap_or(u64::MAX);
+        let release_ns = match trajectory.release_ns() {
+            Some(release_ns) if !self.stroke.is_guided => release_ns,
+            _ => u64::MAX,
+        };
         if self.time_ns < release_ns {
             (end_ns.min(release_ns) - self.time_ns, self.stroke.drawn(self.time_ns))
         } else {
@@ -293,6 +295,7 @@ impl Stroke {
     }
 
     /// Returns the intended motion of the hand at the end of the stroke, where a guide begins. Without a grip, the motion of the handle.
+    #[cold] // a client takes the hand seldom
     fn follower(&self, state: &State) -> Follower {
         self.drawn(self.end_ns).map_or_else(
             || Follower::of(state),
@@ -313,7 +316,7 @@ impl Stroke {
     /// The aim at a time during the stroke, drawn straight to its end: position on the chord with
     /// its slope as velocity; orientation and force, which the plant takes as constant, halfway. Where the hand
     /// releases the handle before the end it stays.
-    #[inline]
+    #[inline(always)]
     fn drawn(&self, time_ns: u64) -> Option<Intention> {
         let start = self.start?;
         let end = self.end.unwrap_or(start);

@@ -72,7 +72,7 @@ impl Guidance {
     /// True while the trajectory alone moves the hand. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn is_free(&self) -> bool {
-        self.phase == Phase::Free
+        matches!(self.phase, Phase::Free)
     }
 
     /// Number of the client that guides; 0 for none. Real-time: bounded, no allocation.
