@@ -65,7 +65,7 @@ def size_of(source):
 
 
 def averages(drawing, size):
-    """Grey levels averaged over squares; one row and column of squares at the edge is left out."""
+    """Grey levels averaged over squares; a strip at the edge narrower than a square is left out."""
     grey = np.asarray(drawing.convert("L").resize(size), dtype=float)
     rows, columns = grey.shape[0] // SQUARE, grey.shape[1] // SQUARE
     return grey[: rows * SQUARE, : columns * SQUARE].reshape(rows, SQUARE, columns, SQUARE).mean((1, 3))

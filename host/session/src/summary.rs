@@ -147,7 +147,7 @@ impl NotComputed {
         self.energy |= record.model.energy_j().is_none();
     }
 
-    /// Adds the outputs that were computed, if at all, for clients alone: when a client comes and goes is not the run's.
+    /// Adds the outputs that only clients asked for: the summary does not depend on clients.
     fn beyond(&self, needed: Demand) -> Self {
         let is_absent = |absent: bool, output| absent || !needed.contains(output);
         Self {

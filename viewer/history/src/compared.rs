@@ -23,7 +23,7 @@ impl Compared {
         Ok(Self { name, histories: History::read(file)? })
     }
 
-    /// Returns the samples of a device by its number; none if the recording has fewer devices.
+    /// Returns the samples of a device, counted from 0 in the order of the scene; none if the recording has fewer devices.
     #[must_use]
     pub fn history(&self, device: usize) -> Option<&History> {
         self.histories.get(device)
