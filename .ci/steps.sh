@@ -49,6 +49,9 @@ libraries="libegl1 libgl1-mesa-dri libxkbcommon-x11-0"
 # What the tests use has to be here: where a tool is missing they fail instead of being skipped.
 export FLOTOR_REQUIRE=${FLOTOR_REQUIRE-cc,cxx,valgrind,display,qemu,python,rustfmt}
 
+# Without a size, tests that take longer than others are skipped, as in a newcomer's `cargo test`.
+export FLOTOR_TEST_SIZE=${FLOTOR_TEST_SIZE-daily}
+
 # What is not here, by package.
 missing_packages() {
     local tool
@@ -116,7 +119,7 @@ every_change() {
     step deny deny
     # The README's `cargo test`; the viewer, whose GPU stack that leaves out; and what needs tools that take long to build. One
     # command: of two, the second builds half of what both use again, with other features.
-    step test env FLOTOR_TEST_SIZE=daily cargo test --workspace --features flotor-tests/formats,flotor-tests/drop-ins --no-fail-fast
+    step test cargo test --workspace --features flotor-tests/formats,flotor-tests/drop-ins --no-fail-fast
     step lint cargo clippy --workspace --all-targets --all-features -- -D warnings
     # With the features and examples of `lint`: else what wgpu and serde depend on is checked a second time, with fewer features.
     # The named program is the only one without a library beside it.
