@@ -6,7 +6,6 @@ import sys
 import time
 
 from forcedimension_core import dhd, drd
-from forcedimension_core.dhd.os_independent import sleep
 from forcedimension_core.containers import DOFFloat, Status, Vec3
 
 SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 5.0
@@ -25,7 +24,7 @@ assert dhd.stop() == 0, "a program may stop what is not open until that succeeds
 device = dhd.open()
 assert device == 0, dhd.errorGetLastStr()
 assert dhd.openID(0) == 0, "open already"
-assert dhd.getSystemType(device) == 108 and dhd.getSystemName(device)
+assert dhd.getSystemType(device) == 104 and dhd.getSystemName(device)
 assert dhd.getSerialNumber(device) >= 0
 assert dhd.hasBase(device) and dhd.hasWrist(device) and not dhd.hasGripper(device)
 
@@ -75,10 +74,9 @@ dhd.setForce((2.0, 0.0, 0.0), device)
 dhd.getForce(force, device)
 assert norm(force) == 0.0, "nothing after a stop"
 
-# Regulation holds the handle against the hand, more or less, and moves it.
+# Regulation moves the handle against the hand that holds it: towards the place, and not all the way, until the timeout.
 assert drd.isInitialized(device) and drd.start(device) == 0 and drd.isRunning(device)
-assert drd.moveToPos((0.0, 0.003, 0.0), True, device) == 0
-sleep(0.2)
+assert drd.moveToPos((0.0, 0.003, 0.0), True, device) == -1 and dhd.errorGetLast() == 7
 dhd.getPosition(position, device)
 assert position[1] > 0.0003, position
 assert drd.stop(True, device) == 0 and not drd.isRunning(device)
