@@ -129,7 +129,8 @@ pub struct Viewer {
     audience: Audience,
 }
 
-/// What stands above everything: of a run, made once.
+/// Title and subtitle of a run; empty without a run.
+#[derive(Default)]
 struct Heading {
     title: String,
     subtitle: String,
@@ -164,11 +165,10 @@ impl Viewer {
             }
             Start::Recording(recorded) => (Source::Recording, Vec::new(), Some(recorded), None),
         };
-        let devices = Devices::new(Vec::new());
         let mut viewer = Self {
             source,
-            heading: Heading::of(devices.history().run()),
-            devices,
+            heading: Heading::default(),
+            devices: Devices::new(Vec::new()),
             shapes: Vec::new(),
             shape_version: 0,
             panels: Vec::new(),

@@ -37,6 +37,7 @@ pub fn apply(context: &Context, look: Look) {
         // Opaque: between panels there is nothing beneath it.
         let seam = palette.panel.lerp_to_gamma(palette.grid, 0.6);
         visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, seam);
+        visuals.text_edit_bg_color = Some(palette.panel.lerp_to_gamma(palette.grid, 0.3));
         visuals.selection.bg_fill = Color32::from_rgb(0, 114, 178);
         style.spacing.item_spacing = egui::vec2(8.0, 6.0);
     });

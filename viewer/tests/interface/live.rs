@@ -19,6 +19,7 @@ fn without_a_run_the_window_says_what_to_do() {
     window.run_steps(2);
     window.get_by_label("Waiting for a run");
     assert!(window.query_by_label("EMERGENCY STOP").is_none(), "there is nothing to stop");
+    assert!(window.query_by_label_contains("Hz").is_none(), "no run has a rate");
 }
 
 #[test]
