@@ -1,9 +1,10 @@
 //! What each velocity estimate of the simulated flotor trades: noise at rest against lag in motion, table and
 //! picture.
 //!
-//! Noise is the root mean square of the estimate for flotors that rest at random places, seen by the sensors of
-//! preset `full` (1 µm of noise, steps of 2 µm). Lag is how far the estimate is behind a steady acceleration, over
-//! that acceleration, seen by perfect sensors. Nothing here depends on the machine.
+//! Noise is the root mean square of the estimate along z for a flotor at rest, seen by the sensors of preset `full` (1 µm of
+//! noise, steps of 2 µm): their samples are independent, so it follows from the answer to a single wrong sample, without a
+//! sampling error. Lag is how far the estimate is behind a steady acceleration, over that acceleration. Nothing here depends on
+//! the machine.
 //!
 //! ```text
 //! cargo run --release -p flotor-tests --features measurements --example velocity_estimators -- velocity.svg > velocity.csv
@@ -21,11 +22,8 @@ use std::error::Error;
 const TICK_S: f64 = 1.0e-3;
 const TICK_NS: u64 = 1_000_000;
 
-/// Places a flotor rests at, and ticks it is watched at each.
-const PLACES: u32 = 100;
+/// Length of a run, ticks: the slowest estimate has forgotten its start to e^-12.
 const TICKS: u64 = 400;
-/// Ticks until an estimate has settled.
-const SETTLED: usize = 200;
 
 /// Steady acceleration, m/s²: 8 mm in the ticks of a run.
 const ACCELERATION_M_PER_S2: f64 = 0.1;
@@ -58,8 +56,7 @@ impl Trade {
 
 /// Measures all estimators, family by family.
 pub(crate) fn trades() -> Result<Vec<Trade>, InvalidParameter> {
-    // Deviation of a coordinate of preset `full`: its noise, and its steps evenly distributed.
-    let noise_m = SensingParameters::MAGLEV.noise_m.hypot(SensingParameters::MAGLEV.step_m / 12.0_f64.sqrt());
+    let noise_m = cell_noise_m();
     let low_pass = [500.0, 200.0, 100.0, 50.0, 20.0, 10.0, 5.0].map(|bandwidth_hz| {
         Trade::measured("low-pass", Some(bandwidth_hz), EstimatorKind::LowPass { bandwidth_hz })
     });
@@ -95,13 +92,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// A row of estimates for the heights (m) a flotor is at, tick after tick.
-fn estimates(
-    parameters: &SensingParameters,
-    seed: u64,
-    height_m: impl Fn(u64) -> f64,
-) -> Result<Vec<f64>, InvalidParameter> {
-    let mut sensing = Sensing::new(parameters, seed, &Pose::HOME)?;
+/// Returns the deviation of a cell of preset `full`, m: its noise, and its steps evenly distributed.
+fn cell_noise_m() -> f64 {
+    SensingParameters::MAGLEV.noise_m.hypot(SensingParameters::MAGLEV.step_m / 12.0_f64.sqrt())
+}
+
+/// Returns the estimates of perfect sensors for the heights (m) a flotor is at, tick after tick.
+fn estimates(estimator: EstimatorKind, height_m: impl Fn(u64) -> f64) -> Result<Vec<f64>, InvalidParameter> {
+    let parameters = SensingParameters {
+        estimator,
+        latency_ns: 0,
+        noise_m: 0.0,
+        step_m: 0.0,
+        edge_nonlinearity: 0.0,
+        ..SensingParameters::MAGLEV
+    };
+    let mut sensing = Sensing::new(&parameters, 0, &Pose::HOME)?;
     let rows = (0..TICKS).map(|tick| {
         let state = State { position_m: DVec3::new(0.0, 0.0, height_m(tick)), ..State::HOME };
         sensing.sample(&state, tick * TICK_NS, TICK_S);
@@ -111,30 +117,16 @@ fn estimates(
 }
 
 fn noise_m_per_s(estimator: EstimatorKind) -> Result<f64, InvalidParameter> {
-    let parameters = SensingParameters { estimator, latency_ns: 0, ..SensingParameters::MAGLEV };
-    let (mut sum, mut count) = (0.0, 0.0);
-    for place in 0..PLACES {
-        // Golden section: places spread over a millimetre, nowhere near the steps of the sensor.
-        let height_m = (f64::from(place) * 0.618_033_988_749_895).fract() * 1.0e-3;
-        for estimate in estimates(&parameters, u64::from(place), |_| height_m)?.iter().skip(SETTLED) {
-            sum += estimate * estimate;
-            count += 1.0;
-        }
-    }
-    Ok((sum / count).sqrt())
+    const WRONG_M: f64 = 1.0e-3;
+    let answer = estimates(estimator, |tick| if tick == 1 { WRONG_M } else { 0.0 })?;
+    let gain_per_s = answer.iter().map(|estimate| estimate * estimate).sum::<f64>().sqrt() / WRONG_M;
+    // The height is the mean of the three cells.
+    Ok(gain_per_s * cell_noise_m() / 3.0_f64.sqrt())
 }
 
 fn lag_s(estimator: EstimatorKind) -> Result<f64, InvalidParameter> {
-    let parameters = SensingParameters {
-        estimator,
-        latency_ns: 0,
-        noise_m: 0.0,
-        step_m: 0.0,
-        edge_nonlinearity: 0.0,
-        ..SensingParameters::MAGLEV
-    };
     let time_s = |tick: u64| tick as f64 * TICK_S;
-    let row = estimates(&parameters, 0, |tick| 0.5 * ACCELERATION_M_PER_S2 * time_s(tick).powi(2))?;
+    let row = estimates(estimator, |tick| 0.5 * ACCELERATION_M_PER_S2 * time_s(tick).powi(2))?;
     let last = row.last().copied().unwrap_or(f64::NAN);
     Ok(time_s(TICKS - 1) - last / ACCELERATION_M_PER_S2)
 }

@@ -11,7 +11,6 @@ use flotor_tests::printed::assert_chapter_prints;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tables::{Row, number, table};
-use std::f64::consts::TAU;
 
 #[allow(dead_code)] // times and picture
 #[path = "../../examples/integrators.rs"]
@@ -71,60 +70,22 @@ fn the_book_prints_noise_and_lag_of_the_velocity_estimates() {
     }
 }
 
-/// A low-pass that takes the share `a` of a difference has `a / sqrt(2 - a)` of its noise and lags by `T (1 - a) / a` more.
+/// The table is of transfer functions, Riccati and Lyapunov equations (`tests/generators/velocity.py`).
 #[test]
-fn noise_and_lag_of_the_low_pass_are_its_closed_forms() {
+fn noise_and_lag_of_the_velocity_estimates_are_those_of_their_transfer_functions() {
     if TestSize::of_this_run().leaves_out_long_tests() {
         return;
     }
     let trades = velocity_estimators::trades().expect("physical parameters");
-    let [difference, ..] = trades.as_slice() else { panic!("no estimates") };
-    let low_pass: Vec<_> = trades.iter().filter(|trade| trade.family == "low-pass").collect();
-    assert!(low_pass.len() > 3, "{}", low_pass.len());
-    for trade in low_pass {
-        let share = 1.0 - (-TAU * trade.setting.expect("a bandwidth") * 1.0e-3).exp();
-        let lag_ms = (1.0 - share) / share + 0.5;
-        // The first difference of a run has faded to e^-12 at the end.
-        assert!((trade.lag_ms / lag_ms - 1.0).abs() < 1.0e-3, "{}, not {lag_ms} ms", trade.line());
-        let noise_mm_per_s = difference.noise_mm_per_s * share / (2.0 - share).sqrt();
-        // Of 20 000 estimates about the share is independent: six deviations of their mean square's root.
-        let bound = 6.0 / (2.0 * 20_000.0 * share).sqrt();
-        let is_close = (trade.noise_mm_per_s / noise_mm_per_s - 1.0).abs() < bound;
-        assert!(is_close, "{}, not {noise_mm_per_s} mm/s", trade.line());
-    }
-}
-
-/// Gains of the steady Kalman filter by iteration of its Riccati equation; behind a steady acceleration the filter lags by
-/// `T (alpha / beta - 1 / 2)`.
-#[test]
-fn lag_of_the_kalman_filter_is_that_of_its_riccati_equation() {
-    if TestSize::of_this_run().leaves_out_long_tests() {
-        return;
-    }
-    let trades = velocity_estimators::trades().expect("physical parameters");
-    let kalman: Vec<_> = trades.iter().filter(|trade| trade.family == "kalman").collect();
-    assert!(kalman.len() > 3, "{}", kalman.len());
-    let (tick_s, noise_m) = (1.0e-3, 1.0e-6_f64.hypot(2.0e-6 / 12.0_f64.sqrt()));
-    for trade in kalman {
-        let acceleration_m_per_s2 = trade.setting.expect("an acceleration");
-        let [way, change] = [0.5 * tick_s * tick_s, tick_s].map(|gain| gain * acceleration_m_per_s2);
-        // Covariance of position and velocity after a measurement.
-        let (mut p, mut q, mut r) = (noise_m * noise_m, 0.0, 1.0);
-        let (mut alpha, mut beta) = (1.0, 0.0);
-        for _ in 0..100_000 {
-            let (before_p, before_q, before_r) = (
-                p + 2.0 * tick_s * q + tick_s * tick_s * r + way * way,
-                q + tick_s * r + way * change,
-                r + change * change,
-            );
-            let innovation = before_p + noise_m * noise_m;
-            (alpha, beta) = (before_p / innovation, tick_s * before_q / innovation);
-            (p, q) = ((1.0 - alpha) * before_p, (1.0 - alpha) * before_q);
-            r = before_r - before_q * before_q / innovation;
-        }
-        let lag_ms = 1.0e3 * tick_s * (alpha / beta - 0.5);
-        // The start of a run has faded to e^-12 of a lag of 3 ms.
-        assert!((trade.lag_ms - lag_ms).abs() < 1.0e-3, "{}, not {lag_ms} ms", trade.line());
+    let rows = table("velocity_estimates.csv");
+    assert_eq!(trades.len(), rows.len());
+    for (trade, row) in trades.iter().zip(&rows) {
+        let setting = trade.setting.map_or_else(String::new, |number| number.to_string());
+        assert_eq!((trade.family, &setting), (row["estimate"].as_str(), &row["setting"]));
+        // The start of a run has faded to e^-12 of a lag of 32 ms, and of the sum of squares to its square.
+        let (noise_mm_per_s, lag_ms) = (number(row, "noise_mm_per_s"), number(row, "lag_ms"));
+        let is_close = (trade.noise_mm_per_s / noise_mm_per_s - 1.0).abs() < 1.0e-4;
+        assert!(is_close && (trade.lag_ms - lag_ms).abs() < 1.0e-3, "{}, not {row:?}", trade.line());
     }
 }
 

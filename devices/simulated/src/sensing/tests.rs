@@ -184,6 +184,33 @@ fn the_same_seed_gives_the_same_samples() {
     assert_ne!(run(5).pose, run(6).pose);
 }
 
+/// Three cells with noise, and with steps that are evenly distributed over many places: the height is their mean.
+#[test]
+fn the_height_has_the_noise_of_the_mean_of_three_cells() {
+    let (mut square, mut count) = (0.0, 0.0_f64);
+    for place in 0..100_u32 {
+        // Golden section: places spread over a millimetre, nowhere near the steps of the sensor.
+        let truth = state(&pose([0.0, 0.0, (f64::from(place) * 0.618_033_988_749_895).fract()], [0.0; 3]));
+        let mut sensing =
+            Sensing::new(&SensingParameters::MAGLEV, u64::from(place), &Pose::HOME).expect("physical");
+        let mut previous = f64::NAN;
+        for tick in 0..200 {
+            sensing.sample(&truth, tick, TICK_S);
+            let height_m = sensing.arrived(0).pose.expect("in range").position_m.z;
+            if previous.is_finite() {
+                square += (height_m - previous).powi(2);
+                count += 1.0;
+            }
+            previous = height_m;
+        }
+    }
+    let noise_m = (square / (2.0 * count)).sqrt();
+    let expected_m = 1.0e-6_f64.hypot(2.0e-6 / 12.0_f64.sqrt()) / 3.0_f64.sqrt();
+    // Squares of differences of independent samples: six deviations of the root of their mean.
+    let bound = 6.0 * (1.5 / (2.0 * count)).sqrt();
+    assert!((noise_m / expected_m - 1.0).abs() < bound, "{noise_m} {expected_m}");
+}
+
 /// Root mean square error of a velocity estimate (m/s): at rest under noise, and behind a steady acceleration.
 fn noise_and_lag(kind: EstimatorKind) -> (f64, f64) {
     const NOISE_M: f64 = 2.0e-6;
