@@ -3,6 +3,7 @@
 
 mod architecture;
 mod asynchronous_models;
+mod bench_errors;
 mod book;
 mod boundary;
 mod c_plugins;

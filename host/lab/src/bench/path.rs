@@ -35,7 +35,8 @@ impl Hand {
     }
 
     /// The poses of the first ticks, at 1 kHz.
-    pub(super) fn poses(self, ticks: usize) -> Vec<Pose> {
+    #[must_use]
+    pub fn poses(self, ticks: usize) -> Vec<Pose> {
         let trajectory = self.trajectory();
         (0..ticks).map(|tick| trajectory.pose(tick as f64 * 1.0e-3)).collect()
     }
@@ -62,7 +63,8 @@ impl Workspace {
     }
 
     /// The poses of the first ticks, at 1 kHz.
-    pub(super) fn poses(self, ticks: usize) -> Vec<Pose> {
+    #[must_use]
+    pub fn poses(self, ticks: usize) -> Vec<Pose> {
         let pose = |tick: usize| {
             let [position, rotation] = SWEEPS_HZ.map(|rates_hz| in_unit_ball(tick as f64 * 1.0e-3, rates_hz));
             Pose::new(
