@@ -32,6 +32,7 @@ pub use output::{
     exit_code_of, first_error, keep_results_apart, note, print_error_line, print_line, print_result,
     report_line, write_json, write_text,
 };
+pub use platform::INTERRUPTED;
 pub use progress::{Redrawn, progress_bar, while_preparing};
 pub use reference::{reference, whole_program};
 pub use shell::{command_line, quoted};

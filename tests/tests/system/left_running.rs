@@ -8,6 +8,7 @@ use flotor_tests::tools::{Tool, required};
 use flotor_tests::{TestSize, workspace_root};
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use serde_json::Value;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -49,30 +50,29 @@ impl Hanging {
         let arguments = arguments.iter().map(|word| if *word == "MODEL" { model.as_str() } else { word });
         Flotor::with(arguments).inside(self.path())
     }
+}
 
-    /// The processes whose folder this is: commands of a test and all that they have started.
-    fn processes(&self) -> Vec<String> {
-        let own = self.path().canonicalize().expect("it is there");
-        let entries = std::fs::read_dir("/proc").expect("/proc is there").flatten();
-        let inside = entries.filter(|process| {
-            std::fs::read_link(process.path().join("cwd")).is_ok_and(|folder| folder == own)
-        });
-        // The command line of a process that has ended is empty.
-        let words = inside.filter_map(|process| std::fs::read_to_string(process.path().join("cmdline")).ok());
-        words.map(|words| words.replace('\0', " ")).filter(|words| !words.is_empty()).collect()
-    }
+/// Returns the processes in a folder: commands of a test and all that they have started.
+fn processes_in(folder: &Path) -> Vec<String> {
+    let own = folder.canonicalize().expect("it is there");
+    let entries = std::fs::read_dir("/proc").expect("/proc is there").flatten();
+    let inside = entries
+        .filter(|process| std::fs::read_link(process.path().join("cwd")).is_ok_and(|folder| folder == own));
+    // The command line of a process that has ended is empty.
+    let words = inside.filter_map(|process| std::fs::read_to_string(process.path().join("cmdline")).ok());
+    words.map(|words| words.replace('\0', " ")).filter(|words| !words.is_empty()).collect()
+}
 
-    /// Waits until no process is left; the time it took.
-    fn is_left(&self, what: &str) -> Duration {
-        let since = Instant::now();
-        loop {
-            let left = self.processes();
-            if left.is_empty() {
-                return since.elapsed();
-            }
-            assert!(since.elapsed() < FOR_EVER, "{what} left running: {left:#?}");
-            std::thread::sleep(Duration::from_millis(5));
+/// Waits until no process is in a folder; returns the time it took.
+fn no_process_is_left_in(folder: &Path, what: &str) -> Duration {
+    let since = Instant::now();
+    loop {
+        let left = processes_in(folder);
+        if left.is_empty() {
+            return since.elapsed();
         }
+        assert!(since.elapsed() < FOR_EVER, "{what} left running: {left:#?}");
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 
@@ -133,9 +133,10 @@ fn nothing_is_left_of_a_command_that_is_killed_while_a_model_hangs() {
             // Spread evenly, without a period of its own: the golden section.
             let share = (number as f64 * 0.618_034).fract();
             std::thread::sleep(Duration::from_secs_f64(1.5 * share));
-            most = most.max(scene.processes().len());
+            most = most.max(processes_in(scene.path()).len());
             end.bring_about(&started);
-            slowest = slowest.max(scene.is_left(&format!("{command:?} {end:?} after {share}")));
+            slowest = slowest
+                .max(no_process_is_left_in(scene.path(), &format!("{command:?} {end:?} after {share}")));
             let ended = started.wait();
             assert_ne!(ended.code, Some(exit_code::CONFIGURATION), "{ended:?}");
             let _ = std::fs::remove_dir_all(scene.path().join("data"));
@@ -219,6 +220,51 @@ fn a_process_that_leaves_the_group_of_a_lent_program_is_named() {
     assert!(ran.stderr.contains(&named), "{ran:?}");
 }
 
+/// A program that ignores every request to end and suspends the service: the child of `lend` that is not the guard of the program.
+const SUSPENDS_ITS_SERVICE: &str = "trap '' TERM INT HUP
+lend=$(cut -d ' ' -f 4 /proc/$PPID/stat)
+for child in $(cat /proc/$lend/task/$lend/children); do
+    [ \"$child\" = \"$PPID\" ] || kill -STOP \"-$child\"
+done
+echo >suspended
+while :; do sleep 600; done
+";
+
+#[test]
+fn a_service_that_does_not_end_is_killed_with_the_program_and_named() {
+    let scratch = Scratch::default();
+    let lend = ["lend", "--api", "ml-api", "--listen", "127.0.0.1:0", "--json", "run.json", "--"];
+    let lend = lend.into_iter().chain(["sh", "-c", SUSPENDS_ITS_SERVICE]);
+    let mut started = Flotor::with(lend).inside(scratch.path()).leading_a_group().start();
+    soon("the service is suspended", || scratch.path().join("suspended").exists());
+    started.signal(Signal::TERM);
+    soon("lend has ended", || started.try_wait().expect("it is ours").is_some());
+    let ran = started.wait();
+    assert!(ran.stderr.contains("the service did not end in time after the request to stop"), "{ran:?}");
+    let summary = std::fs::read_to_string(scratch.path().join("run.json")).expect("it is written");
+    let summary: Value = serde_json::from_str(&summary).expect("it is JSON");
+    assert!(summary["end"].as_str().is_some_and(|end| end.contains("was killed")), "{summary:#}");
+    no_process_is_left_in(scratch.path(), "flotor lend");
+}
+
+#[test]
+fn a_program_that_cannot_be_started_leaves_no_service_and_no_folder() {
+    let scratch = Scratch::default();
+    let program = scratch.file("program", "#!/no/such/interpreter\n");
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("it is ours");
+    let temporary = scratch.path().join("temporary");
+    std::fs::create_dir(&temporary).expect("an empty folder takes another");
+    let lend = ["lend", "--api", "ml-api", "--listen", "127.0.0.1:0", "--", "./program"];
+    let lend = Flotor::with(lend).inside(scratch.path()).env("TMPDIR", &temporary.display().to_string());
+    let ran = lend.run();
+    assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:?}");
+    assert!(ran.stderr.contains("cannot be started"), "{ran:?}");
+    no_process_is_left_in(scratch.path(), "flotor lend");
+    let left = std::fs::read_dir(&temporary).expect("it is there").flatten();
+    let left: Vec<_> = left.map(|entry| entry.file_name()).collect();
+    assert!(left.iter().all(|name| !name.to_string_lossy().starts_with("flotor-lend")), "{left:?}");
+}
+
 #[test]
 fn a_test_of_a_model_that_hangs_leaves_nothing_when_it_ends() {
     if !required(Tool::Cc) {
@@ -229,7 +275,7 @@ fn a_test_of_a_model_that_hangs_leaves_nothing_when_it_ends() {
     let ran = hanging.flotor(&test).env("FLOTOR_STEP_LIMIT_S", "600").run();
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
     assert!(ran.stdout.contains("it had not ended after 1 s, and was killed"), "{}", ran.stdout);
-    hanging.is_left("flotor test");
+    no_process_is_left_in(hanging.path(), "flotor test");
 }
 
 // ---------------------------------------------------------------- a name

@@ -12,9 +12,10 @@ use unix as system;
 #[cfg(windows)]
 use windows as system;
 
+pub use system::INTERRUPTED;
 pub(crate) use system::{
-    INTERRUPTED, KeyTerminal, Requests, accept_interrupts, ask_to_end, become_program, die_by, divide,
-    is_orphaned, outlive_requests, results_apart, stack_limit_bytes,
+    KeyTerminal, Requests, accept_interrupts, ask_to_end, become_program, die_by, divide, is_orphaned,
+    outlive_requests, results_apart, stack_limit_bytes,
 };
 
 /// What asks a run to end.

@@ -23,7 +23,7 @@ use std::time::Duration;
 pub(crate) use supervision::{accept_interrupts, die_by, divide, is_orphaned};
 
 /// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as shells have it.
-pub(crate) const INTERRUPTED: i32 = 130;
+pub const INTERRUPTED: i32 = 130;
 
 /// Signals that stop a run: the keys of a terminal (Ctrl-C, `Ctrl-\`, Ctrl-Z), its closing, and process managers.
 ///

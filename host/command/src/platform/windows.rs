@@ -46,7 +46,7 @@ pub(crate) fn die_by(_: i32) -> ! {
 
 /// Exit code after a third request, when nothing else has ended the process: that of a program that Ctrl-C has ended
 /// (`STATUS_CONTROL_C_EXIT`).
-pub(crate) const INTERRUPTED: i32 = 0xc000_013a_u32.cast_signed();
+pub const INTERRUPTED: i32 = 0xc000_013a_u32.cast_signed();
 
 /// How long a console that closes waits: the system ends the process 5 s after it asked.
 const CLOSING: Duration = Duration::from_secs(5);

@@ -5,12 +5,11 @@ pub(crate) mod guard;
 mod outcome;
 mod program;
 mod service;
+mod stop_request;
 
 use clap::{Args, ValueEnum};
 use flotor_command::options::{ControlGroupOption, PluginPathOption, json_file, mcap_file, seed};
-use flotor_command::stopping::stop_on_signals;
-use flotor_command::{CommandError, note};
-use flotor_servo::StopSwitch;
+use flotor_command::{CommandError, INTERRUPTED, note, write_json};
 use flotor_servo::last_stop::spawn_unblocked;
 use flotor_session::registry::{PATH_VARIABLE, Registry};
 use flotor_session::scene::Scene;
@@ -19,12 +18,14 @@ use guard::{KILL_GROUP, ProgramEnd};
 use outcome::Runs;
 use program::Program;
 use rustix::process::{Pid, Signal, kill_process};
-use service::Service;
+use serde_json::json;
+use service::{Service, ServiceEnd};
 use std::ffi::OsString;
 use std::os::unix::fs::{DirBuilderExt, symlink};
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
-use std::time::{Duration, Instant};
+use stop_request::{Stage, StopRequest};
 
 /// Run an unmodified program, written for another maker's device, on the device of a scene, within the scene's limits.
 #[derive(Args)]
@@ -222,48 +223,52 @@ impl Drop for Folder {
     }
 }
 
+/// Why `flotor lend` ends without an end of its program.
+enum Early {
+    Failed(CommandError),
+    /// With this exit code: another process has printed the cause, or a stop was requested.
+    Exit(i32),
+}
+
+impl From<CommandError> for Early {
+    fn from(error: CommandError) -> Self {
+        Self::Failed(error)
+    }
+}
+
 pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
-    let stop = stop_on_signals()?;
+    match lend(&arguments) {
+        Ok(0) => Ok(()),
+        // Here the service has ended and the folder is gone, which `exit` would leave.
+        Ok(code) | Err(Early::Exit(code)) => std::process::exit(code),
+        Err(Early::Failed(error)) => Err(error),
+    }
+}
+
+/// Runs the program; returns its exit code, or that of its runs.
+fn lend(arguments: &LendArguments) -> Result<i32, Early> {
+    let stop = StopRequest::by_signals()?;
     let [name, rest @ ..] = arguments.program.as_slice() else {
-        return Err(CommandError::Usage(
-            "which program? `flotor lend [SCENE] -- PROGRAM ARGUMENTS`".to_owned(),
-        ));
+        let usage = "which program? `flotor lend [SCENE] -- PROGRAM ARGUMENTS`".to_owned();
+        return Err(CommandError::Usage(usage).into());
     };
     let api = arguments.api.as_deref().map(Api::of_word).transpose()?;
-    check_scene(&arguments)?;
+    check_scene(arguments)?;
     let program = Program::find(name)?;
     let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
     let api = match api {
-        Some(Interface::Service(service)) => return serve(&arguments, service, &program, rest, &own, &stop),
+        Some(Interface::Service(service)) => return serve(arguments, service, &program, rest, &own, &stop),
         Some(Interface::Library(api)) => Some(api),
         None => None,
     };
     if arguments.listen.is_some() {
-        return Err(CommandError::Usage("--listen is for `--api haply` and `--api ml-api`".to_owned()));
+        let usage = "--listen is for `--api haply` and `--api ml-api`".to_owned();
+        return Err(CommandError::Usage(usage).into());
     }
     program.check(api)?;
-    let folder = Folder::new()?;
-    for wanted in api.map_or(Api::ALL.to_vec(), |api| vec![api]) {
-        match wanted.library(&own) {
-            Ok(library) => folder.put(wanted, &library)?,
-            // Of those that nobody named, the ones that the program does not call may be missing.
-            Err(missing) if api.is_some() || program.calls(wanted) => return Err(missing),
-            Err(_) => {}
-        }
-    }
-    // CHAI3D looks at this one first, and calls nothing of it.
-    let (beside, phantom) = (folder.0.join("libHD.so"), folder.0.join("libhdPhantom.so"));
-    if !beside.exists() && phantom.exists() {
-        let _ = symlink(&phantom, &beside);
-    }
-    if !folder.0.join("lib").exists() && !beside.exists() {
-        return Err(Api::Dhd
-            .library(&own)
-            .err()
-            .unwrap_or_else(|| CommandError::Failed("no library".to_owned())));
-    }
+    let folder = folder_of_libraries(api, &program, &own)?;
     let mut command = guarded(&program, rest, &folder, &own);
-    environment(&mut command, &arguments, &folder.0, &own)?;
+    environment(&mut command, arguments, &folder.0, &own)?;
     let end = carry_out(&mut command, &program, &folder, &stop)?;
     let runs = Runs::read(&folder.0, &end);
     if !runs.tell(&program, arguments.record.as_deref()) {
@@ -277,7 +282,31 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
             program.path.display()
         ));
     }
-    end_as(&runs, arguments.json.as_deref(), folder, 0)
+    arguments.json.as_deref().map_or(Ok(()), |json| runs.write(json))?;
+    Ok(runs.exit_code())
+}
+
+/// Makes the folder with the libraries of an interface, or of all.
+fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Result<Folder, CommandError> {
+    let folder = Folder::new()?;
+    for wanted in api.map_or(Api::ALL.to_vec(), |api| vec![api]) {
+        match wanted.library(own) {
+            Ok(library) => folder.put(wanted, &library)?,
+            // Of those that nobody named, the ones that the program does not call may be missing.
+            Err(missing) if api.is_some() || program.calls(wanted) => return Err(missing),
+            Err(_) => {}
+        }
+    }
+    // CHAI3D looks at this one first, and calls nothing of it.
+    let (beside, phantom) = (folder.0.join("libHD.so"), folder.0.join("libhdPhantom.so"));
+    if !beside.exists() && phantom.exists() {
+        let _ = symlink(&phantom, &beside);
+    }
+    if !folder.0.join("lib").exists() && !beside.exists() {
+        let missing = Api::Dhd.library(own).err();
+        return Err(missing.unwrap_or_else(|| CommandError::Failed("no library".to_owned())));
+    }
+    Ok(folder)
 }
 
 /// Returns the command that starts the program under its [`guard`].
@@ -288,52 +317,56 @@ fn guarded(program: &Program, rest: &[OsString], folder: &Folder, own: &Path) ->
     command
 }
 
-/// Runs the guarded program; its end. Exits with the code of the guard if that could not start the program, and has said why.
+/// Runs the guarded program; returns its end. A guard that cannot start the program has printed the cause.
 fn carry_out(
     command: &mut Command,
     program: &Program,
     folder: &Folder,
-    stop: &StopSwitch,
-) -> Result<ProgramEnd, CommandError> {
+    stop: &StopRequest,
+) -> Result<ProgramEnd, Early> {
+    if stop.stage() > Stage::Running {
+        return Err(Early::Exit(INTERRUPTED));
+    }
     let guard = spawn_unblocked(command)
         .map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))?;
     let status = wait(guard, stop);
-    let end = ProgramEnd::read(&folder.program_end()).unwrap_or_else(|| match status.code() {
-        Some(code) => std::process::exit(code),
-        None => ProgramEnd::of(status),
-    });
+    let end = match (ProgramEnd::read(&folder.program_end()), status.code()) {
+        (Some(end), _) => end,
+        (None, Some(code)) => return Err(Early::Exit(code)),
+        (None, None) => ProgramEnd::of(status),
+    };
     end.tell();
     Ok(end)
 }
 
-/// Serves a program by the network.
+/// Serves a program by the network; returns the exit code of the program and its runs, or where that is 0, of the service, whose run may
+/// have been refused.
 fn serve(
     arguments: &LendArguments,
     service: Service,
     program: &Program,
     rest: &[OsString],
     own: &Path,
-    stop: &StopSwitch,
-) -> Result<(), CommandError> {
+    stop: &StopRequest,
+) -> Result<i32, Early> {
     let folder = Folder::new()?;
-    let served = service.start(arguments, &folder, own)?;
+    let served = service.start(arguments, &folder, own, stop)?;
     let end = carry_out(&mut guarded(program, rest, &folder, own), program, &folder, stop)?;
     let served = served.finish();
     let runs = Runs::read(&folder.0, &end);
     runs.tell(program, arguments.record.as_deref());
-    let json = arguments.json.as_deref().filter(|_| service.leaves_its_summary_here());
-    end_as(&runs, json, folder, served)
-}
-
-/// Writes the summaries, removes the folder, and ends with the exit code of the program and its runs; where these give 0, with that of
-/// the service, whose run may have been refused.
-fn end_as(runs: &Runs<'_>, json: Option<&Path>, folder: Folder, service: i32) -> Result<(), CommandError> {
-    json.map_or(Ok(()), |json| runs.write(json))?;
-    drop(folder);
-    match (runs.exit_code(), service) {
-        (0, 0) => Ok(()),
-        (0, code) | (code, _) => std::process::exit(code),
+    if let Some(json) = &arguments.json {
+        match served {
+            _ if service.leaves_its_summary_here() => runs.write(json)?,
+            ServiceEnd::Killed => write_json(json, &json!({ "end": ServiceEnd::KILLED }))?,
+            // The service has written it.
+            ServiceEnd::Exited(_) => {}
+        }
     }
+    Ok(match runs.exit_code() {
+        0 => served.exit_code(),
+        code => code,
+    })
 }
 
 /// Reads the scene and looks for its plugins before the program starts: a program would see a device that is not there.
@@ -414,36 +447,27 @@ fn told(
     Ok(())
 }
 
-/// Time that a program has to end by the signal of the terminal, before SIGTERM.
-const PATIENCE: Duration = Duration::from_millis(500);
-/// Time that a program has to end once it was asked to, before it is killed.
-const LAST_PATIENCE: Duration = Duration::from_millis(1300);
-/// Pause between two looks at it.
-const LOOK: Duration = Duration::from_millis(10);
+/// Waits for the guard of the program. After a request to stop, sends SIGTERM to the guard, then the request to kill the group. At the
+/// end of the schedule the guard goes on alone. A terminal sends its own signal to the program.
+fn wait(mut guard: Child, stop: &StopRequest) -> ExitStatus {
+    let process = Pid::from_child(&guard);
+    let mut asked = Stage::Running;
+    let status = stop.poll(|stage| {
+        let status = has_ended(&mut guard);
+        if status.is_none() && (asked < stage || stage >= Stage::ProgramKilled) {
+            let _ = match stage {
+                Stage::Running | Stage::Requested => Ok(()),
+                Stage::ProgramAsked => kill_process(process, Signal::TERM),
+                Stage::ProgramKilled | Stage::Over => kill_process(process, KILL_GROUP),
+            };
+            asked = stage;
+        }
+        status
+    });
+    status.unwrap_or_else(|| ExitStatus::from_raw(Signal::KILL.as_raw()))
+}
 
-/// Waits for the guard of the program. After a request to stop, sends SIGTERM to the guard, and kills it if it does not end. A terminal
-/// sends its own signal to the program.
-fn wait(mut child: Child, stop: &StopSwitch) -> ExitStatus {
-    let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
-    let send = |signal| process.map(|process| kill_process(process, signal));
-    let mut asked: Option<Instant> = None;
-    let mut was_told = false;
-    loop {
-        match child.try_wait() {
-            Ok(Some(status)) => return status,
-            Err(_) => return ExitStatus::default(),
-            Ok(None) => {}
-        }
-        if stop.is_stop_asked() {
-            asked.get_or_insert_with(Instant::now);
-        }
-        let waited = asked.map(|since| since.elapsed()).unwrap_or_default();
-        if stop.emergency().is_some() || waited > LAST_PATIENCE {
-            let _ = send(KILL_GROUP);
-        } else if !was_told && waited > PATIENCE {
-            was_told = true;
-            let _ = send(Signal::TERM);
-        }
-        std::thread::sleep(LOOK);
-    }
+/// Returns the exit status of a process once it has ended.
+fn has_ended(child: &mut Child) -> Option<ExitStatus> {
+    child.try_wait().unwrap_or_else(|_| Some(ExitStatus::default()))
 }

@@ -1,15 +1,17 @@
 //! Interfaces that a program reaches by the network: the service is a process of its own beside the program.
 
-use super::{Folder, LendArguments, PaceOption, told};
+use super::stop_request::{Stage, StopRequest};
+use super::{Early, Folder, LendArguments, PaceOption, has_ended, told};
 use flotor_command::separate::{Built, SeparateProgram};
-use flotor_command::{CommandError, note, say};
+use flotor_command::{CommandError, INTERRUPTED, note, say};
 use flotor_servo::last_stop::spawn_unblocked;
-use rustix::process::{Pid, Signal, kill_process};
+use flotor_session::end_with_this_thread;
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
-use std::thread::JoinHandle;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 /// The simulated flotor that a program of the ML API finds without a scene.
 const SCENE: &str = include_str!("ml-api.toml");
@@ -50,12 +52,13 @@ impl Service {
     }
 
     /// Starts it and waits until it listens.
-    pub(super) fn start(
+    pub(super) fn start<'a>(
         self,
         arguments: &LendArguments,
         folder: &Folder,
         own: &Path,
-    ) -> Result<Served, CommandError> {
+        stop: &'a StopRequest,
+    ) -> Result<Served<'a>, Early> {
         let mut command = match self {
             Self::Haply => {
                 let program = SeparateProgram {
@@ -75,10 +78,11 @@ impl Service {
         };
         // Ctrl-C is for the program: the service ends after it.
         command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
+        end_with_this_thread(&mut command);
         let file = command.get_program().to_owned();
         let child = spawn_unblocked(&mut command)
             .map_err(|cause| CommandError::file(file.as_ref(), "cannot be started", cause))?;
-        Served::wait(child, self)
+        Served::wait(child, self, stop)
     }
 
     /// `flotor run` with the controller as one more model of the scene.
@@ -111,62 +115,109 @@ impl Service {
     }
 }
 
-/// A service that listens. Dropped, it is told to end, and waited for.
-pub(super) struct Served {
+/// The end of a service.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ServiceEnd {
+    /// With this exit code, which is not 0 where its run has failed.
+    Exited(i32),
+    /// By `flotor lend`, because it did not end after a request to stop.
+    Killed,
+}
+
+impl ServiceEnd {
+    /// Explanation of [`ServiceEnd::Killed`].
+    pub(super) const KILLED: &str =
+        "the service did not end in time after the request to stop, and was killed without a summary";
+
+    /// Returns the exit code that it gives to the command.
+    pub(super) fn exit_code(self) -> i32 {
+        match self {
+            Self::Exited(code) => code,
+            Self::Killed => 1,
+        }
+    }
+}
+
+/// A service that listens. Dropped, it is asked to end, and waited for.
+pub(super) struct Served<'a> {
     child: Child,
-    /// What it says after it has said where it listens.
-    said: Option<JoinHandle<String>>,
+    stop: &'a StopRequest,
+    /// Its output after the place where it listens, once that is complete.
+    output: Receiver<String>,
 }
 
-impl Served {
-    fn wait(mut child: Child, service: Service) -> Result<Self, CommandError> {
-        let mut output = child.stdout.take().map(BufReader::new);
-        let address = output.as_mut().and_then(listening);
-        let said = output.and_then(|mut output| {
-            // Without the thread the output of the service is lost; the service continues.
-            let thread = std::thread::Builder::new().name("flotor-service".to_owned());
-            let read = move || {
-                let mut rest = String::new();
-                let _ = output.read_to_string(&mut rest);
-                rest
-            };
-            thread.spawn(read).ok()
-        });
-        let mut served = Self { child, said };
-        let Some(address) = address else {
-            // It has said why.
-            let code = served.child.wait().ok().and_then(|status| status.code());
-            drop(served);
-            std::process::exit(code.unwrap_or(1));
+impl<'a> Served<'a> {
+    fn wait(mut child: Child, service: Service, stop: &'a StopRequest) -> Result<Self, Early> {
+        let (sender, output) = channel();
+        let pipe = child.stdout.take();
+        let served = Self { child, stop, output };
+        let read = move || {
+            let Some(mut pipe) = pipe.map(BufReader::new) else { return };
+            let Some(address) = listening(&mut pipe) else { return };
+            let _ = sender.send(address);
+            let mut rest = String::new();
+            let _ = pipe.read_to_string(&mut rest);
+            let _ = sender.send(rest);
         };
-        note(format_args!(
-            "`--api {}` is served at {address}: the program has to connect there",
-            service.word()
-        ));
-        Ok(served)
+        let thread = std::thread::Builder::new().name("flotor-service".to_owned()).spawn(read);
+        thread.map_err(|cause| {
+            CommandError::Failed(format!("no thread for the output of the service: {cause}"))
+        })?;
+        let address = stop.poll(|stage| match served.output.try_recv() {
+            Ok(address) => Some(Ok(address)),
+            // It has printed why.
+            Err(TryRecvError::Disconnected) => Some(Err(None)),
+            Err(TryRecvError::Empty) => (stage > Stage::Running).then_some(Err(Some(INTERRUPTED))),
+        });
+        match address.unwrap_or(Err(Some(INTERRUPTED))) {
+            Ok(address) => {
+                note(format_args!(
+                    "`--api {}` is served at {address}: the program has to connect there",
+                    service.word()
+                ));
+                Ok(served)
+            }
+            Err(code) => {
+                let end = served.finish();
+                Err(Early::Exit(code.unwrap_or_else(|| end.exit_code().max(1))))
+            }
+        }
     }
 
-    /// Ends it, prints what it said of the run, and returns its exit code; that is not 0 where its run has failed.
-    pub(super) fn finish(mut self) -> i32 {
-        let said = self.end();
-        if !said.trim().is_empty() {
-            say!("{}", said.trim_end());
+    /// Ends it, prints its output on the run, and returns its end.
+    pub(super) fn finish(mut self) -> ServiceEnd {
+        let end = self.end();
+        if end == ServiceEnd::Killed {
+            note(ServiceEnd::KILLED);
         }
-        self.child.wait().ok().and_then(|status| status.code()).unwrap_or_default()
+        let output = self.stop.poll(|_| match self.output.try_recv() {
+            Err(TryRecvError::Empty) => None,
+            complete => Some(complete.unwrap_or_default()),
+        });
+        let output = output.unwrap_or_default();
+        if !output.trim().is_empty() {
+            say!("{}", output.trim_end());
+        }
+        end
     }
 
-    /// Ends it; what it said of the run.
-    fn end(&mut self) -> String {
-        if self.child.try_wait().ok().flatten().is_none() {
-            let process = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
-            let _ = process.map(|process| kill_process(process, Signal::TERM));
+    /// Asks it to end, and waits. At the end of the schedule its process group is killed; its devices are stopped by the watchdog
+    /// process.
+    fn end(&mut self) -> ServiceEnd {
+        let process = Pid::from_child(&self.child);
+        if has_ended(&mut self.child).is_none() {
+            let _ = kill_process(process, Signal::TERM);
         }
-        let _ = self.child.wait();
-        self.said.take().and_then(|said| said.join().ok()).unwrap_or_default()
+        let status = self.stop.poll(|_| has_ended(&mut self.child));
+        if status.is_none() {
+            let _ = kill_process_group(process, Signal::KILL);
+            let _ = self.child.wait();
+        }
+        status.map_or(ServiceEnd::Killed, |status| ServiceEnd::Exited(status.code().unwrap_or(1)))
     }
 }
 
-impl Drop for Served {
+impl Drop for Served<'_> {
     fn drop(&mut self) {
         self.end();
     }
