@@ -215,6 +215,29 @@ wheel() {
         -q -p no:cacheprovider host/python/tests/test_model.py -k "whatever_lies or share_memory or not_aligned"
     if grep "_flotor\|libflotor" target/wheel-memory.log; then return 1; fi
     FLOTOR_TEST_SIZE=full FLOTOR_PYTHON=$PWD/target/venv/bin/python cargo test --release -p flotor-tests --test system -- book:: examples::
+    PATH=$PWD/target/venv/bin:$PATH FLOTOR_PYTHON=$PWD/target/venv/bin/python book_blocks wheel
+}
+
+# book_blocks STEP [COMMAND...]: runs the blocks of the book that are marked with this step, in the chapters that have them; with a
+# command that starts another one, through it.
+book_blocks() {
+    local step=$1
+    shift
+    FLOTOR_BOOK_STEP=$step FLOTOR_TEST_SIZE=daily "$@" cargo test --release -p flotor-tests --test system -- --nocapture \
+        book::every_block_of_the_book_does_what_the_book_says
+}
+
+# The blocks of the book that need Gmsh, the profiler, or an installation.
+book() {
+    cargo build --release
+    book_blocks book
+}
+
+# The blocks of the book in which host and emulated device keep the time of the machine's clock: with real-time priority.
+real() {
+    cargo build --release
+    cargo build --release -p flotor-haply --example emulated_board
+    book_blocks real chrt -f 10
 }
 
 # Programs of other makers' interfaces, as they are published: each drives the simulated flotor for a minute at its own pace.
@@ -287,6 +310,7 @@ pictures() {
     cargo build --release -p flotor-viewer
     PATH=$PWD/target/release:$PWD/target/sweep/release:$PATH FLOTOR_PLUGIN_PATH=$PWD/target/release tests/pictures/make "$folder/made"
     /usr/bin/python3 tests/pictures/draw.py "$folder/made" "$folder/sheets"
+    book_blocks pictures
 }
 
 # The archive of a release, unpacked into an empty folder: the demo and the scenes of the repository, and a picture by the viewer,

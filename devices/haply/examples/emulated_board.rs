@@ -1,9 +1,10 @@
-//! A board without hardware at a pseudo terminal: its handle goes towards the user and back, once in two seconds.
+//! A board without hardware at a pseudo terminal: its handle goes towards the user and back, once in two seconds. The argument is the
+//! name of a link to that terminal, which is made.
 //!
 //! ```text
-//! $ cargo run -p flotor-haply --example emulated_board
+//! $ cargo run -p flotor-haply --example emulated_board -- target/board
 //! port /dev/pts/3
-//! $ flotor run haply --set device.port=/dev/pts/3
+//! $ flotor run haply --set device.port=target/board
 //! ```
 
 use flotor_hal::glam::DVec2;
@@ -12,6 +13,8 @@ use flotor_haply::pantograph::Pantograph;
 use serialport::{SerialPort, TTYPort};
 use std::f64::consts::TAU;
 use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 const LINKAGE: Pantograph = Pantograph { inner_m: 0.07, outer_m: 0.09, base_m: 0.038 };
@@ -19,10 +22,22 @@ const PERIOD_S: f64 = 2.0;
 /// Half the way.
 const AMPLITUDE_M: f64 = 0.02;
 
+/// Makes a link to the port, in the place of an earlier one.
+fn point(link: &Path, port: &str) -> std::io::Result<()> {
+    if link.is_symlink() {
+        std::fs::remove_file(link)?;
+    }
+    symlink(port, link)
+}
+
 fn main() -> std::io::Result<()> {
     let (mut port, other_end) = TTYPort::pair()?;
     port.set_timeout(Duration::from_millis(1))?;
-    println!("port {}", other_end.name().unwrap_or_default());
+    let port_path = other_end.name().unwrap_or_default();
+    if let Some(link) = std::env::args_os().nth(1).map(PathBuf::from) {
+        point(&link, &port_path)?;
+    }
+    println!("port {port_path}");
     let centre_m = DVec2::new(0.5 * LINKAGE.base_m, 0.1);
     let mut board = EmulatedBoard::new(LINKAGE, centre_m);
     let (started, mut said) = (Instant::now(), Instant::now());

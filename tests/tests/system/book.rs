@@ -13,7 +13,8 @@
 //! - `<!-- test: skip, needs hardware: a GPU -->`: no test can run it; the reasons for commands are those of [`REASONS`];
 //! - `<!-- test: full, takes a minute -->`: it runs with `FLOTOR_TEST_SIZE=full` only;
 //! - `<!-- test: build, takes a minute -->`: likewise, in the root of the repository and the profile of these tests;
-//! - `<!-- test: step NAME -->`: this step of `.ci/full` runs the commands;
+//! - `<!-- test: step NAME -->`: this step of `.ci/full` runs the commands, by itself or by these tests with `FLOTOR_BOOK_STEP=NAME`,
+//!   which run the chapters with such blocks one after the other;
 //! - `<!-- test: numbers, real clock -->`: they and digests differ from run to run, and only words are compared;
 //! - `<!-- test: columns mean | p99, times -->`: in tables, the columns of these headings differ from run to run; all others and
 //!   all other numbers are compared;
@@ -37,6 +38,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// Environment variable: a Python interpreter that has the wheel and its extras for tests.
 const PYTHON: &str = "FLOTOR_PYTHON";
+/// Environment variable: the step of `.ci/full` whose blocks run.
+const STEP: &str = "FLOTOR_BOOK_STEP";
 /// What chapters name by its place in the repository.
 const REPOSITORY: [&str; 4] = ["devices", "hal", "host", "models"];
 
@@ -49,16 +52,24 @@ const REASONS: [&str; 4] = [
     "needs a second machine",
     "needs a program that no package index has: ",
 ];
-/// Chapters with commands that no test runs yet for another reason, and their number.
-const NOT_YET: &[(&str, usize)] = &[
-    ("docs/src/bench.md", 1),
-    ("docs/src/devices/haply.md", 1),
-    ("docs/src/devices/maglev-200.md", 1),
-    ("docs/src/python.md", 2),
-    ("docs/src/releasing.md", 1),
-    ("docs/src/solid.md", 2),
-    ("docs/src/viewer.md", 2),
-];
+
+/// Conditions under which blocks run.
+#[derive(Clone, Debug)]
+struct Conditions {
+    size: TestSize,
+    /// The step of `.ci/full` whose blocks run.
+    step: Option<String>,
+}
+
+impl Conditions {
+    fn of_this_run() -> Self {
+        Self { size: TestSize::of_this_run(), step: std::env::var(STEP).ok() }
+    }
+
+    fn of_size(size: TestSize) -> Self {
+        Self { size, step: None }
+    }
+}
 
 /// What a comment before a block asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -125,14 +136,23 @@ struct Block {
 }
 
 impl Block {
-    /// Why it does not run in a test of this size.
-    fn left_out(&self, size: TestSize) -> Option<&str> {
+    /// Returns the reason why it does not run under these conditions.
+    fn left_out(&self, conditions: &Conditions) -> Option<&str> {
+        let is_of_step = self.is_of_step(conditions);
         self.marks.iter().find_map(|mark| match mark {
             Mark::Skip(why) => Some(why.as_str()),
-            Mark::Step(_) => Some("runs in a step of .ci/full"),
-            Mark::Full(why) | Mark::Build(why) if size < TestSize::Full => Some(why),
+            Mark::Step(_) if !is_of_step => Some("runs in a step of .ci/full"),
+            Mark::Full(why) | Mark::Build(why) if !is_of_step && conditions.size < TestSize::Full => {
+                Some(why)
+            }
             _ => None,
         })
+    }
+
+    fn is_of_step(&self, conditions: &Conditions) -> bool {
+        let is_step =
+            |mark: &Mark| matches!(mark, Mark::Step(name) if Some(name) == conditions.step.as_ref());
+        self.marks.iter().any(is_step)
     }
 
     /// Where its commands run.
@@ -200,7 +220,7 @@ struct Chapter {
 }
 
 impl Chapter {
-    fn read(name: &str, markdown: &str, given: &Path, size: TestSize) -> Result<Self, String> {
+    fn read(name: &str, markdown: &str, given: &Path, conditions: &Conditions) -> Result<Self, String> {
         let mut chapter = Self {
             name: name.to_owned(),
             given: given.to_owned(),
@@ -209,13 +229,13 @@ impl Chapter {
             left_out: Vec::new(),
         };
         for block in blocks(markdown).map_err(|error| format!("{name}:{error}"))? {
-            chapter.take(&block, size).map_err(|error| format!("{name}:{}: {error}", block.line))?;
+            chapter.take(&block, conditions).map_err(|error| format!("{name}:{}: {error}", block.line))?;
         }
         Ok(chapter)
     }
 
-    fn take(&mut self, block: &Block, size: TestSize) -> Result<(), String> {
-        let left_out = block.left_out(size);
+    fn take(&mut self, block: &Block, conditions: &Conditions) -> Result<(), String> {
+        let left_out = block.left_out(conditions);
         self.left_out.extend(left_out.map(|why| format!("{}:{}: {why}", self.name, block.line)));
         if block.language == "python" {
             return self.take_python(block, left_out.is_none());
@@ -269,9 +289,17 @@ impl Chapter {
             return Err("it begins with no command `$ ...`".to_owned());
         }
         for text in block.text.lines() {
-            match text.strip_prefix("$ ") {
-                Some(command) => self.step(block, command),
-                None => self.steps.last_mut().into_iter().for_each(|step| step.shown.push(text.to_owned())),
+            if let Some(command) = text.strip_prefix("$ ") {
+                self.step(block, command);
+            } else if let Some(step) = self.steps.last_mut() {
+                match text.strip_prefix("> ") {
+                    // A shell removes the backslash and the line end.
+                    Some(rest) if step.command.ends_with('\\') => {
+                        step.command.pop();
+                        step.command.push_str(rest);
+                    }
+                    _ => step.shown.push(text.to_owned()),
+                }
             }
         }
         Ok(())
@@ -320,7 +348,7 @@ impl Chapter {
         for (number, step) in self.steps.iter().enumerate() {
             let (said, code) = (self.said(number), self.code(number));
             if step.place == Place::Repository {
-                script.push_str("cd \"$REPOSITORY\"\n");
+                script.push_str("cd \"$REPOSITORY\"; export CARGO_TARGET_DIR=$REPOSITORY/target\n");
             }
             let _ = write!(
                 script,
@@ -330,7 +358,7 @@ impl Chapter {
                 code.display()
             );
             if step.place == Place::Repository {
-                let _ = writeln!(script, "cd '{}'", folder.display());
+                let _ = writeln!(script, "cd '{}'; unset CARGO_TARGET_DIR", folder.display());
             }
             if step.command.split(" #").next().is_some_and(|command| command.trim_end().ends_with('&')) {
                 // In the background: it is there when it says so.
@@ -398,7 +426,8 @@ impl Step {
         let is_debug = build_folder().ends_with("debug");
         match self.place {
             Place::Repository if is_debug => {
-                self.command.replace(" --release", "").replace("target/release", "target/debug")
+                let debug = self.command.replace(" --release", "").replace("target/release", "target/debug");
+                debug.replace("cargo install", "cargo install --debug")
             }
             _ => self.command.clone(),
         }
@@ -432,6 +461,17 @@ fn chapters() -> Vec<String> {
     std::iter::once("README.md".to_owned()).chain(written).collect()
 }
 
+/// The chapters with something to do under these conditions, with their texts.
+fn chapters_under(conditions: &Conditions) -> Vec<(String, String)> {
+    let chapters = chapters().into_iter().map(|name| {
+        let text = std::fs::read_to_string(workspace_root().join(&name)).expect("a chapter is text");
+        (name, text)
+    });
+    let is_of_step =
+        |text: &str| blocks(text).is_ok_and(|blocks| blocks.iter().any(|block| block.is_of_step(conditions)));
+    chapters.filter(|(_, text)| conditions.step.is_none() || is_of_step(text)).collect()
+}
+
 #[test]
 fn every_block_of_the_book_does_what_the_book_says() {
     if TestSize::of_this_run().leaves_out_long_tests() {
@@ -440,18 +480,22 @@ fn every_block_of_the_book_does_what_the_book_says() {
     if !required(Tool::Python) {
         return;
     }
-    let size = TestSize::of_this_run();
-    let done: Vec<(usize, Vec<String>, Vec<String>)> = chapters()
-        .into_par_iter()
-        .map(|name| {
-            let text = std::fs::read_to_string(workspace_root().join(&name)).expect("a chapter is text");
+    let conditions = Conditions::of_this_run();
+    let chapters = chapters_under(&conditions);
+    assert!(!chapters.is_empty(), "no block is of the step {:?}", conditions.step);
+    // The blocks of a step may need the machine for themselves; 0: as many threads as there are cores.
+    let threads = usize::from(conditions.step.is_some());
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("there are threads");
+    let done: Vec<(usize, Vec<String>, Vec<String>)> = pool.install(|| {
+        let ran = chapters.into_par_iter().map(|(name, text)| {
             let given = Scratch::default();
-            match Chapter::read(&name, &text, given.path(), size) {
+            match Chapter::read(&name, &text, given.path(), &conditions) {
                 Ok(chapter) => (chapter.steps.len(), chapter.run(), chapter.left_out),
                 Err(error) => (0, vec![error], Vec::new()),
             }
-        })
-        .collect();
+        });
+        ran.collect()
+    });
     let commands: usize = done.iter().map(|(commands, ..)| commands).sum();
     let left_out: Vec<&String> = done.iter().flat_map(|(.., left_out)| left_out).collect();
     for line in &left_out {
@@ -470,7 +514,7 @@ fn every_block_of_the_book_does_what_the_book_says() {
 
 #[test]
 fn commands_that_no_test_runs_have_one_of_four_reasons() {
-    let mut not_yet = Vec::new();
+    let mut others = Vec::new();
     for name in chapters() {
         let text = std::fs::read_to_string(workspace_root().join(&name)).expect("a chapter is text");
         let blocks = blocks(&text).unwrap_or_else(|error| panic!("{name}:{error}"));
@@ -482,14 +526,9 @@ fn commands_that_no_test_runs_have_one_of_four_reasons() {
             skips.map(|why| (block.line, why))
         });
         let other = reasons.filter(|(_, why)| REASONS.iter().all(|reason| !why.starts_with(reason)));
-        let other: Vec<_> = other.collect();
-        if !other.is_empty() {
-            println!("{name}: {other:?}");
-            not_yet.push((name, other.len()));
-        }
+        others.extend(other.map(|(line, why)| format!("{name}:{line}: {why}")));
     }
-    let listed = NOT_YET.iter().map(|(name, count)| ((*name).to_owned(), *count));
-    assert_eq!(not_yet, listed.collect::<Vec<_>>());
+    assert_eq!(others, Vec::<String>::new());
 }
 
 /// The chapter on experiments goes from nothing to the analysis of a pilot: its commands, in its order, in one folder.
@@ -501,7 +540,8 @@ fn the_chapter_on_experiments_leads_to_the_analysis_of_a_pilot() {
     let name = "docs/src/experiments.md";
     let text = std::fs::read_to_string(workspace_root().join(name)).expect("a chapter is text");
     let given = Scratch::default();
-    let chapter = Chapter::read(name, &text, given.path(), TestSize::Daily).expect("a chapter of blocks");
+    let chapter = Chapter::read(name, &text, given.path(), &Conditions::of_size(TestSize::Daily))
+        .expect("a chapter of blocks");
     let place = |command: &str| {
         let found = chapter.steps.iter().position(|step| step.command.contains(command));
         found.unwrap_or_else(|| panic!("`{command}` does not run: {:?}", chapter.steps))
@@ -524,7 +564,7 @@ fn the_chapter_on_experiments_leads_to_the_analysis_of_a_pilot() {
 /// What is wrong with a chapter.
 fn wrong_with(markdown: &str) -> Vec<String> {
     let given = Scratch::default();
-    match Chapter::read("chapter", markdown, given.path(), TestSize::Quick) {
+    match Chapter::read("chapter", markdown, given.path(), &Conditions::of_size(TestSize::Quick)) {
         Ok(chapter) => chapter.run(),
         Err(error) => vec![error],
     }
@@ -553,6 +593,27 @@ fn a_wrong_line_of_a_chapter_is_found() {
     assert!(!wrong_with("<!-- test: run echo a; echo b; echo c -->\n```text\n…\nb\n```\n").is_empty());
     assert!(!wrong_with("```toml\n[limits]\nforce = 3\n```\n").is_empty(), "no such key");
     assert!(!wrong_with("```python\nprint(\n```\n").is_empty(), "no Python");
+}
+
+#[test]
+fn a_command_may_go_on_in_the_next_line() {
+    let right = "```console\n$ echo 1 \\\n>   2\n1 2\n```\n";
+    assert_eq!(wrong_with(right), Vec::<String>::new());
+    assert_eq!(wrong_with(&right.replace(" \\", "")).len(), 1, "without the backslash it is an output");
+}
+
+#[test]
+fn blocks_of_a_step_run_in_that_step_only() {
+    let markdown = "<!-- test: step book -->\n<!-- test: build, takes a build -->\n```console\n$ true\n```\n";
+    let step = |name: &str| Conditions { size: TestSize::Daily, step: Some(name.to_owned()) };
+    for (conditions, runs) in
+        [(Conditions::of_size(TestSize::Full), false), (step("full"), false), (step("book"), true)]
+    {
+        let given = Scratch::default();
+        let chapter = Chapter::read("chapter", markdown, given.path(), &conditions).expect("a chapter");
+        assert_eq!((chapter.steps.len(), chapter.left_out.len()), (usize::from(runs), usize::from(!runs)));
+        assert!(chapter.steps.iter().all(|step| step.place == Place::Repository));
+    }
 }
 
 #[test]
