@@ -55,6 +55,8 @@ fn an_installed_program_finds_its_plugins_from_any_folder() {
     with_plugins(&scratch.path().join("lib/flotor/plugins"));
     let with = ran(demo(&program, &home));
     assert_eq!(with.status.code(), Some(exit_code::OK), "{with:?}");
+    let printed = String::from_utf8_lossy(&with.stdout);
+    assert!(printed.contains("/lib/flotor/plugins/") && !printed.contains("/../"), "{printed}");
 }
 
 #[test]

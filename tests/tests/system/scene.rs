@@ -2,6 +2,7 @@
 
 use flotor_core::limits::Bound;
 use flotor_session::scene::Scene;
+use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use std::path::Path;
@@ -256,6 +257,20 @@ fn an_unknown_plugin_is_named_with_the_nearest_one() {
         ran.error().contains("scene.toml:8: no model plugin `sprnig`; did you mean `spring`?"),
         "{ran:?}"
     );
+}
+
+#[test]
+fn a_plugin_that_is_not_built_is_named_with_the_folder_in_which_it_is_missing() {
+    let scratch = Scratch::default();
+    let scene = RIGHT.replace("\"spring\"", "\"jelly\"");
+    let scene = scratch.file("scene.toml", format!("plugin_folders = [\"target/release\"]\n{scene}"));
+    let error = || Flotor::with(["run", &scene.display().to_string()]).run().error().to_owned();
+    let hint = "target/release` contains no plugin: build it first";
+    assert!(error().contains(hint), "{}", error());
+    let _ = scratch.folder("target");
+    let folder = scratch.folder("target/release");
+    std::fs::copy(plugin_file("flotor-wall"), folder.join("libflotor_wall.so")).expect("it is built");
+    assert!(!error().contains(hint), "{}", error());
 }
 
 #[test]

@@ -35,7 +35,10 @@ pub struct Registry {
     ambiguous: Vec<(Metadata, Metadata)>,
     broken: Vec<LoadError>,
     skipped: Vec<SkippedFolder>,
+    /// Those of the scene first.
     folders: Vec<PathBuf>,
+    /// Number of folders of the scene.
+    of_scene: usize,
     loaded: Mutex<Vec<Loaded>>,
 }
 
@@ -74,7 +77,7 @@ pub enum LookupError {
         kind: Option<PluginKind>,
         /// The most similar id of that kind.
         nearest: Option<String>,
-        /// A file of that name, and why it is not meant or cannot be read as a plugin.
+        /// A file of that name, and why it is not meant or cannot be read as a plugin; or a folder of the scene without a plugin.
         hint: Option<String>,
     },
     /// Two files of one folder have the id.
@@ -115,6 +118,7 @@ impl Registry {
             broken: Vec::new(),
             skipped: Vec::new(),
             folders,
+            of_scene: scene_folders.len(),
             loaded: Mutex::new(Vec::new()),
         };
         for folder in registry.folders.clone() {
@@ -268,8 +272,16 @@ impl Registry {
             id: id.to_owned(),
             kind,
             nearest: nearest(id, candidates.map(|known| known.id.as_str())).map(str::to_owned),
-            hint: here.or_else(broken).or_else(unknown_program),
+            hint: here.or_else(broken).or_else(|| self.unbuilt()).or_else(unknown_program),
         }
+    }
+
+    /// Returns the advice to build, if a folder of the scene contains no plugin.
+    fn unbuilt(&self) -> Option<String> {
+        let holds_plugin = |folder: &Path| self.found.iter().any(|known| known.path.parent() == Some(folder));
+        let mut of_scene = self.folders.iter().take(self.of_scene);
+        let empty = of_scene.find(|folder| !holds_plugin(folder))?;
+        Some(format!("`{}` contains no plugin: build it first", empty.display()))
     }
 
     /// Loads a file, or gives what was loaded before if the file is unchanged: libraries are never unloaded, and a
@@ -305,7 +317,9 @@ fn own_folders() -> Vec<PathBuf> {
     let Some(own) = program.as_deref().and_then(Path::parent) else { return Vec::new() };
     // `deps` before the folder itself: `cargo run` refreshes only `deps`, and an older copy may lie above it.
     let beside = ["deps", "", "plugins", "../lib/flotor/plugins"];
-    beside.map(|folder| if folder.is_empty() { own.to_path_buf() } else { own.join(folder) }).to_vec()
+    let folder = |name: &str| if name.is_empty() { own.to_path_buf() } else { own.join(name) };
+    // Without `bin/..` in what the summary of a run prints.
+    beside.map(folder).map(|folder| folder.canonicalize().unwrap_or(folder)).to_vec()
 }
 
 /// Whether a plugin belongs to this installation: it is linked into the program, or lies beside it or in
