@@ -73,11 +73,34 @@ fn keep_budget(name: &str, counted: f64) {
     assert!(counted <= most, "{name}: {counted:.2} counted, at most {most:.2}");
 }
 
-/// Numbers of `budgets.toml`.
-fn budgets<const N: usize>(names: [&str; N]) -> [f64; N] {
+/// Holds a count to its share of the count at an earlier commit, where the compiler is the one of that count.
+fn keep_baseline(name: &str, counted: f64) {
+    let file = budget_file();
+    let baseline = file["baseline"].as_table().expect("a table of counts");
+    let compiler = baseline["compiler"].as_str().expect("a compiler and its version");
+    if cfg!(not(target_arch = "x86_64")) || !this_compiler().starts_with(compiler) {
+        return tools::skipped(&format!("the baseline of {name} is of {compiler} on x86-64"));
+    }
+    let [before, most] = [name, "most"].map(|key| baseline[key].as_float().expect("a number"));
+    println!("{name}: {:.4} of the baseline", counted / before);
+    assert!(counted <= most * before, "{name}: {counted:.2} counted, at most {:.2}", most * before);
+}
+
+/// Name, version and commit of the compiler in use.
+fn this_compiler() -> String {
+    let answer = Command::new("rustc").arg("--version").output().expect("there is a compiler");
+    String::from_utf8_lossy(&answer.stdout).into_owned()
+}
+
+fn budget_file() -> toml::Table {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("budgets.toml");
     let text = std::fs::read_to_string(file).expect("the budgets are there");
-    let budgets: toml::Table = text.parse().expect("the budgets are TOML");
+    text.parse().expect("the budgets are TOML")
+}
+
+/// Numbers of `budgets.toml`.
+fn budgets<const N: usize>(names: [&str; N]) -> [f64; N] {
+    let budgets = budget_file();
     let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
     names.map(|name| budgets.get(name).and_then(number).unwrap_or_else(|| panic!("no budget `{name}`")))
 }
@@ -131,6 +154,7 @@ fn a_whole_tick_keeps_its_budget() {
     for (name, workload) in [("tick_scripted", "tick-scripted"), ("tick_simulated", "tick-simulated")] {
         let Some([_, ticks]) = parts(workload) else { return };
         keep_budget(name, ticks / 3072.0);
+        keep_baseline(name, ticks / 3072.0);
     }
 }
 
@@ -232,9 +256,7 @@ const DEMANDS: [(&str, f64); 19] = [
 
 /// Instructions of a step by demand (force; force and torque; all) of a setting.
 fn demand_budget(name: &str) -> [f64; 3] {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("budgets.toml");
-    let text = std::fs::read_to_string(file).expect("the budgets are there");
-    let budgets: toml::Table = text.parse().expect("the budgets are TOML");
+    let budgets = budget_file();
     let counts = budgets.get("demand").and_then(|all| all.get(name)?.as_array());
     let counts = counts.unwrap_or_else(|| panic!("no demand `{name}`"));
     std::array::from_fn(|demand| counts[demand].as_integer().expect("a count") as f64)
