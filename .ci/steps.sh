@@ -102,7 +102,7 @@ missing_named() {
 }
 
 # Workspaces of their own beside the core.
-satellites="host/python host/bridge host/sweep tests/fuzz"
+satellites="interop/python interop/bridge interop/sweep tests/fuzz"
 
 format() {
     local satellite
@@ -196,7 +196,7 @@ deny() {
         echo "skipped: cargo-deny is not installed"
         return 0
     fi
-    for workspace in . host/python host/bridge host/sweep; do
+    for workspace in . interop/python interop/bridge interop/sweep; do
         cargo deny --manifest-path "$workspace/Cargo.toml" check --config deny.toml advisories licenses sources
     done
 }
@@ -204,15 +204,15 @@ deny() {
 # The Python wheel as a user installs it, and its tests against the command: models, runs, sweeps on threads and Dask; and the
 # Python of the book, with the package that it names for recordings.
 wheel() {
-    cargo clippy --manifest-path host/python/Cargo.toml --target-dir target --all-targets -- -D warnings
+    cargo clippy --manifest-path interop/python/Cargo.toml --target-dir target --all-targets -- -D warnings
     python3 -m venv target/venv
-    CARGO_TARGET_DIR=$PWD/target target/venv/bin/pip install --quiet 'host/python[test]' mcap-protobuf-support
+    CARGO_TARGET_DIR=$PWD/target target/venv/bin/pip install --quiet 'interop/python[test]' mcap-protobuf-support
     cargo build --release
-    cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep
-    FLOTOR=target/release/flotor FLOTOR_SWEEP=target/sweep/release/flotor-sweep target/venv/bin/python -m pytest -q host/python
+    cargo build --release --manifest-path interop/sweep/Cargo.toml --target-dir target/sweep
+    FLOTOR=target/release/flotor FLOTOR_SWEEP=target/sweep/release/flotor-sweep target/venv/bin/python -m pytest -q interop/python
     # Whatever array is passed, no call of ours reads or writes beside it; CPython and the loader have findings of their own.
     PYTHONMALLOC=malloc valgrind --error-limit=no --num-callers=40 --log-file=target/wheel-memory.log target/venv/bin/python -m pytest \
-        -q -p no:cacheprovider host/python/tests/test_model.py -k "whatever_lies or share_memory or not_aligned"
+        -q -p no:cacheprovider interop/python/tests/test_model.py -k "whatever_lies or share_memory or not_aligned"
     if grep "_flotor\|libflotor" target/wheel-memory.log; then return 1; fi
     FLOTOR_TEST_SIZE=full FLOTOR_PYTHON=$PWD/target/venv/bin/python cargo test --release -p flotor-tests --test system -- book:: examples::
     PATH=$PWD/target/venv/bin:$PATH FLOTOR_PYTHON=$PWD/target/venv/bin/python book_blocks wheel
@@ -288,8 +288,8 @@ print(*(os.path.dirname(package["manifest_path"]) for package in json.load(sys.s
 # The sweeper: a table of every kind.
 sweep() {
     cargo build --release
-    FLOTOR=$PWD/target/release/flotor cargo test --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep
-    cargo clippy --release --all-targets --manifest-path host/sweep/Cargo.toml --target-dir target/sweep -- -D warnings
+    FLOTOR=$PWD/target/release/flotor cargo test --release --manifest-path interop/sweep/Cargo.toml --target-dir target/sweep
+    cargo clippy --release --all-targets --manifest-path interop/sweep/Cargo.toml --target-dir target/sweep -- -D warnings
 }
 
 # The bridge: messages to the bit, who may do what, what is refused, over loopback; two hosts with a hand each over a bad way.
@@ -297,8 +297,8 @@ sweep() {
 bridge() {
     cargo build --release
     FLOTOR=target/release/flotor FLOTOR_TEST_SIZE=full \
-        cargo test --release --manifest-path host/bridge/Cargo.toml --target-dir target/bridge
-    cargo clippy --release --all-targets --manifest-path host/bridge/Cargo.toml --target-dir target/bridge -- -D warnings
+        cargo test --release --manifest-path interop/bridge/Cargo.toml --target-dir target/bridge
+    cargo clippy --release --all-targets --manifest-path interop/bridge/Cargo.toml --target-dir target/bridge -- -D warnings
 }
 
 # Every kind of picture that a command draws, and those of the book, by four renderers. The sheets show them side by side.

@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn an_installation_without_a_program_names_its_own_folder() {
         let (built, build) =
-            (Built::OwnWorkspace("sweep"), "cargo build --manifest-path host/sweep/Cargo.toml");
+            (Built::OwnWorkspace("sweep"), "cargo build --manifest-path interop/sweep/Cargo.toml");
         let sweep = SeparateProgram { program: "flotor-sweep", built, build };
         let name = format!("flotor-sweep{}", std::env::consts::EXE_SUFFIX);
         let missing = sweep.missing(Path::new("/opt/flotor/bin/flotor"));

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub(super) const BRIDGE: SeparateProgram<'static> = SeparateProgram {
     program: "flotor-bridge",
     built: Built::OwnWorkspace("bridge"),
-    build: "cargo build --release --manifest-path host/bridge/Cargo.toml --target-dir target/bridge",
+    build: "cargo build --release --manifest-path interop/bridge/Cargo.toml --target-dir target/bridge",
 };
 
 /// Prefix of the names of remote sessions.

@@ -66,7 +66,7 @@ const TEST: SeparateProgram<'static> =
 const SWEEP: SeparateProgram<'static> = SeparateProgram {
     program: "flotor-sweep",
     built: Built::OwnWorkspace("sweep"),
-    build: "cargo build --release --manifest-path host/sweep/Cargo.toml --target-dir target/sweep",
+    build: "cargo build --release --manifest-path interop/sweep/Cargo.toml --target-dir target/sweep",
 };
 
 /// What a command takes that a separate program carries out.

@@ -93,28 +93,32 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/core", Core, &[Contract, Sync]),
     ("host/coupling", Coupling, &[Contract, Sync, Core]),
     ("host/servo", Servo, &[Contract, Sync, Core, Coupling]),
-    ("host/mcap", Container, &[]),
+    ("devices/mcap", Container, &[]),
     ("host/record", Record, &[Contract, Sync, Core, Container]),
     ("host/live", Live, &[Contract, Sync, Core, Record]),
     ("host/session", Session, &[Contract, Sync, Core, Coupling, Servo, Record, Live]),
-    ("host/compat/common", Compat, &[Contract, Sync, Core, Servo, Record, Live, Session]),
-    ("host/compat/chai3d", DropIn, &[Contract, Compat]),
-    ("host/compat/openhaptics", DropIn, &[Contract, Compat]),
-    ("host/compat/dhd", DropIn, &[Contract, Compat]),
-    ("host/compat/haply", Service, &[Contract, Compat, Command, OfEmulators]),
-    ("host/statistics", Statistics, &[]),
+    ("interop/compat/common", Compat, &[Contract, Sync, Core, Servo, Record, Live, Session]),
+    ("interop/compat/chai3d", DropIn, &[Contract, Compat]),
+    ("interop/compat/openhaptics", DropIn, &[Contract, Compat]),
+    ("interop/compat/dhd", DropIn, &[Contract, Compat]),
+    ("interop/compat/haply", Service, &[Contract, Compat, Command, OfEmulators]),
+    ("study/statistics", Statistics, &[]),
     ("host/plot", Plot, &[]),
     ("host/command", Command, &[Contract, Sync, Core, Servo, Record, Live, Session]),
-    ("host/lab/guard", Guard, &[]),
-    ("host/judge", Judge, &[Contract, Core, Session, Plot]),
-    ("host/lab", Lab, &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Judge]),
-    ("host/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
-    // Neither the session nor the loader: everything it runs is a process of its own.
-    ("host/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
-    ("host/study", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
-    ("host/study/analysis", Analysis, &[Statistics, Study]),
+    ("lab/guard", Guard, &[]),
+    ("lab/judge", Judge, &[Contract, Core, Session, Plot]),
     (
-        "host/study/program",
+        "lab/measure",
+        Lab,
+        &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Judge],
+    ),
+    ("lab/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
+    // Neither the session nor the loader: everything it runs is a process of its own.
+    ("lab/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
+    ("study/core", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
+    ("study/analysis", Analysis, &[Statistics, Study]),
+    (
+        "study/program",
         StudyProgram,
         &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command, Study, Analysis],
     ),
@@ -358,7 +362,9 @@ fn the_host_names_no_plugin() {
     let members = workspace_members(&metadata());
     let plugins = members.iter().filter(|member| member.role == Role::Plugin);
     let plugins: Vec<String> = plugins.map(|member| member.name.replace('-', "_")).collect();
-    let sources = files_under("host", "rs").expect("the host has sources");
+    let rooms = ["host", "interop", "lab", "study"].into_iter();
+    let sources = rooms.flat_map(|room| files_under(room, "rs").expect("it has sources"));
+    let sources: Vec<_> = sources.collect();
     assert!(sources.len() > 10, "{} sources of the host", sources.len());
     for file in sources.iter().filter(|file| !file.display().to_string().contains("/examples/")) {
         let named = identifiers_of(file).into_iter().find(|identifier| plugins.contains(identifier));
@@ -386,11 +392,11 @@ const UNSAFE: &[(&str, &str)] = &[
         "what a child does between `fork` and `exec`: it asks for its end with its parent",
     ),
     (
-        "host/compat/",
+        "interop/compat/",
         "entry points in C for programs of other makers' interfaces, and what a library in another program hooks: `fork`, `exit`",
     ),
     (
-        "host/lab/guard/src/lib.rs",
+        "lab/guard/src/lib.rs",
         "an allocator in the place of the C library's, for the one process in which `validate` looks for overruns",
     ),
     ("viewer/src/shape.rs", "the one place of the viewer that loads a plugin file"),
@@ -416,7 +422,7 @@ const UNSAFE: &[(&str, &str)] = &[
         "calls into the user's HDAPI, which is C, and the callback of its scheduler",
     ),
     (
-        "host/python/src/rows.rs",
+        "interop/python/src/rows.rs",
         "NumPy records that are the contract's structs: the layout promise, and arrays used where they lie",
     ),
     (
@@ -441,7 +447,7 @@ const UNSAFE: &[(&str, &str)] = &[
         "host/session/src/platform/linux/locale.rs",
         "the locale of the C library, which plugins change: no safe crate has it",
     ),
-    ("host/study/program/src/platform/windows.rs", "how much of a disk is free"),
+    ("study/program/src/platform/windows.rs", "how much of a disk is free"),
     ("viewer/src/platform/windows.rs", "times and memory of the process"),
     ("tests/tests/realtime.rs", "an allocator that counts, to see that a tick does not allocate"),
 ];
@@ -506,23 +512,23 @@ const PORTED: &[&str] = &[
     "devices/spacemouse/src/",
     "devices/vendor-sdk/src/",
     "hal/src/",
-    "host/calibration/src/",
+    "lab/calibration/src/",
     "host/command/src/",
     "host/core/src/",
     "host/coupling/src/",
-    "host/judge/src/",
-    "host/lab/src/",
+    "lab/judge/src/",
+    "lab/measure/src/",
     "host/live/src/",
     "host/plot/src/",
     "host/record/src/",
-    "host/scene-test/src/",
+    "lab/scene-test/src/",
     "host/servo/src/",
     "host/session/src/",
     "host/src/",
-    "host/statistics/src/",
-    "host/study/analysis/src/",
-    "host/study/program/src/",
-    "host/study/src/",
+    "study/statistics/src/",
+    "study/analysis/src/",
+    "study/program/src/",
+    "study/core/src/",
     "host/sync/src/",
     "models/",
     "viewer/drawing/src/",
@@ -532,7 +538,7 @@ const PORTED: &[&str] = &[
 
 /// Where files of Linux's kernel are named outside a module `platform`, in crates that run on no other system yet: libraries that
 /// stand in for those of other makers.
-const KERNEL_FILES_ELSEWHERE: &[&str] = &["host/compat/common/src/process.rs"];
+const KERNEL_FILES_ELSEWHERE: &[&str] = &["interop/compat/common/src/process.rs"];
 
 /// Crates with what only one system has.
 const SYSTEM_CRATES: &[&str] = &["libc", "rustix", "signal_hook", "thread_priority", "windows_sys"];
@@ -636,13 +642,13 @@ fn a_system_outside_its_platform_is_noticed() {
     assert_eq!(count("devices/usbip/src/lib.rs", asks), 0);
     let names = "use std::os::fd::AsFd; use rustix::io; fn f() { std::process::id() }";
     assert_eq!(
-        (count("host/live/src/client.rs", names), count("host/compat/common/src/lib.rs", names)),
+        (count("host/live/src/client.rs", names), count("interop/compat/common/src/lib.rs", names)),
         (2, 0)
     );
     let kernel = "fn f(n: u32) { read(\"/proc/version\"); read(format!(\"/sys/{n}\")); read(\"/processes\"); Path::new(\"/proc\") }";
-    assert_eq!((count("host/judge/src/watch.rs", kernel), count("viewer/tests/memory.rs", kernel)), (3, 0));
+    assert_eq!((count("lab/judge/src/watch.rs", kernel), count("viewer/tests/memory.rs", kernel)), (3, 0));
     assert_eq!(
-        (count("host/compat/common/src/process.rs", kernel), count("devices/usbip/src/vhci.rs", kernel)),
+        (count("interop/compat/common/src/process.rs", kernel), count("devices/usbip/src/vhci.rs", kernel)),
         (0, 0)
     );
     // Neither text nor other conditions.

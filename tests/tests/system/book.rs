@@ -41,7 +41,7 @@ const PYTHON: &str = "FLOTOR_PYTHON";
 /// Environment variable: the step of `.ci/full` whose blocks run.
 const STEP: &str = "FLOTOR_BOOK_STEP";
 /// What chapters name by its place in the repository.
-const REPOSITORY: [&str; 4] = ["devices", "hal", "host", "models"];
+const REPOSITORY: [&str; 5] = ["devices", "hal", "host", "interop", "models"];
 
 // ---------------------------------------------------------------- blocks
 

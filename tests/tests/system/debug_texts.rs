@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Folders of the product.
-const FOLDERS: [&str; 5] = ["devices", "hal", "host", "models", "viewer"];
+const FOLDERS: [&str; 8] = ["devices", "hal", "host", "interop", "lab", "models", "study", "viewer"];
 /// Sources that use `{:?}`, with the reader of the text.
 const READERS: [(&str, &str); 17] = [
     ("devices/emulation/src/rig.rs", "a scene in TOML"),
@@ -17,13 +17,13 @@ const READERS: [(&str, &str); 17] = [
     ("devices/maglev/emulator/src/ml_api/server/state.rs", "a log: the name of a phase"),
     ("hal/src/abi/loader/capabilities.rs", NUMBERS),
     ("hal/src/extension/calibration.rs", NUMBERS),
-    ("host/lab/src/cli/eval.rs", "a number of a CSV file"),
-    ("host/python/src/model.rs", "`repr` of Python"),
+    ("lab/measure/src/cli/eval.rs", "a number of a CSV file"),
+    ("interop/python/src/model.rs", "`repr` of Python"),
     ("host/record/src/run.rs", "a setting of a recording"),
     ("host/session/src/calibration_file.rs", NUMBERS),
-    ("host/scene-test/src/bless.rs", "a number of a TOML file"),
-    ("host/study/program/src/study/spring.rs", "a scene in TOML"),
-    ("host/sweep/src/design.rs", "a key of the store"),
+    ("lab/scene-test/src/bless.rs", "a number of a TOML file"),
+    ("study/program/src/study/spring.rs", "a scene in TOML"),
+    ("interop/sweep/src/design.rs", "a key of the store"),
     ("models/solid/src/law.rs", "the key of a prepared solid"),
     ("viewer/drawing/src/light.rs", "a shader"),
 ];

@@ -123,7 +123,7 @@ fn a_folder_of_somebody_else_is_not_searched_and_the_reason_is_reported() {
 
 #[test]
 fn the_wheel_contains_every_plugin() {
-    let manifest = workspace_root().join("host/python/Cargo.toml");
+    let manifest = workspace_root().join("interop/python/Cargo.toml");
     let manifest = std::fs::read_to_string(manifest).expect("it is there");
     for folder in plugin_folders() {
         let dependency = format!("{} = {{ path = \"../../{folder}\" }}", crate_name_of(&folder));

@@ -9,17 +9,17 @@ use std::collections::BTreeSet;
 use toml::{Table, Value};
 
 /// The workspaces: the core, and those of their own beside it.
-const WORKSPACES: [&str; 4] = [".", "host/python", "host/bridge", "host/sweep"];
+const WORKSPACES: [&str; 4] = [".", "interop/python", "interop/bridge", "interop/sweep"];
 
 /// Abandoned crates that `deny.toml` names, and a lock file that has each. One that is gone is to be struck out there.
 const ABANDONED: [(&str, &str); 7] = [
     ("generational-arena", "."),
     ("paste", "."),
     ("abi_stable", "."),
-    ("rustls-pemfile", "host/bridge"),
-    ("serde_yaml", "host/bridge"),
-    ("unsafe-libyaml", "host/bridge"),
-    ("lz4_flex", "host/bridge"),
+    ("rustls-pemfile", "interop/bridge"),
+    ("serde_yaml", "interop/bridge"),
+    ("unsafe-libyaml", "interop/bridge"),
+    ("lz4_flex", "interop/bridge"),
 ];
 
 fn rules() -> (Table, String) {

@@ -179,7 +179,7 @@ fn better_estimators_find_the_threshold() {
 /// The table is of an independent simulation, `tests/generators/estimators.py`.
 #[test]
 fn estimators_err_as_an_independent_simulation_does() {
-    let table = include_str!("../../../../tests/data/cases/estimators.csv");
+    let table = include_str!("../../../tests/data/cases/estimators.csv");
     let runs = match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
         Ok("full") => 10_000,
         Ok("daily") => 150,

@@ -1,6 +1,6 @@
 # Makes reference.json: published data sets, and what R says about them, with all digits.
 #
-#   Rscript host/statistics/tests/data/reference.R > host/statistics/tests/data/reference.json
+#   Rscript study/statistics/tests/data/reference.R > study/statistics/tests/data/reference.json
 #
 # Needs R with the packages car and carData; the versions it was made with stand in the file. The data come with
 # R (package datasets) and carData; where they were first published is said beside each.

@@ -1,6 +1,6 @@
 //! Whether calls stay inside the memory that is theirs or was given to them.
 //!
-//! The process of this rule is started with an allocator of its own (`host/lab/guard`), in which every block ends at a
+//! The process of this rule is started with an allocator of its own (`lab/guard`), in which every block ends at a
 //! page that nobody may touch: a read or write past its end ends the process there, and a damaged edge is found when
 //! the block is freed. Input and output of a call are blocks, too.
 

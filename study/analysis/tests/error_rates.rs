@@ -25,7 +25,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 #[allow(unreachable_pub)] // another crate's, included
-#[path = "../../../../tests/src/printed.rs"]
+#[path = "../../../tests/src/printed.rs"]
 mod printed;
 
 const LEVEL: f64 = 0.05;

@@ -1,7 +1,7 @@
 """Error against cost of a deformable body: Flotor's solid, MuJoCo's flex and PositionBasedDynamics on one beam, the first two
 on one indentation too.
 
-    cargo build --release && pip install numpy mujoco pyPBD && python host/python/bench/solid.py [PICTURE.svg]
+    cargo build --release && pip install numpy mujoco pyPBD && python interop/python/bench/solid.py [PICTURE.svg]
 
 Beam: 200 x 40 x 40 mm, 0.1 MPa, Poisson's ratio 0.3, clamped, 0.05 N across its tip. Indentation: a sphere of 12.7 mm,
 3 mm deep in the middle of a cube of 80 mm, 10 kPa. The truth is that of tests/data/cases/solid. Every peer rests before it

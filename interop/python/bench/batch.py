@@ -28,7 +28,7 @@ def main():
     target = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).parent.parent / "target"))
     program = target / "release/examples/batch_seconds"
     if not program.is_file():
-        raise SystemExit(f"there is no {program}; in host/python, `cargo build --release --example batch_seconds` builds it")
+        raise SystemExit(f"there is no {program}; in interop/python, `cargo build --release --example batch_seconds` builds it")
     yardstick = [program, model.path, str(POSES), str(ROUNDS)]
     rust_s, python_s = np.inf, np.inf
     for _ in range(ALTERNATIONS):  # alternating, so that a slow spell of the machine hits both
