@@ -25,7 +25,8 @@
 //! - Models: [`ForceModel`], [`export_model!`]; parameters: [`Parameter`], [`Settings`].
 //! - Devices: [`Device`], [`ActiveDevice`], [`SafeStop`], [`export_device!`].
 //! - What else a plugin may offer: [`extension`].
-//! - Rules for every plugin: [`conformance`]; functions with the same bits on every machine: [`math`].
+//! - Rules for every plugin: [`conformance`]; functions with the same bits on every machine: [`math`]; text for a
+//!   terminal: [`terminal`].
 //! - The binary contract, which authors in Rust never see: [`abi`].
 
 pub mod abi;
@@ -39,6 +40,7 @@ mod parameter;
 mod refusal;
 mod sampled_loop;
 mod table;
+pub mod terminal;
 mod text_file;
 
 pub use abi::Choices;

@@ -2,8 +2,8 @@
 //! plugins are.
 
 use clap::Parser;
-use flotor_core::terminal::{escaped, escaped_arguments};
 use flotor_drawing::camera::View;
+use flotor_hal::terminal::{escaped, escaped_arguments};
 use flotor_history::History;
 use flotor_history::compared::Compared;
 use flotor_history::quantity::Quantity;

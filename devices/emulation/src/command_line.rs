@@ -1,7 +1,7 @@
 //! What the programs of emulators read and write.
 
 use clap::Parser;
-use flotor_core::terminal::{escaped, escaped_arguments};
+use flotor_hal::terminal::{escaped, escaped_arguments};
 use std::error::Error;
 use std::io::Write;
 use std::path::Path;

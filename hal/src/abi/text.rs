@@ -192,21 +192,13 @@ impl Message {
         }
     }
 
-    /// The sentence for a person and a terminal, whatever a foreign plugin wrote, up to its first null: what is not UTF-8 as
-    /// a replacement character, control characters but the end of a line escaped. Not real-time.
+    /// Returns the text for a terminal, whatever a foreign plugin wrote, up to its first null: a replacement character for each part
+    /// that is not UTF-8, control characters escaped. Not real-time.
     #[cfg(feature = "loader")]
     pub(crate) fn for_people(&self) -> String {
         let bytes = self.text.get(..self.len as usize).unwrap_or(&self.text);
         let bytes = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
-        let mut text = String::with_capacity(bytes.len());
-        for character in String::from_utf8_lossy(bytes).chars() {
-            if character.is_control() && character != '\n' {
-                text.extend(character.escape_default());
-            } else {
-                text.push(character);
-            }
-        }
-        text
+        crate::terminal::escaped(&String::from_utf8_lossy(bytes))
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A text carries its colours as marks, noncharacters of Unicode, which become sequences of the terminal when the text is printed.
 
-use flotor_core::terminal::escaped;
+use flotor_hal::terminal::escaped;
 use std::io::IsTerminal;
 
 /// Marks in a text, each with its sequence for the terminal.

@@ -7,7 +7,6 @@
 //! - [`plausibility`]: whether a sample can be true.
 //! - [`coupling`]: two devices held together; [`peer`]: what the two ends tell each other.
 //! - [`guidance`]: the parameters that guide a simulated hand.
-//! - [`terminal`]: text without control characters.
 //! - [`Change`]: a parameter that changed while the loop ran.
 //!
 //! Nothing here reads files, starts threads or talks to the system.
@@ -27,7 +26,6 @@ pub mod plausibility;
 mod random;
 pub mod region;
 pub mod rendered_boundary;
-pub mod terminal;
 pub mod trace;
 
 pub use change::{Change, ChangeOutcome, ChangeSubject};

@@ -11,7 +11,7 @@ use flotor_bridge::remote::{Remote, bridges};
 use flotor_bridge::request::{Request, Right};
 use flotor_bridge::serve::{Launcher, Service, serve};
 use flotor_bridge::stop_channel::press_both_ways;
-use flotor_core::terminal::{escaped, escaped_arguments};
+use flotor_hal::terminal::{escaped, escaped_arguments};
 use flotor_live::{Directory, SetValue};
 use std::error::Error;
 use std::path::PathBuf;

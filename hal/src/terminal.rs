@@ -1,4 +1,4 @@
-//! Text for a terminal: a file, a folder or a message may be anybody's, the terminal is not.
+//! Text for a terminal: anybody may have written a file name, a message or the text of a plugin.
 
 /// Returns a text as a terminal may receive it: control characters but line ends and tabs escaped, likewise characters that change
 /// the direction of the text. Not real-time.
