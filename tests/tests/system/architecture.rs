@@ -247,8 +247,13 @@ fn wrong_dependencies(members: &[Member]) -> Vec<String> {
 }
 
 fn metadata() -> Metadata {
+    metadata_of(".")
+}
+
+/// Returns the members of a workspace with their dependencies.
+pub(super) fn metadata_of(workspace: &str) -> Metadata {
     let mut command = MetadataCommand::new();
-    command.manifest_path(workspace_root().join("Cargo.toml")).no_deps();
+    command.manifest_path(workspace_root().join(workspace).join("Cargo.toml")).no_deps();
     command.other_options(vec!["--offline".to_owned()]);
     command.exec().expect("cargo metadata reads the workspace")
 }

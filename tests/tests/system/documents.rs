@@ -8,7 +8,17 @@ use flotor_tests::{TestSize, files_under, workspace_root};
 use std::path::{Path, PathBuf};
 
 /// Documents outside the book.
-const DOCUMENTS: [&str; 4] = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"];
+const DOCUMENTS: [&str; 9] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "devices/README.md",
+    "interop/README.md",
+    "lab/README.md",
+    "models/README.md",
+    "study/README.md",
+];
 /// Where the book's chapters lie.
 const BOOK: &str = "docs/src";
 

@@ -56,6 +56,7 @@ mod reference;
 mod refusal;
 mod replay;
 mod rod;
+mod rooms;
 mod safety;
 mod scaffold;
 mod scene;

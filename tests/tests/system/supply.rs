@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use toml::{Table, Value};
 
 /// The workspaces: the core, and those of their own beside it.
-const WORKSPACES: [&str; 4] = [".", "interop/python", "interop/bridge", "interop/sweep"];
+pub(super) const WORKSPACES: [&str; 4] = [".", "interop/python", "interop/bridge", "interop/sweep"];
 
 /// Abandoned crates that `deny.toml` names, and a lock file that has each. One that is gone is to be struck out there.
 const ABANDONED: [(&str, &str); 7] = [
