@@ -124,7 +124,7 @@ fn tanks_balance_and_energy_on_its_way_is_in_neither() {
 /// lost.
 #[test]
 fn the_pair_generates_no_energy_whatever_becomes_of_the_messages() {
-    for seed in 0..20 {
+    for seed in 0..200 {
         let mut state = seed;
         let config = CouplingConfig::default();
         let mut ends = [(); 2].map(|()| End::new(&config, &MappingConfig::default(), PERIOD_S));
