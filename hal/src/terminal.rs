@@ -1,4 +1,4 @@
-//! Text for a terminal: anybody may have written a file name, a message or the text of a plugin.
+//! Escapes control characters in text for a terminal: file names, messages and texts of plugins come from strangers.
 
 /// Returns a text as a terminal may receive it: control characters but line ends and tabs escaped, likewise characters that change
 /// the direction of the text. Not real-time.

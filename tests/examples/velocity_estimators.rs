@@ -3,8 +3,8 @@
 //!
 //! Noise is the root mean square of the estimate along z for a flotor at rest, seen by the sensors of preset `full` (1 µm of
 //! noise, steps of 2 µm): their samples are independent, so it follows from the answer to a single wrong sample, without a
-//! sampling error. Lag is how far the estimate is behind a steady acceleration, over that acceleration. Nothing here depends on
-//! the machine.
+//! sampling error. Lag is the delay of the estimate behind the velocity of a steady acceleration. No number depends on the
+//! machine.
 //!
 //! ```text
 //! cargo run --release -p flotor-tests --features measurements --example velocity_estimators -- velocity.svg > velocity.csv
@@ -97,7 +97,7 @@ fn cell_noise_m() -> f64 {
     SensingParameters::MAGLEV.noise_m.hypot(SensingParameters::MAGLEV.step_m / 12.0_f64.sqrt())
 }
 
-/// Returns the estimates of perfect sensors for the heights (m) a flotor is at, tick after tick.
+/// Returns the velocity estimates (m/s) for a height (m) as a function of the tick, with sensors without error.
 fn estimates(estimator: EstimatorKind, height_m: impl Fn(u64) -> f64) -> Result<Vec<f64>, InvalidParameter> {
     let parameters = SensingParameters {
         estimator,

@@ -1,5 +1,5 @@
-//! A board without hardware at a pseudo terminal: its handle goes towards the user and back, once in two seconds. The argument is the
-//! name of a link to that terminal, which is made.
+//! Emulates a board at a pseudo terminal: the handle goes towards the user and back, once in two seconds. The argument is the path of
+//! a new symbolic link to that terminal.
 //!
 //! ```text
 //! $ cargo run -p flotor-haply --example emulated_board -- target/board

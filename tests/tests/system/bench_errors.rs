@@ -113,8 +113,8 @@ fn the_book_prints_errors_and_losses_along_the_hand() {
     }
 }
 
-/// Columns of a row of the chapter's table on the workspace without its times: largest and mean error of the force, largest of the
-/// torque.
+/// Returns the error columns of a row in the chapter's table of the workspace: largest and mean error of the force, largest error of
+/// the torque.
 fn printed_of_the_workspace(name: &str) -> String {
     let chapter = std::fs::read_to_string(workspace_root().join("docs/src").join(CHAPTER));
     let chapter = chapter.expect("the chapter is there");

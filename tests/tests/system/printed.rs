@@ -70,7 +70,7 @@ fn the_book_prints_noise_and_lag_of_the_velocity_estimates() {
     }
 }
 
-/// The table is of transfer functions, Riccati and Lyapunov equations (`tests/generators/velocity.py`).
+/// Compares noise and lag with a table from transfer functions, Riccati and Lyapunov equations (`tests/generators/velocity.py`).
 #[test]
 fn noise_and_lag_of_the_velocity_estimates_are_those_of_their_transfer_functions() {
     if TestSize::of_this_run().leaves_out_long_tests() {

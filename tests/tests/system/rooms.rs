@@ -50,7 +50,7 @@ fn floor_of(room: &str) -> Option<usize> {
     FLOORS.iter().position(|rooms| rooms.contains(&room))
 }
 
-/// Rooms without a floor, and arrows that do not point to a lower floor.
+/// Returns the rooms without a floor, and the arrows that do not point to a lower floor.
 fn complaints(arrows: &Arrows) -> Vec<String> {
     let mut complaints = Vec::new();
     for (user, used) in arrows {
@@ -90,7 +90,7 @@ fn an_arrow_that_does_not_point_down_is_noticed() {
 
 // ---------------------------------------------------------------- the drawing
 
-/// The floors from the top down; beside each, the arrows of its rooms.
+/// Draws the floors from the top down, each with the arrows of its rooms.
 fn drawing(arrows: &Arrows) -> String {
     let mut lines = String::new();
     for (floor, rooms) in FLOORS.iter().enumerate().rev() {
@@ -124,7 +124,7 @@ fn the_architecture_draws_the_rooms() {
 
 // ---------------------------------------------------------------- folders
 
-/// Folders of a room with sources; others, such as the output of an earlier build, are nobody's.
+/// Folders of a room with sources; the output of an earlier build does not count.
 fn folders_in(room: &str) -> BTreeSet<String> {
     let sources = ["proto", "rs", "toml"].into_iter();
     let sources = sources.flat_map(|extension| files_under(room, extension).expect("a room is a folder"));

@@ -35,7 +35,7 @@ pub struct Registry {
     ambiguous: Vec<(Metadata, Metadata)>,
     broken: Vec<LoadError>,
     skipped: Vec<SkippedFolder>,
-    /// Those of the scene first.
+    /// Searched folders, those of the scene first.
     folders: Vec<PathBuf>,
     /// Number of folders of the scene.
     of_scene: usize,

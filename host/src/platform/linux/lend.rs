@@ -226,7 +226,7 @@ impl Drop for Folder {
 /// Why `flotor lend` ends without an end of its program.
 enum Early {
     Failed(CommandError),
-    /// With this exit code: another process has printed the cause, or a stop was requested.
+    /// The exit code, after a request to stop or an error that another process has printed.
     Exit(i32),
 }
 

@@ -118,9 +118,9 @@ impl Service {
 /// The end of a service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ServiceEnd {
-    /// With this exit code, which is not 0 where its run has failed.
+    /// The service ended with this exit code; not 0 after a failed run.
     Exited(i32),
-    /// By `flotor lend`, because it did not end after a request to stop.
+    /// `flotor lend` killed the service at the end of the schedule.
     Killed,
 }
 
@@ -138,11 +138,11 @@ impl ServiceEnd {
     }
 }
 
-/// A service that listens. Dropped, it is asked to end, and waited for.
+/// Running service. Its drop requests the end of the service and waits for it.
 pub(super) struct Served<'a> {
     child: Child,
     stop: &'a StopRequest,
-    /// Its output after the place where it listens, once that is complete.
+    /// Output of the service after its address, sent when the output has ended.
     output: Receiver<String>,
 }
 
