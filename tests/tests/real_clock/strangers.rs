@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 const ATTACKERS: usize = 2;
 const PAUSE: Duration = Duration::from_millis(1);
 /// Connections that a stand-in holds, as a live socket does.
-const HELD: usize = 24;
+const HELD: usize = 20;
 
 /// A request to watch, of which attackers send parts.
 fn request() -> Vec<u8> {

@@ -46,8 +46,16 @@ impl Hanging {
     }
 
     fn flotor(&self, arguments: &[&str]) -> Flotor {
-        let model = self.model.display().to_string();
-        let arguments = arguments.iter().map(|word| if *word == "MODEL" { model.as_str() } else { word });
+        self.numbered(arguments, 0)
+    }
+
+    /// `MODEL` stands for the model, and `DATA` for a folder of that number.
+    fn numbered(&self, arguments: &[&str], number: usize) -> Flotor {
+        let arguments = arguments.iter().map(|word| match *word {
+            "MODEL" => self.model.display().to_string(),
+            "DATA" => format!("data-{number}"),
+            word => word.to_owned(),
+        });
         Flotor::with(arguments).inside(self.path())
     }
 }
@@ -110,7 +118,7 @@ const COMMANDS: [&[&str]; 6] = [
     &["test", "hangs.test.toml"],
     &["validate", "MODEL", "--timeout", "600s"],
     &["stress", "--model", "MODEL", "--timeout", "600s"],
-    &["study", "jnd", "--scene", "felt.toml", "--out", "data"],
+    &["study", "jnd", "--scene", "felt.toml", "--out", "DATA"],
 ];
 
 /// A spin, and a wait.
@@ -123,28 +131,38 @@ fn nothing_is_left_of_a_command_that_is_killed_while_a_model_hangs() {
     }
     take_interrupts();
     let kills = TestSize::of_this_run().pick(6, 200);
-    let hanging = HANGS.map(Hanging::by);
-    for command in COMMANDS {
-        let (mut most, mut slowest) = (0, Duration::ZERO);
-        for number in 0..kills {
-            let end = [End::Kill, End::Term, End::Interrupt][number % 3];
-            let scene = &hanging[number / 3 % 2];
-            let started = scene.flotor(command).env("FLOTOR_STEP_LIMIT_S", "600").leading_a_group().start();
-            // Spread evenly, without a period of its own: the golden section.
-            let share = (number as f64 * 0.618_034).fract();
-            std::thread::sleep(Duration::from_secs_f64(1.5 * share));
-            most = most.max(processes_in(scene.path()).len());
-            end.bring_about(&started);
-            slowest = slowest
-                .max(no_process_is_left_in(scene.path(), &format!("{command:?} {end:?} after {share}")));
-            let ended = started.wait();
-            assert_ne!(ended.code, Some(exit_code::CONFIGURATION), "{ended:?}");
-            let _ = std::fs::remove_dir_all(scene.path().join("data"));
+    std::thread::scope(|scope| {
+        for command in COMMANDS {
+            scope.spawn(move || kill_again_and_again(command, kills));
         }
-        assert!(most > 1, "{command:?} never had a process of its own");
-        let name = command[0];
-        println!("{name}: 0 of {kills} kills left a process; the last one ended after {slowest:.2?} at most");
+    });
+}
+
+/// Kills a command at instants spread over the time from its start to a tick that hangs; expects no process afterwards.
+fn kill_again_and_again(command: &[&str], kills: usize) {
+    let hanging = HANGS.map(Hanging::by);
+    let (mut most, mut slowest) = (0, Duration::ZERO);
+    for number in 0..kills {
+        let end = [End::Kill, End::Term, End::Interrupt][number % 3];
+        let scene = &hanging[number / 3 % 2];
+        let started =
+            scene.numbered(command, number).env("FLOTOR_STEP_LIMIT_S", "600").leading_a_group().start();
+        // Spread evenly, without a period of its own: the golden section.
+        let share = (number as f64 * 0.618_034).fract();
+        let kill_at = Instant::now() + Duration::from_secs_f64(1.5 * share);
+        while Instant::now() < kill_at {
+            most = most.max(processes_in(scene.path()).len());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        end.bring_about(&started);
+        let what = format!("{command:?} {end:?} after {share}");
+        slowest = slowest.max(no_process_is_left_in(scene.path(), &what));
+        let ended = started.wait();
+        assert_ne!(ended.code, Some(exit_code::CONFIGURATION), "{what}: {ended:?}");
     }
+    assert!(most > 1, "{command:?} never had a process of its own");
+    let name = command[0];
+    println!("{name}: 0 of {kills} kills left a process; the last one ended after {slowest:.2?} at most");
 }
 
 /// Lets commands of this process take SIGINT, which it may have inherited as ignored itself: `exec` restores the default action of a

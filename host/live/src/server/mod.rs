@@ -34,14 +34,16 @@ use watcher::Watcher;
 const MOST_WATCHERS: usize = 16;
 /// Connections at a time. There is always one that does not watch: the one that was silent for longest makes room for a new
 /// one, so that an emergency stop finds a place whoever is connected.
-const MOST_CONNECTIONS: usize = MOST_WATCHERS + 8;
+const MOST_CONNECTIONS: usize = MOST_WATCHERS + 4;
+/// Threads of the connections, and of those closed whose last request is being answered.
+const MOST_THREADS: usize = 3 * MOST_CONNECTIONS;
 /// Stack of the threads here, bytes. With locked memory every page of it is real.
 const STACK_BYTES: usize = 256 * 1024;
 /// Time for a client to read the end of a run, and for its requests to be answered.
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Limit on the end of all connections together, beyond the time of the clients.
 const END_WAIT: Duration = Duration::from_millis(1000);
-/// Pause after a connection that failed for lack of something (descriptors, mostly).
+/// Pause after a connection that failed for lack of something (descriptors, mostly), and the longest wait for threads to end.
 const BREATH: Duration = Duration::from_millis(10);
 
 /// Why a run cannot be watched.
@@ -76,6 +78,8 @@ pub struct Publication {
 /// What all threads of a publication know.
 struct Shared {
     watchers: Mutex<Vec<Watcher>>,
+    /// A copy in each thread of a connection counts them.
+    threads: Arc<()>,
     /// How many watchers want ticks: all that is looked at in a tick.
     watching: AtomicUsize,
     greeting: Mutex<Greeting>,
@@ -101,6 +105,7 @@ impl Publication {
         let listener = directory.listen()?;
         let shared = Arc::new(Shared {
             watchers: Mutex::default(),
+            threads: Arc::default(),
             watching: AtomicUsize::new(0),
             greeting: Mutex::new(greeting),
             run: run.to_bytes(),
@@ -175,6 +180,17 @@ impl Shared {
         u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
+    /// Waits until two more threads are allowed, at most [`BREATH`]; returns whether they are.
+    fn has_room_soon(&self) -> bool {
+        let until = Instant::now() + BREATH;
+        // One copy is here.
+        let has_room = || Arc::strong_count(&self.threads) - 1 + 2 <= MOST_THREADS;
+        while !has_room() && Instant::now() < until {
+            std::thread::sleep(BREATH / 100);
+        }
+        has_room()
+    }
+
     /// Lets one more watch, unless too many do.
     fn admit(&self, outbox: &Outbox, every: u32) -> Result<(), String> {
         let watchers = self.watchers();
@@ -209,10 +225,9 @@ fn accept(socket: &Listening, shared: &Arc<Shared>) {
     }
 }
 
-/// Serves a connection. A watcher who cannot be served is turned away: the connection closes. Waits for no other client: the
-/// threads of those that left end by themselves.
+/// Serves a connection, or closes it where threads are missing. The threads of clients that left end by themselves.
 fn welcome(stream: Stream, shared: &Arc<Shared>) {
-    if has_left(&stream) {
+    if has_left(&stream) || !shared.has_room_soon() {
         return;
     }
     let mut watchers = shared.watchers();

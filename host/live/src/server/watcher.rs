@@ -35,10 +35,16 @@ impl Watcher {
         let stream = Arc::new(stream);
         let (to_write, to_read) = (Arc::clone(&stream), Arc::clone(&stream));
         let (for_writer, for_reader, of_run) = (Arc::clone(&outbox), Arc::clone(&outbox), Arc::clone(shared));
-        let writer = thread("flotor-live-out").spawn(move || write(&to_write, &for_writer)).ok()?;
+        let [counts_writer, counts_reader] = [Arc::clone(&shared.threads), Arc::clone(&shared.threads)];
+        let writer = thread("flotor-live-out").spawn(move || {
+            let _counted = counts_writer;
+            write(&to_write, &for_writer);
+        });
+        let writer = writer.ok()?;
         let heard_ms = Arc::new(AtomicU64::new(shared.now_ms()));
         let heard = Arc::clone(&heard_ms);
         let reader = thread("flotor-live-in").spawn(move || {
+            let _counted = counts_reader;
             read(&to_read, &for_reader, &of_run, &heard);
             // The watcher has gone or talks nonsense: the writer ends, too.
             for_reader.want_no_ticks();
