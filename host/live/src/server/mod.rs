@@ -35,8 +35,8 @@ const MOST_WATCHERS: usize = 16;
 /// Connections at a time. There is always one that does not watch: the one that was silent for longest makes room for a new
 /// one, so that an emergency stop finds a place whoever is connected.
 const MOST_CONNECTIONS: usize = MOST_WATCHERS + 4;
-/// Threads of the connections, and of those closed whose last request is being answered.
-const MOST_THREADS: usize = 3 * MOST_CONNECTIONS;
+/// Connections beyond those whose threads may be ending at a time.
+const MOST_CLOSING: usize = MOST_CONNECTIONS / 2;
 /// Stack of the threads here, bytes. With locked memory every page of it is real.
 const STACK_BYTES: usize = 256 * 1024;
 /// Time for a client to read the end of a run, and for its requests to be answered.
@@ -78,8 +78,8 @@ pub struct Publication {
 /// What all threads of a publication know.
 struct Shared {
     watchers: Mutex<Vec<Watcher>>,
-    /// A copy in each thread of a connection counts them.
-    threads: Arc<()>,
+    /// Clients that left or were evicted, until their threads have ended.
+    closing: Mutex<Vec<Watcher>>,
     /// How many watchers want ticks: all that is looked at in a tick.
     watching: AtomicUsize,
     greeting: Mutex<Greeting>,
@@ -105,7 +105,7 @@ impl Publication {
         let listener = directory.listen()?;
         let shared = Arc::new(Shared {
             watchers: Mutex::default(),
-            threads: Arc::default(),
+            closing: Mutex::default(),
             watching: AtomicUsize::new(0),
             greeting: Mutex::new(greeting),
             run: run.to_bytes(),
@@ -180,15 +180,23 @@ impl Shared {
         u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    /// Waits until two more threads are allowed, at most [`BREATH`]; returns whether they are.
-    fn has_room_soon(&self) -> bool {
+    /// Joins the threads that have ended; waits for some at most [`BREATH`] where too many are ending. Returns whether one more
+    /// connection may close.
+    fn has_room_to_close(&self) -> bool {
         let until = Instant::now() + BREATH;
-        // One copy is here.
-        let has_room = || Arc::strong_count(&self.threads) - 1 + 2 <= MOST_THREADS;
-        while !has_room() && Instant::now() < until {
+        let mut closing = self.closing.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            closing.extract_if(.., |watcher| watcher.has_ended()).for_each(Watcher::join);
+            if closing.len() < MOST_CLOSING || Instant::now() >= until {
+                return closing.len() < MOST_CLOSING;
+            }
             std::thread::sleep(BREATH / 100);
         }
-        has_room()
+    }
+
+    /// Keeps a client until its threads have ended.
+    fn close(&self, watcher: Watcher) {
+        self.closing.lock().unwrap_or_else(PoisonError::into_inner).push(watcher);
     }
 
     /// Lets one more watch, unless too many do.
@@ -218,22 +226,24 @@ fn accept(socket: &Listening, shared: &Arc<Shared>) {
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(_) => {
                 // A client that asks for nothing may hold the descriptor that is missing.
-                evict_longest_silent(&mut shared.watchers());
+                if shared.has_room_to_close() {
+                    evict_longest_silent(&mut shared.watchers(), shared);
+                }
                 std::thread::sleep(BREATH);
             }
         }
     }
 }
 
-/// Serves a connection, or closes it where threads are missing. The threads of clients that left end by themselves.
+/// Serves a connection, or closes it where threads or places are missing.
 fn welcome(stream: Stream, shared: &Arc<Shared>) {
-    if has_left(&stream) || !shared.has_room_soon() {
+    if has_left(&stream) || !shared.has_room_to_close() {
         return;
     }
     let mut watchers = shared.watchers();
-    watchers.retain(|watcher| !watcher.is_gone());
+    watchers.extract_if(.., |watcher| watcher.is_gone()).for_each(|watcher| shared.close(watcher));
     shared.count(&watchers);
-    if watchers.len() >= MOST_CONNECTIONS && !evict_longest_silent(&mut watchers) {
+    if watchers.len() >= MOST_CONNECTIONS && !evict_longest_silent(&mut watchers, shared) {
         return;
     }
     let outbox = Arc::new(Outbox::default());
@@ -245,10 +255,11 @@ fn welcome(stream: Stream, shared: &Arc<Shared>) {
 }
 
 /// Closes the connection of the client that watches nothing and was silent for longest; false if there is none.
-fn evict_longest_silent(watchers: &mut Vec<Watcher>) -> bool {
+fn evict_longest_silent(watchers: &mut Vec<Watcher>, shared: &Shared) -> bool {
     let idle = watchers.iter().enumerate().filter(|(_, watcher)| !watcher.outbox.wants_ticks());
     let longest = idle.min_by_key(|(_, watcher)| watcher.heard_ms()).map(|(place, _)| place);
-    longest.map(|place| watchers.remove(place).evict()).is_some()
+    let evicted = longest.map(|place| watchers.remove(place));
+    evicted.inspect(Watcher::evict).map(|watcher| shared.close(watcher)).is_some()
 }
 
 /// Waits for the end of a thread until then; one that goes on is left to itself.

@@ -35,16 +35,10 @@ impl Watcher {
         let stream = Arc::new(stream);
         let (to_write, to_read) = (Arc::clone(&stream), Arc::clone(&stream));
         let (for_writer, for_reader, of_run) = (Arc::clone(&outbox), Arc::clone(&outbox), Arc::clone(shared));
-        let [counts_writer, counts_reader] = [Arc::clone(&shared.threads), Arc::clone(&shared.threads)];
-        let writer = thread("flotor-live-out").spawn(move || {
-            let _counted = counts_writer;
-            write(&to_write, &for_writer);
-        });
-        let writer = writer.ok()?;
+        let writer = thread("flotor-live-out").spawn(move || write(&to_write, &for_writer)).ok()?;
         let heard_ms = Arc::new(AtomicU64::new(shared.now_ms()));
         let heard = Arc::clone(&heard_ms);
         let reader = thread("flotor-live-in").spawn(move || {
-            let _counted = counts_reader;
             read(&to_read, &for_reader, &of_run, &heard);
             // The watcher has gone or talks nonsense: the writer ends, too.
             for_reader.want_no_ticks();
@@ -71,8 +65,19 @@ impl Watcher {
     }
 
     /// Takes no further request; its threads end by themselves, after those that have arrived are answered.
-    pub(super) fn evict(self) {
+    pub(super) fn evict(&self) {
         let _ = self.stream.shutdown(Shutdown::Read);
+    }
+
+    /// Whether both threads are at their end.
+    pub(super) fn has_ended(&self) -> bool {
+        self.writer.is_finished() && self.reader.is_finished()
+    }
+
+    /// Waits for both threads.
+    pub(super) fn join(self) {
+        let _ = self.writer.join();
+        let _ = self.reader.join();
     }
 
     /// Sends what waits to a client that reads it within [`PATIENCE`], and closes the connection.
