@@ -396,7 +396,7 @@ fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_wit
     let device = scratch.path().join("libdevice.so");
     compile_c_file(&workspace_root().join("tests/c/campaign/device.c"), &["SIMULATED"], &device);
     // In lockstep a tick a call: as many as are wanted, and as a log has room for. What depends on time or dies runs in real time.
-    let (calls, rounds) = (TestSize::of_this_run().pick(2_000, 120_000), TestSize::of_this_run().pick(1, 3));
+    let (calls, rounds) = (TestSize::of_this_run().pick(2_000, 120_000), TestSize::of_this_run().pick(1, 5));
     let in_lockstep = ["steps", "huge", "nan"].map(|way| (way, "lockstep", calls));
     let in_real_time = [
         ("plain", "real", 600),
@@ -441,6 +441,9 @@ fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_wit
             _ => exit_code::OK,
         };
         assert_eq!(ran.code, Some(expected), "{way}: {ran:?}");
+        if (*way, *pace) == ("steps", "lockstep") {
+            assert!(ran.stdout.contains("the force swung between its limits"), "{ran:?}");
+        }
         match *way {
             "steps" | "huge" => assert!(largest_n > 0.9 * MOST_N, "{way}: only {largest_n} N"),
             "nan" => assert!(ran.stdout.contains("refused, not finite"), "{ran:?}"),
