@@ -27,6 +27,8 @@ step() {
     else
         report+=("$(printf '%-10s FAILED after %d s (exit code %d): %s' "$name" $((SECONDS - started)) "$code" "$*")")
         summary
+        # The place and the first words of every failed test: of a long log, often the end alone is kept.
+        { grep -aA 3 ' panicked at ' "$log" || true; } | cut -c 1-400 | tail -n 60
         exit "$code"
     fi
 }

@@ -21,11 +21,12 @@ struct Hanging {
 }
 
 impl Hanging {
-    /// `how` is a statement that does not return.
+    /// `how` is a statement that does not return. The file `hangs` is there from the hang on.
     fn by(how: &str) -> Self {
         let folder = Scratch::default();
         let model = folder.path().join("libhangs.so");
-        let habit = format!("IN_STEP=if (input->tick == 70) {how}");
+        let mark = folder.path().join("hangs");
+        let habit = format!("IN_STEP=if (input->tick == 70) {{ fclose(fopen({mark:?}, \"w\")); {how} }}");
         compile_c_file(&workspace_root().join("tests/c/model_that.c"), &[&habit], &model);
         let scene = format!(
             "duration_s = 0.2\n[device]\nplugin = \"simulated\"\n[[model]]\nname = \"jelly\"\nplugin = {model:?}\n"
@@ -85,7 +86,7 @@ fn no_process_is_left_in(folder: &Path, what: &str) -> Duration {
 }
 
 /// Time after which a process is taken for one that never ends.
-const FOR_EVER: Duration = Duration::from_secs(30);
+const FOR_EVER: Duration = Duration::from_secs(120);
 
 /// How a command ends.
 #[derive(Clone, Copy, Debug)]
@@ -109,7 +110,8 @@ impl End {
 }
 
 /// A program that ignores every request to end, as its child and grandchild do: one waits, one spins.
-const PROGRAM: &str = "trap '' TERM INT HUP\n(while :; do sleep 600; done) &\nwhile :; do :; done\n";
+const PROGRAM: &str =
+    "trap '' TERM INT HUP\n(while :; do sleep 600; done) &\n: >hangs\nwhile :; do :; done\n";
 
 /// Each would go on for minutes.
 const COMMANDS: [&[&str]; 6] = [
@@ -132,37 +134,45 @@ fn nothing_is_left_of_a_command_that_is_killed_while_a_model_hangs() {
     take_interrupts();
     let kills = TestSize::of_this_run().pick(6, 200);
     std::thread::scope(|scope| {
-        for command in COMMANDS {
-            scope.spawn(move || kill_again_and_again(command, kills));
+        // As many commands at a time as a small machine has processors: half of them spin.
+        for commands in COMMANDS.chunks(3) {
+            scope.spawn(move || commands.iter().for_each(|command| kill_again_and_again(command, kills)));
         }
     });
 }
 
-/// Kills a command at instants spread over the time from its start to a tick that hangs; expects no process afterwards.
+/// Kills a command at instants spread over the time from its start to some time after its hang; expects no process afterwards.
 fn kill_again_and_again(command: &[&str], kills: usize) {
     let hanging = HANGS.map(Hanging::by);
-    let (mut most, mut slowest) = (0, Duration::ZERO);
+    let started = |scene: &Hanging, number| {
+        scene.numbered(command, number).env("FLOTOR_STEP_LIMIT_S", "600").leading_a_group().start()
+    };
+    let ends = |scene: &Hanging, started: Running, end: End, what: &str| {
+        end.bring_about(&started);
+        let took = no_process_is_left_in(scene.path(), what);
+        let ended = started.wait();
+        assert_ne!(ended.code, Some(exit_code::CONFIGURATION), "{what}: {ended:?}");
+        took
+    };
+    let since = Instant::now();
+    let first = started(&hanging[0], kills);
+    soon(&format!("{command:?} hangs"), || hanging[0].path().join("hangs").exists());
+    let until_it_hangs = since.elapsed();
+    assert!(processes_in(hanging[0].path()).len() > 1, "{command:?} has no process of its own");
+    let mut slowest = ends(&hanging[0], first, End::Kill, &format!("{command:?}, hanging"));
     for number in 0..kills {
         let end = [End::Kill, End::Term, End::Interrupt][number % 3];
         let scene = &hanging[number / 3 % 2];
-        let started =
-            scene.numbered(command, number).env("FLOTOR_STEP_LIMIT_S", "600").leading_a_group().start();
+        let started = started(scene, number);
         // Spread evenly, without a period of its own: the golden section.
         let share = (number as f64 * 0.618_034).fract();
-        let kill_at = Instant::now() + Duration::from_secs_f64(1.5 * share);
-        while Instant::now() < kill_at {
-            most = most.max(processes_in(scene.path()).len());
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        end.bring_about(&started);
-        let what = format!("{command:?} {end:?} after {share}");
-        slowest = slowest.max(no_process_is_left_in(scene.path(), &what));
-        let ended = started.wait();
-        assert_ne!(ended.code, Some(exit_code::CONFIGURATION), "{what}: {ended:?}");
+        std::thread::sleep(until_it_hangs.mul_f64(1.5 * share));
+        slowest = slowest.max(ends(scene, started, end, &format!("{command:?} {end:?} after {share}")));
     }
-    assert!(most > 1, "{command:?} never had a process of its own");
     let name = command[0];
-    println!("{name}: 0 of {kills} kills left a process; the last one ended after {slowest:.2?} at most");
+    println!(
+        "{name}: hangs after {until_it_hangs:.2?}; 0 of {kills} kills left a process; the last one ended after {slowest:.2?} at most"
+    );
 }
 
 /// Lets commands of this process take SIGINT, which it may have inherited as ignored itself: `exec` restores the default action of a

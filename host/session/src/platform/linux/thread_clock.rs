@@ -65,6 +65,9 @@ mod tests {
             (clock, waiting)
         });
         assert!(!waiting.wants && waiting.ran < used().ran);
-        assert!(clock.used().is_none(), "the thread is gone");
+        // The system removes an ended thread a moment after its last instruction.
+        while clock.used().is_some() {
+            std::thread::yield_now();
+        }
     }
 }
