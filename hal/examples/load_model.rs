@@ -1,9 +1,9 @@
-//! Loads model plugins from their files and asks each at a hundred poses: what a host does, without the rest of one.
+//! Loads model plugins from files and steps each through a hundred poses: the plugin side of a host, without the rest.
 //!
 //! `cargo run -p flotor-hal --features loader --example load_model -- target/debug/libflotor_wall.so`
 //!
-//! Each file has one line: what it is and the bits of the last answer with a sum of the bits of all, or why it is refused. The same
-//! model gives the same line on every system.
+//! Prints one line per file: id, version, last force and a checksum of all wrenches, or why the file was rejected. The
+//! same model prints the same line on every system.
 
 #![allow(unsafe_code)] // a plugin file is loaded: its user trusts it
 
@@ -22,7 +22,7 @@ fn main() {
     for file in files {
         match ask(Path::new(&file)) {
             Ok(line) => println!("{line}"),
-            // The end of the sentence, without the path.
+            // The end of the sentence, with `it` in place of the path.
             Err(error) => println!("refused: {}", error.to_string().replace(&*file.to_string_lossy(), "it")),
         }
     }

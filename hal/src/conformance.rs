@@ -1,20 +1,20 @@
-//! What every plugin must do, as data: `flotor validate`, the tests and the book print this one list.
+//! Conformance rules for plugins, as data: `flotor validate`, the tests and the book print this one list.
 
 use crate::abi::PluginKind;
 
-/// One rule of the contract that can be checked from outside.
+/// Rule of the contract that can be checked from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Rule {
     /// The metadata section can be read and names kind, id, version, contract and entry.
     Metadata,
-    /// The library links, its entry is right, and its layouts are the host's.
+    /// The library links, its entry is valid, and its layouts equal the host's.
     Loads,
     /// Every parameter has id, doc and a default inside its range, and no id occurs twice.
     Schema,
     /// An instance can be created from defaults alone.
     Defaults,
-    /// At home and near it a model answers with finite numbers.
+    /// A model gives finite numbers at home and near home.
     FiniteNearHome,
     /// NaN and infinity in the pose give a status, not NaN, and no panic.
     SurvivesNotFinite,
@@ -24,7 +24,7 @@ pub enum Rule {
     ResetRepeats,
     /// A step takes less than half a period at 1 kHz.
     TimeBudget,
-    /// Two instances give the same answers alternately, on two threads and alone.
+    /// Two instances give the same results alternately, on two threads and alone.
     Independent,
     /// Neither `create`, `prepare`, a step nor `destroy` leaves a thread behind.
     NoThreads,
@@ -34,20 +34,20 @@ pub enum Rule {
     Capabilities,
     /// Activate, read, write, deactivate and activate again all work.
     Lifecycle,
-    /// After `safe_stop` from another thread the device gives no wrench and still answers.
+    /// After `safe_stop` from another thread the device gives no wrench and still responds.
     SafeStop,
     /// Reads and writes take less than half a period; stopping and activating end soon.
     DeviceTime,
-    /// Every extension that is offered answers, and the instance works afterwards.
+    /// Every extension that is offered responds, and the instance works afterwards.
     Extensions,
-    /// What belongs to the host's process stays as it is: signals, floating-point mode, environment, limits.
+    /// No call changes the state of the host's process: signals, floating-point mode, environment, limits.
     HostUntouched,
     /// No call reads or writes memory that is not the plugin's or was not given to it.
     InsideMemory,
 }
 
 impl Rule {
-    /// All rules, in the order they are checked.
+    /// All rules, in the sequence of the checks.
     pub const ALL: [Rule; 19] = [
         Rule::Metadata,
         Rule::Loads,
@@ -70,7 +70,7 @@ impl Rule {
         Rule::InsideMemory,
     ];
 
-    /// Short name in reports.
+    /// Returns the short name in reports.
     #[must_use]
     pub const fn id(self) -> &'static str {
         match self {
@@ -96,7 +96,7 @@ impl Rule {
         }
     }
 
-    /// What is demanded, for people.
+    /// Returns the requirement as a sentence for people.
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
@@ -130,13 +130,13 @@ impl Rule {
         }
     }
 
-    /// The rule with a short name, if there is one.
+    /// Returns the rule with a short name; `None` if unknown.
     #[must_use]
     pub fn from_id(id: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|rule| rule.id() == id)
     }
 
-    /// Whether the rule is about plugins of this kind.
+    /// Returns true if the rule applies to plugins of this kind.
     #[must_use]
     pub const fn applies_to(self, kind: PluginKind) -> bool {
         match self {

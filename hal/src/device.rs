@@ -1,4 +1,4 @@
-//! Devices: what an author implements, and the data that goes in and out each tick.
+//! Devices: the traits that an author implements, and the data that goes in and out each tick.
 //!
 //! A device is *opened* (it answers questions, it gives no force), then *active* (energised, real-time), then
 //! opened again. The two are different types, so that a real-time call before activation does not compile.
@@ -19,7 +19,7 @@ layout! {
     DeviceInfo { id, name, doc, embodiment, reserved }
 }
 
-/// One tick as a device and a host see it. 24 bytes.
+/// Number and scheduled time of a tick. 24 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -32,7 +32,7 @@ pub struct Tick {
     pub dt_ns: u64,
 }
 
-/// What is wrong with a device, as a closed set that says what to do.
+/// Fault of a device, as a closed set with a remedy for each.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
@@ -44,20 +44,20 @@ pub enum Fault {
     OverCurrent = 3,
     /// The handle moved faster than the device allows.
     OverSpeed = 4,
-    /// The device is gone: check cable and power.
+    /// The device is disconnected: check cable and power.
     Disconnected = 5,
-    /// The device did not answer in time.
+    /// The device did not respond in time.
     Timeout = 6,
-    /// The device answered something that makes no sense.
+    /// The device sent malformed data.
     Protocol = 7,
-    /// Somebody pressed the emergency stop of the device.
+    /// The emergency stop of the device is pressed.
     EmergencyStop = 8,
     /// The plugin broke (panic, or a code outside the contract).
     Broken = 9,
 }
 
 impl Fault {
-    /// Reads a fault from the boundary: 0 is none, anything unknown means the plugin broke the contract.
+    /// Converts a code from the boundary: 0 is `None`, an unknown code [`Self::Broken`].
     #[inline]
     #[must_use]
     pub const fn from_code(code: u32) -> Option<Self> {
@@ -75,7 +75,7 @@ impl Fault {
         })
     }
 
-    /// What happened and what to do, for people.
+    /// Returns the cause and the remedy, for people.
     #[must_use]
     pub const fn advice(self) -> &'static str {
         match self {
@@ -92,19 +92,19 @@ impl Fault {
     }
 }
 
-/// Verdict of one real-time call on a device.
+/// Result of one real-time call on a device.
 #[must_use]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cycle {
     /// A new sample is in the state.
     Fresh,
-    /// No new sample since the last call; the state is the old one.
+    /// No new sample since the last call; the state is unchanged.
     Stale,
     /// The device is faulted and gives no force.
     Fault(Fault),
 }
 
-/// What a device reports each tick. 168 bytes, in the device frame.
+/// Sample that a device reports each tick. 168 bytes, in the device frame.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -113,17 +113,17 @@ pub struct DeviceState {
     pub pose: Pose,
     /// Velocity of the handle, m/s and rad/s.
     pub twist: Twist,
-    /// Wrench the device says it delivered to the hand since the previous tick, N and N·m.
+    /// Wrench delivered to the hand since the previous tick, as reported by the device, N and N·m.
     pub delivered: Wrench,
-    /// When the sample was taken, ns on the loop's clock.
+    /// Time of the sample, ns on the loop's clock.
     pub sampled_ns: u64,
     /// Buttons, one bit each.
     pub buttons: u32,
-    /// What else is to be known of this sample.
+    /// Further conditions of this sample.
     pub conditions: Conditions,
 }
 
-/// What a device says of a sample beside pose and faults, as a bit set: nothing that ends a run.
+/// Conditions of a sample beside pose and faults, as a bit set; none ends a run.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -132,24 +132,24 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// Nothing.
+    /// No condition.
     pub const NONE: Conditions = Conditions { bits: 0 };
-    /// The actuators are at their limit: since the previous tick they gave less than was commanded.
+    /// Actuators at their limit: since the previous tick they gave less than commanded.
     pub const SATURATED: Conditions = Conditions { bits: 1 << 0 };
-    /// The force requested of the device is more than it should be used with: warn the person who holds it.
+    /// Requested force above the recommended force of the device: warn the person who holds the handle.
     pub const EXCESS_FORCE: Conditions = Conditions { bits: 1 << 1 };
-    /// The pose was measured, with noise of at least a step of its numbers: that it stays the same to the bit for long
-    /// means that the sensor is stuck. A device that counts steps (an encoder at rest) does not say this.
+    /// Pose measured with noise of at least one step of its numbers: a pose constant to the bit for a long time means
+    /// that the sensor is stuck. Not set by a device that counts steps (an encoder at rest).
     pub const NOISY: Conditions = Conditions { bits: 1 << 2 };
 
-    /// Both. Real-time: bounded, no allocation.
+    /// Returns the union of both sets. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn with(self, other: Conditions) -> Conditions {
         Conditions { bits: self.bits | other.bits }
     }
 
-    /// True if all of `other` is among them. Real-time: bounded, no allocation.
+    /// Returns true if the set contains all of `other`. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn contains(self, other: Conditions) -> bool {
@@ -158,7 +158,7 @@ impl Conditions {
 }
 
 impl DeviceState {
-    /// At home, at rest.
+    /// State at home, at rest.
     pub const HOME: DeviceState = DeviceState {
         pose: Pose::HOME,
         twist: Twist::ZERO,
@@ -168,7 +168,7 @@ impl DeviceState {
         conditions: Conditions::NONE,
     };
 
-    /// True if every number is finite. Real-time: bounded, no allocation.
+    /// Returns true if every number is finite. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
@@ -176,7 +176,7 @@ impl DeviceState {
     }
 }
 
-/// Which of the six axes a device senses or actuates: x, y, z, then rotation about x, y, z.
+/// Set of axes that a device senses or actuates: x, y, z, then rotation about x, y, z.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -185,7 +185,7 @@ pub struct Axes {
 }
 
 impl Axes {
-    /// None.
+    /// No axis.
     pub const NONE: Axes = Axes { bits: 0 };
     /// Translation along x.
     pub const X: Axes = Axes { bits: 0b00_0001 };
@@ -205,7 +205,7 @@ impl Axes {
     pub const TRANSLATION: Axes = Axes { bits: 0b00_0111 };
     /// The three rotations.
     pub const ROTATION: Axes = Axes { bits: 0b11_1000 };
-    /// All six.
+    /// All six axes.
     pub const ALL: Axes = Axes { bits: 0b11_1111 };
 
     /// Joins two sets: `Axes::X.with(Axes::Z)` in constants, `Axes::X | Axes::Z` elsewhere.
@@ -214,7 +214,7 @@ impl Axes {
         Axes { bits: self.bits | other.bits }
     }
 
-    /// True if all of `other` is among them.
+    /// Returns true if the set contains all of `other`.
     #[must_use]
     pub const fn contains(self, other: Axes) -> bool {
         self.bits & other.bits == other.bits
@@ -229,11 +229,11 @@ impl std::ops::BitOr for Axes {
     }
 }
 
-/// What a device can do, as numbers a host compares with a model and enforces. 200 bytes, device frame.
+/// Capabilities of a device, as numbers that a host compares with a model and enforces. 200 bytes, device frame.
 ///
-/// Every number is finite, none is negative, and they are the same from `open` on: a host refuses others before anything
-/// is energised. An axis that is driven has a limit and, where it is sensed, a range; what is driven has a slew. Only the
-/// slew of what is not driven may be infinite.
+/// Every number is finite and not negative, and constant from `open` on: a host refuses others before anything is
+/// energised. An actuated axis has a limit and, if sensed, a range; actuated axes have a slew. Only the slew without an
+/// actuated axis may be infinite.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -261,12 +261,12 @@ pub struct Capabilities {
     pub max_stiffness_n_per_m: f64,
     /// Slowest and fastest loop the device runs at, Hz.
     pub rate_hz: [f64; 2],
-    /// Time from taking a sample to the force that answers it, beyond one period, s.
+    /// Time from taking a sample to the resulting force, beyond one period, s.
     pub latency_s: f64,
 }
 
 impl Capabilities {
-    /// Of a device that drives nothing: a sensor says here what it senses, and takes the rest.
+    /// Capabilities of a device without actuators; a sensor sets its sensed axes and ranges and inherits the other fields.
     pub const UNDRIVEN: Capabilities = Capabilities {
         sensed: Axes::NONE,
         actuated: Axes::NONE,
@@ -275,7 +275,7 @@ impl Capabilities {
         resolution_m: 0.0,
         max_force_n: [0.0; 3],
         max_torque_nm: [0.0; 3],
-        max_force_slew_n_per_s: f64::INFINITY, // of nothing
+        max_force_slew_n_per_s: f64::INFINITY, // without actuators no limit
         max_torque_slew_nm_per_s: f64::INFINITY,
         max_stiffness_n_per_m: 0.0,
         rate_hz: [100.0, 10_000.0],
@@ -283,18 +283,18 @@ impl Capabilities {
     };
 }
 
-/// What a device moves when it is commanded, as a closed set.
+/// Embodiment of a device: a physical handle, or a simulation only; a closed set.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Embodiment {
-    /// Something that a hand can hold. What says nothing is this.
+    /// Handle that a hand can hold; the default.
     Physical = 0,
-    /// Numbers only: no command ever reaches anything that could push a hand.
+    /// Simulation: no command ever reaches an actuator that could push a hand.
     Simulated = 1,
 }
 
 impl Embodiment {
-    /// Reads it from the boundary: whatever is unknown may push a hand.
+    /// Converts a code from the boundary; an unknown code counts as [`Self::Physical`], because the device may push a hand.
     #[must_use]
     pub const fn from_code(code: u32) -> Self {
         match code {
@@ -304,7 +304,7 @@ impl Embodiment {
     }
 }
 
-/// What a device says about itself; constant, readable without opening it.
+/// Declaration of a device; constant, readable without opening the device.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -319,7 +319,7 @@ pub struct DeviceInfo {
 }
 
 impl DeviceInfo {
-    /// `id` is what scenes and commands say ("simulated"); `name` and `doc` are for people.
+    /// Builds the declaration of a physical device: `id` for scenes and commands ("simulated"), `name` and `doc` for people.
     #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {
@@ -331,46 +331,46 @@ impl DeviceInfo {
         }
     }
 
-    /// The same of a device that exists in numbers only. A host sends at most its ceiling to any other, unless a person
+    /// Marks the device as a simulation. A host limits the force of a physical device to its ceiling, unless a person
     /// allows more.
     #[must_use]
     pub const fn simulated(self) -> Self {
         Self { embodiment: Embodiment::Simulated as u32, ..self }
     }
 
-    /// What it moves.
+    /// Returns the embodiment.
     #[must_use]
     pub const fn embodiment(&self) -> Embodiment {
         Embodiment::from_code(self.embodiment)
     }
 
-    /// What scenes and commands call it.
+    /// Returns the id used in scenes and commands.
     #[must_use]
     pub const fn id(&self) -> &str {
         self.id.as_str()
     }
 
-    /// What people call it.
+    /// Returns the display name.
     #[must_use]
     pub const fn name(&self) -> &str {
         self.name.as_str()
     }
 
-    /// One sentence for people.
+    /// Returns the description, one sentence.
     #[must_use]
     pub const fn doc(&self) -> &str {
         self.doc.as_str()
     }
 }
 
-/// Makes a device safe from any thread at any time, without its cooperation.
+/// Stop of a device from any thread at any time, without its cooperation.
 pub trait SafeStop: Send + Sync + 'static {
-    /// Actuators to zero (or to a controlled landing) and stay there until the next activation.
+    /// Sets the actuators to zero (or to a controlled landing) until the next activation.
     /// Bounded, no allocation, no lock; may be called twice and while another thread is inside `read` or `write`.
     fn safe_stop(&self);
 }
 
-/// The stop of a device that drives nothing: there is no force to take away.
+/// Stop of a device without actuators: there is no force to remove.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NothingToStop;
 
@@ -378,62 +378,62 @@ impl SafeStop for NothingToStop {
     fn safe_stop(&self) {}
 }
 
-/// A device that is opened: known, not energised. Not real-time.
+/// Opened device, not energised. Not real-time.
 pub trait Device: Sized + Send + 'static {
-    /// What the device says about itself.
+    /// Declaration of the device.
     const INFO: DeviceInfo;
-    /// What the device can be told.
+    /// Parameter schema of the device.
     const PARAMETERS: &'static [Parameter] = &[];
-    /// The same device, energised.
+    /// Type of the energised device.
     type Active: ActiveDevice<Opened = Self>;
-    /// How another thread stops it.
+    /// Handle that stops the device from another thread.
     type Stop: SafeStop;
 
     /// Opens the device. The settings are already checked against the schema. May block.
     ///
     /// # Errors
-    /// A [`Refusal`] if it is missing, busy, forbidden or told nonsense.
+    /// A [`Refusal`] if the device is missing, busy, forbidden or configured wrongly.
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal>;
 
-    /// What it can do, now that it is open.
+    /// Returns the capabilities of the opened device.
     fn capabilities(&self) -> Capabilities;
 
-    /// The handle by which another thread stops it; asked once, right after opening.
+    /// Returns the handle that stops the device from another thread; called once, right after opening.
     fn stopper(&self) -> Self::Stop;
 
-    /// Energises the device; it starts at zero wrench.
+    /// Energises the device at zero wrench.
     ///
     /// # Errors
-    /// The device itself, still open, and a [`Refusal`]: nothing is lost, the caller may retry.
+    /// The opened device and a [`Refusal`]: nothing is lost, the caller may retry.
     fn activate(self, config: &LoopConfig) -> Result<Self::Active, (Self, Refusal)>;
 
-    /// The value in force, presets resolved (by index into [`Self::PARAMETERS`]).
+    /// Returns the current value of a parameter, presets resolved (by index into [`Self::PARAMETERS`]).
     fn parameter(&self, index: usize) -> f64 {
         Self::PARAMETERS.get(index).map_or(f64::NAN, Parameter::default)
     }
 }
 
-/// A device that is energised. Every method is real-time: bounded, no allocation, no lock, no unwinding.
-/// Dropping it must leave the actuators at zero.
+/// Energised device. Every method is real-time: bounded, no allocation, no lock, no unwinding. Dropping it must set the
+/// actuators to zero.
 pub trait ActiveDevice: Send + 'static {
-    /// What it becomes when deactivated.
+    /// Type of the device after deactivation.
     type Opened;
 
-    /// Takes the newest sample into `state`. Real-time.
+    /// Reads the newest sample into `state`. Real-time.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle;
 
     /// Commands the wrench on the hand until the next write. Real-time.
     fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle;
 
-    /// Changes a live parameter at a tick boundary; range already checked. Real-time.
+    /// Changes a live parameter at a tick boundary; the range is already checked. Real-time.
     ///
     /// # Errors
-    /// [`OutOfRange`] if the value does not fit the others; the old value stays.
+    /// [`OutOfRange`] if the value is inconsistent with other parameters; the old value stays.
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
         let _ = index;
         Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
     }
 
-    /// Zero wrench, then opened again. Not real-time; cannot fail.
+    /// Commands zero wrench and returns to the opened phase. Not real-time; cannot fail.
     fn deactivate(self) -> Self::Opened;
 }

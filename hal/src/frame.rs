@@ -29,35 +29,35 @@ impl Pose {
     /// The home pose: no displacement, no rotation.
     pub const HOME: Pose = Pose { position_m: [0.0; 3], orientation_xyzw: [0.0, 0.0, 0.0, 1.0] };
 
-    /// A pose from glam values. Real-time: bounded, no allocation.
+    /// Builds a pose from glam values. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn new(position_m: DVec3, orientation: DQuat) -> Self {
         Self { position_m: position_m.to_array(), orientation_xyzw: orientation.to_array() }
     }
 
-    /// Position, m. Real-time: bounded, no allocation.
+    /// Returns the position, m. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn position(&self) -> DVec3 {
         DVec3::from_array(self.position_m)
     }
 
-    /// Orientation as a unit quaternion. Real-time: bounded, no allocation.
+    /// Returns the orientation as a unit quaternion. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn orientation(&self) -> DQuat {
         DQuat::from_array(self.orientation_xyzw)
     }
 
-    /// True if every number is finite. Real-time: bounded, no allocation.
+    /// Returns true if every number is finite. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.non_finite_bits() == 0
     }
 
-    /// 0 if every number is finite.
+    /// Returns 0 if every number is finite.
     #[inline]
     pub(crate) fn non_finite_bits(&self) -> u64 {
         non_finite_bits(&self.position_m) | non_finite_bits(&self.orientation_xyzw)
@@ -79,35 +79,35 @@ impl Twist {
     /// No motion.
     pub const ZERO: Twist = Twist { linear_m_per_s: [0.0; 3], angular_rad_per_s: [0.0; 3] };
 
-    /// A twist from glam values. Real-time: bounded, no allocation.
+    /// Builds a twist from glam values. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn new(linear_m_per_s: DVec3, angular_rad_per_s: DVec3) -> Self {
         Self { linear_m_per_s: linear_m_per_s.to_array(), angular_rad_per_s: angular_rad_per_s.to_array() }
     }
 
-    /// Linear velocity, m/s. Real-time: bounded, no allocation.
+    /// Returns the linear velocity, m/s. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn linear(&self) -> DVec3 {
         DVec3::from_array(self.linear_m_per_s)
     }
 
-    /// Angular velocity, rad/s. Real-time: bounded, no allocation.
+    /// Returns the angular velocity, rad/s. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn angular(&self) -> DVec3 {
         DVec3::from_array(self.angular_rad_per_s)
     }
 
-    /// True if every number is finite. Real-time: bounded, no allocation.
+    /// Returns true if every number is finite. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.non_finite_bits() == 0
     }
 
-    /// 0 if every number is finite.
+    /// Returns 0 if every number is finite.
     #[inline]
     pub(crate) fn non_finite_bits(&self) -> u64 {
         non_finite_bits(&self.linear_m_per_s) | non_finite_bits(&self.angular_rad_per_s)
@@ -131,35 +131,35 @@ impl Wrench {
     /// No force, no torque.
     pub const ZERO: Wrench = Wrench { force_n: [0.0; 3], torque_nm: [0.0; 3] };
 
-    /// A wrench from glam values. Real-time: bounded, no allocation.
+    /// Builds a wrench from glam values. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn new(force_n: DVec3, torque_nm: DVec3) -> Self {
         Self { force_n: force_n.to_array(), torque_nm: torque_nm.to_array() }
     }
 
-    /// A pure force, N. Real-time: bounded, no allocation.
+    /// Builds a wrench of a force in N, without torque. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn from_force(force_n: DVec3) -> Self {
         Self::new(force_n, DVec3::ZERO)
     }
 
-    /// Force, N. Real-time: bounded, no allocation.
+    /// Returns the force, N. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn force(&self) -> DVec3 {
         DVec3::from_array(self.force_n)
     }
 
-    /// Torque, N·m. Real-time: bounded, no allocation.
+    /// Returns the torque, N·m. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn torque(&self) -> DVec3 {
         DVec3::from_array(self.torque_nm)
     }
 
-    /// True if every number is finite. Real-time: bounded, no allocation.
+    /// Returns true if every number is finite. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
@@ -191,7 +191,7 @@ impl std::ops::Mul<f64> for Wrench {
     }
 }
 
-/// Rotation vector (axis times angle, rad, angle in 0..=pi) of a unit quaternion: its logarithm.
+/// Returns the rotation vector (axis times angle, rad, angle in 0..=pi) of a unit quaternion: its logarithm.
 ///
 /// Exact to rounding near the identity, where `acos` would lose half the digits.
 /// Real-time: bounded, no allocation.
@@ -209,7 +209,7 @@ pub fn rotation_vector(orientation: DQuat) -> DVec3 {
     axis_sin_half * factor
 }
 
-/// Unit quaternion of a rotation vector (axis times angle, rad): the exponential.
+/// Returns the unit quaternion of a rotation vector (axis times angle, rad): the exponential.
 ///
 /// Real-time: bounded, no allocation.
 #[inline]
@@ -222,10 +222,10 @@ pub fn orientation_from_rotation_vector(rotation_rad: DVec3) -> DQuat {
     DQuat::from_xyzw(xyz.x, xyz.y, xyz.z, math::cos(0.5 * angle_rad))
 }
 
-/// 0 if every number is finite: a number less itself is 0 in all its bits, and one that is not finite leaves NaN. A few vector
-/// instructions, not a branch for each.
+/// Returns 0 if every number is finite: `value - value` is 0 in all bits for a finite value, and NaN otherwise.
+/// Compiles to a few vector instructions without branches.
 #[inline]
-#[allow(clippy::eq_op)] // that is the point of it
+#[allow(clippy::eq_op)] // NaN for values that are not finite
 fn non_finite_bits<const N: usize>(values: &[f64; N]) -> u64 {
     values.iter().fold(0, |bits, value| bits | (value - value).to_bits())
 }

@@ -15,19 +15,19 @@
 //!
 //! # Thread classes
 //!
-//! Every function says one of:
+//! Every function is documented as one of:
 //! - *Not real-time*: may allocate, block and talk to the system. Runs before the loop starts or beside it.
-//! - *Real-time: bounded, no allocation*: runs inside a tick. No allocation, lock, system call, formatting or
-//!   panic; the boundary catches a panic, but it costs the instance its life and the tick its force.
+//! - *Real-time: bounded, no allocation*: runs inside a tick. No allocation, lock, system call, formatting or panic;
+//!   the boundary catches a panic, but disables the instance, and the tick has no force.
 //!
 //! # Where to look
 //!
 //! - Models: [`ForceModel`], [`export_model!`]; parameters: [`Parameter`], [`Settings`].
 //! - Devices: [`Device`], [`ActiveDevice`], [`SafeStop`], [`export_device!`].
-//! - What else a plugin may offer: [`extension`].
+//! - Optional interfaces of a plugin: [`extension`].
 //! - Rules for every plugin: [`conformance`]; functions with the same bits on every machine: [`math`]; text for a
 //!   terminal: [`terminal`].
-//! - The binary contract, which authors in Rust never see: [`abi`].
+//! - The binary contract, not needed by authors in Rust: [`abi`].
 
 pub mod abi;
 pub mod conformance;

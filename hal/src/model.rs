@@ -1,4 +1,4 @@
-//! Force models: what an author implements, and the data of one step.
+//! Force models: the trait that an author implements, and the data of one step.
 
 use crate::abi::Str;
 use crate::abi::layout::layout;
@@ -12,9 +12,9 @@ layout! {
     LoopConfig { period_ns, seed }
 }
 
-/// Which outputs a scene needs from a step; what is not demanded need not be computed.
+/// Outputs that a scene needs from a step; other outputs need not be computed.
 ///
-/// Shape is not among them: it is an extension ([`crate::extension::centerline`], [`crate::extension::shape`]) that observers call off the loop.
+/// The shape is an extension ([`crate::extension::centerline`], [`crate::extension::shape`]) that observers call off the loop.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -31,22 +31,22 @@ impl Demand {
     pub const ENERGY: Demand = Demand { bits: 4 };
     /// Force and torque.
     pub const WRENCH: Demand = Demand { bits: 3 };
-    /// Everything a step can give.
+    /// All outputs of a step.
     pub const ALL: Demand = Demand { bits: 7 };
 
-    /// Both. Real-time: bounded, no allocation.
+    /// Returns the union of both sets. Real-time: bounded, no allocation.
     #[must_use]
     pub const fn with(self, other: Demand) -> Demand {
         Demand { bits: self.bits | other.bits }
     }
 
-    /// What is in both. Real-time: bounded, no allocation.
+    /// Returns the intersection of both sets. Real-time: bounded, no allocation.
     #[must_use]
     pub const fn limited_to(self, other: Demand) -> Demand {
         Demand { bits: self.bits & other.bits }
     }
 
-    /// True if all of `other` is demanded. Real-time: bounded, no allocation.
+    /// Returns true if all of `other` is demanded. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn contains(self, other: Demand) -> bool {
@@ -54,7 +54,7 @@ impl Demand {
     }
 }
 
-/// Everything a force model gets for one step. 136 bytes, in the **model frame**.
+/// Input of a force model for one step. 136 bytes, in the **model frame**.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -67,22 +67,22 @@ pub struct Input {
     pub time_ns: u64,
     /// Time since the previous step, ns (0 on the first).
     pub dt_ns: u64,
-    /// Which tick this is.
+    /// Number of the tick, from 0.
     pub tick: u64,
     /// Buttons of the device, one bit each.
     pub buttons: u32,
-    /// Which outputs are needed.
+    /// Outputs needed.
     pub demand: Demand,
 }
 
 impl Input {
-    /// A step at a pose, at rest, at time zero, with everything demanded: for tests and off-line evaluation.
+    /// Builds the input at a pose, at rest, at time zero, with all outputs demanded: for tests and off-line evaluation.
     #[must_use]
     pub const fn at_rest(pose: Pose) -> Self {
         Self { pose, twist: Twist::ZERO, time_ns: 0, dt_ns: 0, tick: 0, buttons: 0, demand: Demand::ALL }
     }
 
-    /// Step length, s. Real-time: bounded, no allocation.
+    /// Returns the step length, s. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn dt_s(&self) -> f64 {
@@ -90,14 +90,14 @@ impl Input {
     }
 }
 
-/// What a model says about the answer it gave.
+/// Status of a model's output.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StepStatus {
-    /// The law holds here.
+    /// The law is valid at this input.
     #[default]
     Ok = 0,
-    /// The answer was saturated to stay finite and safe.
+    /// The output was saturated to stay finite and safe.
     Clamped = 1,
     /// The pose is outside the model's domain; the wrench is the best safe continuation.
     OutOfDomain = 2,
@@ -108,7 +108,7 @@ pub enum StepStatus {
 }
 
 impl StepStatus {
-    /// Reads a status from the boundary; `None` if the plugin wrote something unknown.
+    /// Converts a code from the boundary; `None` for an unknown code.
     #[inline]
     #[must_use]
     pub const fn from_code(code: u32) -> Option<Self> {
@@ -122,7 +122,7 @@ impl StepStatus {
         }
     }
 
-    /// The word `flotor eval` prints.
+    /// Returns the name that `flotor eval` prints.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -135,7 +135,7 @@ impl StepStatus {
     }
 }
 
-/// The answer of one step. 64 bytes, in the model frame.
+/// Output of one step. 64 bytes, in the model frame.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -149,14 +149,14 @@ pub struct Output {
 }
 
 impl Output {
-    /// An answer with its status. Real-time: bounded, no allocation.
+    /// Builds an output with its status. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn new(wrench: Wrench, energy_j: f64, status: StepStatus) -> Self {
         Self { wrench, energy_j, status: status as u32, reserved: 0 }
     }
 
-    /// What the model says about this answer; `None` if a foreign plugin wrote an unknown code.
+    /// Returns the status; `None` if a foreign plugin wrote an unknown code.
     #[inline]
     #[must_use]
     pub const fn status(&self) -> Option<StepStatus> {
@@ -171,7 +171,7 @@ impl From<Wrench> for Output {
     }
 }
 
-/// Whether the force is path-dependent: the model has an internal state.
+/// Path dependence of the force: a path-dependent model has an internal state.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Memory {
@@ -182,14 +182,14 @@ pub enum Memory {
 }
 
 impl Memory {
-    /// Reads a value from the boundary; anything unknown is taken as path-dependent, the safe reading.
+    /// Converts a code from the boundary; an unknown code counts as path-dependent, the safe choice.
     #[must_use]
     pub(crate) const fn from_code(code: u32) -> Self {
         if code == Self::Stateless as u32 { Self::Stateless } else { Self::PathDependent }
     }
 }
 
-/// What a force model says about itself; constant, readable without creating it.
+/// Declaration of a force model; constant, readable without creating an instance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -202,7 +202,7 @@ pub struct ModelInfo {
 }
 
 impl ModelInfo {
-    /// `id` is what scenes and commands say ("spring"); `name` and `doc` are for people.
+    /// Builds a declaration: `id` for scenes and commands ("spring"), `name` and `doc` for people.
     #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {
@@ -214,53 +214,53 @@ impl ModelInfo {
         }
     }
 
-    /// Which demands the model can serve (default: force and torque).
+    /// Declares the demands that the model can serve (default: force and torque).
     #[must_use]
     pub const fn serving(mut self, demand: Demand) -> Self {
         self.serves = demand;
         self
     }
 
-    /// Declares that the answer depends on the path. Where that depends on settings, declare the safe reading here and
-    /// the exact one with [`crate::VariantModel`].
+    /// Declares the path dependence of the output. If it depends on settings, declare the safe value here and the exact
+    /// one with [`crate::VariantModel`].
     #[must_use]
     pub const fn with_memory(mut self, memory: Memory) -> Self {
         self.memory = memory as u32;
         self
     }
 
-    /// What scenes and commands call it.
+    /// Returns the id used in scenes and commands.
     #[must_use]
     pub const fn id(&self) -> &str {
         self.id.as_str()
     }
 
-    /// What people call it.
+    /// Returns the display name.
     #[must_use]
     pub const fn name(&self) -> &str {
         self.name.as_str()
     }
 
-    /// One sentence for people.
+    /// Returns the description, one sentence.
     #[must_use]
     pub const fn doc(&self) -> &str {
         self.doc.as_str()
     }
 
-    /// Which demands the model can serve.
+    /// Returns the demands that the model can serve.
     #[must_use]
     pub const fn serves(&self) -> Demand {
         self.serves
     }
 
-    /// Whether the answer depends on the path; anything unknown is taken as path-dependent, the safe reading.
+    /// Returns the path dependence of the output; an unknown code counts as path-dependent, the safe choice.
     #[must_use]
     pub const fn memory(&self) -> Memory {
         Memory::from_code(self.memory)
     }
 }
 
-/// What the loop promises a plugin before it starts. 16 bytes.
+/// Loop settings that a plugin receives before the start. 16 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -271,7 +271,7 @@ pub struct LoopConfig {
     pub seed: u64,
 }
 
-/// A force model: gives the wrench for a pose. Implement it, then write [`crate::export_model!`].
+/// Force model: computes the wrench for a pose. Implement it, then write [`crate::export_model!`].
 ///
 /// ```
 /// use flotor_hal::{DVec3, ForceModel, Input, ModelInfo, Output, Parameter, Refusal, Settings, Wrench};
@@ -296,18 +296,18 @@ pub struct LoopConfig {
 /// flotor_hal::export_model!(Floor);
 /// ```
 pub trait ForceModel: Sized + Send + 'static {
-    /// What the model says about itself.
+    /// Declaration of the model.
     const INFO: ModelInfo;
-    /// What the model can be told.
+    /// Parameter schema of the model.
     const PARAMETERS: &'static [Parameter] = &[];
 
-    /// Makes an instance. The settings are already checked against the schema. Not real-time.
+    /// Creates an instance. The settings are already checked against the schema. Not real-time.
     ///
     /// # Errors
-    /// A [`Refusal`] if the values do not fit together.
+    /// A [`Refusal`] if the values are inconsistent.
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal>;
 
-    /// Last chance to allocate before the loop starts. Not real-time.
+    /// Prepares the model for the loop: its last opportunity to allocate. Not real-time.
     ///
     /// # Errors
     /// A [`Refusal`] if the model cannot run at this rate.
@@ -315,10 +315,10 @@ pub trait ForceModel: Sized + Send + 'static {
         Ok(())
     }
 
-    /// The wrench for a pose. Real-time: bounded, no allocation, lock, system call or unwinding.
+    /// Computes the wrench for a pose. Real-time: bounded, no allocation, lock, system call or unwinding.
     fn step(&mut self, input: &Input) -> Output;
 
-    /// Many independent poses of one handle, in order. Real-time per pose; override it to go faster.
+    /// Computes the wrenches for many poses of one handle, in order. Real-time per pose; override it to go faster.
     fn step_batch(&mut self, inputs: &[Input], outputs: &mut [Output]) {
         for (input, output) in inputs.iter().zip(outputs) {
             *output = self.step(input);
@@ -329,17 +329,17 @@ pub trait ForceModel: Sized + Send + 'static {
     /// Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// [`OutOfRange`] if the value does not fit the others; the old value stays.
+    /// [`OutOfRange`] if the value is inconsistent with other parameters; the old value stays.
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
         let _ = index;
         Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
     }
 
-    /// The value in force, presets resolved (by index into [`Self::PARAMETERS`]). Real-time: bounded, no allocation.
+    /// Returns the current value of a parameter, presets resolved (by index into [`Self::PARAMETERS`]). Real-time: bounded, no allocation.
     fn parameter(&self, index: usize) -> f64 {
         Self::PARAMETERS.get(index).map_or(f64::NAN, Parameter::default)
     }
 
-    /// Back to the state after `create`: history forgotten, parameters kept. Real-time: bounded, no allocation.
+    /// Restores the state after `create`: clears the history, keeps the parameters. Real-time: bounded, no allocation.
     fn reset(&mut self) {}
 }

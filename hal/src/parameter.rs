@@ -1,8 +1,8 @@
-//! Parameters: what a plugin can be told, as data that panels, scenes and checks are generated from.
+//! Parameters of plugins, as data from which panels, scenes and checks are generated.
 //!
-//! A plugin declares a schema (`&'static [Parameter]`). A host checks values against it before the plugin
-//! sees them, so an author only checks what a range cannot say (that values fit together). Values travel by
-//! index into the schema, not by name: setting one in a running loop costs no string comparison.
+//! A plugin declares a schema (`&'static [Parameter]`). A host checks values against the schema before the plugin sees
+//! them, so an author only checks conditions beyond a range (that values are consistent). Values are addressed by index
+//! into the schema, not by name: setting a value in a running loop costs no string comparison.
 
 use crate::abi::layout::layout;
 use crate::abi::{Choices, Str};
@@ -13,8 +13,8 @@ layout! {
     ParameterValue { index, reserved, number, text }
 }
 
-/// A constant list of words for [`Parameter::choice`], [`Parameter::file`] and [`crate::extension::details::Detail::word`]:
-/// `choices!["plane", "sphere"]`, or `choices!(= WORDS)` for a constant `&[&str]`.
+/// Builds a constant list of words for [`Parameter::choice`], [`Parameter::file`] and
+/// [`crate::extension::details::Detail::word`]: `choices!["plane", "sphere"]`, or `choices!(= WORDS)` for a constant `&[&str]`.
 #[macro_export]
 macro_rules! choices {
     () => { $crate::Choices::EMPTY };
@@ -26,7 +26,7 @@ macro_rules! choices {
     ($($word:literal),+ $(,)?) => { $crate::choices!(= &[$($word),+]) };
 }
 
-/// How a parameter's number is to be read.
+/// Kind of a parameter: the meaning of its number.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {
@@ -36,12 +36,12 @@ pub enum ParameterKind {
     Choice = 2,
     /// Free text (a serial number); only at creation.
     Text = 3,
-    /// A file, or one of `choices`, which are built in; only at creation. A host gives the path of a file that can
-    /// be opened from where it runs: what a scene calls `tap.toml` lies beside the scene.
+    /// File, or one of `choices`, which are built in; only at creation. A host passes a path that can be opened from
+    /// its working directory: a scene's `tap.toml` is relative to the scene.
     File = 4,
 }
 
-/// When a parameter may change.
+/// Mutability of a parameter.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mutability {
@@ -51,7 +51,7 @@ pub enum Mutability {
     Live = 1,
 }
 
-/// One entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`].
+/// Entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -68,7 +68,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// A real number. `unit` is what a person reads beside the slider ("mm", "N", "1" for none).
+    /// Declares a real number. `unit` is shown beside the slider ("mm", "N", "1" for none).
     #[must_use]
     pub const fn real(
         id: &'static str,
@@ -91,7 +91,7 @@ impl Parameter {
         }
     }
 
-    /// One of a fixed list of names; `default` is an index into it.
+    /// Declares a choice from a fixed list of names; `default` is an index into the list.
     ///
     /// # Panics
     /// In the compiler (schemas are constants), if `default` is not an index.
@@ -105,7 +105,7 @@ impl Parameter {
         parameter
     }
 
-    /// A file, or one of `built_in` by its name; none by default.
+    /// Declares a file, or one of `built_in` by its name; none by default.
     #[must_use]
     pub const fn file(id: &'static str, built_in: Choices, doc: &'static str) -> Self {
         let mut parameter = Self::text(id, doc);
@@ -114,7 +114,7 @@ impl Parameter {
         parameter
     }
 
-    /// Free text, empty by default.
+    /// Declares a free text, empty by default.
     #[must_use]
     pub const fn text(id: &'static str, doc: &'static str) -> Self {
         let mut parameter = Self::real(id, "", 0.0, 0.0, 0.0, doc);
@@ -122,38 +122,38 @@ impl Parameter {
         parameter
     }
 
-    /// The same parameter, changeable at tick boundaries.
+    /// Makes the parameter changeable at tick boundaries.
     #[must_use]
     pub const fn live(mut self) -> Self {
         self.mutability = Mutability::Live as u32;
         self
     }
 
-    /// Name in scenes and on the command line.
+    /// Returns the name in scenes and on the command line.
     #[must_use]
     pub const fn id(&self) -> &str {
         self.id.as_str()
     }
 
-    /// Unit for people; empty where a number has none.
+    /// Returns the unit for people; empty for a dimensionless number.
     #[must_use]
     pub const fn unit(&self) -> &str {
         self.unit.as_str()
     }
 
-    /// One sentence for people.
+    /// Returns the description, one sentence.
     #[must_use]
     pub const fn doc(&self) -> &str {
         self.doc.as_str()
     }
 
-    /// Names of a choice in index order, or what is built in beside files; empty for the other kinds.
+    /// Returns the names of a choice in index order, or the built-in files; empty for the other kinds.
     #[must_use]
     pub const fn choices(&self) -> &[Str] {
         self.choices.as_slice()
     }
 
-    /// How the number is to be read.
+    /// Returns the kind; an unknown code counts as a real number.
     #[must_use]
     pub const fn kind(&self) -> ParameterKind {
         match self.kind {
@@ -164,25 +164,25 @@ impl Parameter {
         }
     }
 
-    /// When it may change.
+    /// Returns the mutability.
     #[must_use]
     pub const fn mutability(&self) -> Mutability {
         if self.mutability == Mutability::Live as u32 { Mutability::Live } else { Mutability::Fixed }
     }
 
-    /// Smallest legal number.
+    /// Returns the smallest legal number.
     #[must_use]
     pub const fn min(&self) -> f64 {
         self.min
     }
 
-    /// Largest legal number.
+    /// Returns the largest legal number.
     #[must_use]
     pub const fn max(&self) -> f64 {
         self.max
     }
 
-    /// Number used when nothing is set (a preset may say otherwise).
+    /// Returns the default number (a preset may override it).
     #[must_use]
     pub const fn default(&self) -> f64 {
         self.default
@@ -191,7 +191,7 @@ impl Parameter {
     /// Checks a number against kind and range. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// [`OutOfRange`] with the range, if the number is not finite, outside it, or no index of a choice.
+    /// [`OutOfRange`] with the range, if the number is not finite, outside the range, or no index of a choice.
     pub fn check(&self, value: f64) -> Result<(), OutOfRange> {
         let in_range = value >= self.min && value <= self.max; // false for NaN
         let is_index = !matches!(self.kind(), ParameterKind::Choice) || value.fract() == 0.0;
@@ -205,14 +205,14 @@ impl fmt::Debug for Parameter {
     }
 }
 
-/// A number outside the range its schema gives. `Copy`: nothing to allocate in a tick.
+/// Error of a number outside the range of its schema. `Copy`: nothing to allocate in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfRange {
     /// Smallest legal number.
     pub min: f64,
     /// Largest legal number.
     pub max: f64,
-    /// The number refused.
+    /// Rejected number.
     pub value: f64,
 }
 
@@ -224,7 +224,7 @@ impl fmt::Display for OutOfRange {
 
 impl std::error::Error for OutOfRange {}
 
-/// One value as it crosses the boundary: index into the schema, number, text (of texts and files).
+/// Value at the plugin boundary: index into the schema, number, text (of texts and files).
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -235,9 +235,9 @@ pub struct ParameterValue {
     pub(crate) text: Str,
 }
 
-/// What was explicitly set for one instance: nothing in it is a default.
+/// Explicitly set values of one instance, without defaults.
 ///
-/// A plugin resolves the rest itself, because what a default is may depend on another parameter (a preset).
+/// A plugin resolves the other values itself, because a default may depend on another parameter (a preset).
 #[derive(Clone, Copy)]
 pub struct Settings<'a> {
     schema: &'static [Parameter],
@@ -254,33 +254,33 @@ impl<'a> Settings<'a> {
         self.values.iter().rev().find(|value| value.index as usize == index)
     }
 
-    /// The number explicitly set for a real parameter or a choice, if any.
+    /// Returns the number explicitly set for a real parameter or a choice, if any.
     #[must_use]
     pub fn number(&self, id: &str) -> Option<f64> {
         self.explicit(id).map(|value| value.number)
     }
 
-    /// The number set, else the schema's default, else NaN for an id the schema does not have.
+    /// Returns the number set, else the schema's default, else NaN for an unknown id.
     #[must_use]
     pub fn number_or_default(&self, id: &str) -> f64 {
         let default = || self.schema.iter().find(|p| p.id() == id).map_or(f64::NAN, Parameter::default);
         self.number(id).unwrap_or_else(default)
     }
 
-    /// The index chosen for a choice, else the schema's default.
+    /// Returns the index set for a choice, else the schema's default.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked indices, small and whole
     pub fn choice_or_default(&self, id: &str) -> usize {
         self.number_or_default(id) as usize
     }
 
-    /// The text set for a text or the path set for a file, if any.
+    /// Returns the text set for a text or the path set for a file, if any.
     #[must_use]
     pub fn text(&self, id: &str) -> Option<&'a str> {
         self.explicit(id).map(|value| value.text.as_str()).filter(|text| !text.is_empty())
     }
 
-    /// Ids of everything that was set, in the order it was set.
+    /// Returns the ids of all set values, in the sequence of the settings.
     pub fn ids(&self) -> impl Iterator<Item = &'static str> + 'a {
         let schema = self.schema;
         self.values.iter().filter_map(move |v| schema.get(v.index as usize).map(Parameter::id))

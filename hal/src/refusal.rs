@@ -1,8 +1,8 @@
-//! Why a plugin says no before anything runs.
+//! Refusal of a plugin to create, open, prepare or activate.
 
 use std::fmt;
 
-/// What to do about a refusal: the closed set a host maps to exit codes and advice.
+/// Kind of a refusal: a closed set that a host maps to exit codes and advice.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RefusalKind {
@@ -17,7 +17,7 @@ pub enum RefusalKind {
 }
 
 impl RefusalKind {
-    /// Reads a status code from the boundary; anything unknown means the plugin broke the contract.
+    /// Converts a code from the boundary; an unknown code counts as [`Self::Broken`].
     #[must_use]
     pub const fn from_code(code: u32) -> Self {
         match code {
@@ -29,35 +29,35 @@ impl RefusalKind {
     }
 }
 
-/// A plugin's reason for not creating, opening, preparing or activating. Not real-time.
+/// Refusal to create, open, prepare or activate, with its reason. Not real-time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
-    /// What to do about it.
+    /// Kind of the refusal, which determines the remedy.
     pub kind: RefusalKind,
-    /// One sentence for people: which value, what is wrong, what would be right.
+    /// Reason in one sentence for people: value, problem and remedy.
     pub reason: String,
 }
 
 impl Refusal {
-    /// A parameter value cannot be used.
+    /// Builds a refusal of a parameter value.
     #[must_use]
     pub fn parameter(reason: impl fmt::Display) -> Self {
         Self { kind: RefusalKind::Parameter, reason: reason.to_string() }
     }
 
-    /// The plugin cannot do what is asked.
+    /// Builds a refusal of a request that the plugin does not support.
     #[must_use]
     pub fn unsupported(reason: impl fmt::Display) -> Self {
         Self { kind: RefusalKind::Unsupported, reason: reason.to_string() }
     }
 
-    /// Something outside the plugin is missing, busy or forbidden.
+    /// Builds a refusal because a resource outside the plugin is missing, busy or forbidden.
     #[must_use]
     pub fn resource(reason: impl fmt::Display) -> Self {
         Self { kind: RefusalKind::Resource, reason: reason.to_string() }
     }
 
-    /// The plugin misbehaved.
+    /// Builds a refusal because the plugin panicked or broke the contract.
     #[must_use]
     pub fn broken(reason: impl fmt::Display) -> Self {
         Self { kind: RefusalKind::Broken, reason: reason.to_string() }

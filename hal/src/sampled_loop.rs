@@ -1,6 +1,6 @@
-//! The stiffness that a sampled loop renders stably: one rule for every wall and spring of hosts and devices.
+//! Largest stiffness that a sampled loop renders stably: one rule for every wall and spring of hosts and devices.
 
-/// Time that passes between a motion and the force that answers it.
+/// Timing of a sampled force loop: period and latency.
 ///
 /// The rule is the linear one of Gil, Sanchez, Hulin, Preusche and Hirzinger (2009, J. Comput. Inf. Sci. Eng. 9:011005),
 /// `K < (b + B) / (T / 2 + latency)`, with the damping of the device `b` and that of the wall `B`. It assumes
@@ -14,7 +14,7 @@
 pub struct SampledLoop {
     /// Time between two samples, s.
     pub period_s: f64,
-    /// Time from a sample to the force that answers it, s: [`Capabilities::latency_s`](crate::Capabilities::latency_s).
+    /// Time from a sample to the resulting force, s: [`Capabilities::latency_s`](crate::Capabilities::latency_s).
     pub latency_s: f64,
 }
 
@@ -23,13 +23,13 @@ pub struct SampledLoop {
 pub enum Damper {
     /// Resists motion in both directions.
     BothWays(f64),
-    /// Resists motion in one direction, as in a wall that never pulls. An oscillation meets it in half of its time, so
-    /// it counts half.
+    /// Resists motion in one direction, as in a wall that never pulls. Active for half of an oscillation, so it counts
+    /// half.
     OneWay(f64),
 }
 
 impl Damper {
-    /// Damping in the mean over an oscillation.
+    /// Returns the mean damping over an oscillation.
     fn mean(self) -> f64 {
         match self {
             Self::BothWays(damping) => damping,
@@ -39,8 +39,8 @@ impl Damper {
 }
 
 impl SampledLoop {
-    /// Share of the stability limit that a wall may have. The other half is for what the rule does not know: filters of the
-    /// velocity, quantisation, and handles lighter than it assumes.
+    /// Fraction of the stability limit that a wall may use. The other half covers effects outside the rule: filters of
+    /// the velocity, quantisation, and handles lighter than assumed.
     pub const STABILITY_MARGIN: f64 = 0.5;
 
     /// Returns the stiffness at which the loop becomes unstable, on a device of this damping; 0 without any damping. Not

@@ -1,14 +1,14 @@
-//! Tables of numbers in a text: a line of column names, then a line a row, cells separated by commas.
+//! Tables of numbers in a text: a line of column names, then one line per row, cells separated by commas.
 //!
-//! One reader for all tables that people name, so that what spreadsheets and programs write is read, or refused with the cause,
-//! everywhere alike.
+//! One reader for all user-supplied tables, so that files of spreadsheets and programs are read, or rejected with the
+//! cause, alike everywhere.
 
 use crate::TextProblem;
 use std::borrow::Cow;
 
-/// Length of the longest line, bytes.
+/// Maximum length of a line, bytes.
 const LONGEST_LINE_BYTES: usize = 64 << 10;
-/// Longest text of a table that an error repeats, characters.
+/// Maximum length of a quotation in an error, characters.
 const LONGEST_QUOTE: usize = 40;
 
 /// Meaning of a line that begins with `#`.
@@ -20,7 +20,7 @@ pub enum HashLines {
     Rows,
 }
 
-/// A table: its columns, and an iterator over its rows.
+/// Table with its columns, and an iterator over its rows.
 #[derive(Clone, Debug)]
 pub struct Table<'a> {
     lines: Lines<'a>,
@@ -28,7 +28,7 @@ pub struct Table<'a> {
     columns: Vec<String>,
 }
 
-/// A row of a table.
+/// Row of a table, one cell per column.
 #[derive(Clone, Debug)]
 pub struct Row<'t> {
     line: usize,
@@ -58,7 +58,7 @@ impl<'a> Table<'a> {
     /// Reads the column names. A byte order mark and a spreadsheet's line `sep=,` are skipped. Not real-time.
     ///
     /// # Errors
-    /// Another separator than a comma, a column without a name, a name that is there twice, no column at all.
+    /// For a separator other than a comma, a column without a name, a duplicate name, or no column at all.
     pub fn parse(text: &'a str, hash_lines: HashLines) -> Result<Self, TextProblem> {
         let text = text.trim_start_matches('\u{feff}');
         let mut lines = Lines { lines: text.lines().enumerate(), hash_lines };
@@ -98,13 +98,13 @@ impl<'a> Table<'a> {
         &self.columns
     }
 
-    /// Returns the index of a column.
+    /// Returns the index of a column; `None` for an unknown name.
     #[must_use]
     pub fn column(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column == name)
     }
 
-    /// Makes an error of the line with the column names. Not real-time.
+    /// Builds an error located at the line with the column names. Not real-time.
     #[must_use]
     pub fn header_problem(&self, problem: impl Into<String>) -> TextProblem {
         TextProblem::at(self.header_line, problem)
@@ -145,7 +145,7 @@ impl Row<'_> {
     /// Returns the number in a cell; NaN and infinity are numbers. Not real-time.
     ///
     /// # Errors
-    /// The cell has another text.
+    /// If the cell has another text.
     pub fn number(&self, column: usize) -> Result<f64, TextProblem> {
         let text = self.text(column);
         text.parse().map_err(|_| {
@@ -161,7 +161,7 @@ impl Row<'_> {
     /// Returns the finite number in a cell. Not real-time.
     ///
     /// # Errors
-    /// The cell has another text.
+    /// If the cell has another text.
     pub fn finite(&self, column: usize) -> Result<f64, TextProblem> {
         let number = self.number(column)?;
         let name = self.columns.get(column).map_or("", |name| name);
@@ -170,7 +170,7 @@ impl Row<'_> {
     }
 }
 
-/// Separates the cells of a line of bounded length. Quotation marks around a cell are removed, doubled ones inside are one.
+/// Splits a line of bounded length into cells. Quotation marks around a cell are removed, doubled marks inside become single.
 fn cells(line: &str) -> Result<Vec<Cow<'_, str>>, String> {
     if line.len() > LONGEST_LINE_BYTES {
         return Err(format!("the line has more than {LONGEST_LINE_BYTES} bytes: this is no table"));
@@ -198,7 +198,7 @@ fn cells(line: &str) -> Result<Vec<Cow<'_, str>>, String> {
     }
 }
 
-/// Reads a cell up to its closing quotation mark; returns it and the text after it.
+/// Reads a cell up to its closing quotation mark; returns the cell and the text after it.
 fn quoted_cell(text: &str) -> Result<(String, &str), String> {
     let mut cell = String::new();
     let mut rest = text;
@@ -224,7 +224,7 @@ fn other_separator(separator: &str) -> String {
     )
 }
 
-/// Prepares a text for an error of one line.
+/// Shortens and escapes a text for an error of one line.
 fn quoted(text: &str) -> String {
     text.chars().take(LONGEST_QUOTE).flat_map(char::escape_debug).collect()
 }

@@ -1,7 +1,7 @@
-//! Escapes control characters in text for a terminal: file names, messages and texts of plugins come from strangers.
+//! Escaping of control characters in text for a terminal: file names, messages and texts of plugins are untrusted.
 
-/// Returns a text as a terminal may receive it: control characters but line ends and tabs escaped, likewise characters that change
-/// the direction of the text. Not real-time.
+/// Escapes control characters, except line ends and tabs, and characters that change the direction of the text. Not
+/// real-time.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
@@ -24,8 +24,8 @@ fn is_harmless(character: char) -> bool {
     }
 }
 
-/// Returns the arguments of this process with their control characters escaped. A parser that has refused the arguments parses these
-/// instead, for its message. Not real-time.
+/// Returns the arguments of this process with control characters escaped. A parser that has rejected the arguments
+/// parses these instead, for its message. Not real-time.
 pub fn escaped_arguments() -> impl Iterator<Item = String> {
     std::env::args_os().map(|argument| escaped(&argument.to_string_lossy()))
 }

@@ -1,36 +1,36 @@
-//! Files that people name: read whole, within a bound, and where in a text something is wrong.
+//! User-supplied files: read whole up to a size limit, with errors located by line.
 
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Most bytes of a text: hundreds of times the largest table in use.
+/// Maximum size of a text, bytes: hundreds of times the largest table in use.
 const MOST_TEXT_BYTES: u64 = 256 << 20;
-/// Mark at the start of a text that some programs write.
+/// Byte order mark of UTF-8, which some programs write at the start of a text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// What is wrong with a text file.
+/// Problem in a text file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TextProblem {
-    /// Line, from 1; 0 where it is about the file as a whole.
+    /// Line, from 1; 0 for a problem of the whole file.
     pub line: usize,
-    /// What is wrong and what would be right.
+    /// Cause and remedy.
     pub problem: String,
 }
 
 impl TextProblem {
-    /// In this line, from 1. Not real-time.
+    /// Builds a problem in a line, from 1. Not real-time.
     pub fn at(line: usize, problem: impl Into<String>) -> Self {
         Self { line, problem: problem.into() }
     }
 
-    /// About the file as a whole. Not real-time.
+    /// Builds a problem of the whole file. Not real-time.
     pub fn of_file(problem: impl Into<String>) -> Self {
         Self::at(0, problem)
     }
 
-    /// `FILE:LINE: PROBLEM`, without the line where there is none. Not real-time.
+    /// Formats `FILE:LINE: PROBLEM`, without the line for a problem of the whole file. Not real-time.
     #[must_use]
     pub fn in_file(&self, file: impl fmt::Display) -> String {
         match self.line {
@@ -44,7 +44,7 @@ impl TextProblem {
 /// opened. Not real-time.
 ///
 /// # Errors
-/// The system's; of kind `IsADirectory` for a folder, `InvalidInput` for a pipe or a device file.
+/// Errors of the operating system; of kind `IsADirectory` for a folder, `InvalidInput` for a pipe or a device file.
 pub fn open_file(path: &Path) -> io::Result<File> {
     let attributes = std::fs::metadata(path)?;
     if attributes.is_dir() {
@@ -57,10 +57,10 @@ pub fn open_file(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// Reads a whole regular file of at most so many bytes. Not real-time.
+/// Reads a whole regular file of at most `most_bytes` bytes. Not real-time.
 ///
 /// # Errors
-/// Those of [`open_file`]; of kind `FileTooLarge` for a longer file.
+/// Errors of [`open_file`]; of kind `FileTooLarge` for a longer file.
 pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open_file(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
@@ -71,21 +71,21 @@ pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text file of at most 256 MiB, as [`text_from_bytes`] does; `what` names it where it cannot be read. Not real-time.
+/// Reads a text file of at most 256 MiB, as [`text_from_bytes`] does; `what` describes the file in an error. Not real-time.
 ///
 /// # Errors
-/// What the system says, or the first line that is not UTF-8.
+/// Errors of the operating system, or the first line that is not UTF-8 or has a byte 0.
 pub fn read_text(path: &Path, what: &str) -> Result<String, TextProblem> {
     let bytes = read_file(path, MOST_TEXT_BYTES)
         .map_err(|error| TextProblem::of_file(format!("cannot read {what}: {error}")))?;
     text_from_bytes(bytes)
 }
 
-/// Makes a text of the bytes of a file: without a byte order mark, and with line feeds where every line ends in a carriage
-/// return alone. Not real-time.
+/// Decodes the bytes of a file: drops a byte order mark, and replaces carriage returns by line feeds if the text has no
+/// line feed. Not real-time.
 ///
 /// # Errors
-/// The first line that is not UTF-8, or has a byte 0.
+/// The first line that is not UTF-8, or has a byte 0; UTF-16.
 pub fn text_from_bytes(mut bytes: Vec<u8>) -> Result<String, TextProblem> {
     if bytes.starts_with(BYTE_ORDER_MARK) {
         bytes.drain(..BYTE_ORDER_MARK.len());

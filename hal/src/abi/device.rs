@@ -1,4 +1,4 @@
-//! `flotor.device/1`: the function table of a device, and how a [`Device`] becomes one: phases are types inside.
+//! `flotor.device/1`: function table of a device, and its implementation for a [`Device`], whose phases are types.
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind};
 use super::instance::{self, Plugged, call, fill, from_any_thread, refusable};
@@ -12,13 +12,13 @@ use crate::{
 use std::ffi::c_void;
 use std::marker::PhantomData;
 
-/// Result of `read` and `write` as it crosses the boundary: a type of its own, so that no other code of the contract is taken for
-/// one. 4 bytes.
+/// Result of `read` and `write` at the boundary, 4 bytes. A separate type, so that no other code of the contract can be
+/// mistaken for a result.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct CycleCode {
-    /// 0 fresh, 1 stale, 256 + a fault.
+    /// 0: fresh; 1: stale; 256 + code of a fault.
     pub(super) code: u32,
 }
 
@@ -53,19 +53,19 @@ impl CycleCode {
     }
 }
 
-/// `flotor.device/1`. `open` and `activate` return 0 or a [`crate::RefusalKind`] and say why in the message;
-/// `read` and `write` return a [`CycleCode`]; the others a [`super::CallStatus`] code.
+/// Function table `flotor.device/1`. `open` and `activate` return 0, or a [`crate::RefusalKind`] with the reason in the
+/// message; `read` and `write` return a [`CycleCode`]; the others a [`super::CallStatus`] code.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct DeviceTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Number of parameters.
     pub parameter_count: u32,
-    /// The schema, constant.
+    /// Parameter schema, constant.
     pub parameters: *const Parameter,
-    /// What the device says about itself.
+    /// Id, name and description of the device, constant.
     pub info: DeviceInfo,
     /// Opens a device. May block. Not real-time.
     pub open: Option<
@@ -76,31 +76,31 @@ pub struct DeviceTable {
             out: *mut Instance,
         ) -> u32,
     >,
-    /// Closes it; deactivates first if needed. Not real-time.
+    /// Closes the device; deactivates an active device first. Not real-time.
     pub close: Option<unsafe extern "C" fn(instance: Instance)>,
-    /// What it can do. Not real-time.
+    /// Writes the capabilities of the device. Not real-time.
     pub capabilities: Option<unsafe extern "C" fn(instance: Instance, out: *mut Capabilities) -> u32>,
-    /// Energises it at zero wrench. Not real-time.
+    /// Energises the device at zero wrench. Not real-time.
     pub activate: Option<
         unsafe extern "C" fn(instance: Instance, config: *const LoopConfig, message: *mut Message) -> u32,
     >,
-    /// Zero wrench, then opened again. Not real-time.
+    /// Commands zero wrench and returns to the opened phase. Not real-time.
     pub deactivate: Option<unsafe extern "C" fn(instance: Instance) -> u32>,
-    /// Newest sample. Real-time.
+    /// Reads the newest sample. Real-time.
     pub read: Option<
         unsafe extern "C" fn(instance: Instance, tick: *const Tick, state: *mut DeviceState) -> CycleCode,
     >,
-    /// Wrench on the hand until the next write. Real-time.
+    /// Commands the wrench on the hand until the next write. Real-time.
     pub write: Option<
         unsafe extern "C" fn(instance: Instance, tick: *const Tick, wrench: *const Wrench) -> CycleCode,
     >,
-    /// Actuators safe, now. Any thread, any time, also during `read` and `write`.
+    /// Makes the actuators safe at once. Any thread, any time, also during `read` and `write`.
     pub safe_stop: Option<unsafe extern "C" fn(instance: Instance)>,
     /// Changes a live parameter at a tick boundary. Real-time. May be null.
     pub set_parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32, value: f64) -> u32>,
-    /// The value in force. May be null.
+    /// Returns the current value of a parameter. May be null.
     pub parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32) -> f64>,
-    /// Why the last call failed. Not real-time. May be null.
+    /// Writes the reason of the last failure. Not real-time. May be null.
     pub last_message: Option<unsafe extern "C" fn(instance: Instance, message: *mut Message)>,
 }
 
@@ -111,14 +111,14 @@ layout! {
         safe_stop, set_parameter, parameter, last_message,
     }
 }
-/// A device as the tables see it.
+/// Adapter of a [`Device`] for the function tables.
 pub(crate) struct DevicePlug<D>(PhantomData<D>);
 
-/// Where a device is in its life.
+/// Phase of a device instance.
 pub(crate) enum Phase<D: Device> {
     Opened(D),
     Active(D::Active),
-    /// Only while it goes from one to the other.
+    /// Placeholder during a transition.
     Between,
 }
 
@@ -160,7 +160,7 @@ impl<D: Device> Phase<D> {
     }
 }
 
-/// What a call that belongs to the opened phase is told in another.
+/// Returns the refusal of a call that is valid in the opened phase only.
 pub(crate) fn not_opened() -> Refusal {
     Refusal::broken("the device is not in the opened phase")
 }
@@ -273,20 +273,20 @@ unsafe extern "C" fn get_interface<D: Device, E: Extensions<D>>(id: Str) -> *con
     find::<D, E>(&offer::<D>(), id)
 }
 
-/// The entry of a device plugin without extensions.
+/// Returns the entry of a device plugin without extensions.
 #[must_use]
 pub const fn device_entry<D: Device>() -> Entry {
     device_entry_with::<D, ()>()
 }
 
-/// The entry of a device plugin with extensions; [`crate::export_device!`] makes a static of it.
+/// Returns the entry of a device plugin with extensions; used by [`crate::export_device!`].
 #[must_use]
 pub const fn device_entry_with<D: Device, E: Extensions<D>>() -> Entry {
     Entry::of(PluginKind::Device, get_interface::<D, E>)
 }
 
-/// Makes a [`crate::Device`] a plugin: `export_device!(SpaceMouse);`. The extensions that it implements are listed behind it
-/// by their names in [`crate::extension`]: `export_device!(SimulatedFlotor, calibration, pacing);`. One per crate.
+/// Exports a [`crate::Device`] as a plugin: `export_device!(SpaceMouse);`. The extensions that the type implements follow by
+/// their names in [`crate::extension`]: `export_device!(SimulatedFlotor, calibration, pacing);`. One per crate.
 #[macro_export]
 macro_rules! export_device {
     ($device:ty $(, $extension:ident)* $(,)?) => {

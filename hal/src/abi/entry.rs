@@ -1,4 +1,4 @@
-//! The one exported symbol: who made the plugin, for which contract, and where its interfaces are.
+//! Entry of a plugin, the one exported symbol: kind, contract version, layouts and interface lookup.
 
 use super::layout::{LAYOUTS, layout};
 use super::{FieldLayout, Str};
@@ -6,17 +6,17 @@ use std::ffi::c_void;
 
 /// First eight bytes of every entry.
 pub const MAGIC: [u8; 8] = *b"FLOTOR\r\n";
-/// Version of the contract: 1.0, as a candidate. What is built for another version, or for an earlier candidate whose
-/// layouts differ, is built again.
+/// Version of the contract: 1.0, release candidate. A plugin for another version, or for an earlier candidate with
+/// different layouts, must be rebuilt.
 pub const CONTRACT: &str = "1.0-rc";
-/// Major version of the contract. Another one is another contract.
+/// Major version of the contract; contracts of different major versions are incompatible.
 pub const ABI_MAJOR: u16 = 1;
-/// Minor version of the contract. A later one only adds.
+/// Minor version of the contract; a later minor version only adds.
 pub const ABI_MINOR: u16 = 0;
-/// 1 for the release candidate of that version, 0 once it is released.
+/// 1 in a release candidate of the version, 0 after its release.
 pub const ABI_CANDIDATE: u32 = 1;
 
-/// What a plugin mainly is.
+/// Kind of a plugin, by its main interface.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PluginKind {
@@ -27,7 +27,7 @@ pub enum PluginKind {
 }
 
 impl PluginKind {
-    /// Reads a kind from the boundary; `None` for a code that this contract does not know.
+    /// Converts a code from the boundary; `None` for an unknown code.
     #[must_use]
     pub const fn from_code(code: u32) -> Option<Self> {
         match code {
@@ -37,7 +37,7 @@ impl PluginKind {
         }
     }
 
-    /// The word in metadata and in lists.
+    /// Returns the name of the kind in metadata and lists.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -47,27 +47,27 @@ impl PluginKind {
     }
 }
 
-/// An opaque instance made and owned by a plugin.
+/// Opaque instance, created and owned by a plugin.
 pub type Instance = *mut c_void;
 
 /// Status of one call through a table.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CallStatus {
-    /// Done.
+    /// Success.
     Ok = 0,
-    /// The plugin panicked, now or earlier; the instance answers nothing any more.
+    /// The plugin panicked, now or earlier; the instance is disabled.
     Panicked = 1,
     /// The call is not allowed in this phase (real-time call on a device that is not active).
     WrongPhase = 2,
     /// A value is out of range.
     OutOfRange = 3,
-    /// The plugin does not offer this.
+    /// The plugin does not offer this function.
     Unsupported = 4,
 }
 
 impl CallStatus {
-    /// Reads a status from the boundary; anything unknown counts as a broken plugin.
+    /// Converts a code from the boundary; an unknown code counts as [`Self::Panicked`].
     #[inline]
     #[must_use]
     pub const fn from_code(code: u32) -> Self {
@@ -84,16 +84,16 @@ impl CallStatus {
 /// [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
 pub const HOST_QUIET_PANICS: u32 = 1;
 
-/// What a host tells a plugin once, before anything else.
+/// Host information that a plugin receives once, before any other call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct Host {
-    /// Bytes of this struct as the host knows it.
+    /// Size of this struct in the host's build, bytes.
     pub size: u32,
-    /// Contract the host speaks.
+    /// Major version of the host's contract.
     pub abi_major: u16,
-    /// Contract the host speaks.
+    /// Minor version of the host's contract.
     pub abi_minor: u16,
     /// [`HOST_QUIET_PANICS`] or 0.
     pub flags: u32,
@@ -113,9 +113,9 @@ pub struct LayoutProof {
     pub(crate) size: u32,
     /// Reserved, 0.
     pub(crate) reserved: u32,
-    /// `abi_stable::library::AbiHeader`: says whether the layouts below can be read at all.
+    /// `abi_stable::library::AbiHeader`; the layouts below are readable only if the header is valid.
     pub(crate) abi_stable_header: *const c_void,
-    /// Name of a contract type to its `abi_stable::type_layout::TypeLayout`, or null.
+    /// Returns the `abi_stable::type_layout::TypeLayout` of a contract type by name, or null.
     pub(crate) layout_of: Option<unsafe extern "C" fn(name: Str) -> *const c_void>,
 }
 
@@ -127,25 +127,25 @@ unsafe impl Sync for LayoutProof {}
 pub struct Entry {
     /// [`MAGIC`].
     pub(crate) magic: [u8; 8],
-    /// Bytes of this struct as the plugin knows it.
+    /// Size of this struct in the plugin's build, bytes.
     pub(crate) size: u32,
-    /// Contract the plugin was built for.
+    /// Major version of the plugin's contract.
     pub(crate) abi_major: u16,
-    /// Contract the plugin was built for.
+    /// Minor version of the plugin's contract.
     pub(crate) abi_minor: u16,
-    /// [`PluginKind`].
+    /// Code of a [`PluginKind`].
     pub(crate) kind: u32,
     /// [`ABI_CANDIDATE`] of the contract the plugin was built for.
     pub(crate) abi_candidate: u32,
     /// The layout table of the plugin's build.
     pub(crate) layouts: *const FieldLayout,
-    /// Number of its rows.
+    /// Number of rows of `layouts`.
     pub(crate) layout_count: u32,
     /// Reserved, 0.
     pub(crate) reserved: u32,
     /// Called once after loading. May be null.
     pub(crate) init: Option<unsafe extern "C" fn(host: *const Host)>,
-    /// Interface id to its table, or null if not offered.
+    /// Returns the table of an interface id, or null if not offered.
     pub(crate) get_interface: Option<unsafe extern "C" fn(id: Str) -> *const c_void>,
     /// A second proof of the layouts, or null.
     pub(crate) layout_proof: *const LayoutProof,
@@ -155,7 +155,7 @@ pub struct Entry {
 unsafe impl Sync for Entry {}
 
 impl Entry {
-    /// The entry of a Rust plugin built from this crate.
+    /// Returns the entry of a Rust plugin built with this crate.
     #[allow(clippy::cast_possible_truncation)] // a hundred bytes, some hundred rows
     pub(super) const fn of(
         kind: PluginKind,

@@ -1,38 +1,38 @@
-//! An instance as a plugin holds it, and what the functions of all tables share: panics stay inside, a plugin that
-//! panicked is never called again, and what is said goes to the caller's memory.
+//! Plugin instances and the common part of all table functions: catch panics, disable an instance after a panic, and
+//! write results to the caller's memory.
 
 use super::entry::{CallStatus, Instance};
 use super::{Message, panics};
 use crate::{Mutability, Parameter, ParameterValue, Refusal, RefusalKind, Settings};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// A plugin type, as the tables see it.
+/// Adapter of a plugin type for the function tables.
 pub(crate) trait Plugged: 'static {
-    /// What the thread that uses an instance works with.
+    /// State for the thread that uses an instance.
     type State;
-    /// What any other thread may use meanwhile.
+    /// State that any other thread may use concurrently.
     type Shared: Sync;
-    /// The schema.
+    /// Parameter schema.
     const PARAMETERS: &'static [Parameter];
 
     fn make(settings: &Settings<'_>) -> Result<(Self::State, Self::Shared), Refusal>;
 }
 
-/// What an [`Instance`] pointer points at. The two halves are borrowed separately and never as a whole while the instance
-/// lives: `shared` from any thread, `work` by the one that uses the instance.
+/// Target of an [`Instance`] pointer. The two halves are borrowed separately and never as a whole while the instance
+/// lives: `shared` from any thread, `work` by the thread that uses the instance.
 struct Slot<P: Plugged> {
     shared: P::Shared,
     work: Work<P::State>,
 }
 
 struct Work<S> {
-    /// Nothing after a panic: what panicked is in an unknown state.
+    /// `None` after a panic, which leaves the state undefined.
     state: Option<S>,
     message: Message,
 }
 
 impl<S> Work<S> {
-    /// Runs `body`; `None` if the plugin panics or did so before. A panic ends the instance; its message is kept.
+    /// Runs `body`; `None` if the plugin panics now or panicked before. A panic disables the instance; the panic message is stored.
     #[inline]
     fn call<T>(&mut self, body: impl FnOnce(&mut S) -> T) -> Option<T> {
         let state = self.state.as_mut()?;
@@ -48,14 +48,14 @@ impl<S> Work<S> {
     }
 }
 
-/// Runs what has nobody to tell of a panic.
+/// Runs `body` and discards a panic.
 fn guarded(body: impl FnOnce()) {
     if let Err(panic) = catch_unwind(AssertUnwindSafe(body)) {
         panics::discard(panic);
     }
 }
 
-/// The working half of an instance.
+/// Returns the working half of an instance.
 ///
 /// # Safety
 /// The contract of every table call: `instance` came from [`create`] of this type, is alive, and no other thread uses
@@ -66,7 +66,7 @@ unsafe fn work<'a, P: Plugged>(instance: Instance) -> &'a mut Work<P::State> {
     unsafe { &mut (*instance.cast::<Slot<P>>()).work }
 }
 
-/// The half of an instance that any thread may use.
+/// Returns the half of an instance that any thread may use.
 ///
 /// # Safety
 /// `instance` came from [`create`] of this type and is alive during `'a`.
@@ -85,7 +85,7 @@ pub(super) unsafe fn from_any_thread<P: Plugged>(instance: Instance, body: impl 
     guarded(|| body(shared));
 }
 
-/// Runs `body`, which may say why not; a [`CallStatus`] code.
+/// Runs `body` on the state; returns a [`CallStatus`] code.
 ///
 /// # Safety
 /// As for [`work`].
@@ -103,7 +103,7 @@ pub(crate) unsafe fn call<P: Plugged>(
     }
 }
 
-/// The same for one answer that goes to the caller's memory.
+/// Runs `body` and writes its value to `out`; returns a [`CallStatus`] code.
 ///
 /// # Safety
 /// As for [`work`]; `out` is valid for a write.
@@ -122,7 +122,7 @@ pub(crate) unsafe fn fill<P: Plugged, T>(
     }
 }
 
-/// Runs `body`, which may refuse; 0 or a [`RefusalKind`] with the reason in `message`.
+/// Runs `body`; returns 0, or a [`RefusalKind`] with the reason in `message`.
 ///
 /// # Safety
 /// As for [`work`]; `message` is valid for a write.
@@ -155,7 +155,7 @@ unsafe fn refuse(refusal: &Refusal, message: *mut Message) -> u32 {
     refusal.kind as u32
 }
 
-/// `create` of models, `open` of devices.
+/// Creates an instance: `create` of models, `open` of devices.
 pub(super) unsafe extern "C" fn create<P: Plugged>(
     values: *const ParameterValue,
     count: u32,
@@ -187,14 +187,14 @@ pub(super) unsafe extern "C" fn create<P: Plugged>(
     }
 }
 
-/// `destroy` of models, `close` of devices.
+/// Destroys an instance: `destroy` of models, `close` of devices.
 pub(super) unsafe extern "C" fn destroy<P: Plugged>(instance: Instance) {
     // SAFETY: the contract of `destroy`: `instance` came from `create` of this type and is not used again.
     let slot = unsafe { Box::from_raw(instance.cast::<Slot<P>>()) };
     guarded(|| drop(slot));
 }
 
-/// Checks a live value against the schema before `body` sees it; a [`CallStatus`] code.
+/// Checks a live value against the schema, then runs `body`; returns a [`CallStatus`] code.
 ///
 /// # Safety
 /// As for [`work`].
@@ -213,7 +213,7 @@ pub(super) unsafe fn set_parameter<P: Plugged>(
     }
 }
 
-/// The value in force; NaN from a plugin that panicked.
+/// Returns the current value of a parameter; NaN from a plugin that panicked.
 ///
 /// # Safety
 /// As for [`work`].
@@ -225,7 +225,7 @@ pub(super) unsafe fn parameter<P: Plugged>(
     unsafe { work::<P>(instance) }.call(body).unwrap_or(f64::NAN)
 }
 
-/// Why the last call failed.
+/// Writes the reason of the last failure.
 pub(super) unsafe extern "C" fn last_message<P: Plugged>(instance: Instance, message: *mut Message) {
     // SAFETY: the contract of every table call; `message` is valid for a write.
     unsafe { message.write(work::<P>(instance).message) };

@@ -1,5 +1,5 @@
-//! What a plugin offers: function tables behind ids. Only this crate makes them, each for the type whose instances it
-//! calls, so that no safe code can hand a host a table that lies.
+//! Interfaces of a plugin: function tables by id. Only this crate builds tables, each for the type whose instances its
+//! functions take, so that safe code cannot pass a wrong table to a host.
 
 use super::Str;
 use std::ffi::c_void;
@@ -15,8 +15,8 @@ pub(crate) unsafe trait Table: Sized + 'static {
     const ID: &'static str;
 }
 
-/// Says that a struct is the table behind an id, and makes the one of a plugin type that has what it takes: `offer`, for the
-/// export macros.
+/// Implements [`Table`] for a struct and defines `offer`, which builds the table of a plugin type, for the export
+/// macros.
 macro_rules! table {
     ($table:ident: $id:literal, $plugin:ident: [$($bound:tt)+] { $($fields:tt)+ }) => {
         #[doc(hidden)]
@@ -42,7 +42,7 @@ macro_rules! table {
 }
 pub(crate) use table;
 
-/// One table of a plugin whose type is `P`. Made by the `offer` of an extension, and by nothing else:
+/// Function table for instances of `P`. Only the `offer` function of an extension constructs an `Interface`:
 ///
 /// ```compile_fail,E0624
 /// use flotor_hal::abi::{Interface, MAGIC};
@@ -55,15 +55,15 @@ pub struct Interface<P> {
 }
 
 impl<P> Interface<P> {
-    /// A table whose functions take instances of `P`.
+    /// Wraps a table whose functions take instances of `P`.
     pub(crate) const fn of<T: Table>(table: &'static T) -> Self {
         Self { id: T::ID, table: std::ptr::from_ref(table).cast(), plugin: PhantomData }
     }
 }
 
-/// The extensions of a plugin type. The export macros make it of their words.
+/// Extensions of a plugin type, implemented by the export macros.
 pub trait Extensions<P: 'static>: 'static {
-    /// A table each.
+    /// Function tables, one per extension.
     const LIST: &'static [Interface<P>];
 }
 
@@ -71,7 +71,7 @@ impl<P: 'static> Extensions<P> for () {
     const LIST: &'static [Interface<P>] = &[];
 }
 
-/// The table behind an id, null if it is not offered.
+/// Returns the table of an id; null if not offered.
 pub(super) fn find<P: 'static, E: Extensions<P>>(main: &Interface<P>, id: Str) -> *const c_void {
     let mut offered = std::iter::once(main).chain(E::LIST);
     offered.find(|interface| interface.id == id.as_str()).map_or(std::ptr::null(), |found| found.table)

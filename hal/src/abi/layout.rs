@@ -1,29 +1,29 @@
 //! The layout table: name, offset and size of every field of every struct and function table of the contract, as the
-//! compiler of a plugin saw them. Every plugin carries it, in C too, and the host compares it with its own.
+//! compiler of a plugin saw them. Every plugin carries a table, in C too, and the host compares it with its own.
 //!
-//! With feature `layout-proof` a plugin carries a second, independent proof: what abi_stable found, which also knows the
-//! signatures of functions. It is not the call path, and a plugin without it is only "not proven".
+//! With feature `layout-proof` a plugin carries a second, independent proof by abi_stable, which also covers function
+//! signatures. The call path does not use the proof, and a plugin without a proof is only "not proven".
 
 use crate::{device, extension, frame, model, parameter};
 
-/// Bytes of a name in the table.
+/// Size of a name in the table, bytes.
 const NAME_BYTES: usize = 48;
 
-/// One row of the layout table: a field, or a struct as a whole.
+/// Row of the layout table: a field, or a whole struct.
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct FieldLayout {
-    /// `Struct.field`, or `Struct` for the whole of it; filled up with zeros.
+    /// `Struct.field`, or `Struct` for the whole struct; padded with zeros.
     pub(crate) name: [u8; 48],
-    /// Where the field begins in its struct, bytes; 0 for a struct.
+    /// Offset of the field in its struct, bytes; 0 for a struct.
     pub offset: u32,
-    /// Its size, bytes.
+    /// Size of the field or struct, bytes.
     pub size: u32,
 }
 
 impl FieldLayout {
-    /// A row, in the compiler.
+    /// Builds a row at compile time.
     #[allow(clippy::cast_possible_truncation)] // a few hundred bytes
     pub(crate) const fn new(text: &str, offset: usize, size: usize) -> Self {
         let (text, mut name, mut i) = (text.as_bytes(), [0; NAME_BYTES], 0);
@@ -35,26 +35,26 @@ impl FieldLayout {
         Self { name, offset: offset as u32, size: size as u32 }
     }
 
-    /// `Struct.field` or `Struct`; empty if a plugin wrote something that is no text.
+    /// Returns `Struct.field` or `Struct`; empty if a plugin wrote bytes that are not UTF-8.
     #[must_use]
     pub fn name(&self) -> &str {
         let text = self.name.split(|byte| *byte == 0).next().unwrap_or_default();
         std::str::from_utf8(text).unwrap_or_default()
     }
 
-    /// Name of the struct.
+    /// Returns the name of the struct.
     #[cfg(feature = "loader")]
     pub(crate) fn struct_name(&self) -> &str {
         self.name().split('.').next().unwrap_or_default()
     }
 }
 
-/// Size of what a function selects in a struct, bytes.
+/// Returns the size of the field that a function selects, bytes.
 pub(crate) const fn size_of_field<S, F>(_: fn(&S) -> &F) -> usize {
     size_of::<F>()
 }
 
-/// Stands beside the structs of a module and says their layouts; a field that is forgotten does not compile.
+/// Defines the layout rows of the structs of a module; a missing field is a compile error.
 macro_rules! layout {
     ($($name:ident { $($field:ident),+ $(,)? })+) => {
         $(const _: fn(&$name) = |$name { $($field: _),+ }| ();)+
@@ -69,7 +69,7 @@ macro_rules! layout {
             ),)+
         )+];
 
-        /// What abi_stable says of them.
+        /// Layouts of the structs by abi_stable.
         #[cfg(feature = "layout-proof")]
         pub(crate) const PROOF: &[(&str, &abi_stable::type_layout::TypeLayout)] =
             &[$((stringify!($name), <$name as abi_stable::StableAbi>::LAYOUT)),+];
@@ -79,10 +79,10 @@ pub(crate) use layout;
 
 macro_rules! core {
     ($($($part:ident)::+),+ $(,)?) => {
-        /// What every plugin must know; data first, so that a report names the struct and not a table that uses it.
+        /// Rows that every plugin must have; data first, so that an error names the struct and not a table that contains the struct.
         const CORE: &[&[FieldLayout]] = &[$($($part)::+::LAYOUT),+];
 
-        /// What abi_stable says of it.
+        /// Layouts of the core structs by abi_stable.
         #[cfg(feature = "layout-proof")]
         const CORE_PROOF: &[&[(&str, &abi_stable::type_layout::TypeLayout)]] = &[$($($part)::+::PROOF),+];
     };
@@ -123,7 +123,7 @@ pub static LAYOUTS: [FieldLayout; COUNT] = {
     table
 };
 
-/// The second proof.
+/// Layout proof by abi_stable.
 #[cfg(feature = "layout-proof")]
 pub(crate) mod proof {
     use crate::abi::{LayoutProof, Str};
@@ -132,7 +132,7 @@ pub(crate) mod proof {
     use abi_stable::type_layout::TypeLayout;
     use std::ffi::c_void;
 
-    /// Every type of the contract, by name.
+    /// Returns every type of the contract with its name.
     pub(crate) fn types() -> impl Iterator<Item = &'static (&'static str, &'static TypeLayout)> {
         super::CORE_PROOF.iter().chain(extension::PROOFS).copied().flatten()
     }
@@ -144,7 +144,7 @@ pub(crate) mod proof {
 
     static HEADER: AbiHeader = AbiHeader::VALUE;
 
-    /// What every Rust plugin of this build carries.
+    /// Layout proof carried by every Rust plugin of this build.
     #[allow(clippy::cast_possible_truncation)] // 24 bytes
     pub(crate) static PROOF: LayoutProof = LayoutProof {
         size: size_of::<LayoutProof>() as u32,

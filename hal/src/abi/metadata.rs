@@ -1,4 +1,4 @@
-//! What can be read of a plugin without running it: TOML text in a section of the file.
+//! Plugin metadata as TOML text in a section of the file, readable without running the plugin.
 //!
 //! The text is assembled at compile time by `export_model!` and `export_device!`; a C plugin writes it with
 //! one macro of the header. It survives `strip` and the linker's garbage collection.
@@ -8,16 +8,16 @@ use super::{CONTRACT, PluginKind};
 /// Name of the ELF section.
 pub const SECTION: &str = ".flotor";
 
-/// The facts the text is made of.
+/// Contents of the metadata text.
 #[derive(Clone, Copy)]
 pub struct Facts {
     /// Model or device.
     pub kind: PluginKind,
-    /// What scenes and commands call it.
+    /// Id in scenes and commands.
     pub id: &'static str,
-    /// What people call it.
+    /// Display name.
     pub name: &'static str,
-    /// One sentence for people.
+    /// Description in one sentence.
     pub doc: &'static str,
     /// Version of the plugin.
     pub version: &'static str,
@@ -25,7 +25,7 @@ pub struct Facts {
     pub entry: &'static str,
 }
 
-/// Appends to a fixed buffer, or only counts when there is none. Const: runs in the compiler.
+/// Compile-time writer to a fixed buffer; with `N` = 0, a byte counter.
 struct Writer<const N: usize> {
     bytes: [u8; N],
     len: usize,
@@ -68,19 +68,19 @@ const fn write<const N: usize>(facts: &Facts) -> Writer<N> {
         .line("entry", facts.entry)
 }
 
-/// Bytes the text needs.
+/// Returns the length of the metadata text, bytes.
 #[must_use]
 pub const fn length(facts: &Facts) -> usize {
     write::<0>(facts).len
 }
 
-/// The text.
+/// Renders the metadata text into an array of [`length`] bytes.
 #[must_use]
 pub const fn render<const N: usize>(facts: &Facts) -> [u8; N] {
     write::<N>(facts).bytes
 }
 
-/// What both export macros share: the entry static and the metadata section.
+/// Common part of both export macros: the entry static and the metadata section.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! export_plugin {
@@ -109,7 +109,7 @@ macro_rules! export_plugin {
             #[used]
             #[cfg_attr(not(target_vendor = "apple"), unsafe(link_section = ".flotor"))]
             #[cfg_attr(target_vendor = "apple", unsafe(link_section = "__DATA,__flotor"))]
-            // The linker of a DLL keeps what is exported, and drops what is merely used.
+            // The linker of a DLL drops statics that are used but not exported.
             #[cfg_attr(windows, unsafe(export_name = concat!("flotor_metadata_", env!("CARGO_CRATE_NAME"))))]
             static METADATA: [u8; $crate::abi::metadata::length(&FACTS)] =
                 $crate::abi::metadata::render(&FACTS);

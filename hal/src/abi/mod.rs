@@ -1,15 +1,15 @@
 //! The binary contract: `#[repr(C)]` tables, one exported entry, text in a section of the file.
 //!
-//! Plugin authors never come here: they implement [`crate::ForceModel`] or [`crate::Device`] and write one
+//! Plugin authors do not need this module: they implement [`crate::ForceModel`] or [`crate::Device`] and write one
 //! `export_*!` line. C authors include `include/flotor.h`, which is generated from these files.
 //!
 //! Rules, for both sides:
 //! - Data structs are closed per interface revision; function tables only grow at their end and carry `size`.
 //! - Nothing unwinds across the boundary: the trampolines here catch panics.
-//! - Whoever allocates frees. Text is borrowed: for ever in info structs, for the call in arguments.
-//! - What a host passes by pointer is initialised, out parameters too.
+//! - The side that allocates memory frees it. Text is borrowed: for ever in info structs, for the call in arguments.
+//! - Memory that a host passes by pointer is initialised, also for out parameters.
 //! - One instance is used by one thread at a time, except `safe_stop`, which may come from any thread.
-//! - `get_interface`, `create` and `open` may come from several threads at once: what instances share, a plugin locks.
+//! - `get_interface`, `create` and `open` may be called by several threads at once: plugins must lock what their instances share.
 //! - Unknown interface ids get null; null function pointers mean "not offered".
 //! - Libraries are never unloaded.
 //!

@@ -1,4 +1,4 @@
-//! `flotor.force/1`: the function table of a force model, and how a [`ForceModel`] becomes one.
+//! `flotor.force/1`: function table of a force model, and its implementation for a [`ForceModel`].
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind};
 use super::instance::{self, Plugged, call, refusable};
@@ -9,21 +9,21 @@ use crate::{ForceModel, Input, LoopConfig, ModelInfo, Output, Parameter, Paramet
 use std::ffi::c_void;
 use std::marker::PhantomData;
 
-/// `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0 or a
-/// [`crate::RefusalKind`] and say why in the message.
+/// Function table `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0, or a
+/// [`crate::RefusalKind`] with the reason in the message.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct ForceTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Number of parameters.
     pub parameter_count: u32,
-    /// The schema, constant.
+    /// Parameter schema, constant.
     pub parameters: *const Parameter,
-    /// What the model says about itself.
+    /// Declaration of the model: id, texts, and demands and memory over all settings; constant.
     pub info: ModelInfo,
-    /// Makes an instance from explicitly set values. Not real-time.
+    /// Creates an instance from explicitly set values. Not real-time.
     pub create: Option<
         unsafe extern "C" fn(
             values: *const ParameterValue,
@@ -34,14 +34,14 @@ pub struct ForceTable {
     >,
     /// Frees an instance. Not real-time.
     pub destroy: Option<unsafe extern "C" fn(instance: Instance)>,
-    /// Last chance to allocate. Not real-time. May be null.
+    /// Prepares an instance for the loop: its last opportunity to allocate. Not real-time. May be null.
     pub prepare: Option<
         unsafe extern "C" fn(instance: Instance, config: *const LoopConfig, message: *mut Message) -> u32,
     >,
-    /// The wrench for a pose. Real-time: no allocation, lock, system call or unwinding.
+    /// Computes the wrench for a pose. Real-time: no allocation, lock, system call or unwinding.
     pub step:
         Option<unsafe extern "C" fn(instance: Instance, input: *const Input, output: *mut Output) -> u32>,
-    /// `count` poses in order. Real-time per pose. May be null: the host then calls `step`.
+    /// Computes the wrenches for `count` poses in order. Real-time per pose. May be null: the host then calls `step`.
     pub step_batch: Option<
         unsafe extern "C" fn(
             instance: Instance,
@@ -52,11 +52,11 @@ pub struct ForceTable {
     >,
     /// Changes a live parameter at a tick boundary. Real-time. May be null.
     pub set_parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32, value: f64) -> u32>,
-    /// The value in force. Real-time. May be null.
+    /// Returns the current value of a parameter. Real-time. May be null.
     pub parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32) -> f64>,
-    /// Forgets history. Real-time. May be null.
+    /// Clears the history. Real-time. May be null.
     pub reset: Option<unsafe extern "C" fn(instance: Instance) -> u32>,
-    /// Why the last call failed. Not real-time. May be null.
+    /// Writes the reason of the last failure. Not real-time. May be null.
     pub last_message: Option<unsafe extern "C" fn(instance: Instance, message: *mut Message)>,
 }
 
@@ -66,7 +66,7 @@ layout! {
         reset, last_message,
     }
 }
-/// A model as the tables see it.
+/// Adapter of a [`ForceModel`] for the function tables.
 pub(crate) struct ModelPlug<M>(PhantomData<M>);
 
 impl<M: ForceModel> Plugged for ModelPlug<M> {
@@ -166,8 +166,8 @@ unsafe extern "C" fn get_interface<M: ForceModel, E: Extensions<M>>(id: Str) -> 
     find::<M, E>(&offer::<M>(), id)
 }
 
-/// The entry of a model plugin without extensions. In Rust this and [`super::device_entry`] are the only ways to one, so that each
-/// entry that a safe program can have keeps the contract:
+/// Returns the entry of a model plugin without extensions. In Rust, only this function, [`super::device_entry`] and
+/// their `_with` forms construct an entry, so that every entry of a safe program fulfils the contract:
 ///
 /// ```compile_fail,E0451
 /// use flotor_hal::abi::{Entry, MAGIC};
@@ -178,14 +178,14 @@ pub const fn model_entry<M: ForceModel>() -> Entry {
     model_entry_with::<M, ()>()
 }
 
-/// The entry of a model plugin with extensions; [`crate::export_model!`] makes a static of it.
+/// Returns the entry of a model plugin with extensions; used by [`crate::export_model!`].
 #[must_use]
 pub const fn model_entry_with<M: ForceModel, E: Extensions<M>>() -> Entry {
     Entry::of(PluginKind::Model, get_interface::<M, E>)
 }
 
-/// Makes a [`crate::ForceModel`] a plugin: `export_model!(Spring);`. The extensions that the type implements are listed
-/// behind it by their names in [`crate::extension`]: `export_model!(Spring, centerline, variant, details);`. One per crate.
+/// Exports a [`crate::ForceModel`] as a plugin: `export_model!(Spring);`. The extensions that the type implements follow by their
+/// names in [`crate::extension`]: `export_model!(Spring, centerline, variant, details);`. One per crate.
 #[macro_export]
 macro_rules! export_model {
     ($model:ty $(, $extension:ident)* $(,)?) => {

@@ -1,4 +1,4 @@
-//! What happens to a panic inside a plugin: caught at the boundary, its message kept, the terminal left alone.
+//! Panics inside a plugin: caught at the boundary, with the message stored and nothing printed.
 
 use super::entry::{HOST_QUIET_PANICS, Host};
 use std::any::Any;
@@ -11,7 +11,7 @@ compile_error!(
 );
 
 thread_local! {
-    /// File and line of the last panic on this thread, kept by the quiet hook. Fixed size: no allocation.
+    /// File and line of the last panic on this thread, stored by the quiet hook. Fixed size: no allocation.
     static PLACE: Cell<Place> = const { Cell::new(Place { file: [0; 80], len: 0, line: 0 }) };
 }
 
@@ -22,10 +22,10 @@ struct Place {
     line: u32,
 }
 
-/// Called by the host after loading. A library of its own has a Rust runtime of its own: there the default
-/// hook would print from inside the servo and walk the stack for tens of milliseconds, so it is replaced by
-/// one that only notes the place. Linked into another program, the hook belongs to that program. A plugin built with
-/// `-C prefer-dynamic` may share the host's runtime, which nothing here can see: it silences the host's panics too.
+/// Replaces the panic hook of a separately linked library, which has its own Rust runtime, by a hook that only stores the place:
+/// the default hook would print from inside the servo and walk the stack for tens of milliseconds. Called by the host after
+/// loading. The hook of a plugin linked into the host is unchanged. A plugin built with `-C prefer-dynamic` may share the host's
+/// runtime, which is not detectable here: the host's panics are then silenced too.
 pub(super) unsafe extern "C" fn init(host: *const Host) {
     // SAFETY: the contract of `init`: null or a valid host struct for the call.
     let flags = unsafe { host.as_ref() }.map_or(0, |host| host.flags);
@@ -44,8 +44,8 @@ pub(super) unsafe extern "C" fn init(host: *const Host) {
     }
 }
 
-/// Writes what a caught panic said, and where if known, into `message`; then drops the payload, whose own
-/// `Drop` may panic again.
+/// Writes the text of a caught panic, and its place if known, to `message`; then drops the payload, whose `Drop` may
+/// panic again.
 pub(super) fn record(payload: Box<dyn Any + Send>, message: &mut super::Message) {
     let words = payload.downcast_ref::<&str>().copied();
     let words = words.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
@@ -59,7 +59,7 @@ pub(super) fn record(payload: Box<dyn Any + Send>, message: &mut super::Message)
     discard(payload);
 }
 
-/// Drops a panic payload without letting its own `Drop` escape.
+/// Drops a panic payload without letting a panic of its `Drop` escape.
 pub(super) fn discard(payload: Box<dyn Any + Send>) {
     if let Err(second) = catch_unwind(AssertUnwindSafe(|| drop(payload))) {
         std::mem::forget(second);

@@ -3,8 +3,8 @@
 use super::layout::layout;
 use std::fmt;
 
-/// Borrowed UTF-8 text. In a schema or an info struct it lives as long as the process (plugins are never
-/// unloaded); as an argument it lives for the call.
+/// Borrowed UTF-8 text. A text in a schema or an info struct lives as long as the process (plugins are never unloaded);
+/// a text in an argument lives for the call.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -20,16 +20,16 @@ unsafe impl Sync for Str {}
 unsafe impl Send for Str {}
 
 impl Str {
-    /// No text.
+    /// Empty text.
     pub const EMPTY: Str = Str::new("");
 
-    /// Text that lives as long as the process.
+    /// Wraps a text that lives as long as the process.
     #[must_use]
     pub const fn new(text: &'static str) -> Self {
         Self { ptr: text.as_ptr(), len: text.len() }
     }
 
-    /// Constant words as texts; [`crate::choices!`] uses it.
+    /// Converts constant words to texts, for [`crate::choices!`].
     #[doc(hidden)]
     #[must_use]
     pub const fn all<const N: usize>(words: &[&'static str]) -> [Str; N] {
@@ -42,7 +42,7 @@ impl Str {
         texts
     }
 
-    /// Text lent for the duration of a call.
+    /// Borrows a text for the duration of a call.
     ///
     /// # Safety
     /// The caller lets no copy of the result outlive `text`.
@@ -51,7 +51,7 @@ impl Str {
         Self { ptr: text.as_ptr(), len: text.len() }
     }
 
-    /// The text; empty if a foreign plugin left null or bytes that are not UTF-8.
+    /// Returns the text; empty if a foreign plugin wrote null or bytes that are not UTF-8.
     #[must_use]
     pub const fn as_str(&self) -> &str {
         if self.ptr.is_null() || self.len > isize::MAX as usize {
@@ -68,12 +68,12 @@ impl Str {
 
 #[cfg(feature = "loader")]
 impl Str {
-    /// Its length, as its maker says.
+    /// Returns the declared length, bytes; 0 if null.
     pub(crate) const fn bytes(&self) -> usize {
         if self.ptr.is_null() { 0 } else { self.len }
     }
 
-    /// What a foreign plugin may have made.
+    /// Builds the value from raw parts, as a foreign plugin may.
     #[cfg(test)]
     pub(crate) const fn of_raw(ptr: *const u8, len: usize) -> Self {
         Self { ptr, len }
@@ -101,16 +101,16 @@ unsafe impl Sync for Choices {}
 unsafe impl Send for Choices {}
 
 impl Choices {
-    /// No texts.
+    /// Empty list.
     pub const EMPTY: Choices = Choices { ptr: std::ptr::null(), len: 0 };
 
-    /// A list that lives as long as the process.
+    /// Wraps a list that lives as long as the process.
     #[must_use]
     pub const fn new(texts: &'static [Str]) -> Self {
         Self { ptr: texts.as_ptr(), len: texts.len() }
     }
 
-    /// The texts.
+    /// Returns the texts; empty if null or longer than memory.
     #[must_use]
     pub const fn as_slice(&self) -> &[Str] {
         if self.ptr.is_null() || self.len > isize::MAX as usize / size_of::<Str>() {
@@ -123,12 +123,12 @@ impl Choices {
 
 #[cfg(feature = "loader")]
 impl Choices {
-    /// How many there are, as their maker says.
+    /// Returns the declared number of texts; 0 if null.
     pub(crate) const fn count(&self) -> usize {
         if self.ptr.is_null() { 0 } else { self.len }
     }
 
-    /// What a foreign plugin may have made.
+    /// Builds the value from raw parts, as a foreign plugin may.
     #[cfg(test)]
     pub(crate) const fn of_raw(ptr: *const Str, len: usize) -> Self {
         Self { ptr, len }
@@ -141,10 +141,10 @@ impl fmt::Debug for Choices {
     }
 }
 
-/// Bytes a [`Message`] holds.
+/// Capacity of a [`Message`], bytes.
 pub const MESSAGE_BYTES: usize = 508;
 
-/// A sentence for people, written by the callee into memory of the caller: nothing to allocate or to free.
+/// Message text for people, written by the callee to memory of the caller: nothing to allocate or to free.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -160,7 +160,7 @@ impl Default for Message {
 }
 
 impl Message {
-    /// What is wrong with a message of a foreign plugin: it is longer than a message can be, or not text.
+    /// Returns the format error of a foreign plugin's message: too long or not UTF-8; `None` if valid.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         let Some(bytes) = self.text.get(..self.len as usize) else {
@@ -182,7 +182,7 @@ impl Message {
         }
     }
 
-    /// The sentence; whatever a foreign plugin wrote, the longest valid start of it.
+    /// Returns the text; for malformed bytes of a foreign plugin, the longest valid prefix.
     #[must_use]
     pub fn as_str(&self) -> &str {
         let bytes = self.text.get(..self.len as usize).unwrap_or(&self.text);
@@ -192,8 +192,8 @@ impl Message {
         }
     }
 
-    /// Returns the text for a terminal, whatever a foreign plugin wrote, up to its first null: a replacement character for each part
-    /// that is not UTF-8, control characters escaped. Not real-time.
+    /// Returns the text up to the first null, for a terminal: bytes that are not UTF-8 become replacement characters,
+    /// control characters are escaped. Not real-time.
     #[cfg(feature = "loader")]
     pub(crate) fn for_people(&self) -> String {
         let bytes = self.text.get(..self.len as usize).unwrap_or(&self.text);

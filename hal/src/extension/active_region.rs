@@ -1,4 +1,4 @@
-//! Extension `flotor.active-region/1`: where a force model can act; elsewhere a host may leave it inactive.
+//! Extension `flotor.active-region/1`: region in which a force model can act; outside it a host may skip the model.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -8,18 +8,18 @@ use crate::abi::loader::Model;
 use crate::abi::{Instance, ModelPlug};
 use crate::{DVec3, ForceModel};
 
-/// What kind of region it is.
+/// Shape of an active region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RegionShape {
     /// The model may act at any position: it is never inactive.
     Everywhere,
-    /// A ball.
+    /// Ball; `half_sides` is its radius three times.
     Sphere,
-    /// A box with sides along the axes of the model frame.
+    /// Box with sides along the axes of the model frame.
     Box,
 }
 
-/// The positions of the handle, in the model frame, at which a model may act. 56 bytes.
+/// Positions of the handle, in the model frame, at which a model may act. 56 bytes.
 ///
 /// Outside the region wrench and stored energy are **zero at every orientation and velocity**, and the model has
 /// **no history**: the first step inside is as after [`ForceModel::reset`]. The region may be larger than
@@ -35,24 +35,24 @@ pub struct ActiveRegion {
 }
 
 impl ActiveRegion {
-    /// No position is excluded.
+    /// Region without limits.
     pub const EVERYWHERE: Self =
         Self { shape: 0, reserved: 0, center_m: [0.0; 3], half_sides_m: [f64::INFINITY; 3] };
 
-    /// A ball about `center_m`.
+    /// Returns a ball about `center_m`.
     #[must_use]
     pub const fn sphere(center_m: [f64; 3], radius_m: f64) -> Self {
         Self { shape: 1, reserved: 0, center_m, half_sides_m: [radius_m; 3] }
     }
 
-    /// A box about `center_m`, half its sides given, along the axes of the model frame.
+    /// Returns a box about `center_m` from half its sides, along the axes of the model frame.
     #[must_use]
     pub const fn cuboid(center_m: [f64; 3], half_sides_m: [f64; 3]) -> Self {
         Self { shape: 2, reserved: 0, center_m, half_sides_m }
     }
 
-    /// What kind of region it is. Anything unknown, and a region with a number that is none, is everywhere: the safe
-    /// reading.
+    /// Returns the shape of the region; an unknown code or a number that is not finite counts as everywhere, the safe
+    /// choice.
     #[must_use]
     pub fn shape(&self) -> RegionShape {
         let numbers = self.center_m.iter().chain(&self.half_sides_m);
@@ -66,19 +66,19 @@ impl ActiveRegion {
         }
     }
 
-    /// Its centre, m.
+    /// Returns the centre, m.
     #[must_use]
     pub fn center(&self) -> DVec3 {
         DVec3::from_array(self.center_m)
     }
 
-    /// Half the sides of the box about it along the axes, m (for a ball, its radius three times).
+    /// Returns half the sides of the bounding box, m (for a ball, the radius three times).
     #[must_use]
     pub fn half_sides(&self) -> DVec3 {
         DVec3::from_array(self.half_sides_m)
     }
 
-    /// True if the model may act with the handle at `position_m`. Real-time: bounded, no allocation.
+    /// Returns true if the model may act with the handle at `position_m`. Real-time: bounded, no allocation.
     #[must_use]
     pub fn contains(&self, position_m: DVec3) -> bool {
         let from_center = position_m - self.center();
@@ -90,7 +90,7 @@ impl ActiveRegion {
     }
 }
 
-/// A force model that acts in a bounded region only: a scene may hold thousands of them.
+/// Force model that acts in a bounded region only: a scene may contain thousands of such models.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -113,21 +113,21 @@ impl ActiveRegion {
 /// assert!(!foam.active_region().contains(DVec3::ZERO));
 /// ```
 pub trait ActiveRegionModel: ForceModel {
-    /// Where it may act, with the parameters now in force. Real-time: bounded, no allocation (asked again after
-    /// each live parameter).
+    /// Returns the region in which the model may act, with the current parameters. Real-time: bounded, no allocation
+    /// (called again after each live parameter).
     fn active_region(&self) -> ActiveRegion;
 }
 
-/// `flotor.active-region/1`: see [`ActiveRegionModel`]. Real-time.
+/// Function table `flotor.active-region/1`: see [`ActiveRegionModel`]. Real-time.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct ActiveRegionTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// Where the instance can act, with the parameters now in force; a [`crate::abi::CallStatus`] code.
+    /// Writes the active region with the current parameters; returns a [`crate::abi::CallStatus`] code.
     pub region: Option<unsafe extern "C" fn(instance: Instance, out: *mut ActiveRegion) -> u32>,
 }
 
@@ -147,8 +147,8 @@ table!(ActiveRegionTable: "flotor.active-region/1", M: [ActiveRegionModel] {
 
 #[cfg(feature = "loader")]
 impl Model {
-    /// Where the instance can act, with the parameters now in force: everywhere, unless it says otherwise. Real-time:
-    /// bounded, no allocation.
+    /// Returns the active region of the instance with the current parameters; without the extension, everywhere.
+    /// Real-time: bounded, no allocation.
     #[must_use]
     pub fn active_region(&mut self) -> ActiveRegion {
         let ask = self.extensions.active_region.and_then(|table| table.region);

@@ -1,8 +1,8 @@
-//! Calibration of the vertical force: how much of what is commanded arrives at a height.
+//! Calibration of the vertical force: ratio of delivered to commanded force as a function of height.
 //!
-//! Extension `flotor.calibration/1`. The host measures, fits and keeps the file; the device gets numbers and
-//! divides its **total** vertical command by them, gravity compensation included, because the uneven field acts
-//! on the sum (Varadharajan 2007, section 3.4, corrected only the part of the spring).
+//! Extension `flotor.calibration/1`. The host measures, fits and stores the calibration; the device receives the
+//! numbers and divides its **total** vertical command by the ratio, gravity compensation included, because the uneven
+//! field acts on the sum (Varadharajan 2007, section 3.4, corrected only the part of the spring).
 
 use crate::abi::instance::{fill, refusable};
 use crate::abi::interface::table;
@@ -12,19 +12,19 @@ use crate::abi::loader::{OpenedDevice, refusal_from};
 use crate::abi::{DevicePlug, Instance, Message, not_opened};
 use crate::{Device, Refusal};
 
-/// Number of coefficients a calibration has room for: a polynomial of degree seven.
+/// Maximum number of coefficients of a calibration: a polynomial of degree seven.
 pub const CALIBRATION_COEFFICIENTS: usize = 8;
 
-/// Smallest and largest delivered share a calibration may claim. An uneven field is off by tens of percent at
-/// most; what claims more is a mistake, and would multiply a command by it.
+/// Smallest and largest plausible ratio of delivered to commanded force. An uneven field is off by tens of percent at
+/// most; a ratio beyond is a mistake, and would multiply the command.
 const PLAUSIBLE_SHARE: [f64; 2] = [0.5, 2.0];
-/// Farthest from the centre that a calibration may reach, m.
+/// Largest distance from the centre in a calibration, m.
 const MOST_RANGE_M: f64 = 1.0;
 
-/// Heights at which a calibration is checked: fine enough for a polynomial of degree seven.
+/// Number of heights at which a calibration is checked: enough for a polynomial of degree seven.
 const CHECKED_HEIGHTS: u32 = 256;
 
-/// Delivered over commanded vertical force as a polynomial of the height. 80 bytes.
+/// Ratio of delivered to commanded vertical force, as a polynomial of the height. 80 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -33,18 +33,18 @@ pub struct VerticalCalibration {
     pub(crate) coefficients: [f64; CALIBRATION_COEFFICIENTS],
 }
 
-/// Why numbers are no calibration.
+/// Reason why a calibration is invalid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InvalidCalibration {
-    /// The range is not finite, empty, upside down, or larger than any device has, m.
+    /// Range not finite, empty, upside down or implausibly large, m.
     Range([f64; 2]),
-    /// None, or more than there is room for.
+    /// Number of coefficients: none, or more than [`CALIBRATION_COEFFICIENTS`].
     Count(usize),
-    /// The share is not a number, or not between a half and two, at this height in m.
+    /// Ratio that is NaN or not between a half and two.
     Share {
         /// Height, m.
         height_m: f64,
-        /// Delivered over commanded force there.
+        /// Ratio of delivered to commanded force at this height.
         share: f64,
     },
 }
@@ -70,14 +70,14 @@ impl std::fmt::Display for InvalidCalibration {
 impl std::error::Error for InvalidCalibration {}
 
 impl VerticalCalibration {
-    /// All that is commanded arrives.
+    /// Identity: the delivered force equals the commanded force.
     pub const NONE: Self =
         Self { range_m: [-1.0, 1.0], coefficients: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
 
-    /// A polynomial `c0 + c1 z + c2 z² ...` with z in m (so `ck` in 1/mᵏ), measured over `range_m`.
+    /// Builds a polynomial `c0 + c1 z + c2 z² ...` with z in m (so `ck` in 1/mᵏ), measured over `range_m`.
     ///
     /// # Errors
-    /// [`InvalidCalibration`], unless the share is plausible all over the range.
+    /// [`InvalidCalibration`], unless the ratio is plausible over the whole range.
     pub fn new(range_m: [f64; 2], coefficients: &[f64]) -> Result<Self, InvalidCalibration> {
         let mut calibration = Self { range_m, coefficients: [0.0; CALIBRATION_COEFFICIENTS] };
         match calibration.coefficients.get_mut(..coefficients.len()) {
@@ -88,10 +88,10 @@ impl VerticalCalibration {
         Ok(calibration)
     }
 
-    /// Checks numbers that came from elsewhere.
+    /// Checks the numbers of a calibration from another source.
     ///
     /// # Errors
-    /// [`InvalidCalibration`], unless the share is plausible all over the range.
+    /// [`InvalidCalibration`], unless the ratio is plausible over the whole range.
     pub fn check(&self) -> Result<(), InvalidCalibration> {
         let [from, to] = self.range_m;
         if !(from.abs() <= MOST_RANGE_M && to.abs() <= MOST_RANGE_M && from < to) {
@@ -108,20 +108,20 @@ impl VerticalCalibration {
         Ok(())
     }
 
-    /// Where it was measured, lowest and highest, m.
+    /// Returns the measured range of heights, lowest and highest, m.
     #[must_use]
     pub const fn range_m(&self) -> [f64; 2] {
         self.range_m
     }
 
-    /// Coefficients of the powers of the height in m; unused ones are 0.
+    /// Returns the coefficients of the powers of the height in m; unused coefficients are 0.
     #[must_use]
     pub const fn coefficients(&self) -> &[f64; CALIBRATION_COEFFICIENTS] {
         &self.coefficients
     }
 
-    /// Delivered over commanded vertical force at a height of `z_m`; beyond the range as at its end, and 1 for a
-    /// height that is not a number. Real-time: bounded, no allocation.
+    /// Returns the ratio of delivered to commanded vertical force at height `z_m`; constant beyond the range, and 1 for
+    /// a NaN height. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn share(&self, z_m: f64) -> f64 {
@@ -133,8 +133,7 @@ impl VerticalCalibration {
         self.coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * z_m + coefficient)
     }
 
-    /// The vertical command, N, that delivers the total of `total_n` at a height of `z_m`. Real-time: bounded, no
-    /// allocation.
+    /// Returns the vertical command, N, that delivers `total_n` at height `z_m`. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn command_n(&self, total_n: f64, z_m: f64) -> f64 {
@@ -142,7 +141,7 @@ impl VerticalCalibration {
     }
 }
 
-/// A device whose vertical force can be corrected.
+/// Device with a correctable vertical force.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -176,29 +175,29 @@ impl VerticalCalibration {
 /// }
 /// ```
 pub trait CalibrationDevice: Device {
-    /// Serial number of the piece of hardware; empty if it has none. Not real-time.
+    /// Returns the serial number of the hardware; empty if none. Not real-time.
     fn serial(&self) -> String;
 
     /// Corrects the total vertical command, gravity compensation included, from the next activation on. The
     /// numbers are already checked. Not real-time.
     ///
     /// # Errors
-    /// A [`Refusal`] if there is nothing to correct.
+    /// A [`Refusal`] if the device has no vertical force to correct.
     fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal>;
 }
 
-/// `flotor.calibration/1`: see [`CalibrationDevice`]. Both calls belong to the opened phase.
+/// Function table `flotor.calibration/1`: see [`CalibrationDevice`]. Both calls are valid in the opened phase only.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct CalibrationTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// Serial number of the piece of hardware, empty if it has none; a [`crate::abi::CallStatus`] code. Not real-time.
+    /// Writes the serial number of the hardware, empty if none; returns a [`crate::abi::CallStatus`] code. Not real-time.
     pub serial: Option<unsafe extern "C" fn(instance: Instance, serial: *mut Message) -> u32>,
-    /// Corrects the total vertical command from the next activation on; 0 or a [`crate::RefusalKind`] with the
+    /// Corrects the total vertical command from the next activation on; returns 0, or a [`crate::RefusalKind`] with the
     /// reason in the message. Not real-time.
     pub calibrate_vertical: Option<
         unsafe extern "C" fn(
@@ -246,7 +245,7 @@ table!(CalibrationTable: "flotor.calibration/1", D: [CalibrationDevice] {
 
 #[cfg(feature = "loader")]
 impl OpenedDevice {
-    /// Serial number of the piece of hardware; empty if it has none or does not say.
+    /// Returns the serial number of the hardware; empty if none or not reported.
     #[must_use]
     pub fn serial(&mut self) -> String {
         let ask = self.extensions().calibration.and_then(|table| table.serial);
@@ -256,7 +255,7 @@ impl OpenedDevice {
     /// Corrects the total vertical command from the next activation on.
     ///
     /// # Errors
-    /// A [`Refusal`] if the device takes no calibration.
+    /// A [`Refusal`] if the device supports no calibration.
     pub fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
         let calibrate = self.extensions().calibration.and_then(|table| table.calibrate_vertical);
         let Some(calibrate) = calibrate else {

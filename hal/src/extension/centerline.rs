@@ -1,7 +1,7 @@
-//! Extension `flotor.centerline/1`: the shape of a slender deformable body, for people to look at.
+//! Extension `flotor.centerline/1`: centreline of a slender deformable body, for visualisation.
 //!
-//! An observer makes its own instance of the model with the same parameters and asks it at its own rate;
-//! the servo never calls this. A curve with a frame along it draws a rod, a rope or (with turns) a coil spring.
+//! An observer creates its own instance of the model with the same parameters and queries it at its own rate; the servo
+//! never calls this. A curve with a frame along it draws a rod, a rope or (with turns) a coil spring.
 
 use crate::abi::instance::{call, fill};
 use crate::abi::interface::table;
@@ -11,26 +11,26 @@ use crate::abi::loader::Model;
 use crate::abi::{CallStatus, Instance, ModelPlug};
 use crate::{ForceModel, Input, Pose};
 
-/// How to draw the body around its centreline: a tube, or a wire wound about it. 40 bytes.
+/// Drawing style of the body around its centreline: a tube, or a wire wound about it. 40 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct CenterlineInfo {
     /// Radius of the drawn tube or wire, m.
     pub tube_radius_m: f64,
-    /// Radius of the helix the wire follows about the centreline, m; 0 draws a plain tube.
+    /// Radius of the wire's helix about the centreline, m; 0 draws a plain tube.
     pub helix_radius_m: f64,
     /// Turns of the helix over the whole length; 0 for a plain tube.
     pub helix_turns: f64,
     /// Radius of the end plates, m; 0 for none.
     pub plate_radius_m: f64,
-    /// How many points describe the centreline well.
+    /// Recommended number of points on the centreline.
     pub suggested_points: u32,
     pub(crate) reserved: u32,
 }
 
 impl CenterlineInfo {
-    /// A wire of radius `wire_radius_m` wound `turns` times at `helix_radius_m` between plates.
+    /// Returns the style of a wire of radius `wire_radius_m` wound `turns` times at `helix_radius_m` between plates.
     #[must_use]
     pub const fn coil(wire_radius_m: f64, helix_radius_m: f64, turns: f64, plate_radius_m: f64) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl CenterlineInfo {
     }
 }
 
-/// A force model with a shape. Not real-time.
+/// Force model with a centreline. Not real-time.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -78,26 +78,26 @@ impl CenterlineInfo {
 /// assert_eq!(points[2].position(), DVec3::Z * -0.002); // halfway
 /// ```
 pub trait CenterlineModel: ForceModel {
-    /// How to draw the body with the parameters now in force.
+    /// Returns the drawing style of the body with the current parameters.
     fn centerline_info(&self) -> CenterlineInfo;
 
-    /// Fills `points` from the fixed end to the handle, evenly in arc length of the undeformed body: position
-    /// (m, model frame) and section frame (z along the section normal). Returns how many are valid.
+    /// Fills `points` from the fixed end to the handle, evenly in arc length of the undeformed body: position (m, model
+    /// frame) and section frame (z along the section normal). Returns the number of valid points.
     fn centerline(&mut self, input: &Input, points: &mut [Pose]) -> usize;
 }
 
-/// `flotor.centerline/1`: see [`CenterlineModel`]. Not real-time.
+/// Function table `flotor.centerline/1`: see [`CenterlineModel`]. Not real-time.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct CenterlineTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// How to draw the body.
+    /// Writes the drawing style of the body.
     pub info: Option<unsafe extern "C" fn(instance: Instance, out: *mut CenterlineInfo) -> u32>,
-    /// Fills up to `capacity` points; how many are valid goes to `count`.
+    /// Fills up to `capacity` points; writes the number of valid points to `count`.
     pub centerline: Option<
         unsafe extern "C" fn(
             instance: Instance,
@@ -154,7 +154,7 @@ pub struct Centerline<'a> {
 
 #[cfg(feature = "loader")]
 impl Model {
-    /// The model's centreline, if it has one. Not real-time: for observers with an instance of their own.
+    /// Returns access to the model's centreline, if any. Not real-time: for observers with their own instance.
     #[must_use]
     pub fn centerline(&mut self) -> Option<Centerline<'_>> {
         let table = self.extensions.centerline?;
@@ -164,13 +164,13 @@ impl Model {
 
 #[cfg(feature = "loader")]
 impl Centerline<'_> {
-    /// How to draw the body; `None` if the model failed.
+    /// Returns the drawing style of the body; `None` if the model failed.
     #[must_use]
     pub fn info(&mut self) -> Option<CenterlineInfo> {
         self.model.asked(self.table.info, CenterlineInfo::default())
     }
 
-    /// The centreline at an input, in at most `capacity` points; `None` if the model failed.
+    /// Returns the centreline at an input, in at most `capacity` points; `None` if the model failed.
     #[must_use]
     pub fn points(&mut self, input: &Input, capacity: usize) -> Option<Vec<Pose>> {
         let (ask, room) = (self.table.centerline?, u32::try_from(capacity).ok()?);

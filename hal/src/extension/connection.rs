@@ -1,5 +1,5 @@
-//! Extension `flotor.connection/1`: how a device is connected, as data, so that a host can look at the machine before the
-//! device is opened: is it there, may this user use it, does another driver or program have it.
+//! Extension `flotor.connection/1`: connection of a device, as data, so that a host can diagnose the machine before
+//! opening the device: presence, permission, and use by another driver or program.
 
 use crate::Device;
 use crate::abi::interface::table;
@@ -7,20 +7,20 @@ use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Plugin;
 
-/// Through what a device on USB is used, as a closed set. In C as a number of this value.
+/// Access path to a USB device, as a closed set. In C, a number of this value.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UsbAccess {
-    /// The bus itself, without a driver of the kernel.
+    /// USB bus, without a kernel driver.
     Raw = 0,
-    /// A serial port of the kernel's.
+    /// Serial port of the kernel.
     Serial = 1,
-    /// The kernel's raw HID.
+    /// Raw HID interface of the kernel.
     Hid = 2,
 }
 
 impl UsbAccess {
-    /// Reads it from the boundary; `None` for a code that this contract does not know.
+    /// Converts a code from the boundary; `None` for an unknown code.
     #[must_use]
     pub const fn from_code(code: u32) -> Option<Self> {
         match code {
@@ -32,7 +32,7 @@ impl UsbAccess {
     }
 }
 
-/// A kind of device on USB. 8 bytes.
+/// USB identity of a device: vendor, product and access path. 8 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -44,38 +44,38 @@ pub struct UsbKind {
 }
 
 impl UsbKind {
-    /// One product of a vendor.
+    /// Returns the identity of one product of a vendor.
     #[must_use]
     pub const fn new(vendor: u16, product: u16, access: UsbAccess) -> Self {
         Self { vendor, product, access: access as u32 }
     }
 
-    /// Every product of a vendor.
+    /// Returns the identity of all products of a vendor.
     #[must_use]
     pub const fn of_vendor(vendor: u16, access: UsbAccess) -> Self {
         Self::new(vendor, 0, access)
     }
 
-    /// Number of the vendor.
+    /// Returns the vendor id.
     #[must_use]
     pub const fn vendor(&self) -> u16 {
         self.vendor
     }
 
-    /// Number of the product; `None`: every one of the vendor.
+    /// Returns the product id; `None` for all products of the vendor.
     #[must_use]
     pub const fn product(&self) -> Option<u16> {
         if self.product == 0 { None } else { Some(self.product) }
     }
 
-    /// Through what it is used; `None` if a plugin wrote something that is no access.
+    /// Returns the access path; `None` if a plugin wrote an unknown code.
     #[must_use]
     pub const fn access(&self) -> Option<UsbAccess> {
         UsbAccess::from_code(self.access)
     }
 }
 
-/// A device that says how it is connected.
+/// Device that declares its connection.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -105,20 +105,20 @@ impl UsbKind {
 /// assert_eq!(Crank::USB[0].product(), Some(1));
 /// ```
 pub trait ConnectionDevice: Device {
-    /// What it is on USB: any of these.
+    /// USB identities of the device, as alternatives.
     const USB: &'static [UsbKind];
 }
 
-/// `flotor.connection/1`: see [`ConnectionDevice`].
+/// Function table `flotor.connection/1`: see [`ConnectionDevice`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct ConnectionTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
-    /// Number of kinds.
+    /// Number of USB identities.
     pub usb_count: u32,
-    /// What it is on USB, constant.
+    /// USB identities of the device, constant.
     pub usb: *const UsbKind,
 }
 
@@ -133,7 +133,7 @@ table!(ConnectionTable: "flotor.connection/1", D: [ConnectionDevice] {
 
 #[cfg(feature = "loader")]
 impl Plugin {
-    /// What a device is on USB; empty for one that does not say, and for a model.
+    /// Returns the USB identities of a device; empty without a declaration and for a model.
     #[must_use]
     pub fn usb_kinds(&self) -> &'static [UsbKind] {
         match self.device_extensions().and_then(|extensions| extensions.connection) {

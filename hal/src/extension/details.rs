@@ -1,8 +1,8 @@
-//! Extension `flotor.details/1`: numbers about the last answer, for people and for tests.
+//! Extension `flotor.details/1`: diagnostic numbers of the last step, for people and for tests.
 //!
-//! A model that iterates, switches branches or rolls on its seat knows more than a wrench says. It names the
-//! numbers once, and whoever wants them asks after a step: `flotor eval --details` makes columns of them. The
-//! servo never asks.
+//! A model that iterates, switches branches or rolls on its seat has internal numbers beyond the wrench. The model
+//! declares the numbers once; a caller reads them after a step, and `flotor eval --details` prints them as columns. The
+//! servo never calls this.
 
 use crate::abi::instance::call;
 use crate::abi::interface::table;
@@ -12,7 +12,7 @@ use crate::abi::loader::Model;
 use crate::abi::{CallStatus, Choices, Instance, ModelPlug, Str};
 use crate::{ForceModel, choices};
 
-/// One number about an answer. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
+/// Diagnostic number of a step. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -24,50 +24,50 @@ pub struct Detail {
 }
 
 impl Detail {
-    /// A number, in SI. `unit` is for people ("rad", "1" for none).
+    /// Declares a number, in SI. `unit` is for people ("rad", "1" for none).
     #[must_use]
     pub const fn number(id: &'static str, unit: &'static str, doc: &'static str) -> Self {
         Self { id: Str::new(id), unit: Str::new(unit), doc: Str::new(doc), words: Choices::EMPTY }
     }
 
-    /// One of a fixed list of words; the number is its index.
+    /// Declares one of a fixed list of words; the value is its index.
     #[must_use]
     pub const fn word(id: &'static str, words: Choices, doc: &'static str) -> Self {
         Self { id: Str::new(id), unit: Str::EMPTY, doc: Str::new(doc), words }
     }
 
-    /// Yes or no: `1` or `0`.
+    /// Declares a flag: `1` or `0`.
     #[must_use]
     pub const fn flag(id: &'static str, doc: &'static str) -> Self {
         Self::word(id, choices!["0", "1"], doc)
     }
 
-    /// Name of the column.
+    /// Returns the name of the column.
     #[must_use]
     pub const fn id(&self) -> &str {
         self.id.as_str()
     }
 
-    /// Unit for people; empty for a word.
+    /// Returns the unit for people; empty for a word.
     #[must_use]
     pub const fn unit(&self) -> &str {
         self.unit.as_str()
     }
 
-    /// One sentence for people.
+    /// Returns the description, one sentence.
     #[must_use]
     pub const fn doc(&self) -> &str {
         self.doc.as_str()
     }
 
-    /// The words, in index order; empty for a number.
+    /// Returns the words, in index order; empty for a number.
     #[must_use]
     pub const fn words(&self) -> &[Str] {
         self.words.as_slice()
     }
 }
 
-/// A force model that has numbers about its answers.
+/// Force model with diagnostic numbers of its steps.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -95,26 +95,26 @@ impl Detail {
 /// assert_eq!(values, [0.003]);
 /// ```
 pub trait DetailsModel: ForceModel {
-    /// What there is to know, in order.
+    /// Diagnostic numbers, in the order of the values.
     const DETAILS: &'static [Detail];
 
-    /// Writes the numbers of the last [`ForceModel::step`], one for each of [`Self::DETAILS`]; NaN where there is
-    /// none. Real-time: bounded, no allocation.
+    /// Writes the values of the last [`ForceModel::step`], one for each of [`Self::DETAILS`]; NaN for a missing value.
+    /// Real-time: bounded, no allocation.
     fn details(&self, values: &mut [f64]);
 }
 
-/// `flotor.details/1`: see [`DetailsModel`].
+/// Function table `flotor.details/1`: see [`DetailsModel`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct DetailsTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Number of details.
     pub detail_count: u32,
-    /// What there is to know, constant.
+    /// Diagnostic numbers, constant.
     pub details: *const Detail,
-    /// Writes the numbers of the last step into `capacity` places, `detail_count` at most; NaN where there is none.
+    /// Writes the values of the last step to `capacity` places, `detail_count` at most; NaN for a missing value.
     /// Real-time: no allocation, lock, system call or unwinding.
     pub values: Option<unsafe extern "C" fn(instance: Instance, values: *mut f64, capacity: u32) -> u32>,
 }
@@ -147,7 +147,7 @@ table!(DetailsTable: "flotor.details/1", M: [DetailsModel] {
 
 #[cfg(feature = "loader")]
 impl Model {
-    /// Which numbers there are about an answer; empty for a model without details.
+    /// Returns the diagnostic numbers of the model; empty for a model without details.
     #[must_use]
     pub fn details(&self) -> &'static [Detail] {
         match self.extensions.details {
@@ -159,8 +159,8 @@ impl Model {
         }
     }
 
-    /// Writes the numbers of the last step, one for each of [`Self::details`]; NaN where there is none.
-    /// Real-time: bounded by the model, no allocation.
+    /// Writes the values of the last step, one for each of [`Self::details`]; NaN for a missing value. Real-time:
+    /// bounded by the model, no allocation.
     pub fn read_details(&mut self, values: &mut [f64]) -> CallStatus {
         let Some(read) = self.extensions.details.and_then(|table| table.values) else {
             return CallStatus::Unsupported;

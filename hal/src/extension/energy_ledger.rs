@@ -1,4 +1,4 @@
-//! Extension `flotor.energy-ledger/1`: the balance of the mechanical energy of a device with a known plant.
+//! Extension `flotor.energy-ledger/1`: balance of the mechanical energy of a device with a known plant.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -33,7 +33,7 @@ pub struct EnergyLedger {
 }
 
 impl EnergyLedger {
-    /// What the balance fails to explain, J.
+    /// Returns the residual of the balance, J.
     #[must_use]
     pub fn residual_j(&self) -> f64 {
         let explained = self.actuators_j + self.feedforward_j + self.hand_j - self.dissipated_j;
@@ -41,7 +41,7 @@ impl EnergyLedger {
     }
 }
 
-/// An active device with a known plant.
+/// Active device with a known plant.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -73,20 +73,20 @@ impl EnergyLedger {
 /// assert_eq!(crank.energy_ledger().residual_j(), 0.0);
 /// ```
 pub trait EnergyLedgerDevice: ActiveDevice {
-    /// The energy balance since activation. Real-time: bounded, no allocation.
+    /// Returns the energy balance since activation. Real-time: bounded, no allocation.
     fn energy_ledger(&self) -> EnergyLedger;
 }
 
-/// `flotor.energy-ledger/1`: see [`EnergyLedgerDevice`].
+/// Function table `flotor.energy-ledger/1`: see [`EnergyLedgerDevice`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct EnergyLedgerTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// The energy balance since activation; a [`crate::abi::CallStatus`] code. Real-time.
+    /// Writes the energy balance since activation; returns a [`crate::abi::CallStatus`] code. Real-time.
     pub ledger: Option<unsafe extern "C" fn(instance: Instance, out: *mut EnergyLedger) -> u32>,
 }
 
@@ -109,7 +109,7 @@ table!(EnergyLedgerTable: "flotor.energy-ledger/1", D: [Device<Active: EnergyLed
 
 #[cfg(feature = "loader")]
 impl loader::ActiveDevice {
-    /// Energy balance of the plant, where there is one. Real-time: bounded, no allocation.
+    /// Returns the energy balance of the plant; `None` without the extension. Real-time: bounded, no allocation.
     #[must_use]
     pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
         let ask = self.extensions()?.energy_ledger?.ledger;

@@ -1,7 +1,7 @@
-//! Extension `flotor.independent-stop/1`: what stops a device when the host's process is gone, whatever became of it.
+//! Extension `flotor.independent-stop/1`: stop of a device after the host's process has ended in any way.
 //!
-//! A device that keeps its last command offers a handle and a message; a process beside the host, which runs nothing of any
-//! plugin, holds both and writes the message when the host is gone. A device that stops by itself says how soon.
+//! A device that holds its last command offers a handle and a message; the guard process, which runs no plugin code,
+//! stores both and writes the message when the host is gone. A device that stops by itself declares its timeout.
 
 use crate::Device;
 use crate::abi::instance::fill;
@@ -13,47 +13,47 @@ use crate::abi::{DevicePlug, Instance};
 #[cfg(feature = "loader")]
 use crate::{Refusal, extension::independent_stop::means::Independence};
 
-/// Bytes a message may have at most.
+/// Capacity of a stop message, bytes.
 pub const STOP_MESSAGE_BYTES: usize = 64;
-/// The descriptor of a device that stops by itself.
+/// Value of `descriptor` for a device that stops by itself.
 const BY_ITSELF: i32 = -1;
-/// The time of a device that nothing stops, ns.
+/// Value of `within_ns` for a device without any independent stop, ns.
 const NEVER_NS: u64 = u64::MAX;
 
-/// What a device exerts once it is stopped. In C as a number of this value.
+/// Final state of a stopped device. In C, a number of this value.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoppedState {
     /// No force.
     Zero = 0,
-    /// It sets the handle down by itself, and then exerts none.
+    /// No force, after a controlled landing of the handle.
     Landed = 1,
 }
 
-/// How a device is stopped without its host. 88 bytes.
+/// Independent stop of a device, without its host. 88 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct IndependentStop {
-    /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns; with descriptor -1
-    /// the largest number for a device that nothing stops.
+    /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns; with
+    /// descriptor -1 the largest number for a device without an independent stop.
     pub(crate) within_ns: u64,
-    /// A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. On Windows
-    /// the lower 32 bits of a handle. -1: the device stops by itself when no command comes.
+    /// File descriptor of the host's process, open for writing until the device is closed; the host duplicates the
+    /// descriptor. On Windows the lower 32 bits of a handle. -1: the device stops by itself when no command comes.
     pub(crate) descriptor: i32,
-    /// Bytes of the message, 1 to 64; 0 with descriptor -1.
+    /// Length of the message, bytes, 1 to 64; 0 with descriptor -1.
     pub(crate) length: u32,
-    /// What is written to the descriptor, up to three times: the same bytes at any time, also after half a command.
+    /// Message written to the descriptor, up to three times: the same bytes at any time, also after half a command.
     pub(crate) message: [u8; STOP_MESSAGE_BYTES],
-    /// A value of [`StoppedState`].
+    /// Code of a [`StoppedState`].
     pub(crate) state: u32,
     /// Reserved, 0.
     pub(crate) reserved: u32,
 }
 
 impl IndependentStop {
-    /// A device that stops when this message is written to this descriptor, which is open for writing until the device is
-    /// closed. A message that is too long is none, and refused by the host.
+    /// Declares a stop by a message to a descriptor, which is open for writing until the device is closed. The host
+    /// rejects a message that is too long.
     #[must_use]
     pub fn by_message(descriptor: i32, message: &[u8], state: StoppedState, within_ns: u64) -> Self {
         let mut bytes = [0; STOP_MESSAGE_BYTES];
@@ -62,21 +62,21 @@ impl IndependentStop {
         Self { within_ns, descriptor, length, message: bytes, state: state as u32, reserved: 0 }
     }
 
-    /// A device whose controller stops it when no command has come for this time; 0: it is gone with the host's process.
+    /// Declares a stop by the device's controller after `within_ns` without a command; 0: the device ends with the host's process.
     #[must_use]
     pub const fn by_itself(state: StoppedState, within_ns: u64) -> Self {
         let message = [0; STOP_MESSAGE_BYTES];
         Self { within_ns, descriptor: BY_ITSELF, length: 0, message, state: state as u32, reserved: 0 }
     }
 
-    /// A device that nothing stops, as one without this extension: for plugins whose devices differ in that.
+    /// Declares no independent stop, as without this extension: for plugins with several kinds of devices.
     #[must_use]
     pub const fn none() -> Self {
         Self::by_itself(StoppedState::Zero, NEVER_NS)
     }
 }
 
-/// A device that is stopped even if nothing of the host is left.
+/// Device with a stop that does not depend on the host's process.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -106,20 +106,20 @@ impl IndependentStop {
 /// }
 /// ```
 pub trait IndependentStopDevice: Device {
-    /// How. Asked once, after opening; it holds until the device is closed. Not real-time.
+    /// Returns the independent stop. Called once, after opening; valid until the device is closed. Not real-time.
     fn independent_stop(&self) -> IndependentStop;
 }
 
-/// `flotor.independent-stop/1`: see [`IndependentStopDevice`]. Belongs to the opened phase.
+/// Function table `flotor.independent-stop/1`: see [`IndependentStopDevice`]. Valid in the opened phase only.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct IndependentStopTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// How the device is stopped without its host; a [`crate::abi::CallStatus`] code. Not real-time.
+    /// Writes the independent stop of the device; returns a [`crate::abi::CallStatus`] code. Not real-time.
     pub independent_stop: Option<unsafe extern "C" fn(instance: Instance, stop: *mut IndependentStop) -> u32>,
 }
 
@@ -140,36 +140,36 @@ table!(IndependentStopTable: "flotor.independent-stop/1", D: [IndependentStopDev
     independent_stop: Some(independent_stop::<D>),
 });
 
-/// The host's side.
+/// Host side of the independent stop.
 #[cfg(feature = "loader")]
 pub mod means {
     use super::{BY_ITSELF, IndependentStop, NEVER_NS, STOP_MESSAGE_BYTES, StoppedState};
     use crate::Refusal;
     use crate::abi::loader::platform::{Handle, writable_duplicate};
 
-    /// What stops a device without its host.
+    /// Checked independent stop of a device.
     #[derive(Debug)]
     pub enum Independence {
-        /// A message on a handle of its own.
+        /// Stop by a message on a duplicated handle.
         Message {
-            /// Where to.
+            /// Handle that receives the message.
             handle: Handle,
-            /// What.
+            /// Message bytes.
             message: Vec<u8>,
-            /// What the device is then.
+            /// State of the stopped device.
             state: StoppedState,
         },
-        /// Its own controller, after this many ns without a command.
+        /// Stop by the device's own controller.
         Itself {
-            /// How soon, ns.
+            /// Timeout without a command, ns.
             within_ns: u64,
-            /// What the device is then.
+            /// State of the stopped device.
             state: StoppedState,
         },
     }
 
     impl Independence {
-        /// Reads what a plugin declares, with a duplicate of its descriptor; nothing of a device that nothing stops.
+        /// Checks a plugin's declaration and duplicates its descriptor; `None` without an independent stop.
         pub(crate) fn of(told: &IndependentStop) -> Result<Option<Self>, Refusal> {
             let wrong = |what: String| Refusal::broken(format!("its independent stop {what}"));
             let state = match told.state {
@@ -198,16 +198,16 @@ pub mod means {
 
 #[cfg(feature = "loader")]
 impl OpenedDevice {
-    /// What stops the device when the host's process is gone; `None` if nothing does. Not real-time.
+    /// Returns the independent stop of the device; `None` if there is none. Not real-time.
     ///
     /// # Errors
-    /// A [`Refusal`] if what the plugin says cannot be used.
+    /// A [`Refusal`] if the plugin's declaration is invalid.
     pub fn independent_stop(&mut self) -> Result<Option<Independence>, Refusal> {
         let ask = self.extensions().independent_stop.and_then(|table| table.independent_stop);
         if ask.is_none() {
             return Ok(None);
         }
-        // What it does not fill is refused.
+        // Invalid initial value: rejected below unless the plugin writes it.
         let unfilled = IndependentStop::by_message(BY_ITSELF, &[0], StoppedState::Zero, 0);
         let Some(told) = self.asked(ask, unfilled) else {
             return Err(Refusal::broken("it does not say how it is stopped without its host"));

@@ -1,8 +1,8 @@
-//! Extension `flotor.linear-field/1`: a model too slow for the loop, as a local linear field the loop evaluates instead.
+//! Extension `flotor.linear-field/1`: local linear field of a model that is too slow for the loop.
 //!
-//! A model that needs milliseconds (a mesh, a network, a solver) runs asynchronously, at a rate of its own. Each time it
-//! says what the wrench is at one pose, the anchor, and how it changes around it; the loop evaluates that at every tick,
-//! at the pose the handle has then.
+//! A model that needs milliseconds (a mesh, a network, a solver) runs asynchronously, at its own rate. Each call
+//! returns the wrench at one pose, the anchor, and the stiffness around it; the loop evaluates this field at every
+//! tick, at the current pose of the handle.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -20,22 +20,22 @@ use crate::{DVec3, ForceModel, Input, Pose, Wrench, rotation_vector};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct LinearField {
-    /// Where it holds exactly.
+    /// Pose at which the field is exact.
     pub anchor: Pose,
-    /// Wrench on the hand there.
+    /// Wrench on the hand at the anchor, N and N·m.
     pub wrench: Wrench,
     /// Rows: force x, y, z (N), torque x, y, z (N·m); columns: position x, y, z (m), rotation x, y, z (rad).
     pub stiffness: [[f64; 6]; 6],
-    /// How far from the anchor it may be believed, m. Beyond, a host holds what it is at that distance.
+    /// Range of validity about the anchor, m. Beyond, a host uses the wrench at that distance.
     pub valid_m: f64,
-    /// The same of rotation, rad.
+    /// Range of validity in rotation, rad.
     pub valid_rad: f64,
-    /// Time of the loop it was computed for, ns.
+    /// Loop time for which the field was computed, ns.
     pub time_ns: u64,
 }
 
 impl LinearField {
-    /// No force anywhere.
+    /// Field without force.
     pub const NONE: Self = Self {
         anchor: Pose::HOME,
         wrench: Wrench::ZERO,
@@ -45,7 +45,7 @@ impl LinearField {
         time_ns: 0,
     };
 
-    /// A force that changes with position only; `slope_n_per_m` is its change for a displacement along x, y and z.
+    /// Builds a field of a force that depends on position only; `slope_n_per_m` is its derivative along x, y and z.
     #[must_use]
     pub fn of_force(input: &Input, force_n: DVec3, slope_n_per_m: [DVec3; 3], valid_m: f64) -> Self {
         let mut stiffness = [[0.0; 6]; 6];
@@ -66,7 +66,7 @@ impl LinearField {
         }
     }
 
-    /// True if every number that enters a wrench is finite. Real-time: bounded, no allocation.
+    /// Returns true if every number that enters a wrench is finite. Real-time: bounded, no allocation.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.anchor.is_finite()
@@ -76,8 +76,8 @@ impl LinearField {
             && self.valid_rad >= 0.0
     }
 
-    /// The wrench at a pose, and whether the pose is where the field may be believed; beyond, the wrench is that at the
-    /// edge in the same direction. Real-time: bounded, no allocation.
+    /// Returns the wrench at a pose, and true if the pose is within the range of validity; beyond, the wrench is that
+    /// at the edge in the same direction. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, pose: &Pose) -> (Wrench, bool) {
         let (position_m, is_near) = shortened(pose.position() - self.anchor.position(), self.valid_m);
@@ -100,7 +100,7 @@ fn shortened(displacement: DVec3, longest: f64) -> (DVec3, bool) {
     if length <= longest { (displacement, true) } else { (displacement * (longest / length), false) }
 }
 
-/// A force model that can say how its wrench changes around a pose.
+/// Force model that computes a local linear field of its wrench.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -135,23 +135,23 @@ fn shortened(displacement: DVec3, longest: f64) -> (DVec3, bool) {
 /// assert!((wrench.force().z - 1.2).abs() < 1e-12);
 /// ```
 pub trait LinearFieldModel: ForceModel {
-    /// The field at an input, the time since the call before (`input.dt_ns`) having passed. A run uses either this or
-    /// [`ForceModel::step`] of an instance, never both. Not real-time, but bounded: a call takes less than the period
-    /// the model was prepared for.
+    /// Returns the field at an input, after the time since the previous call (`input.dt_ns`). A run uses either this
+    /// function or [`ForceModel::step`] of an instance, never both. Not real-time, but bounded: a call takes less than
+    /// the period the model was prepared for.
     fn linear_field(&mut self, input: &Input) -> LinearField;
 }
 
-/// `flotor.linear-field/1`: see [`LinearFieldModel`].
+/// Function table `flotor.linear-field/1`: see [`LinearFieldModel`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct LinearFieldTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// The field at an input, the time since the call before having passed; a [`crate::abi::CallStatus`] code. Not
-    /// real-time, but bounded.
+    /// Writes the field at an input, after the time since the previous call; returns a [`crate::abi::CallStatus`] code.
+    /// Not real-time, but bounded.
     pub linear_field:
         Option<unsafe extern "C" fn(instance: Instance, input: *const Input, field: *mut LinearField) -> u32>,
 }
@@ -176,13 +176,13 @@ table!(LinearFieldTable: "flotor.linear-field/1", M: [LinearFieldModel] {
 
 #[cfg(feature = "loader")]
 impl Model {
-    /// Whether the model can say how its wrench changes around a pose.
+    /// Returns true if the model offers a local linear field.
     #[must_use]
     pub fn has_linear_field(&self) -> bool {
         self.extensions.linear_field.is_some_and(|table| table.linear_field.is_some())
     }
 
-    /// The field at an input. Not real-time. `field` is only meaningful for [`CallStatus::Ok`].
+    /// Computes the field at an input. Not real-time. `field` is only meaningful for [`CallStatus::Ok`].
     pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> CallStatus {
         let Some(ask) = self.extensions.linear_field.and_then(|table| table.linear_field) else {
             return CallStatus::Unsupported;

@@ -1,5 +1,5 @@
-//! Extensions: what a plugin may offer beside its main interface. Each is one file, named as its trait, its table, its id and
-//! its word in [`crate::export_model!`] or [`crate::export_device!`]; one line here makes a host look for it.
+//! Extensions: optional interfaces of a plugin beside its main interface. Each is one file, named like its trait, its table, its
+//! id and its name in [`crate::export_model!`] or [`crate::export_device!`]; one line here makes a host look for it.
 #![allow(unsafe_code)]
 
 pub mod active_region;
@@ -21,12 +21,12 @@ macro_rules! extensions {
         /// Layouts of the structs of all extensions.
         pub(crate) const LAYOUTS: &[&[crate::abi::FieldLayout]] = &[$($($name::LAYOUT),+),+];
 
-        /// What abi_stable says of them.
+        /// Layouts of the structs of all extensions by abi_stable.
         #[cfg(feature = "layout-proof")]
         pub(crate) const PROOFS: &[&[(&str, &abi_stable::type_layout::TypeLayout)]] = &[$($($name::PROOF),+),+];
 
         $(
-            /// The extensions a plugin offers, as a host sees them.
+            /// Extension tables that a plugin offers.
             #[cfg(feature = "loader")]
             #[derive(Clone, Copy)]
             pub(crate) struct $tables {

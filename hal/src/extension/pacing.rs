@@ -1,4 +1,4 @@
-//! Extension `flotor.pacing/1`: a device that can set the pace: the loop waits for its next sample, not for a clock.
+//! Extension `flotor.pacing/1`: pacing of the loop by a device: the loop waits for the next sample, not for a clock.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -8,7 +8,7 @@ use crate::abi::loader;
 use crate::abi::{CallStatus, DevicePlug, Instance};
 use crate::{ActiveDevice, Device};
 
-/// What came of waiting for a sample.
+/// Result of waiting for a sample.
 #[must_use]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleWait {
@@ -16,15 +16,15 @@ pub enum SampleWait {
     NotPaced,
     /// No sample came in time.
     TimedOut,
-    /// A sample is there to be read.
+    /// A sample is ready to be read.
     Arrived {
-        /// Samples taken since the last wait that ended so: 1 on time, more if some came and went unseen.
+        /// Samples taken since the last successful wait: 1 on time, more if samples were missed.
         samples: u64,
     },
 }
 
 impl SampleWait {
-    /// Number of samples that crosses the boundary; 0 for a wait in vain.
+    /// Returns the number of samples for the plugin boundary; 0 after a timeout.
     const fn samples(self) -> u64 {
         match self {
             Self::NotPaced | Self::TimedOut => 0,
@@ -33,7 +33,7 @@ impl SampleWait {
     }
 }
 
-/// An active device that can set the pace of the loop.
+/// Active device that can set the pace of the loop.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -73,23 +73,23 @@ impl SampleWait {
 /// assert_eq!(crank.wait_for_sample(0), SampleWait::TimedOut);
 /// ```
 pub trait PacingDevice: ActiveDevice {
-    /// Blocks until there is a sample that no earlier wait has told of, or until `timeout_ns` have passed. Asked before
-    /// each `read` of a run that the device paces. Real-time but for the waiting: no allocation.
+    /// Waits for a sample that no earlier wait has reported, for `timeout_ns` at most. Called before each `read` of a
+    /// run that the device paces. Real-time but for the waiting: no allocation.
     fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait;
 }
 
-/// `flotor.pacing/1`: see [`PacingDevice`].
+/// Function table `flotor.pacing/1`: see [`PacingDevice`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct PacingTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// Blocks until the device has a sample that no earlier wait has told of, or until `timeout_ns` have passed;
-    /// writes the number of samples taken since the last wait that found any, 0 after a wait in vain. Returns a
-    /// [`crate::abi::CallStatus`] code. Real-time but for the waiting: no allocation.
+    /// Waits for a sample that no earlier wait has reported, for `timeout_ns` at most; writes the number of samples
+    /// taken since the last successful wait, 0 after a timeout. Returns a [`crate::abi::CallStatus`] code. Real-time
+    /// but for the waiting: no allocation.
     pub wait_for_sample:
         Option<unsafe extern "C" fn(instance: Instance, timeout_ns: u64, samples: *mut u64) -> u32>,
 }
@@ -120,7 +120,7 @@ table!(PacingTable: "flotor.pacing/1", D: [Device<Active: PacingDevice>] {
 
 #[cfg(feature = "loader")]
 impl loader::OpenedDevice {
-    /// Whether the device can set the pace of the loop.
+    /// Returns true if the device can set the pace of the loop.
     #[must_use]
     pub fn can_pace(&self) -> bool {
         self.extensions().pacing.is_some_and(|table| table.wait_for_sample.is_some())

@@ -1,8 +1,8 @@
-//! Extension `flotor.shape/1`: what a body looks like that is no slender one, for people to look at.
+//! Extension `flotor.shape/1`: shape of a body that is not slender, for visualisation.
 //!
-//! Primitives (plane, sphere, box, cylinder) for what does not deform and for the tool, and one surface of triangles with
-//! normals and one number a corner, which a name and a unit explain. As with a centreline, an observer makes its own instance of
-//! the model and asks it at its own rate; the servo never calls this.
+//! Primitives (plane, sphere, box, cylinder) for rigid bodies and for the tool, and one triangle surface with normals
+//! and one scalar per vertex, which a name and a unit explain. As with a centreline, an observer creates its own
+//! instance of the model and queries it at its own rate; the servo never calls this.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -14,11 +14,11 @@ use crate::{DVec3, ForceModel, Input, Pose};
 #[cfg(feature = "loader")]
 use std::ptr::null;
 
-/// The form of a [`Primitive`]. In C as a number of this value.
+/// Form of a [`Primitive`]. In C, a number of this value.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// A rectangle across z at the pose; the solid is below it.
+    /// Rectangle across z at the pose; the solid is below the rectangle.
     Plane = 0,
     /// A ball.
     Sphere = 1,
@@ -28,46 +28,46 @@ pub enum Form {
     Cylinder = 3,
 }
 
-/// What a [`Primitive`] is to the hand. In C as a number of this value.
+/// Role of a [`Primitive`]: touched body or tool. In C, a number of this value.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// What is touched.
+    /// Body that the tool touches.
     Body = 0,
-    /// What touches: the hand holds it.
+    /// Tool in the hand.
     Tool = 1,
 }
 
-/// A body of a simple form. 88 bytes.
+/// Body of a simple form. 88 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct Primitive {
-    /// A value of [`Form`].
+    /// Code of a [`Form`].
     form: u32,
-    /// A value of [`Part`].
+    /// Code of a [`Part`].
     part: u32,
-    /// Its centre (m, model frame) and how it is turned.
+    /// Centre (m, model frame) and orientation.
     pose: Pose,
-    /// Half its sides along the axes of the pose, m.
+    /// Half sides along the axes of the pose, m.
     half_sides_m: [f64; 3],
 }
 
 impl Primitive {
-    /// A body of a form, half of its sides given, m: a plane has no third, a sphere three equal ones (its radius), a
+    /// Builds a body from half its sides, m: a plane has no third side, a sphere three equal ones (its radius), a
     /// cylinder its radius twice and half its height.
     #[must_use]
     pub const fn new(form: Form, part: Part, pose: Pose, half_sides_m: [f64; 3]) -> Self {
         Self { form: form as u32, part: part as u32, pose, half_sides_m }
     }
 
-    /// A ball.
+    /// Builds a ball.
     #[must_use]
     pub const fn sphere(part: Part, pose: Pose, radius_m: f64) -> Self {
         Self::new(Form::Sphere, part, pose, [radius_m; 3])
     }
 
-    /// Its form; `None` for one of a later contract.
+    /// Returns the form; `None` for a form of a later contract.
     #[must_use]
     pub const fn form(&self) -> Option<Form> {
         match self.form {
@@ -79,50 +79,50 @@ impl Primitive {
         }
     }
 
-    /// What it is to the hand; anything unknown is a body.
+    /// Returns the role; an unknown code counts as a body.
     #[must_use]
     pub const fn part(&self) -> Part {
         if self.part == Part::Tool as u32 { Part::Tool } else { Part::Body }
     }
 
-    /// Its centre (m, model frame) and how it is turned.
+    /// Returns the centre (m, model frame) and the orientation.
     #[must_use]
     pub const fn pose(&self) -> Pose {
         self.pose
     }
 
-    /// Half its sides along the axes of the pose, m.
+    /// Returns the half sides along the axes of the pose, m.
     #[must_use]
     pub const fn half_sides_m(&self) -> [f64; 3] {
         self.half_sides_m
     }
 }
 
-/// A corner of the surface. 56 bytes.
+/// Vertex of the surface. 56 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct SurfaceVertex {
-    /// Where it is, m, model frame.
+    /// Position, m, model frame.
     pub position_m: [f64; 3],
     /// Outward unit normal.
     pub normal: [f64; 3],
-    /// The field there, in its unit; 0 without a field.
+    /// Value of the field at this vertex, in its unit; 0 without a field.
     pub value: f64,
 }
 
-/// From where a surface is seen. In C as a number of this value.
+/// Visible sides of a surface. In C, a number of this value.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sides {
-    /// From outside: it encloses a body.
+    /// Outside only: the surface encloses a body.
     #[default]
     Outer = 0,
-    /// From both sides: a sheet.
+    /// Both sides: a sheet.
     Both = 1,
 }
 
-/// What the numbers of a surface are. 32 bytes.
+/// Name and unit of the vertex values of a surface. 32 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -135,19 +135,19 @@ impl ScalarField {
     /// No field: the numbers are not shown.
     pub const NONE: Self = Self::new("", "");
 
-    /// In words for people: "contact pressure", "kPa".
+    /// Declares a field by texts for people: "contact pressure", "kPa".
     #[must_use]
     pub const fn new(name: &'static str, unit: &'static str) -> Self {
         Self { name: Str::new(name), unit: Str::new(unit) }
     }
 
-    /// What it is; empty if there is none.
+    /// Returns the name; empty without a field.
     #[must_use]
     pub const fn name(&self) -> &str {
         self.name.as_str()
     }
 
-    /// Its unit; empty for a number without one.
+    /// Returns the unit; empty for a dimensionless number.
     #[must_use]
     pub const fn unit(&self) -> &str {
         self.unit.as_str()
@@ -166,24 +166,24 @@ impl PartialEq for ScalarField {
     }
 }
 
-/// A surface of triangles; empty for none.
+/// Triangle surface; empty for none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
-    /// Its corners.
+    /// Vertices of the triangles.
     pub vertices: Vec<SurfaceVertex>,
-    /// Three corners each, counter-clockwise seen from outside.
+    /// Indices of three vertices each, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// From where it is seen.
+    /// Visible sides.
     pub sides: Sides,
-    /// What its numbers are.
+    /// Name and unit of the vertex values.
     pub field: ScalarField,
 }
 
 impl Surface {
-    /// Makes the normals those of the triangles at each corner, larger ones counting more. Not real-time.
+    /// Computes the vertex normals as means of the adjacent triangles' normals, weighted by area. Not real-time.
     ///
     /// # Panics
-    /// If a triangle has a corner that there is not.
+    /// If a triangle has a vertex index out of range.
     pub fn set_normals(&mut self) {
         let Self { vertices, triangles, .. } = self;
         vertices.iter_mut().for_each(|vertex| vertex.normal = [0.0; 3]);
@@ -201,16 +201,16 @@ impl Surface {
     }
 }
 
-/// What a model looks like at a pose of the handle, in the model frame.
+/// Visible shape of a model at a pose of the handle, in the model frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shape {
     /// Bodies of simple form, and the tool.
     pub primitives: Vec<Primitive>,
-    /// The surface that deforms.
+    /// Deformable surface.
     pub surface: Surface,
 }
 
-/// A force model with a shape of any form. Not real-time.
+/// Force model with a shape of any form. Not real-time.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -237,44 +237,44 @@ pub struct Shape {
 /// assert_eq!(shape.primitives[1].pose(), Pose::HOME);
 /// ```
 pub trait ShapeModel: ForceModel {
-    /// The shape with the handle at an input, with the parameters now in force. The model keeps it until the next call, so that a
-    /// picture allocates nothing. A model with a history shows where it comes to rest if the handle stays there.
+    /// Returns the shape with the handle at an input, with the current parameters. The model stores the shape until the next call, so that
+    /// a picture allocates nothing. A model with a history shows its rest state for a handle that stays at the input.
     fn shape(&mut self, input: &Input) -> &Shape;
 }
 
-/// A [`Shape`] as it crosses the boundary: the plugin's own memory, valid until the next call of the instance. 88 bytes.
+/// View of a [`Shape`] at the plugin boundary: the plugin's own memory, valid until the next call of the instance. 88 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct ShapeView {
-    /// Bodies of simple form, and the tool; may be null if there are none, as the two below.
+    /// Bodies of simple form, and the tool; like the two lists below, may be null if empty.
     pub primitives: *const Primitive,
-    /// Corners of the surface.
+    /// Vertices of the surface.
     pub vertices: *const SurfaceVertex,
-    /// Its triangles: indices of corners, counter-clockwise seen from outside.
+    /// Triangles of the surface: indices of vertices, counter-clockwise seen from outside.
     pub triangles: *const [u32; 3],
     /// Number of primitives.
     pub primitive_count: u32,
-    /// Number of corners.
+    /// Number of vertices.
     pub vertex_count: u32,
     /// Number of triangles.
     pub triangle_count: u32,
-    /// A value of [`Sides`].
+    /// Code of [`Sides`].
     pub sides: u32,
-    /// What the values are; texts are constant.
+    /// Name and unit of the vertex values; the texts are constant.
     pub field: ScalarField,
 }
 
-/// `flotor.shape/1`: see [`ShapeModel`]. Not real-time.
+/// Function table `flotor.shape/1`: see [`ShapeModel`]. Not real-time.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct ShapeTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// The shape at an input; a [`crate::abi::CallStatus`] code.
+    /// Writes the shape at an input; returns a [`crate::abi::CallStatus`] code.
     pub shape:
         Option<unsafe extern "C" fn(instance: Instance, input: *const Input, out: *mut ShapeView) -> u32>,
 }
@@ -300,10 +300,10 @@ impl ShapeView {
         field: ScalarField::NONE,
     };
 
-    /// What a shape looks like across the boundary, as long as it is not changed.
+    /// Returns the view of a shape, valid as long as the shape is not changed.
     fn of(shape: &Shape) -> Self {
         let Shape { primitives, surface: Surface { vertices, triangles, sides, field } } = shape;
-        // A shape that a picture can hold has fewer; a host refuses what is cut off, because indices then lead nowhere.
+        // No shape within the limits has more; a host rejects a saturated count as too large.
         let count = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
         Self {
             primitives: primitives.as_ptr(),
@@ -332,22 +332,22 @@ table!(ShapeTable: "flotor.shape/1", M: [ShapeModel] {
     shape: Some(shape::<M>),
 });
 
-/// Why a model's shape is none.
+/// Reason why a model's shape is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InvalidShape {
     /// The model failed.
     Failed,
-    /// More corners, triangles or primitives than a picture can hold.
+    /// More vertices, triangles or primitives than the limit.
     TooLarge,
-    /// Nothing at all.
+    /// Neither a primitive nor a triangle.
     Empty,
-    /// A list that is not there.
+    /// Null pointer to a list that is not empty.
     Missing,
-    /// A triangle with a corner that there is not.
+    /// Triangle with a vertex index out of range.
     Corner,
-    /// A number that is not finite, or a side that is negative.
+    /// Number that is not finite, or negative side.
     Number,
-    /// A name or a unit that nobody could read.
+    /// Name or unit of the field that is too long.
     Text,
 }
 
@@ -367,18 +367,18 @@ impl std::fmt::Display for InvalidShape {
 
 impl std::error::Error for InvalidShape {}
 
-/// Most corners, triangles or primitives that are read.
+/// Maximum number of vertices, triangles or primitives.
 #[cfg(feature = "loader")]
 const MOST: u32 = 1 << 20;
-/// Longest name or unit.
+/// Maximum length of a name or unit, bytes.
 #[cfg(feature = "loader")]
 const MOST_TEXT_BYTES: usize = 64;
 
 impl Shape {
-    /// Checks what came from elsewhere. Not real-time.
+    /// Checks a shape from another source. Not real-time.
     ///
     /// # Errors
-    /// [`InvalidShape`].
+    /// [`InvalidShape`] if the shape is empty or has an invalid number or index.
     pub fn check(&self) -> Result<(), InvalidShape> {
         let Surface { vertices, triangles, .. } = &self.surface;
         if self.primitives.is_empty() && triangles.is_empty() {
@@ -405,13 +405,13 @@ impl Shape {
 
 #[cfg(feature = "loader")]
 impl Model {
-    /// True if the model has a shape.
+    /// Returns true if the model has a shape.
     #[must_use]
     pub fn has_shape(&self) -> bool {
         self.extensions.shape.is_some_and(|table| table.shape.is_some())
     }
 
-    /// The model's shape at an input, copied and checked. Not real-time: for observers with an instance of their own.
+    /// Returns the model's shape at an input, copied and checked. Not real-time: for observers with their own instance.
     ///
     /// # Errors
     /// [`InvalidShape`]; also for a model without a shape.
@@ -443,7 +443,7 @@ impl Model {
     }
 }
 
-/// A copy of a plugin's list.
+/// Copies a plugin's list.
 ///
 /// # Safety
 /// `first` is null or points at `count` initialised values.

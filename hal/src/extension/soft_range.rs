@@ -1,10 +1,10 @@
-//! Extension `flotor.soft-range/1`: where a live number of a model is usefully moved by hand.
+//! Extension `flotor.soft-range/1`: range in which a live parameter of a model is usefully changed by hand.
 //!
-//! The legal range of a parameter is all that a model can compute, often many powers of ten. A slider over it is of no use and
-//! does harm: a few pixels are a change no hand expects. A slider covers the soft range instead, and a host moves a live
-//! number at a rate that comes from it. A value beyond it is legal, and is typed.
+//! The legal range of a parameter covers all that a model can compute, often many powers of ten. A slider over it is of
+//! no use and does harm: a few pixels are a change no hand expects. A slider covers the soft range instead, and a host
+//! changes a live parameter at a rate derived from it. A value beyond the soft range is legal, and is typed.
 //!
-//! For what a model does not declare, a host takes [`SoftRange::around`] the value in force.
+//! For a parameter without a declared soft range, a host uses [`SoftRange::around`] the current value.
 
 use crate::abi::Str;
 use crate::abi::interface::table;
@@ -13,7 +13,7 @@ use crate::abi::layout::layout;
 use crate::abi::loader::Plugin;
 use crate::{ForceModel, Parameter, ParameterKind};
 
-/// The soft range of one parameter, in its unit. 40 bytes.
+/// Soft range of one parameter, in its unit. 40 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -25,21 +25,21 @@ pub struct SoftRange {
 }
 
 impl SoftRange {
-    /// How many times a positive value may grow or shrink in a range nobody declared.
+    /// Factor by which a positive value may grow or shrink in an undeclared range.
     const FACTOR: f64 = 3.0;
-    /// Half of the width of a range about zero that nobody declared, as a share of the legal range.
+    /// Half width of an undeclared range about zero, as a fraction of the legal range.
     const SHARE: f64 = 0.05;
-    /// Steps of a range nobody declared.
+    /// Number of steps of an undeclared range.
     const STEPS: f64 = 100.0;
 
-    /// Of the parameter with this id: smallest and largest number, and the step of a key, in the parameter's unit.
+    /// Declares the soft range of a parameter: smallest and largest number, and the step of a key, in its unit.
     #[must_use]
     pub const fn new(id: &'static str, min: f64, max: f64, step: f64) -> Self {
         Self { id: Str::new(id), min, max, step }
     }
 
-    /// A range for a parameter whose model declares none: from a third of a value to three times it, and about zero a
-    /// twentieth of the legal range to both sides; never beyond the legal range. `None` for what is no number, or has no width.
+    /// Returns a range for a parameter without a declared one: from a third of a value to three times the value, and about zero a
+    /// twentieth of the legal range to both sides; never beyond the legal range. `None` unless a number with a range.
     #[must_use]
     pub fn around(parameter: &'static Parameter, value: f64) -> Option<Self> {
         let value = if value.is_finite() { value } else { parameter.default() };
@@ -53,7 +53,7 @@ impl SoftRange {
         Self::new(parameter.id(), low, high, (high - low) / Self::STEPS).within(parameter)
     }
 
-    /// The part of it that is legal; `None` for what is no number, and where nothing of it is left.
+    /// Returns the legal part of the range; `None` for a parameter that is not a number, and if no part is legal.
     #[must_use]
     pub fn within(self, parameter: &'static Parameter) -> Option<Self> {
         let is_number = matches!(parameter.kind(), ParameterKind::Real);
@@ -62,53 +62,53 @@ impl SoftRange {
         (is_number && is_range).then_some(Self { min, max, ..self })
     }
 
-    /// Id of the parameter.
+    /// Returns the id of the parameter.
     #[must_use]
     pub const fn id(&self) -> &str {
         self.id.as_str()
     }
 
-    /// Smallest number.
+    /// Returns the smallest number, in the parameter's unit.
     #[must_use]
     pub const fn min(&self) -> f64 {
         self.min
     }
 
-    /// Largest number.
+    /// Returns the largest number, in the parameter's unit.
     #[must_use]
     pub const fn max(&self) -> f64 {
         self.max
     }
 
-    /// The step of a key.
+    /// Returns the step of a key, in the parameter's unit.
     #[must_use]
     pub const fn step(&self) -> f64 {
         self.step
     }
 
-    /// How fast a live request moves the number, in its unit per second: a tenth of the range in 50 ms.
+    /// Returns the rate at which a live request changes the number, in its unit per second: a tenth of the range in 50 ms.
     #[must_use]
     pub fn rate_per_s(&self) -> f64 {
         (self.max - self.min) * 0.1 / 0.05
     }
 }
 
-/// A force model that says where its numbers are usefully moved.
+/// Force model that declares soft ranges of its parameters.
 pub trait SoftRangeModel: ForceModel {
-    /// One for each parameter it says so of.
+    /// Soft ranges, one per declared parameter.
     const SOFT_RANGES: &'static [SoftRange];
 }
 
-/// `flotor.soft-range/1`: see [`SoftRangeModel`].
+/// Function table `flotor.soft-range/1`: see [`SoftRangeModel`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct SoftRangeTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Number of ranges.
     pub range_count: u32,
-    /// The ranges, constant.
+    /// Soft ranges, constant.
     pub ranges: *const SoftRange,
 }
 
@@ -123,7 +123,7 @@ table!(SoftRangeTable: "flotor.soft-range/1", M: [SoftRangeModel] {
 
 #[cfg(feature = "loader")]
 impl Plugin {
-    /// What a model declares; empty for one that does not, and for a device.
+    /// Returns the soft ranges that a model declares; empty without the extension and for a device.
     #[must_use]
     pub fn soft_ranges(&self) -> &'static [SoftRange] {
         match self.model_extensions().and_then(|extensions| extensions.soft_range) {
@@ -135,8 +135,8 @@ impl Plugin {
         }
     }
 
-    /// The soft range of a parameter, declared or [around](SoftRange::around) the value in force; `None` for what is no
-    /// number. Not real-time.
+    /// Returns the soft range of a parameter, declared or [around](SoftRange::around) the current value; `None` for a
+    /// parameter that is not a number. Not real-time.
     #[must_use]
     pub fn soft_range(&self, index: usize, value: f64) -> Option<SoftRange> {
         let parameter = self.parameters().get(index)?;

@@ -1,8 +1,7 @@
-//! Extension `flotor.variant/1`: a model whose settings decide what it serves and whether it remembers.
+//! Extension `flotor.variant/1`: demands and memory of a model that depend on its settings.
 //!
-//! One plugin may hold several laws: a closed form that knows nothing of the past, and an exact solution that
-//! follows its equilibrium from tick to tick. [`crate::ModelInfo`] speaks for all of them, before any is made; this
-//! extension speaks for one instance, once it is.
+//! One plugin may contain several laws: a stateless closed form, and an exact solution that follows its equilibrium
+//! from tick to tick. [`crate::ModelInfo`] covers all of them, before creation; this extension covers one instance.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -12,7 +11,7 @@ use crate::abi::loader::Model;
 use crate::abi::{Instance, ModelPlug};
 use crate::{Demand, ForceModel, Memory};
 
-/// What one instance serves and whether it remembers; the same for its whole life. 8 bytes.
+/// Demands and memory of one instance; constant over its life. 8 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -22,26 +21,26 @@ pub struct VariantInfo {
 }
 
 impl VariantInfo {
-    /// `serves` is at most what [`crate::ModelInfo::serving`] declares for all settings.
+    /// Declares demands and memory; `serves` is at most the demands of [`crate::ModelInfo::serving`] for all settings.
     #[must_use]
     pub const fn new(serves: Demand, memory: Memory) -> Self {
         Self { serves, memory: memory as u32 }
     }
 
-    /// Which demands the instance can serve.
+    /// Returns the demands that the instance can serve.
     #[must_use]
     pub const fn serves(&self) -> Demand {
         self.serves
     }
 
-    /// Whether its answer depends on the path; anything unknown is taken as path-dependent, the safe reading.
+    /// Returns the path dependence of the wrench; an unknown code counts as path-dependent, the safe choice.
     #[must_use]
     pub const fn memory(&self) -> Memory {
         Memory::from_code(self.memory)
     }
 }
 
-/// A force model whose settings decide what it serves and whether it remembers.
+/// Force model whose demands and memory depend on its settings.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -63,20 +62,20 @@ impl VariantInfo {
 /// assert_eq!(foam.variant_info().memory(), Memory::Stateless);
 /// ```
 pub trait VariantModel: ForceModel {
-    /// About this instance, with the settings it was created with. Not real-time.
+    /// Returns demands and memory of this instance, with the settings it was created with. Not real-time.
     fn variant_info(&self) -> VariantInfo;
 }
 
-/// `flotor.variant/1`: see [`VariantModel`]. Not real-time.
+/// Function table `flotor.variant/1`: see [`VariantModel`]. Not real-time.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct VariantTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// About an instance, with the settings it was created with; a [`crate::abi::CallStatus`] code.
+    /// Writes demands and memory of an instance, with the settings it was created with; returns a [`crate::abi::CallStatus`] code.
     pub info: Option<unsafe extern "C" fn(instance: Instance, out: *mut VariantInfo) -> u32>,
 }
 
@@ -96,7 +95,7 @@ table!(VariantTable: "flotor.variant/1", M: [VariantModel] {
 
 #[cfg(feature = "loader")]
 impl Model {
-    /// What the instance says about itself, else what its type says.
+    /// Returns the variant that the instance declares, or else that of its type.
     pub(crate) fn ask_variant(&mut self) -> VariantInfo {
         let of_type = self.variant;
         let ask = self.extensions.variant.and_then(|table| table.info);

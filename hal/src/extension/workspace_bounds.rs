@@ -1,7 +1,7 @@
-//! Extension `flotor.workspace-bounds/1`: how far a force model means the handle to go.
+//! Extension `flotor.workspace-bounds/1`: workspace limits of a force model.
 //!
-//! A spring ends where its coils touch, a table of measured forces where it was measured. Beyond, the model still answers,
-//! but what it says is not what its subject would do. A host puts a wall there, if its own is farther out.
+//! A spring ends where its coils touch, a table of measured forces at the last measurement. Beyond, the model still
+//! returns a wrench, but not that of the real object. A host puts a wall at these limits, if its own is farther out.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -11,7 +11,7 @@ use crate::abi::loader::Model;
 use crate::abi::{Instance, ModelPlug};
 use crate::{DVec3, ForceModel};
 
-/// The positions of the handle, in the model frame, that a model is made for: a box along its axes. 48 bytes.
+/// Positions of the handle, in the model frame, for which a model is valid: a box along the axes. 48 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -21,23 +21,23 @@ pub struct WorkspaceBounds {
 }
 
 impl WorkspaceBounds {
-    /// No end on any axis.
+    /// Bounds without a limit on any axis.
     pub const UNBOUNDED: Self = Self { lower_m: [f64::NEG_INFINITY; 3], upper_m: [f64::INFINITY; 3] };
 
-    /// From `lower_m` to `upper_m`; infinite where there is no end.
+    /// Builds bounds from `lower_m` to `upper_m`; infinite for no limit.
     #[must_use]
     pub const fn between(lower_m: [f64; 3], upper_m: [f64; 3]) -> Self {
         Self { lower_m, upper_m }
     }
 
-    /// Where it ends, m: lower and upper; infinite where there is no end.
+    /// Returns the lower and upper limits, m; infinite for no limit.
     #[must_use]
     pub const fn ends_m(&self) -> [[f64; 3]; 2] {
         [self.lower_m, self.upper_m]
     }
 
-    /// True if there is an end anywhere. A box with home outside, or with a limit that is no number, bounds nothing: a
-    /// wall there would throw the handle out of where a run begins.
+    /// Returns true if there is any limit. A box with home outside, or with a NaN limit, bounds nothing: a wall there
+    /// would throw the handle out of the start position of a run.
     #[must_use]
     pub fn is_bounded(&self) -> bool {
         let (lower, upper) = (DVec3::from_array(self.lower_m), DVec3::from_array(self.upper_m));
@@ -45,7 +45,7 @@ impl WorkspaceBounds {
         holds_home && *self != Self::UNBOUNDED
     }
 
-    /// The way from its nearest point to a position, m; zero inside. Real-time: bounded, no allocation.
+    /// Returns the displacement from the nearest point of the box to a position, m; zero inside. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn beyond(&self, position_m: DVec3) -> DVec3 {
@@ -53,7 +53,7 @@ impl WorkspaceBounds {
     }
 }
 
-/// A force model with an end.
+/// Force model with workspace limits.
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -75,21 +75,21 @@ impl WorkspaceBounds {
 /// assert_eq!(foam.workspace_bounds().beyond(DVec3::X * 0.025), DVec3::X * (0.025 - 0.02));
 /// ```
 pub trait WorkspaceBoundsModel: ForceModel {
-    /// Where it ends, with the parameters now in force. Real-time: bounded, no allocation (asked again after each live
+    /// Returns the limits with the current parameters. Real-time: bounded, no allocation (called again after each live
     /// parameter).
     fn workspace_bounds(&self) -> WorkspaceBounds;
 }
 
-/// `flotor.workspace-bounds/1`: see [`WorkspaceBoundsModel`]. Real-time.
+/// Function table `flotor.workspace-bounds/1`: see [`WorkspaceBoundsModel`]. Real-time.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct WorkspaceBoundsTable {
-    /// Bytes of this table as the plugin knows it.
+    /// Size of this table in the plugin's build, bytes.
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// Where the instance ends, with the parameters now in force; a [`crate::abi::CallStatus`] code.
+    /// Writes the limits with the current parameters; returns a [`crate::abi::CallStatus`] code.
     pub bounds: Option<unsafe extern "C" fn(instance: Instance, out: *mut WorkspaceBounds) -> u32>,
 }
 
@@ -109,8 +109,8 @@ table!(WorkspaceBoundsTable: "flotor.workspace-bounds/1", M: [WorkspaceBoundsMod
 
 #[cfg(feature = "loader")]
 impl Model {
-    /// Where the instance ends, with the parameters now in force: nowhere, unless it says otherwise. Real-time: bounded,
-    /// no allocation.
+    /// Returns the limits of the instance with the current parameters; unbounded without the extension. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn workspace_bounds(&mut self) -> WorkspaceBounds {
         let ask = self.extensions.workspace_bounds.and_then(|table| table.bounds);

@@ -1,12 +1,12 @@
-//! What a host can enforce of what a device says it can do. Not real-time.
+//! Validation of the capabilities that a device declares. Not real-time.
 //!
-//! The envelope takes its limits from these numbers, the boundary its wall, the check of samples its bounds: one that is
-//! missing, endless or contradictory would leave a hand without them. Each refusal names the field and what to mend.
+//! The safety envelope, the boundary wall and the sample check take their limits from these numbers: a missing,
+//! infinite or contradictory number would leave the hand unprotected. Each refusal names the field and the remedy.
 
 use crate::{Axes, Capabilities, Refusal};
 
-/// A number of a capability, by its field. It may be nothing, but has an end: what is beyond no device of this world
-/// has, and is a mistake of unit or of memory.
+/// Value of a capability field with its largest plausible value. Zero is allowed; a value beyond `most` is a mistake of
+/// unit or a corrupt memory.
 struct Number<T> {
     field: &'static str,
     value: T,
@@ -14,16 +14,16 @@ struct Number<T> {
     unit: &'static str,
 }
 
-/// The numbers of the three translations, or of the three rotations.
+/// Capabilities of the three translations, or of the three rotations.
 struct Group {
-    /// Of x, y and z.
+    /// Axis masks of x, y and z.
     axes: [Axes; 3],
     range: Number<[f64; 3]>,
     limit: Number<[f64; 3]>,
     slew: Number<f64>,
 }
 
-/// Faster than any loop, Hz.
+/// Largest plausible rate, beyond any loop, Hz.
 const MOST_RATE_HZ: f64 = 1.0e7;
 
 /// Refuses numbers that no host can enforce.
@@ -62,7 +62,7 @@ pub(super) fn check(told: &Capabilities) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Refuses numbers that are not those told before: the envelope is built once.
+/// Refuses capabilities that differ from those of an earlier call: the envelope is built once.
 pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Result<(), Refusal> {
     if before == now {
         return Ok(());
@@ -99,10 +99,10 @@ impl Group {
         let held = axes.map(|axis| told.actuated.contains(axis) && told.sensed.contains(axis));
         limit
             .is_more_than_nothing_on(driven, "say the most it gives there, or leave it out of `actuated`")?;
-        // Without a range the wall at its edge stands at home.
+        // Without a range the boundary wall would stand at home.
         range.is_more_than_nothing_on(held, "say how far it moves there, or leave it out of `actuated`")?;
         if driven == [false; 3] {
-            // Endless is the slew of nothing, and no slew is none either.
+            // Without an actuated axis the slew has no effect: infinity and 0 are valid.
             return if slew.value >= 0.0 { Ok(()) } else { Err(slew.wrong("must be 0 or more")) };
         }
         slew.has_an_end()?;
@@ -113,7 +113,7 @@ impl Group {
     }
 }
 
-/// Returns numbers as a scene writes them: one alone, several in brackets, the largest with an exponent.
+/// Formats numbers as a scene writes them: a single number plain, several in brackets, very large ones with an exponent.
 fn list(numbers: &[f64]) -> String {
     let words: Vec<String> = numbers.iter().map(|number| format!("{number:?}")).collect();
     match words.iter().map(|word| word.trim_end_matches(".0")).collect::<Vec<_>>()[..] {

@@ -1,19 +1,19 @@
-//! Compares the contract as host and plugin were compiled, and says in one line what differs.
+//! Comparison of the contract layouts of host and plugin; the first difference is reported in one line.
 
 use crate::abi::layout::CORE_COUNT;
 use crate::abi::{Entry, FieldLayout, LAYOUTS};
 
-/// Whether the layouts, which the tables say are equal, were proven a second time.
+/// Result of the second layout proof, after the layout tables compared equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Proof {
-    /// abi_stable found the same, with all signatures of functions.
+    /// abi_stable confirms the layouts, including all function signatures.
     #[cfg_attr(not(feature = "layout-proof"), allow(dead_code))]
     Proven,
-    /// Host or plugin carries no such proof, or the plugin's was made by another abi_stable.
+    /// Host or plugin carries no abi_stable proof, or the plugin used an incompatible abi_stable.
     NotProven,
 }
 
-/// Compares the layout tables and, where both sides carry one, the second proofs.
+/// Compares the layout tables and, if both sides carry an abi_stable proof, the proofs.
 ///
 /// # Safety
 /// `entry` is a live entry whose magic, size and contract version were checked: its pointers may be followed.
@@ -30,8 +30,8 @@ pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
     }
 }
 
-/// First row that differs. A struct of an extension that one side does not know is none: it is not offered, or not asked
-/// for.
+/// Describes the first row that differs. An extension struct known to one side only is no difference: that extension is
+/// not offered or not requested.
 fn difference(ours: &[FieldLayout], theirs: &[FieldLayout]) -> Option<String> {
     let named = |rows: &'_ [FieldLayout], name: &str| rows.iter().copied().find(|row| row.name() == name);
     let at = |row: FieldLayout| match row.name().contains('.') {
@@ -87,7 +87,7 @@ unsafe fn second_proof(entry: &'static Entry) -> Result<Proof, String> {
     Ok(Proof::Proven)
 }
 
-/// The proof at an address, if none of it is missing.
+/// Returns the proof at an address; `None` if null, misaligned or too short.
 ///
 /// # Safety
 /// Null, or the address of a static proof, or of as much of one as the size it starts with says.

@@ -1,12 +1,12 @@
-//! Checks what a plugin's tables declare against its metadata and themselves: mistakes that no layout shows.
+//! Checks of the ids and lists in a plugin's tables, for mistakes that the layout comparison cannot find.
 
 use super::interfaces::Interface;
 use super::model::ModelTables;
 
-/// Most entries of a list.
+/// Maximum number of entries of a list.
 const MOST_ENTRIES: u32 = 4096;
 
-/// Compares the id of the tables with the one of the metadata, and looks for lists that are not where they should be.
+/// Compares the id in the tables with the id in the metadata; rejects a list at a null pointer or above the limit.
 pub(super) fn check(interface: &Interface, id: &str) -> Result<(), String> {
     let (own, has_list, count) = match interface {
         Interface::Model(ModelTables { force, .. }) => {

@@ -1,4 +1,4 @@
-//! A device a host may use, in two types: opened (it answers) and active (it moves hands).
+//! Loaded device, in two types: [`OpenedDevice`] (answers queries) and [`ActiveDevice`] (energised).
 
 use super::capabilities::{check, check_unchanged};
 use super::float_control::keeping_floats;
@@ -9,10 +9,10 @@ use crate::extension::DeviceExtensions;
 use crate::{Axes, Capabilities, Cycle, DeviceState, Fault, LoopConfig, Parameter, Refusal, Tick, Wrench};
 use std::sync::Arc;
 
-/// A function that writes one answer.
+/// Table function that writes one value.
 type Ask<T> = unsafe extern "C" fn(Instance, *mut T) -> u32;
 
-/// One opened instance; closed when the last handle is gone.
+/// Opened instance; closed when the last reference is dropped.
 struct Handle {
     instance: Instance,
     table: &'static DeviceTable,
@@ -35,16 +35,16 @@ impl Drop for Handle {
     }
 }
 
-/// A device that is opened: known, not energised.
+/// Opened device, not energised.
 pub struct OpenedDevice {
     handle: Arc<Handle>,
-    /// What it has said it can do; nothing before it was asked.
+    /// Capabilities returned by the first call; `None` before.
     told: Option<Box<Capabilities>>,
 }
 
-/// A device that is energised. Dropping it deactivates it.
+/// Energised device; deactivated on drop.
 pub struct ActiveDevice {
-    /// `None` only after `deactivate` has taken it.
+    /// `None` only after `deactivate` has taken the handle.
     handle: Option<Arc<Handle>>,
     told: Option<Box<Capabilities>>,
     instance: Instance,
@@ -52,23 +52,23 @@ pub struct ActiveDevice {
     write: unsafe extern "C" fn(Instance, *const Tick, *const Wrench) -> CycleCode,
     /// First result outside the contract, with the function that returned it.
     unknown: Option<(&'static str, CycleCode)>,
-    /// Calls that left the floating-point environment changed.
+    /// Number of calls that changed the floating-point environment.
     pub(crate) float_changes: u64,
-    /// Those that were told.
+    /// Value of `float_changes` at the last [`Self::has_changed_floats`].
     float_changes_told: u64,
 }
 
 // SAFETY: the contract lets an instance be used by any one thread at a time; `&mut self` sees to "one".
 unsafe impl Send for ActiveDevice {}
 
-/// Stops a device from any thread, at any time.
+/// Handle that stops a device from any thread, at any time.
 #[derive(Clone)]
 pub struct Stopper {
     handle: Arc<Handle>,
 }
 
 impl Stopper {
-    /// Actuators safe, now. Bounded, no allocation, no lock.
+    /// Makes the actuators safe at once. Bounded, no allocation, no lock.
     pub fn safe_stop(&self) {
         if let Some(safe_stop) = self.handle.table.safe_stop {
             // SAFETY: a live instance (this handle keeps it open); `safe_stop` may come from any thread.
@@ -94,7 +94,7 @@ impl OpenedDevice {
         let count = u32::try_from(values.len()).unwrap_or(u32::MAX);
         // SAFETY: all pointers are valid for the call, as the contract of `open` asks.
         let opened = || unsafe { open(values.as_ptr(), count, &raw mut message, &raw mut instance) };
-        // Nothing depends on it before the device is active: it is put back, and nobody is told.
+        // Before activation nothing depends on the floating-point environment: a change is restored but not reported.
         let code = keeping_floats(&mut 0, opened);
         refusal_from(code, &message)?;
         if instance.is_null() {
@@ -103,13 +103,13 @@ impl OpenedDevice {
         Ok(Self { handle: Arc::new(Handle { instance, table, extensions, parameters }), told: None })
     }
 
-    /// What the device can be told.
+    /// Returns the parameter schema of the device.
     #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
         self.handle.parameters
     }
 
-    /// The value in force of the parameter at `index`, presets resolved; NaN if unknown.
+    /// Returns the current value of the parameter at `index`, presets resolved; NaN if unknown.
     #[must_use]
     pub fn parameter(&mut self, index: usize) -> f64 {
         let Some(parameter) = self.handle.table.parameter else { return f64::NAN };
@@ -118,10 +118,10 @@ impl OpenedDevice {
         unsafe { parameter(self.handle.instance, index) }
     }
 
-    /// What the device can do: numbers a host can enforce, the same at every call.
+    /// Returns the capabilities of the device: numbers that a host can enforce, the same at every call.
     ///
     /// # Errors
-    /// A [`Refusal`] if the plugin failed, answered numbers that no host can enforce, or others than before.
+    /// A [`Refusal`] if the plugin fails, or if the capabilities cannot be enforced or differ from those of an earlier call.
     pub fn capabilities(&mut self) -> Result<Capabilities, Refusal> {
         let ask = self.handle.table.capabilities;
         let Some(capabilities) = self.asked(ask, UNKNOWN) else {
@@ -132,7 +132,7 @@ impl OpenedDevice {
         Ok(capabilities)
     }
 
-    /// The handle by which another thread stops the device.
+    /// Returns a handle that stops the device from another thread.
     #[must_use]
     pub fn stopper(&self) -> Stopper {
         Stopper { handle: Arc::clone(&self.handle) }
@@ -141,7 +141,7 @@ impl OpenedDevice {
     /// Energises the device.
     ///
     /// # Errors
-    /// The device itself, still open, and its [`Refusal`].
+    /// The opened device and the [`Refusal`], if the device refuses.
     pub fn activate(self, config: &LoopConfig) -> Result<ActiveDevice, (Self, Refusal)> {
         let table = self.handle.table;
         let (Some(activate), Some(read), Some(write)) = (table.activate, table.read, table.write) else {
@@ -178,7 +178,7 @@ impl OpenedDevice {
         self.handle.instance
     }
 
-    /// What a function of this device's tables writes; `None` if there is no such function or it failed.
+    /// Calls a function of this device's tables and returns the value written; `None` if the function is missing or failed.
     pub(crate) fn asked<T>(&mut self, ask: Option<Ask<T>>, answer: T) -> Option<T> {
         asked(self.handle.instance, ask, answer)
     }
@@ -203,7 +203,7 @@ impl ActiveDevice {
         self.known("read", code)
     }
 
-    /// Returns the result that a code stands for; one outside the contract is a fault, and kept for the message.
+    /// Converts a code to a result; a code outside the contract is a fault and is stored for the message.
     #[inline]
     fn known(&mut self, function: &'static str, code: CycleCode) -> Cycle {
         code.cycle().unwrap_or_else(|| {
@@ -212,14 +212,14 @@ impl ActiveDevice {
         })
     }
 
-    /// Calls so far that left rounding mode, flush-to-zero or traps of the thread changed; each time the host has put them
-    /// back. Real-time: bounded, no allocation.
+    /// Returns the number of calls so far that changed the rounding mode, flush-to-zero or traps of the thread; the
+    /// host restored them each time. Real-time: bounded, no allocation.
     #[must_use]
     pub fn float_changes(&self) -> u64 {
         self.float_changes
     }
 
-    /// True if there was such a call since this was asked last. Real-time: bounded, no allocation.
+    /// Returns true if a call changed the floating-point environment since the last query. Real-time: bounded, no allocation.
     #[inline]
     pub fn has_changed_floats(&mut self) -> bool {
         let is_new = self.float_changes != self.float_changes_told;
@@ -237,7 +237,7 @@ impl ActiveDevice {
     }
 
     /// Changes a live parameter, by its index in the schema, at a tick boundary (for a choice, `value` is its index).
-    /// It is checked against the schema here, and by the plugin once more. Real-time: bounded, no allocation.
+    /// The value is checked against the schema here and again by the plugin. Real-time: bounded, no allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         let Some(handle) = &self.handle else { return CallStatus::Unsupported };
         let Some(set_parameter) = handle.table.set_parameter else { return CallStatus::Unsupported };
@@ -255,7 +255,7 @@ impl ActiveDevice {
         self.instance
     }
 
-    /// What a function of this device's tables writes; `None` if there is no such function or it failed.
+    /// Calls a function of this device's tables and returns the value written; `None` if the function is missing or failed.
     pub(crate) fn asked<T>(&mut self, ask: Option<Ask<T>>, answer: T) -> Option<T> {
         asked(self.instance, ask, answer)
     }
@@ -276,7 +276,7 @@ impl ActiveDevice {
         message.for_people()
     }
 
-    /// Zero wrench, then opened again. Not real-time. `None` if the plugin broke.
+    /// Commands zero wrench and returns to the opened phase; `None` if the plugin failed. Not real-time.
     #[must_use]
     pub fn deactivate(mut self) -> Option<OpenedDevice> {
         let handle = self.handle.take()?;
@@ -295,7 +295,7 @@ impl Drop for ActiveDevice {
     }
 }
 
-/// Asks the owner's instance, of whose table the function is; both `asked` above have it by `&mut`.
+/// Calls a function of an instance's table; both `asked` methods above hold the instance by `&mut`.
 fn asked<T>(instance: Instance, ask: Option<Ask<T>>, mut answer: T) -> Option<T> {
     let ask = ask?;
     // SAFETY: a live instance, used by this thread only, an out pointer valid for the call.
@@ -309,7 +309,7 @@ fn deactivate(handle: &Handle) -> CallStatus {
     CallStatus::from_code(keeping_floats(&mut 0, || unsafe { deactivate(handle.instance) }))
 }
 
-/// What the out parameter holds before the plugin fills it: fails every check if it does not.
+/// Initial value of the out parameter; fails every check unless the plugin writes it.
 const UNKNOWN: Capabilities = Capabilities {
     sensed: Axes::NONE,
     actuated: Axes::NONE,

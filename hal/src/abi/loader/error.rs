@@ -1,11 +1,11 @@
-//! Why a plugin was refused: one readable line with file, cause and remedy.
+//! Errors of loading a plugin: one readable line with file, cause and remedy.
 
 use super::platform::link_remedy;
 use crate::abi::{CONTRACT, PluginKind};
 use crate::{Refusal, RefusalKind};
 use std::path::PathBuf;
 
-/// Why a plugin was not loaded. Every variant prints one line: file, cause, what to do.
+/// Reason why a plugin was not loaded. Every variant prints one line: file, cause, remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
@@ -13,27 +13,27 @@ pub enum LoadError {
     #[error("{}: cannot read the plugin: {cause}; check the path and its permissions",
         std::path::absolute(path).as_ref().unwrap_or(path).display())]
     Unreadable {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         cause: std::io::Error,
     },
     /// The file is no shared library, or a damaged one.
     #[error("{}: not a shared library ({cause}); build the plugin again", path.display())]
     NotALibrary {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// What the parser said.
+        /// Error of the parser.
         cause: object::Error,
     },
-    /// The library ends before its own tables say.
+    /// The library is shorter than its own tables require.
     #[error("{}: the file is truncated ({have} bytes of at least {need}); copy or build it again", path.display())]
     Truncated {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// Bytes in the file.
+        /// Length of the file, bytes.
         have: u64,
-        /// Bytes its tables speak of.
+        /// Bytes required by the library's tables.
         need: u64,
     },
     /// The library carries no metadata section.
@@ -42,61 +42,61 @@ pub enum LoadError {
          a plugin needs `export_model!`, `export_device!` or FLOTOR_METADATA", path.display()
     )]
     NotAPlugin {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
     },
-    /// The metadata section does not say what it must.
+    /// The metadata section is malformed or incomplete.
     #[error("{}: unreadable plugin metadata: {cause}; build it with the export macros or the current header", path.display())]
     BadMetadata {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// What is wrong with the text.
+        /// Problem with the metadata text.
         cause: String,
     },
-    /// Built for another contract.
+    /// The plugin was built for another contract.
     #[error(
         "{}: built for plugin contract {theirs}, this host speaks {CONTRACT}; rebuild the plugin against this \
          version", path.display()
     )]
     OtherContract {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// Contract of the plugin.
+        /// Contract version of the plugin.
         theirs: String,
     },
-    /// The dynamic linker refused.
+    /// The dynamic linker rejected the library.
     #[error("{}: the system cannot link the library: {cause}; {}", path.display(), link_remedy(cause))]
     Link {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// What the linker said, all of it.
+        /// Error text of the linker, with all its causes.
         cause: String,
     },
-    /// No private copy could be made.
+    /// The private copy could not be created.
     #[error("{}: cannot make a private copy of the plugin: {cause}; check memory limits", path.display())]
     Copy {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         cause: std::io::Error,
     },
     /// The entry that the metadata names is not exported, or not an entry.
     #[error("{}: no plugin entry `{symbol}` in the library; export it with default visibility", path.display())]
     NoEntry {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// The name in the metadata.
+        /// Name of the entry in the metadata.
         symbol: String,
     },
-    /// The entry is of another kind than the metadata say, or of none the contract knows.
+    /// The kind in the entry differs from the kind in the metadata, or is unknown.
     #[error(
         "{}: the metadata say {metadata}, the entry's `kind` is {entry} ({}); make both say the same and build \
          the plugin again", path.display(), kind_word(*entry)
     )]
     OtherEntryKind {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// What the metadata say.
+        /// Kind in the metadata.
         metadata: &'static str,
         /// Code of the kind in the entry.
         entry: u32,
@@ -104,64 +104,64 @@ pub enum LoadError {
     /// A struct of the contract differs between host and plugin.
     #[error("{}: the contract differs: {difference}; rebuild the plugin against this host's flotor-hal", path.display())]
     LayoutDiffers {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// Which struct and field, on both sides.
+        /// Struct and field that differ, with both layouts.
         difference: String,
     },
-    /// What the plugin declares (ids, texts, parameters) cannot be.
+    /// The plugin declares an invalid id or list.
     #[error("{}: it declares {cause}; correct its tables and build it again", path.display())]
     BadDeclaration {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// What, and what is wrong with it.
+        /// Invalid declaration and its problem.
         cause: String,
     },
-    /// The plugin does not offer the interface its kind promises, or a required function is missing in it.
+    /// The interface of the plugin's kind, or a required function of the interface, is missing.
     #[error("{}: `{interface}` lacks {missing}; a plugin must offer it", path.display())]
     MissingFunction {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// Which interface.
+        /// Id of the interface.
         interface: &'static str,
-        /// Which function, or the whole table.
+        /// Name of the missing function or table.
         missing: &'static str,
     },
-    /// Its list of parameters has counts or texts no host reads.
+    /// The parameter schema has invalid counts or texts.
     #[error("{}: its list of parameters cannot be read: {problem}; correct it and build the plugin again", path.display())]
     Schema {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
-        /// What is wrong.
+        /// Problem with the schema.
         problem: String,
     },
-    /// The plugin is of the other kind.
+    /// The plugin is a device where a model is needed, or vice versa.
     #[error("{}: `{id}` is a {found} plugin, but a {wanted} is needed here; name another plugin", path.display())]
     OtherKind {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
         /// Id of the plugin.
         id: String,
-        /// What it is.
+        /// Kind of the plugin.
         found: &'static str,
-        /// What is needed.
+        /// Kind required.
         wanted: &'static str,
     },
-    /// The plugin itself said no.
+    /// The plugin refused to create a model or to open a device.
     #[error("{}: `{id}` refused: {refusal}{}", path.display(), advice(refusal.kind))]
     Refused {
-        /// The file.
+        /// Path of the plugin.
         path: PathBuf,
         /// Id of the plugin.
         id: String,
-        /// Its reason.
+        /// Refusal returned by the plugin.
         refusal: Refusal,
     },
 }
 
 impl LoadError {
-    /// True if the configuration is wrong: it names no file, a plugin of the other kind, or a parameter that the plugin
-    /// refuses. Otherwise the plugin is.
+    /// Returns true if the configuration is at fault: an unreadable file, a plugin of the other kind, or a parameter
+    /// refused by the plugin. Otherwise the plugin is at fault.
     #[must_use]
     pub fn is_configuration(&self) -> bool {
         match self {
@@ -172,7 +172,7 @@ impl LoadError {
     }
 }
 
-/// What to do about a refusal whose reason does not say it: a plugin that broke gives no remedy.
+/// Returns the remedy for a refusal without one in its reason: only a broken plugin gives none.
 const fn advice(kind: RefusalKind) -> &'static str {
     match kind {
         RefusalKind::Broken => "; report this to the author of the plugin",

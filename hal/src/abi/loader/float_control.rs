@@ -1,4 +1,4 @@
-//! The floating-point environment of the calling thread, kept across the calls of a plugin.
+//! Floating-point environment of the calling thread, restored after each plugin call.
 //!
 //! Rounding mode, flush-to-zero and traps belong to a thread. A plugin that leaves them changed would change every number
 //! that is computed after it: other models, the mapping, a simulated plant. A call therefore ends with the environment it began with.
@@ -7,26 +7,26 @@ use std::arch::asm;
 #[cfg(target_arch = "x86_64")]
 use std::mem::MaybeUninit;
 
-/// The word of a thread that says how numbers are rounded, and what traps.
+/// Floating-point control register of a thread: rounding mode, flush-to-zero and traps.
 #[derive(Clone, Copy)]
 struct FloatControl {
-    /// Beside it, x87 has a word of its own, which no compiled Rust depends on and which the C library changes together with this one.
+    /// The x87 control word is not saved: no compiled Rust depends on that word, and the C library changes both words together.
     #[cfg(target_arch = "x86_64")]
     mxcsr: u32,
     #[cfg(target_arch = "aarch64")]
     fpcr: u64,
 }
 
-/// Flags of MXCSR that each operation may set.
+/// Exception flags of MXCSR, set by ordinary operations.
 #[cfg(target_arch = "x86_64")]
 const STATUS: u32 = 0x3f;
-/// The word with which the system starts x87 in every thread: to the nearest, no traps.
+/// Initial x87 control word of every thread: round to nearest, no traps.
 #[cfg(target_arch = "x86_64")]
 static X87: u16 = 0x037f;
 
 #[cfg(target_arch = "x86_64")]
 impl FloatControl {
-    /// Real-time: bounded, no allocation.
+    /// Reads the control register. Real-time: bounded, no allocation.
     #[inline(always)]
     fn now() -> Self {
         let mut mxcsr = MaybeUninit::<u32>::uninit();
@@ -39,13 +39,13 @@ impl FloatControl {
         Self { mxcsr }
     }
 
-    /// Whether numbers are rounded as with the other; not whether the same has happened. Real-time: bounded, no allocation.
+    /// Compares the control bits, without the exception flags. Real-time: bounded, no allocation.
     #[inline(always)]
     fn is_as(self, other: Self) -> bool {
         (self.mxcsr ^ other.mxcsr) & !STATUS == 0
     }
 
-    /// Real-time: bounded, no allocation.
+    /// Restores the control register and resets x87. Real-time: bounded, no allocation.
     #[cold]
     fn restore(self) {
         // SAFETY: the first word was this thread's own when the call began, hence legal, and that is what compiled code relies on;
@@ -63,7 +63,7 @@ impl FloatControl {
 
 #[cfg(target_arch = "aarch64")]
 impl FloatControl {
-    /// Real-time: bounded, no allocation.
+    /// Reads the control register. Real-time: bounded, no allocation.
     #[inline(always)]
     fn now() -> Self {
         let fpcr: u64;
@@ -72,13 +72,13 @@ impl FloatControl {
         Self { fpcr }
     }
 
-    /// Whether numbers are rounded as with the other. Real-time: bounded, no allocation.
+    /// Compares the control bits. Real-time: bounded, no allocation.
     #[inline(always)]
     fn is_as(self, other: Self) -> bool {
         self.fpcr == other.fpcr
     }
 
-    /// Real-time: bounded, no allocation.
+    /// Restores the control register. Real-time: bounded, no allocation.
     #[cold]
     fn restore(self) {
         // SAFETY: the register held this value when the call began; that is what compiled code relies on.
@@ -99,8 +99,8 @@ impl FloatControl {
     fn restore(self) {}
 }
 
-/// Runs a call of a plugin; afterwards the environment is what it was. A call that changed it is counted. Real-time: the
-/// call, and six instructions.
+/// Runs a plugin call, restores the floating-point environment, and increments `changed` if the call modified it.
+/// Real-time: the call plus six instructions.
 #[inline(always)]
 pub(crate) fn keeping_floats<T>(changed: &mut u64, call: impl FnOnce() -> T) -> T {
     let before = FloatControl::now();

@@ -1,4 +1,4 @@
-//! Finds the function tables behind an entry, and reads none that is shorter than the contract's.
+//! Lookup of the function tables behind an entry; tables shorter than the contract's are rejected.
 
 use super::LoadError;
 use super::model::ModelTables;
@@ -16,11 +16,11 @@ pub(super) enum Interface {
 }
 
 impl Interface {
-    /// Asks a plugin for the tables of its kind. Not real-time; runs the plugin's code.
+    /// Gets the tables of a plugin by its kind. Not real-time; runs the plugin's code.
     ///
     /// # Errors
-    /// [`LoadError::MissingFunction`]: the interface or a required function of it is not there, or a table,
-    /// be it of an extension, is shorter than the contract's.
+    /// [`LoadError::MissingFunction`] if the interface or a required function is missing, or if a table, also of an
+    /// extension, is shorter than the contract's.
     ///
     /// # Safety
     /// `entry` is the entry of a plugin that keeps the contract: `get_interface` answers any id with null or
@@ -44,7 +44,7 @@ impl Interface {
 
 type GetInterface = unsafe extern "C" fn(id: Str) -> *const c_void;
 
-/// What a plugin offers. Its function answers as [`Interface::find`] demands.
+/// Table lookup of a plugin. `get_interface` meets the conditions of [`Interface::find`].
 pub(crate) struct Offers<'a> {
     path: &'a Path,
     get_interface: GetInterface,
@@ -83,8 +83,8 @@ impl Offers<'_> {
         self.table()?.ok_or_else(|| self.lacks(T::ID, "its function table"))
     }
 
-    /// The table behind an id; `None` if the plugin does not offer it. A short one is a mistake and no older
-    /// contract: this one fixed the sizes of all tables.
+    /// Returns the table of an id; `None` if the plugin does not offer the table. A table that is too short is a
+    /// mistake, not an older contract: the contract fixes the sizes of all tables.
     pub(crate) fn table<T: Table>(&self) -> Result<Option<&'static T>, LoadError> {
         // SAFETY: the plugin keeps the contract ([`Interface::find`]), by which any id may be asked for; this
         // one lives for ever.

@@ -13,16 +13,16 @@ use crate::{DeviceInfo, ModelInfo, Parameter};
 use object::ReadCache;
 use std::path::{Path, PathBuf};
 
-/// Whose Rust runtime a plugin's panics happen in.
+/// Rust runtime that handles a plugin's panics.
 #[derive(Clone, Copy)]
 enum Runtime {
-    /// Its own: the library was opened with `dlopen`.
+    /// The plugin's own runtime: the library was opened with `dlopen`.
     Own,
-    /// This program's: the plugin is linked in.
+    /// The runtime of this program: the plugin is linked in.
     Shared,
 }
 
-/// A plugin whose contract has been checked. Cheap to clone: it is two pointers to statics and its metadata.
+/// Plugin whose contract has been checked. Cheap to clone: two pointers to statics and the metadata.
 #[derive(Clone)]
 pub struct Plugin {
     metadata: Metadata,
@@ -74,7 +74,7 @@ impl Plugin {
     pub fn in_process(entry: &'static Entry) -> Result<Self, LoadError> {
         let metadata = Metadata {
             path: PathBuf::new(),
-            // The entry's own word: there is no other. One that is unknown is refused in `from_entry`.
+            // The kind in the entry is the only source here; `from_entry` rejects an unknown kind.
             kind: PluginKind::from_code(entry.kind).unwrap_or(PluginKind::Model),
             id: String::new(),
             name: String::new(),
@@ -97,7 +97,7 @@ impl Plugin {
         Ok(plugin)
     }
 
-    /// Checks an entry and what is behind it, each thing before anything relies on it.
+    /// Checks an entry and its tables, each part before its first use.
     ///
     /// # Safety
     /// `entry` is null or the address of eight bytes and more that stay for ever. If those are the magic,
@@ -151,25 +151,25 @@ impl Plugin {
         Ok(Self { metadata, interface, parameters, proof })
     }
 
-    /// What the plugin says about itself.
+    /// Returns the metadata of the plugin.
     #[must_use]
     pub fn metadata(&self) -> &Metadata {
         &self.metadata
     }
 
-    /// Whether abi_stable proved the layouts a second time; the contract's own layout tables are always compared.
+    /// Returns true if abi_stable also proved the layouts; the contract's own layout tables are always compared.
     #[must_use]
     pub fn layouts_proven(&self) -> bool {
         self.proof == check::Proof::Proven
     }
 
-    /// What the plugin can be told.
+    /// Returns the parameter schema of the plugin.
     #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
         self.parameters
     }
 
-    /// What a model says about itself; `None` for a device.
+    /// Returns the declaration of a model; `None` for a device.
     #[must_use]
     pub fn model_info(&self) -> Option<ModelInfo> {
         match self.interface {
@@ -178,7 +178,7 @@ impl Plugin {
         }
     }
 
-    /// What a device says about itself; `None` for a model.
+    /// Returns the declaration of a device; `None` for a model.
     #[must_use]
     pub fn device_info(&self) -> Option<DeviceInfo> {
         match self.interface {
@@ -187,10 +187,10 @@ impl Plugin {
         }
     }
 
-    /// Makes a model. Not real-time.
+    /// Creates a model. Not real-time.
     ///
     /// # Errors
-    /// [`LoadError::OtherKind`] for a device, [`LoadError::Refused`] if the plugin says no.
+    /// [`LoadError::OtherKind`] for a device, [`LoadError::Refused`] if the plugin refuses.
     pub fn create_model(&self, settings: &[Setting]) -> Result<Model, LoadError> {
         let Interface::Model(tables) = self.interface else {
             return Err(self.other_kind(PluginKind::Model));
@@ -201,7 +201,7 @@ impl Plugin {
     /// Opens a device. Not real-time; may block.
     ///
     /// # Errors
-    /// [`LoadError::OtherKind`] for a model, [`LoadError::Refused`] if the plugin says no.
+    /// [`LoadError::OtherKind`] for a model, [`LoadError::Refused`] if the plugin refuses.
     pub fn open_device(&self, settings: &[Setting]) -> Result<OpenedDevice, LoadError> {
         let Interface::Device { device, extensions } = self.interface else {
             return Err(self.other_kind(PluginKind::Device));
@@ -210,7 +210,7 @@ impl Plugin {
             .map_err(|refusal| self.refused(refusal))
     }
 
-    /// The extensions of a device; `None` for a model.
+    /// Returns the extensions of a device; `None` for a model.
     pub(crate) fn device_extensions(&self) -> Option<&DeviceExtensions> {
         match &self.interface {
             Interface::Device { extensions, .. } => Some(extensions),
@@ -218,7 +218,7 @@ impl Plugin {
         }
     }
 
-    /// The extensions of a model; `None` for a device.
+    /// Returns the extensions of a model; `None` for a device.
     pub(crate) fn model_extensions(&self) -> Option<&ModelExtensions> {
         match &self.interface {
             Interface::Model(tables) => Some(&tables.extensions),
@@ -236,7 +236,7 @@ impl Plugin {
     }
 }
 
-/// The entry at an address, if there is one and none of it is missing.
+/// Returns the entry at an address; `None` if null, misaligned, too short or without the magic.
 ///
 /// # Safety
 /// As for [`Plugin::from_entry`].

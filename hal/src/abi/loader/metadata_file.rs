@@ -1,4 +1,4 @@
-//! Reads what a file says about itself without running any of it.
+//! Metadata of a plugin file, read without running the plugin's code.
 
 use super::{LoadError, platform};
 use crate::abi::{CONTRACT, PluginKind};
@@ -6,22 +6,22 @@ use object::{ReadCache, ReadRef};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// What a plugin says about itself.
+/// Metadata of a plugin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Metadata {
-    /// The file it was read from; empty for a plugin linked into this program.
+    /// Path of the plugin file; empty for a plugin linked into this program.
     pub path: PathBuf,
     /// Model or device.
     pub kind: PluginKind,
-    /// What scenes and commands call it.
+    /// Id in scenes and commands.
     pub id: String,
-    /// What people call it.
+    /// Display name.
     pub name: String,
-    /// One sentence for people.
+    /// Description in one sentence.
     pub doc: String,
     /// Version of the plugin.
     pub version: String,
-    /// Contract it was built for, as [`CONTRACT`].
+    /// Contract version of the plugin's build, in the form of [`CONTRACT`].
     pub abi: String,
     /// Name of the exported entry.
     pub entry: String,
@@ -30,16 +30,16 @@ pub struct Metadata {
 /// Reads the metadata of a plugin file. Runs and maps none of its code. Not real-time.
 ///
 /// # Errors
-/// Everything of [`LoadError`] that can be known without `dlopen`, except the contract version, which a list
-/// may want to show: see [`Metadata::check_contract`].
+/// Any [`LoadError`] that can be found without `dlopen`, except a wrong contract version, which a list may want to
+/// show: see [`Metadata::check_contract`].
 pub fn read_metadata(path: &Path) -> Result<Metadata, LoadError> {
     let (file, length) = open_regular(path)?;
     // Reads headers, their names and one section, no symbols: a folder of large libraries is listed in a millisecond.
     parse(path, &ReadCache::new(file), length)
 }
 
-/// Opens what is to be a library, and says how long it is, bytes. Whatever else has the name is never opened: a pipe
-/// would wait for a writer for ever.
+/// Opens a regular file and returns it with its length, bytes. Other kinds of files are never opened: a pipe would wait
+/// for a writer for ever.
 pub(super) fn open_regular(path: &Path) -> Result<(File, u64), LoadError> {
     let unreadable = |cause| LoadError::Unreadable { path: path.into(), cause };
     let attributes = std::fs::metadata(path).map_err(unreadable)?;
@@ -56,7 +56,7 @@ impl Metadata {
     /// Checks that the plugin was built for the contract this host speaks.
     ///
     /// # Errors
-    /// [`LoadError::OtherContract`], unless it is [`CONTRACT`].
+    /// [`LoadError::OtherContract`], unless the version is [`CONTRACT`].
     pub fn check_contract(&self) -> Result<(), LoadError> {
         if self.abi == CONTRACT {
             return Ok(());
@@ -65,7 +65,7 @@ impl Metadata {
     }
 }
 
-/// Finds and reads the metadata section of the bytes of a library.
+/// Parses the metadata section of a library.
 pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Result<Metadata, LoadError> {
     let text = platform::metadata_section(path, data, length)?;
     let bad = |cause: String| LoadError::BadMetadata { path: path.into(), cause };
@@ -94,11 +94,11 @@ pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Res
     })
 }
 
-/// A line `key = "value"`, the one form of TOML that metadata use.
+/// Parses a line `key = "value"`, the only form of TOML in metadata.
 fn key_and_value(line: &str) -> Option<(&str, &str)> {
     let (key, value) = line.split_once('=')?;
     let value = value.trim().strip_prefix('"')?.strip_suffix('"')?;
-    // A control character would go to a terminal.
+    // Reject control characters: the text is printed to terminals.
     let is_plain = |sign: char| !matches!(sign, '"' | '\\') && !sign.is_control();
     value.chars().all(is_plain).then_some((key.trim(), value))
 }

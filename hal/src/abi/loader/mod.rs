@@ -1,10 +1,10 @@
-//! The host's side of the contract: find out what a file is, open it, prove that both sides mean the same
-//! structs, and wrap its tables in types that cannot be called in the wrong order.
+//! Host side of the contract: identifies a plugin file, opens it, compares the struct layouts of both sides, and wraps
+//! its tables in types that cannot be called in the wrong order.
 //!
 //! Order of a load, each step cheaper and safer than the next:
 //! file -> ELF section with metadata -> contract version -> private copy -> `dlopen` -> entry -> kind ->
-//! layouts -> interface table -> declarations. Nothing of the plugin runs before `dlopen`, and a file that fails before it
-//! never gets that far: a truncated library would otherwise raise SIGBUS inside `dlopen`.
+//! layouts -> interface table -> declarations. No code of the plugin runs before `dlopen`, and a file that fails an
+//! earlier check is never opened: a truncated library would otherwise raise SIGBUS inside `dlopen`.
 
 mod capabilities;
 mod check;

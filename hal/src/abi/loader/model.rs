@@ -1,4 +1,4 @@
-//! A force model a host may call: an instance and its function table.
+//! Loaded force model: an instance and its function table.
 
 use super::float_control::keeping_floats;
 use super::setting::{Setting, index_of, live_index, to_raw};
@@ -16,16 +16,16 @@ pub(super) struct ModelTables {
     pub(super) extensions: ModelExtensions,
 }
 
-/// One instance of a force model. Used by one thread at a time.
+/// Instance of a force model. Used by one thread at a time.
 pub struct Model {
     pub(crate) instance: Instance,
-    /// Copied out of the table: one load less in every tick.
+    /// Copied from the table to save a load in every tick.
     step: StepFn,
     table: &'static ForceTable,
     pub(crate) extensions: ModelExtensions,
     pub(crate) variant: VariantInfo,
     parameters: &'static [Parameter],
-    /// Calls that left the floating-point environment changed.
+    /// Number of calls that changed the floating-point environment.
     pub(crate) float_changes: u64,
 }
 
@@ -62,7 +62,7 @@ impl Model {
         Ok(model)
     }
 
-    /// What a function of this instance's tables writes; `None` if there is no such function or it failed.
+    /// Calls a function of this instance's tables and returns the value written; `None` if the function is missing or failed.
     pub(crate) fn asked<T>(
         &mut self,
         ask: Option<unsafe extern "C" fn(Instance, *mut T) -> u32>,
@@ -75,19 +75,19 @@ impl Model {
         (code == CallStatus::Ok as u32).then_some(answer)
     }
 
-    /// What the model says about itself, whatever its settings.
+    /// Returns the model's declaration, which holds for all settings.
     #[must_use]
     pub fn info(&self) -> &ModelInfo {
         &self.table.info
     }
 
-    /// What the model can be told.
+    /// Returns the parameter schema of the model.
     #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
         self.parameters
     }
 
-    /// What is wrong with its last message, whatever it is about: that it is too long for one, or no text. Not real-time.
+    /// Returns the format error of the last message: too long or not UTF-8; `None` if valid. Not real-time.
     #[must_use]
     pub fn message_problem(&mut self) -> Option<String> {
         let mut message = Message::default();
@@ -98,27 +98,27 @@ impl Model {
         message.problem()
     }
 
-    /// Which demands it can serve, with the settings it was created with.
+    /// Returns the demands that the model serves with the settings it was created with.
     #[must_use]
     pub fn serves(&self) -> Demand {
         self.variant.serves()
     }
 
-    /// Whether the answer depends on the path, with the settings it was created with.
+    /// Returns the path dependence of the model with the settings it was created with.
     #[must_use]
     pub fn memory(&self) -> Memory {
         self.variant.memory()
     }
 
-    /// Calls so far that left rounding mode, flush-to-zero or traps of the thread changed; each time the host has put them
-    /// back. Real-time: bounded, no allocation.
+    /// Returns the number of calls so far that changed the rounding mode, flush-to-zero or traps of the thread; the
+    /// host restored them each time. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn float_changes(&self) -> u64 {
         self.float_changes
     }
 
-    /// Last chance for the model to allocate before the loop starts. Not real-time.
+    /// Prepares the model for the loop: its last opportunity to allocate. Not real-time.
     ///
     /// # Errors
     /// The model's [`Refusal`].
@@ -131,7 +131,7 @@ impl Model {
         refusal_from(code, &message)
     }
 
-    /// One step. Real-time: bounded by the model, no allocation. `output` is only meaningful for [`CallStatus::Ok`].
+    /// Computes one step. Real-time: bounded by the model, no allocation. `output` is only meaningful for [`CallStatus::Ok`].
     #[inline]
     pub fn step(&mut self, input: &Input, output: &mut Output) -> CallStatus {
         // SAFETY: as in `prepare`.
@@ -139,7 +139,7 @@ impl Model {
         CallStatus::from_code(keeping_floats(&mut self.float_changes, stepped))
     }
 
-    /// Steps through poses in order; the shorter slice decides how many. Real-time per pose.
+    /// Steps through inputs in order, up to the length of the shorter slice. Real-time per pose.
     pub fn step_batch(&mut self, inputs: &[Input], outputs: &mut [Output]) -> CallStatus {
         let count = inputs.len().min(outputs.len());
         if let Some(step_batch) = self.table.step_batch {
@@ -158,7 +158,7 @@ impl Model {
     }
 
     /// Changes a live parameter, by its index in the schema, at a tick boundary (for a choice, `value` is its index).
-    /// It is checked against the schema here, and by the plugin once more. Real-time: bounded, no allocation.
+    /// The value is checked against the schema here and again by the plugin. Real-time: bounded, no allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         let Some(set_parameter) = self.table.set_parameter else { return CallStatus::Unsupported };
         let Some(index) = live_index(self.parameters, index, value) else { return CallStatus::OutOfRange };
@@ -167,7 +167,7 @@ impl Model {
         CallStatus::from_code(keeping_floats(&mut self.float_changes, set))
     }
 
-    /// The value in force of the parameter at `index`, presets resolved; NaN if unknown. Real-time.
+    /// Returns the current value of the parameter at `index`, presets resolved; NaN if unknown. Real-time.
     #[must_use]
     pub fn parameter(&mut self, index: usize) -> f64 {
         let Some(parameter) = self.table.parameter else { return f64::NAN };
@@ -176,14 +176,14 @@ impl Model {
         keeping_floats(&mut self.float_changes, || unsafe { parameter(self.instance, index) })
     }
 
-    /// Forgets history. Real-time: bounded, no allocation.
+    /// Clears the history. Real-time: bounded, no allocation.
     pub fn reset(&mut self) -> CallStatus {
         let Some(reset) = self.table.reset else { return CallStatus::Ok };
         // SAFETY: as in `prepare`.
         CallStatus::from_code(keeping_floats(&mut self.float_changes, || unsafe { reset(self.instance) }))
     }
 
-    /// What the model said when a call failed. Not real-time.
+    /// Returns the model's message about the call that failed. Not real-time.
     #[must_use]
     pub fn last_message(&mut self) -> String {
         let mut message = Message::default();
@@ -206,7 +206,7 @@ impl Drop for Model {
     }
 }
 
-/// Turns the code of a refusing call into a [`Refusal`].
+/// Converts the return code of a refusable call to a result; 0 is success.
 pub(crate) fn refusal_from(code: u32, message: &Message) -> Result<(), Refusal> {
     if code == 0 {
         return Ok(());

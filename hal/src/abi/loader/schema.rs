@@ -1,14 +1,14 @@
-//! Checks what a plugin says of itself before anybody relies on its lengths: counts and texts are a foreign library's.
+//! Validation of a plugin's parameter schema: counts and texts come from a foreign library and are checked before use.
 
 use crate::Parameter;
 use crate::abi::{Choices, Str};
 
-/// Most parameters of a plugin, and most choices of one.
+/// Maximum number of parameters of a plugin, and of choices of a parameter.
 const MOST_ENTRIES: usize = 4096;
-/// Most bytes of a text.
+/// Maximum length of a text, bytes.
 const MOST_BYTES: usize = 64 * 1024;
 
-/// The schema of a table, if its counts and texts are within what a host reads; else what is wrong.
+/// Returns the schema of a table, or the problem if a count or a text is invalid.
 ///
 /// # Safety
 /// `parameters` is null or the address of `count` parameters that stay for ever, as far as `count` is legal.
@@ -45,7 +45,7 @@ fn check_choices(choices: &Choices) -> Result<(), String> {
     choices.as_slice().iter().try_for_each(|choice| check_text("choice", choice))
 }
 
-/// That a text can be shown to a person.
+/// Checks a text for display: length, UTF-8, and no control characters except line breaks.
 pub(super) fn check_text(name: &str, text: &Str) -> Result<(), String> {
     let bytes = text.bytes();
     if bytes > MOST_BYTES {

@@ -1,9 +1,9 @@
-//! What a person typed (`spring.gamma_n=17`) into what a plugin understands, checked against its schema.
+//! Conversion of user input (`spring.gamma_n=17`) to parameter values, checked against a plugin's schema.
 
 use crate::abi::Str;
 use crate::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Refusal};
 
-/// One checked value for one parameter of one plugin's schema. A plugin takes no setting of another's.
+/// Checked value of one parameter of a plugin's schema. Plugins with another schema reject the setting.
 #[derive(Clone, Debug)]
 pub struct Setting {
     parameter: &'static Parameter,
@@ -12,7 +12,7 @@ pub struct Setting {
     text: String,
 }
 
-/// Why a setting is refused. Prints what, and what would be right.
+/// Error in a setting. Prints the problem and the valid values.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SettingError {
@@ -20,45 +20,45 @@ pub enum SettingError {
     #[error("no parameter `{id}`; {}",
         nearest.as_ref().map_or("`flotor plugins ID` lists them".to_owned(), |n| format!("did you mean `{n}`?")))]
     Unknown {
-        /// The id in the request.
+        /// Requested id.
         id: String,
-        /// The most similar id, if one is similar at all.
+        /// Most similar id, if similar enough.
         nearest: Option<String>,
     },
-    /// A number was expected.
+    /// The value is not a number.
     #[error("`{id}` must be a number{}, not `{value}`", if unit.is_empty() { String::new() } else { format!(" in {unit}") })]
     NotANumber {
-        /// The parameter.
+        /// Id of the parameter.
         id: String,
-        /// Its unit.
+        /// Unit of the parameter; empty if dimensionless.
         unit: String,
-        /// What was given.
+        /// Rejected value.
         value: String,
     },
     /// The number is outside the range.
     #[error("`{id}` = {}: must be {} to {}{}", range.value, range.min, range.max, if unit.is_empty() { String::new() } else { format!(" {unit}") })]
     OutOfRange {
-        /// The parameter.
+        /// Id of the parameter.
         id: String,
-        /// Its unit.
+        /// Unit of the parameter; empty if dimensionless.
         unit: String,
-        /// The number and its range.
+        /// Number and its legal range.
         range: OutOfRange,
     },
-    /// Not one of the choices.
+    /// The value is not one of the choices.
     #[error("`{id}` = `{value}`: must be {}", choices.join(" | "))]
     NotAChoice {
-        /// The parameter.
+        /// Id of the parameter.
         id: String,
-        /// What was given.
+        /// Rejected value.
         value: String,
-        /// What there is.
+        /// Valid choices.
         choices: Vec<String>,
     },
 }
 
 impl Setting {
-    /// Reads a value for the parameter `id` of a schema.
+    /// Parses a value for the parameter `id` of a schema.
     ///
     /// # Errors
     /// [`SettingError`] with the closest valid id, the range, or the choices.
@@ -70,7 +70,7 @@ impl Setting {
             }
             ParameterKind::Choice => {
                 let names = parameter.choices();
-                // A scene may write true or false.
+                // Scenes may use the booleans true and false.
                 let is_it = |name: &Str| matches!((name.as_str(), value), ("on", "true") | ("off", "false"));
                 let choice = names.iter().position(|name| name.as_str() == value || is_it(name));
                 let choice = choice.ok_or_else(|| SettingError::NotAChoice {
@@ -91,7 +91,7 @@ impl Setting {
         }
     }
 
-    /// Takes a number for the parameter `id` of a schema (for a choice, its index).
+    /// Checks a number for the parameter `id` of a schema (for a choice, its index).
     ///
     /// # Errors
     /// [`SettingError`] with the closest valid id or the range.
@@ -105,19 +105,19 @@ impl Setting {
         Ok(Self { parameter, index, number, text: String::new() })
     }
 
-    /// Index of the parameter in its schema.
+    /// Returns the index of the parameter in its schema.
     #[must_use]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
-    /// The number (for a choice, its index; 0 for texts and files).
+    /// Returns the number (for a choice, its index; 0 for texts and files).
     #[must_use]
     pub fn value(&self) -> f64 {
         self.number
     }
 
-    /// The value as a person would type it.
+    /// Returns the value in the form in which a person would type it.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked indices of a few choices
     pub fn display(&self) -> String {
@@ -131,10 +131,10 @@ impl Setting {
     }
 }
 
-/// The form that crosses the boundary.
+/// Converts settings to the form of the plugin boundary.
 ///
 /// # Errors
-/// A [`Refusal`] if one of them was made for another schema: its index would mean another parameter, or none.
+/// A [`Refusal`] if a setting was made for another schema: its index would mean another parameter, or none.
 ///
 /// # Safety
 /// The result must not outlive `settings`.
@@ -156,12 +156,12 @@ pub(super) unsafe fn to_raw(
     settings.iter().map(raw).collect()
 }
 
-/// The index that crosses the boundary, if the schema has it.
+/// Converts an index for the plugin boundary; `None` outside the schema.
 pub(super) fn index_of(schema: &[Parameter], index: usize) -> Option<u32> {
     u32::try_from(index).ok().filter(|_| index < schema.len())
 }
 
-/// The same of a live parameter that may take a value.
+/// Converts the index of a live parameter for the plugin boundary; `None` if the parameter cannot take the value.
 pub(super) fn live_index(schema: &[Parameter], index: usize, value: f64) -> Option<u32> {
     let parameter = schema.get(index)?;
     let is_legal = parameter.mutability() == Mutability::Live && parameter.check(value).is_ok();
@@ -171,17 +171,17 @@ pub(super) fn live_index(schema: &[Parameter], index: usize, value: f64) -> Opti
 fn find(schema: &'static [Parameter], id: &str) -> Result<(u32, &'static Parameter), SettingError> {
     let found = (0u32..).zip(schema).find(|(_, parameter)| parameter.id() == id);
     found.ok_or_else(|| {
-        // Who writes `spring.gamma_n` has named the plugin twice.
+        // The key of `spring.gamma_n`: the plugin is already named.
         let key = id.rsplit_once('.').map_or(id, |(_, key)| key);
         let nearest = nearest(key, schema.iter().map(Parameter::id)).map(str::to_owned);
         SettingError::Unknown { id: id.to_owned(), nearest }
     })
 }
 
-/// The known word most like `word`, if any is like it at all. Not real-time.
+/// Returns the known word most similar to `word`; `None` below a threshold. Not real-time.
 pub fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<&'k str> {
-    // Jaro-Winkler: a letter that is wrong, missing or swapped leaves 0.9 and more, an ending of its own (`rz_deg` for
-    // `rz_rad`) 0.84; words that only share letters (`jelly` and `wall`: 0.63, `balls` and `wall`: 0.78) stay below.
+    // Jaro-Winkler similarity: one wrong, missing or swapped character gives at least 0.9, a different ending (`rz_deg` for
+    // `rz_rad`) 0.84; words that only share characters (`jelly` and `wall`: 0.63, `balls` and `wall`: 0.78) score lower.
     const ALIKE: f64 = 0.8;
     let scored = known.map(|candidate| (strsim::jaro_winkler(word, candidate), candidate));
     scored

@@ -15,16 +15,16 @@ use std::os::fd::{AsRawFd, BorrowedFd, OwnedFd};
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
-/// Lowest number of a duplicate: not one of the three that every process has.
+/// Lowest number of a duplicate descriptor, above the three standard streams.
 const LOWEST_DESCRIPTOR: i32 = 3;
 
-/// What is kept of a plugin's descriptor.
+/// Duplicate of a plugin's descriptor.
 pub(crate) type Handle = OwnedFd;
 
-/// A duplicate of a descriptor that can be written; it stays when the plugin closes its own.
+/// Duplicates a writable descriptor; the duplicate stays open when the plugin closes the original.
 ///
 /// # Errors
-/// What is wrong with the descriptor.
+/// A description of the problem if the descriptor is negative, closed or not writable.
 ///
 /// # Safety
 /// The descriptor is open during the call, as the contract obliges the plugin that owns it.
@@ -42,15 +42,15 @@ pub(crate) unsafe fn writable_duplicate(descriptor: i32) -> Result<Handle, Strin
     fcntl_dupfd_cloexec(theirs, LOWEST_DESCRIPTOR).map_err(no_use)
 }
 
-/// A copy in memory that nobody else can reach: nobody can change the file under a running loop (an overwritten mapped
-/// library raises SIGBUS at the next call), and a rebuilt plugin at the same path is new code.
+/// Private copy of a plugin in memory: nobody can change the file under a running loop (an overwritten mapped library
+/// raises SIGBUS at the next call), and a rebuilt plugin at the same path is new code.
 pub(crate) struct PrivateCopy(File);
 
 impl PrivateCopy {
-    /// Copies a file, called like `path` for debuggers.
+    /// Copies a file to memory, under its file name for debuggers.
     ///
     /// # Errors
-    /// What the system said.
+    /// Errors of the operating system.
     pub(crate) fn of(path: &Path, original: &mut File) -> io::Result<Self> {
         let name = path.file_name().map(OsStrExt::as_bytes).unwrap_or_default();
         let name = CString::new(name).unwrap_or_default();
@@ -59,15 +59,15 @@ impl PrivateCopy {
         Ok(Self(copy))
     }
 
-    /// The copy, to be read.
+    /// Returns the copy for reading.
     pub(crate) fn file(&self) -> &File {
         &self.0
     }
 
-    /// Opens it as a library, for ever: the address of a symbol, null if it has none.
+    /// Loads the copy as a library, for ever; returns the address of a symbol, null if missing.
     ///
     /// # Errors
-    /// All that the linker said.
+    /// The error text of the linker, with all its causes.
     ///
     /// # Safety
     /// The caller trusts the library: opening it runs its initialisers.
@@ -87,9 +87,9 @@ impl PrivateCopy {
     }
 }
 
-/// Returns what helps where the dynamic linker refuses a library for this cause.
+/// Returns the remedy for an error text of the dynamic linker.
 pub(crate) fn link_remedy(cause: &str) -> &'static str {
-    // Texts of the C library, and what helps against each.
+    // Error texts of the C library, each with its remedy.
     const REMEDIES: [(&str, &str); 6] = [
         (
             "static TLS",
@@ -109,17 +109,17 @@ pub(crate) fn link_remedy(cause: &str) -> &'static str {
     found.map_or("rebuild the plugin for this system", |(_, remedy)| remedy)
 }
 
-/// The bytes of the metadata section.
+/// Returns the bytes of the metadata section.
 ///
 /// # Errors
-/// [`LoadError`], if this is no whole ELF library or has no such section.
+/// [`LoadError`] if the file is no complete ELF library or has no metadata section.
 pub(crate) fn metadata_section<'d>(
     path: &Path,
     data: impl ReadRef<'d>,
     length: u64,
 ) -> Result<&'d [u8], LoadError> {
     let not_a_library = |cause| LoadError::NotALibrary { path: path.into(), cause };
-    // The header first: the table it points at is at the end of the file, the first thing a cut takes away.
+    // Check the header first: its section table is at the end of the file, which a truncation removes first.
     let header = FileHeader64::<Endianness>::parse(data).map_err(not_a_library)?;
     let truncated = |need| LoadError::Truncated { path: path.into(), have: length, need };
     let need = end_of_section_headers(header).map_err(not_a_library)?;
@@ -129,7 +129,7 @@ pub(crate) fn metadata_section<'d>(
     let endian = header.endian().map_err(not_a_library)?;
     let segments = header.program_headers(endian, data).map_err(not_a_library)?;
     let sections = header.sections(endian, data).map_err(not_a_library)?;
-    // `dlopen` maps them all and dies of SIGBUS in a file that is shorter.
+    // `dlopen` maps all segments and raises SIGBUS if the file is shorter.
     let ends =
         segments.iter().map(|segment| segment.p_offset(endian).saturating_add(segment.p_filesz(endian)));
     let ranges = sections.iter().filter_map(|section| section.file_range(endian));
@@ -142,7 +142,7 @@ pub(crate) fn metadata_section<'d>(
     section.data(endian, data).map_err(not_a_library)
 }
 
-/// Bytes a file needs to hold its section headers.
+/// Returns the file length that the section headers require, bytes.
 fn end_of_section_headers(header: &FileHeader64<Endianness>) -> object::Result<u64> {
     let endian = header.endian()?;
     let size = u64::from(header.e_shnum(endian)) * u64::from(header.e_shentsize(endian));

@@ -1,10 +1,10 @@
-//! What differs between systems when a plugin is loaded: the format of a library, and how a private copy of it is kept and opened.
+//! Platform-specific loading of a plugin: library format, private copy and opening.
 //!
 //! Each system has one module with the same items:
 //! - `PrivateCopy`: a copy of a plugin's file that nobody can change, opened once and never unloaded;
 //! - `metadata_section`: the bytes of the section `.flotor` of a library, without running any of it;
-//! - `link_remedy`: what helps where the system cannot link a library;
-//! - `Handle` and `writable_duplicate`: what a plugin's descriptor is kept as.
+//! - `link_remedy`: the remedy if the system cannot link a library;
+//! - `Handle` and `writable_duplicate`: a duplicate of a plugin's descriptor.
 
 #[cfg(not(windows))]
 mod linux;
@@ -16,7 +16,7 @@ pub(crate) use linux::{Handle, PrivateCopy, link_remedy, metadata_section, writa
 #[cfg(windows)]
 pub(crate) use windows::{Handle, PrivateCopy, link_remedy, metadata_section, writable_duplicate};
 
-/// What an error says, and what caused it.
+/// Returns the text of an error with the chain of its causes.
 fn whole_cause(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();

@@ -16,22 +16,22 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-/// Others may read the copy, and neither write nor remove it (`FILE_SHARE_READ`).
+/// Share mode of the copy (`FILE_SHARE_READ`): other processes may read the file, and neither write nor remove it.
 const SHARE_READ: u32 = 1;
-/// Folder of the copies, in the one for temporary files.
+/// Folder of the copies, inside the folder for temporary files.
 const FOLDER: &str = "flotor-plugins";
-/// A copy that is younger may be one that another process has not opened yet.
+/// Minimum age of a removable copy: another process may not have opened a younger copy yet.
 const OPENED_WITHIN: Duration = Duration::from_secs(60);
 
-/// Returns what helps where the system cannot link a library.
+/// Returns the remedy if the system cannot link a library.
 pub(crate) fn link_remedy(_: &str) -> &'static str {
     "install what is missing or rebuild the plugin"
 }
 
-/// What is kept of a plugin's descriptor: nothing, because no process beside the host uses it yet.
+/// Placeholder for a plugin's descriptor: on Windows no other process uses the descriptor yet.
 pub(crate) type Handle = PhantomData<OwnedHandle>;
 
-/// Nothing is kept.
+/// Returns a placeholder without duplicating the descriptor.
 ///
 /// # Errors
 /// None.
@@ -42,18 +42,18 @@ pub(crate) unsafe fn writable_duplicate(_: i32) -> Result<Handle, String> {
     Ok(PhantomData)
 }
 
-/// A copy in a file of its own, which nobody can write or remove while this process lives: the file of the plugin stays free to
-/// be built again. A loaded library cannot be removed; a later start of any program does it.
+/// Private copy in a separate file, which nobody can write or remove while this process lives, so that the plugin's own
+/// file can be rebuilt. A loaded library cannot be removed; a later start of any program removes the copy.
 pub(crate) struct PrivateCopy {
     path: PathBuf,
     file: File,
 }
 
 impl PrivateCopy {
-    /// Copies a file.
+    /// Copies a file to the folder of the copies.
     ///
     /// # Errors
-    /// What the system said.
+    /// Errors of the operating system.
     pub(crate) fn of(path: &Path, original: &mut File) -> io::Result<Self> {
         static COPIES: AtomicU32 = AtomicU32::new(0);
         let folder = std::env::temp_dir().join(FOLDER);
@@ -67,15 +67,15 @@ impl PrivateCopy {
         Ok(Self { path, file })
     }
 
-    /// The copy, to be read.
+    /// Returns the copy for reading.
     pub(crate) fn file(&self) -> &File {
         &self.file
     }
 
-    /// Opens it as a library, for ever: the address of a symbol, null if it has none.
+    /// Loads the copy as a library, for ever; returns the address of a symbol, null if missing.
     ///
     /// # Errors
-    /// All that the system said.
+    /// The error text of the operating system, with all its causes.
     ///
     /// # Safety
     /// The caller trusts the library: opening it runs its initialisers.
@@ -85,14 +85,14 @@ impl PrivateCopy {
         // SAFETY: the symbol is only used as an address.
         let found = unsafe { library.get::<*const c_void>(symbol.as_bytes()) };
         let address = found.map(|entry| entry.as_raw_ptr()).unwrap_or(std::ptr::null_mut());
-        // Thread-local destructors make unloading unsound: a library stays for the life of the process. Its file stays open: so
-        // nobody can change it.
+        // Thread-local destructors make unloading unsound: a library stays for the life of the process. The file stays
+        // open, so that nobody can change the copy.
         std::mem::forget((library, self.file));
         Ok(address.cast_const())
     }
 }
 
-/// Copies that earlier processes left: one that is in use cannot be removed, and stays.
+/// Removes the copies of earlier processes; the system refuses to remove a copy in use.
 fn remove_those_nobody_has(folder: &Path) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -104,10 +104,10 @@ fn remove_those_nobody_has(folder: &Path) {
     }
 }
 
-/// The bytes of the metadata section.
+/// Returns the bytes of the metadata section.
 ///
 /// # Errors
-/// [`LoadError`], if this is no whole PE library of 64 bits or has no such section.
+/// [`LoadError`] if the file is no complete 64-bit PE library or has no metadata section.
 pub(crate) fn metadata_section<'d>(
     path: &Path,
     data: impl ReadRef<'d>,
