@@ -1,4 +1,4 @@
-//! Clients of a port that serves one at a time.
+//! Queue of the clients of a port that serves one client at a time.
 
 use crate::port::Port;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -6,30 +6,30 @@ use std::io;
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Time in which a client sends its first message.
+/// Time in which a client must send its first message.
 pub const FIRST_MESSAGE: Duration = Duration::from_secs(5);
-/// Time from the first bytes of a message to its last: a host writes it at once, and a slower client delays the others.
+/// Timeout from the first bytes of a message to its last: a host writes a message at once, and a slower client delays the others.
 const REST_OF_MESSAGE: Duration = Duration::from_millis(200);
-/// Silence after which the client that is served is disconnected if another waits. Before its first tick a host may be silent for
-/// longer, where its models take their time.
+/// Silence after which the served client is disconnected if another client waits. Before its first tick a host may be silent for
+/// longer, while its models are prepared.
 const LONGEST_SILENCE: Duration = Duration::from_secs(5);
-/// Clients that have sent nothing yet at most; a further one takes the place of the oldest.
+/// Limit on clients that have sent nothing yet; a further client replaces the oldest.
 const MOST_SILENT: usize = 32;
 /// Interval at which silent clients are checked.
 const CHECK: Timespec = Timespec { tv_sec: 1, tv_nsec: 0 };
 const NOW: Timespec = Timespec { tv_sec: 0, tv_nsec: 0 };
 
-/// Clients of a port that serves one at a time: the first that sends something. Silent ones keep nobody out.
+/// Clients of a port, served one at a time by the arrival of their first messages. Silent clients block no others.
 pub struct Clients {
     port: Port,
     silent: Vec<(TcpStream, Instant)>,
 }
 
 impl Clients {
-    /// The clients of a port.
+    /// Creates the queue of a port, without clients.
     ///
     /// # Errors
-    /// The system's error.
+    /// If the port cannot be set to non-blocking.
     pub fn of(port: Port) -> io::Result<Self> {
         port.listener().set_nonblocking(true)?;
         Ok(Self { port, silent: Vec::new() })
@@ -38,7 +38,7 @@ impl Clients {
     /// Waits for the next client that sends something. Silent clients stay connected for [`FIRST_MESSAGE`].
     ///
     /// # Errors
-    /// The system's error.
+    /// The error of `poll`.
     pub fn wait_for_one(&mut self) -> io::Result<TcpStream> {
         loop {
             if let Some(place) = self.look(&CHECK)? {
@@ -49,13 +49,14 @@ impl Clients {
         }
     }
 
-    /// Returns whether a client has sent something and waits. Does not wait.
+    /// Returns whether another client has sent something and waits. Does not block.
     fn is_one_waiting(&mut self) -> bool {
         // As many events at most as there may be silent clients.
         (0..MOST_SILENT).any(|_| self.look(&NOW).is_ok_and(|place| place.is_some()))
     }
 
-    /// Handles one event in a time: accepts a client, removes one that has left, or returns the place of one that has sent something.
+    /// Handles at most one event within a timeout: accepts a client, removes a client that has left, or returns the index of a
+    /// client that has sent something.
     fn look(&mut self, timeout: &Timespec) -> io::Result<Option<usize>> {
         self.silent.retain(|(_, since)| since.elapsed() < FIRST_MESSAGE);
         let ready = self.wait(timeout)?;
@@ -91,42 +92,42 @@ impl Clients {
     }
 }
 
-/// Descriptors that can be read.
+/// Readable descriptors after a poll.
 struct Ready {
-    /// The place of a client that has sent something or has left.
+    /// Index of a silent client that has sent something or has left.
     client: Option<usize>,
-    /// Whether a client connects.
+    /// True if a client connects.
     is_new: bool,
 }
 
-/// The time for which a client is served while others wait. One that sends whole messages is a host, and keeps its turn: a program
-/// of the same user could end the emulator as well.
+/// Service period of a client, watched while others wait. A client that sends whole messages is a host, and is not interrupted: a
+/// program of the same user could end the emulator as well.
 pub struct Tenure<'c> {
     others: &'c mut Clients,
-    /// The last whole message.
+    /// Time of the last whole message.
     message: Instant,
-    /// The first bytes of a message that is not whole yet.
+    /// Arrival of the first bytes of an incomplete message.
     part: Option<Instant>,
 }
 
 impl<'c> Tenure<'c> {
-    /// Begins the service to a client, whose first message is due.
+    /// Begins the service of a client, whose first message is due.
     pub fn begin(others: &'c mut Clients) -> Self {
         let now = Instant::now();
         Self { others, message: now, part: Some(now) }
     }
 
-    /// Counts a whole message.
+    /// Records a whole message.
     pub fn message(&mut self) {
         (self.message, self.part) = (Instant::now(), None);
     }
 
-    /// Counts bytes of a message that is not whole.
+    /// Records bytes of an incomplete message.
     pub fn part(&mut self) {
         self.part.get_or_insert_with(Instant::now);
     }
 
-    /// Returns whether the client is to be disconnected: a message of it did not come whole in time, or it has been silent for long and
+    /// Returns whether the client is to be disconnected: the rest of a message is late, or the client has been silent for long and
     /// another one waits.
     pub fn is_over(&mut self) -> bool {
         self.part.is_some_and(|since| since.elapsed() > REST_OF_MESSAGE)

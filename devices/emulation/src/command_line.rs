@@ -1,4 +1,4 @@
-//! What the programs of emulators read and write.
+//! Command line arguments and output lines of emulators.
 
 use clap::Parser;
 use flotor_hal::terminal::{escaped, escaped_arguments};
@@ -6,7 +6,7 @@ use std::error::Error;
 use std::io::Write;
 use std::path::Path;
 
-/// Returns the arguments of this process. Ends the process if they are wrong, with an error without control characters.
+/// Parses the arguments of this process. Ends the process on an error, with a message without control characters.
 #[must_use]
 pub fn arguments<T: Parser>() -> T {
     T::try_parse().unwrap_or_else(|error| {
@@ -15,10 +15,10 @@ pub fn arguments<T: Parser>() -> T {
     })
 }
 
-/// A number of an option, within its limits.
+/// Parses the number of an option and checks its limits.
 ///
 /// # Errors
-/// What is wrong with the text.
+/// A message: the text is no number, or the number is outside the limits.
 pub fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
     let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
     if (least..=most).contains(&number) {
@@ -28,10 +28,10 @@ pub fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, Stri
     }
 }
 
-/// Writes a line at once, because somebody may be waiting for it, with control characters escaped.
+/// Writes a line to standard output and flushes, with control characters escaped.
 pub fn say(line: &str) {
     let mut out = std::io::stdout().lock();
-    // Nobody reads: nothing to do about it, the device goes on.
+    // Without a reader the write fails; the device goes on.
     let _ = writeln!(out, "{}", escaped(line)).and_then(|()| out.flush());
 }
 
@@ -40,10 +40,10 @@ pub fn warn(line: &str) {
     let _ = writeln!(std::io::stderr(), "{}", escaped(line));
 }
 
-/// A symbolic link by this name. Only a link is replaced, never somebody's file.
+/// Creates a symbolic link, replacing an earlier link but never a file.
 ///
 /// # Errors
-/// What the system says.
+/// If the link cannot be replaced or created.
 pub fn link_to(target: &Path, link: &Path) -> Result<(), Box<dyn Error>> {
     if link.is_symlink() {
         std::fs::remove_file(link)?;

@@ -1,7 +1,7 @@
-//! What the emulators of devices share.
+//! Shared parts of the device emulators.
 //!
 //! - [`command_line`]: numbers with limits, lines of output, a name for a terminal.
-//! - [`port`]: a TCP port, and the users and machines whose programs may connect; [`clients`]: service to one at a time.
+//! - [`port`]: a TCP port with limits on the users and machines that may connect; [`clients`]: service to one at a time.
 //! - [`rig`]: the rig of the vertical calibration: a stand that comes down step by step, and a force sensor.
 //!
 //! Not real-time.

@@ -1,4 +1,4 @@
-//! The user at the other end of a connection of this machine, as the kernel knows it (`sock_diag`, `inet_diag`).
+//! Lookup of the user at the other end of a connection within this machine, by the kernel (`sock_diag`, `inet_diag`).
 //!
 //! ```text
 //! question  header 16 bytes | family u8, protocol u8, 2 x 0 | states u32 | socket 48 bytes
@@ -18,9 +18,9 @@ const REQUEST: u16 = 1;
 const TCP: u8 = 6;
 const IPV4: u8 = 2;
 const IPV6: u8 = 10;
-/// Length of a question.
+/// Length of a request.
 const QUESTION_BYTES: u32 = 72;
-/// Places of type, user and inode in an answer, and of the code in an error.
+/// Offsets of type, user and inode in a reply, and of the code in an error.
 const TYPE_AT: usize = 4;
 const ERROR_AT: usize = 16;
 const USER_AT: usize = 80;
@@ -29,7 +29,7 @@ const INODE_AT: usize = 84;
 /// Returns the user of the process at the other end of a connection from this machine. Not real-time.
 ///
 /// # Errors
-/// The system's error; `NotFound` if no process of this machine has the other end open any more.
+/// Errors of the system; `NotFound` if no process of this machine has the other end open any more.
 pub(crate) fn user(stream: &TcpStream) -> io::Result<Uid> {
     let question = question(stream.peer_addr()?, stream.local_addr()?);
     let kernel = socket(AddressFamily::NETLINK, SocketType::RAW, Some(SOCK_DIAG))?;
@@ -40,17 +40,17 @@ pub(crate) fn user(stream: &TcpStream) -> io::Result<Uid> {
     let number = |at: usize| answer.get(at..)?.first_chunk().copied().map(u32::from_ne_bytes);
     let kind = answer.get(TYPE_AT..).and_then(<[u8]>::first_chunk).copied().map(u16::from_ne_bytes);
     match (kind, number(USER_AT), number(INODE_AT)) {
-        // A socket that no process has open has inode 0, and user 0 in kernels that forget its user. The kernel reads the user first.
+        // A socket that no process has open has inode 0, and user 0 in kernels that drop the user. The kernel reads the user first.
         (Some(BY_FAMILY), Some(user), Some(1..)) => Ok(Uid::from_raw(user)),
         (Some(BY_FAMILY), ..) => Err(ErrorKind::NotFound.into()),
-        // An error repeats the question after its code.
+        // An error reply repeats the request after its code.
         _ => Err(io::Error::from_raw_os_error(
             number(ERROR_AT).map_or(0, |code| code.wrapping_neg().cast_signed()),
         )),
     }
 }
 
-/// Asks for the socket with these ends.
+/// Encodes the request for the socket with these ends.
 fn question(source: SocketAddr, destination: SocketAddr) -> Vec<u8> {
     let family = if source.is_ipv4() { IPV4 } else { IPV6 };
     let mut bytes = Vec::with_capacity(QUESTION_BYTES as usize);
@@ -59,7 +59,7 @@ fn question(source: SocketAddr, destination: SocketAddr) -> Vec<u8> {
     bytes.extend(REQUEST.to_ne_bytes());
     bytes.extend([0; 8]);
     bytes.extend([family, TCP, 0, 0]);
-    // In any state.
+    // Sockets in any state.
     bytes.extend([0xff; 4]);
     bytes.extend(source.port().to_be_bytes());
     bytes.extend(destination.port().to_be_bytes());

@@ -1,4 +1,4 @@
-//! A TCP port of an emulator, and the users and machines whose programs may connect to it.
+//! TCP port of an emulator, with limits on the users and machines whose programs may connect.
 
 use crate::command_line::warn;
 use crate::peer;
@@ -8,19 +8,19 @@ use std::io::{self, ErrorKind};
 use std::net::{SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
 use std::sync::Once;
 
-/// Options that let more programs connect than those of this user.
+/// Command line options that admit programs of other users or machines.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ReachArguments {
     /// Tcp: let programs of every user of this machine connect
     #[arg(long)]
     allow_users: bool,
-    /// Tcp: listen beyond this machine: anybody who reaches the port commands the device
+    /// Tcp: listen beyond this machine: every program that reaches the port commands the device
     #[arg(long)]
     allow_remote: bool,
 }
 
 impl ReachArguments {
-    /// Returns the reach that the options permit.
+    /// Returns the widest reach that the options permit.
     #[must_use]
     pub fn reach(self) -> Reach {
         match self {
@@ -31,18 +31,18 @@ impl ReachArguments {
     }
 }
 
-/// Programs that may connect to a port.
+/// Users and machines whose programs may connect to a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reach {
-    /// Those of the user of this process, and of root.
+    /// Programs of the user of this process, and of root.
     ThisUser,
-    /// Those of every user of this machine.
+    /// Programs of every user of this machine.
     ThisMachine,
-    /// Those of all machines that reach the address.
+    /// Programs of all machines that can reach the address.
     AnyMachine,
 }
 
-/// A port that is listened at.
+/// Listening TCP port that checks the user of each connection.
 #[derive(Debug)]
 pub struct Port {
     listener: TcpListener,
@@ -50,10 +50,10 @@ pub struct Port {
 }
 
 impl Port {
-    /// Binds a port.
+    /// Binds a port and listens.
     ///
     /// # Errors
-    /// The system's error, or one of kind `InvalidInput` for an address beyond this machine without consent; both with the remedy.
+    /// Errors of the system, or `InvalidInput` for an address beyond this machine without consent; both with the remedy.
     pub fn bind(at: &str, reach: Reach) -> io::Result<Self> {
         let unusable = |error: io::Error| {
             let problem = format!("cannot listen at {at}: {error}; 127.0.0.1:0 takes any free port");
@@ -71,18 +71,18 @@ impl Port {
         Ok(Self { listener, reach })
     }
 
-    /// Returns the address that is listened at.
+    /// Returns the bound address, with the port number that the system chose for port 0.
     ///
     /// # Errors
-    /// The system's error.
+    /// Errors of the system.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.listener.local_addr()
     }
 
-    /// Returns the next connection that is within the reach of the port; closes others. The first refusal is reported.
+    /// Accepts the next connection within the reach of the port; closes others. The first refusal is reported.
     ///
     /// # Errors
-    /// The system's error.
+    /// Errors of the system.
     pub fn accept(&self) -> io::Result<TcpStream> {
         static REFUSAL: Once = Once::new();
         loop {
@@ -93,7 +93,7 @@ impl Port {
             let cause = match peer::user(&stream) {
                 Ok(user) if user.is_root() || user == geteuid() => return Ok(stream),
                 Ok(user) => format!("its program is of user {}", user.as_raw()),
-                // It was closed at once.
+                // The client closed the connection at once.
                 Err(error) if error.kind() == ErrorKind::NotFound => continue,
                 Err(error) => format!("the system does not tell the user of its program: {error}"),
             };
@@ -102,7 +102,7 @@ impl Port {
         }
     }
 
-    /// Returns the socket for calls of the system that wait for a connection.
+    /// Returns the socket, for `poll`.
     pub(crate) fn listener(&self) -> &TcpListener {
         &self.listener
     }

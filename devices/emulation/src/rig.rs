@@ -1,5 +1,5 @@
-//! The rig of the vertical calibration around an emulated device: a stand that comes down step by step in place of the
-//! hand, and a force sensor on a pseudo terminal that answers `R` with `F` and the force on it in N.
+//! Emulated rig of the vertical calibration: a stand that holds the handle and comes down step by step, and a force sensor on a
+//! pseudo terminal that answers `R` with `F` and the force on it in N.
 
 use crate::command_line::{link_to, within};
 use clap::Args;
@@ -10,19 +10,19 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Highest place of the stand, and as far below the middle its lowest, mm: what the thesis measured (Varadharajan 2007,
-/// section 3.4).
+/// Height of the top of the stand's travel above its middle, mm, and depth of the bottom below: the range that the thesis measured
+/// (Varadharajan 2007, section 3.4).
 const TOP_MM: f64 = 7.0;
 /// Time of one step down, s.
 const MOVE_S: f64 = 0.15;
 /// Time back up to the top, s.
 const RETURN_S: f64 = 1.0;
-/// Movements a script may have: the stand comes down as often as there is room for.
+/// Limit on the movements of a script; the number of rounds follows from it.
 const MOVEMENTS: u32 = 10_000;
-/// Characters of the longest line the sensor looks at.
+/// Longest command line that the sensor accepts, bytes.
 const LINE_BYTES: usize = 80;
 
-/// The options of the rig.
+/// Command line options of the rig.
 #[derive(Args, Clone, Debug)]
 pub struct RigArguments {
     /// Hold the handle in a calibration rig instead of a hand: a stand that comes down step by step, and a force sensor
@@ -46,7 +46,7 @@ fn stop_s(text: &str) -> Result<f64, String> {
 }
 
 impl RigArguments {
-    /// The name of the force sensor, and the stand; nothing without a rig.
+    /// Returns the path of the force sensor and the stand; `None` without a rig.
     #[must_use]
     pub fn rig(&self) -> Option<(&Path, Stand)> {
         let stand = Stand { step_mm: self.rig_step_mm, stop_s: self.rig_stop_s };
@@ -54,7 +54,7 @@ impl RigArguments {
     }
 }
 
-/// A stand that goes down from the top in equal steps, waits at each, and goes up again, over and over.
+/// Stand that goes down from the top in equal steps, pauses at each, and returns to the top, repeatedly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stand {
     step_mm: f64,
@@ -62,7 +62,7 @@ pub struct Stand {
 }
 
 impl Stand {
-    /// Where each movement of a round leads, mm, and how long it takes, s; from the bottom to the top first.
+    /// Returns target, mm, and duration, s, of each movement of a round; the return from bottom to top comes first.
     fn round(self) -> impl Iterator<Item = (f64, f64)> {
         (0..=self.steps()).map(move |step| {
             (TOP_MM - f64::from(step) * self.step_mm, if step == 0 { RETURN_S } else { MOVE_S })
@@ -74,7 +74,7 @@ impl Stand {
         (2.0 * TOP_MM / self.step_mm).round() as u32
     }
 
-    /// Its height at a time, m: it begins at the bottom.
+    /// Returns the height of the stand above its middle at a time, m. The stand begins at the bottom.
     #[must_use]
     pub fn height_m(&self, at: Duration) -> f64 {
         let round_s: f64 = self.round().map(|(_, move_s)| move_s + self.stop_s).sum();
@@ -82,7 +82,7 @@ impl Stand {
         let mut from_mm = TOP_MM - f64::from(self.steps()) * self.step_mm;
         for (to_mm, move_s) in self.round() {
             if left_s < move_s + self.stop_s {
-                // Without a jump of speed or acceleration at either end.
+                // Quintic blend: no jump of speed or acceleration at either end.
                 let share = (left_s / move_s).min(1.0);
                 let smooth = share * share * share * (share * (6.0 * share - 15.0) + 10.0);
                 return (from_mm + (to_mm - from_mm) * smooth) * 1.0e-3;
@@ -93,13 +93,13 @@ impl Stand {
         from_mm * 1.0e-3
     }
 
-    /// The same as the script of a simulated hand.
+    /// Returns the motion as a script of a simulated hand, TOML.
     #[must_use]
     pub fn script(&self) -> String {
         let (stop_s, repeat) = (self.stop_s, MOVEMENTS / (2 * (self.steps() + 1)));
         let mut text = format!("title = \"Calibration stand\"\nrepeat = {repeat}\n");
         for (to_mm, move_s) in self.round() {
-            // Writing to a text does not fail.
+            // Writing to a string cannot fail.
             let _ = write!(
                 text,
                 "\n[[step]]\nmove = {{ to_mm = [0, 0, {to_mm:?}], duration_s = {move_s:?} }}\n\n\
@@ -110,11 +110,11 @@ impl Stand {
     }
 }
 
-/// Answers at a pseudo terminal, with a name as a symbolic link, for as long as the program runs; `force_n` is asked for
-/// the force at each reading. The name of the terminal.
+/// Runs the force sensor on a pseudo terminal for the life of the process and returns the terminal's path. `link` becomes a symbolic
+/// link to the terminal; `force_n` returns the force at each reading, N.
 ///
 /// # Errors
-/// What the system says.
+/// If the terminal, the link or the thread cannot be created.
 pub fn serve(
     link: &Path,
     mut force_n: impl FnMut() -> f64 + Send + 'static,
@@ -124,7 +124,7 @@ pub fn serve(
     let name = PathBuf::from(theirs.name().ok_or("the pseudo terminal of the force sensor has no name")?);
     link_to(&name, link)?;
     std::thread::Builder::new().name("force-sensor".to_owned()).spawn(move || {
-        // Held open, or the terminal hangs up whenever nobody listens.
+        // Hold the other end open: otherwise the terminal hangs up whenever no client has it open.
         let _theirs = theirs;
         let mut asked = Vec::new();
         let mut byte = [0];
@@ -138,7 +138,7 @@ pub fn serve(
                     asked.clear();
                     let _ = ours.write_all(answer.as_bytes());
                 }
-                // A line that does not end is none: its start is forgotten.
+                // Overlong line: drop the bytes so far.
                 Ok(1) if asked.len() < LINE_BYTES => asked.push(byte[0]),
                 Ok(_) => asked.clear(),
                 Err(error) if error.kind() == io::ErrorKind::TimedOut => {}

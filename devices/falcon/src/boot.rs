@@ -1,4 +1,4 @@
-//! The handshake with the boot loader, which has the device whenever its power was off (libnifalcon, `FalconFirmware`).
+//! Handshake with the boot loader, which runs after each power-on (libnifalcon, `FalconFirmware`).
 //!
 //! ```text
 //! 9600 baud     host 0a 43 0d      device 0a 44 2c 0d, perhaps with 00 before it, perhaps only after many tries
@@ -12,71 +12,71 @@ use crate::protocol::{Command, Frames, Heard, Report};
 use std::fmt;
 use std::time::{Duration, Instant};
 
-/// What sets the rates of the line: 9600 baud, what the loader takes the firmware at, and 1.5 Mbaud.
+/// Baud rate divisors: 9600 baud for the prompt.
 pub const PROMPT_DIVISOR: u16 = 0x4138;
-/// 3 MHz / 21.
+/// Baud rate divisor while the firmware loads: 3 MHz / 21.
 pub const LOAD_DIVISOR: u16 = 0x15;
-/// 3 MHz / 2.
+/// Baud rate divisor of the running firmware: 3 MHz / 2.
 pub const RUN_DIVISOR: u16 = 0x02;
-/// What the loader is asked, and what it answers.
+/// Prompt to the loader.
 pub const PROMPT: [u8; 3] = [0x0a, 0x43, 0x0d];
-/// Perhaps with a zero before it.
+/// Reply of the loader to the prompt, possibly after a zero byte.
 pub const PROMPT_ANSWER: [u8; 4] = [0x0a, 0x44, 0x2c, 0x0d];
-/// What both say before the firmware.
+/// Agreement byte that host and loader exchange before the firmware.
 pub const AGREED: u8 = 0x41;
 
-/// Eight bits, no parity, one stop bit.
+/// Data format: eight bits, no parity, one stop bit.
 const FORMAT: u16 = 8;
-/// RTS low, DTR low, DTR high.
+/// Modem line values: RTS low, DTR low, DTR high.
 const RTS_LOW: u16 = 0x0200;
 const DTR_LOW: u16 = 0x0100;
 const DTR_HIGH: u16 = 0x0101;
-/// Latency timers of the chip while it loads, and while it runs, ms.
+/// Latency timer of the chip while loading and while running, ms.
 const LOAD_LATENCY_MS: u16 = 16;
 const RUN_LATENCY_MS: u16 = 1;
 
-/// How often the loader is asked.
+/// Prompts per attempt.
 const PROMPTS: u32 = 100;
-/// How often the whole handshake is begun anew: it is known to fail at random.
+/// Attempts at the whole handshake, which fails at random.
 const ATTEMPTS: u32 = 3;
-/// How long an answer of the loader may take, and the first report of the firmware.
+/// Timeouts of the prompt's reply, of an echo, and of the firmware's first report.
 const ANSWER: Duration = Duration::from_millis(30);
 const ECHO: Duration = Duration::from_millis(1000);
 const FIRST_REPORT: Duration = Duration::from_millis(1000);
-/// How long nothing may come before the line counts as quiet, and how long it may take to become so.
+/// Silence after which the line counts as quiet, and the limit on the wait for it.
 const QUIET: Duration = Duration::from_millis(20);
 const SETTLED: Duration = Duration::from_millis(500);
 
-/// Why there is no device that reports.
+/// Reason why a device could not be started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BootFailure {
     /// The chip is gone.
     Lost,
     /// A packet without its status: the chip is no FTDI, or the link is broken.
     ShortPacket,
-    /// The firmware does not run, and the user named no file.
+    /// No firmware runs, and the user named no file.
     NoFirmware,
     /// The loader never answered.
     NoPrompt,
-    /// The loader did not agree to take a firmware.
+    /// The loader did not agree to receive a firmware: its reply, `None` on timeout.
     NotAgreed(Option<u8>),
-    /// A byte of the firmware came back as another one.
+    /// The echo of a byte of the firmware differs.
     Echo {
-        /// Which byte, from 0.
+        /// Index of the byte, from 0.
         at: usize,
-        /// What was sent.
+        /// Byte sent.
         sent: u8,
-        /// What came back.
+        /// Byte received.
         came: u8,
     },
-    /// A byte of the firmware did not come back.
+    /// A byte of the firmware had no echo.
     NoEcho {
-        /// Which byte, from 0.
+        /// Index of the byte, from 0.
         at: usize,
     },
-    /// The firmware was loaded and does not report.
+    /// The firmware was loaded but sends no report.
     NoReport,
-    /// Reports come that no command was sent for.
+    /// The device sends reports without commands.
     StaleReports,
 }
 
@@ -129,7 +129,7 @@ impl fmt::Display for BootFailure {
     }
 }
 
-/// Bytes down the line, without the chip's own.
+/// Byte stream of the serial line, without the chip's status bytes.
 struct Line<'c> {
     chip: &'c dyn Chip,
     waiting: std::collections::VecDeque<u8>,
@@ -140,7 +140,7 @@ impl<'c> Line<'c> {
         Self { chip, waiting: std::collections::VecDeque::new() }
     }
 
-    /// The next byte; nothing if none came in time.
+    /// Returns the next byte; `None` on timeout.
     fn next(&mut self, patience: Duration) -> Result<Option<u8>, BootFailure> {
         let until = Instant::now() + patience;
         let mut packets = [0; PACKET_BYTES];
@@ -158,7 +158,7 @@ impl<'c> Line<'c> {
         }
     }
 
-    /// Takes what comes until nothing does; whether it ended.
+    /// Discards bytes until the line is quiet; returns false if it does not become quiet in time.
     fn settle(&mut self) -> Result<bool, BootFailure> {
         let until = Instant::now() + SETTLED;
         while self.next(QUIET)?.is_some() {
@@ -170,10 +170,10 @@ impl<'c> Line<'c> {
     }
 }
 
-/// Brings a device to where it reports: it may run already, or gets the firmware. Not real-time.
+/// Starts a device up to its first report; loads the firmware unless it runs already. Not real-time.
 ///
 /// # Errors
-/// A [`BootFailure`]: of several attempts, that of the last one.
+/// A [`BootFailure`], the one of the last attempt.
 pub fn start(chip: &dyn Chip, firmware: Option<&[u8]>) -> Result<Report, BootFailure> {
     match run(chip) {
         Err(BootFailure::NoReport) => {}
@@ -183,7 +183,7 @@ pub fn start(chip: &dyn Chip, firmware: Option<&[u8]>) -> Result<Report, BootFai
     let mut attempt = 1;
     loop {
         match load(chip, firmware).and_then(|()| run(chip)) {
-            // What another attempt does not change.
+            // A further attempt cannot help.
             Err(failure @ (BootFailure::Lost | BootFailure::NoPrompt)) => return Err(failure),
             Err(_) if attempt < ATTEMPTS => attempt += 1,
             settled => return settled,
@@ -191,7 +191,7 @@ pub fn start(chip: &dyn Chip, firmware: Option<&[u8]>) -> Result<Report, BootFai
     }
 }
 
-/// Sets the line up for a firmware that runs, and asks it for a report.
+/// Sets the line up for a running firmware, and requests a report.
 fn run(chip: &dyn Chip) -> Result<Report, BootFailure> {
     chip.request(Request::LatencyTimer, RUN_LATENCY_MS)?;
     chip.request(Request::BaudRate, RUN_DIVISOR)?;
@@ -200,7 +200,7 @@ fn run(chip: &dyn Chip) -> Result<Report, BootFailure> {
     chip.request(Request::Reset, 1)?;
     chip.request(Request::Reset, 2)?;
     let (mut line, mut frames) = (Line::new(chip), Frames::default());
-    // What an earlier program left.
+    // Drop the bytes that an earlier program caused.
     if !line.settle()? {
         return Err(BootFailure::StaleReports);
     }
@@ -208,7 +208,7 @@ fn run(chip: &dyn Chip) -> Result<Report, BootFailure> {
     let until = Instant::now() + FIRST_REPORT;
     let mut report = None;
     loop {
-        // One command, one report: whatever comes after it was there before.
+        // One command, one report: further bytes are of earlier commands.
         let patience = if report.is_some() { QUIET } else { until.saturating_duration_since(Instant::now()) };
         match (line.next(patience)?, report) {
             (None, Some(report)) => return Ok(report),
@@ -223,7 +223,7 @@ fn run(chip: &dyn Chip) -> Result<Report, BootFailure> {
     }
 }
 
-/// Loads the firmware.
+/// Runs the handshake and loads the firmware.
 fn load(chip: &dyn Chip, firmware: &[u8]) -> Result<(), BootFailure> {
     chip.request(Request::Reset, 1)?;
     chip.request(Request::Reset, 2)?;

@@ -1,33 +1,33 @@
-//! The FTDI chip between USB and the device's serial line, as the host sees it (FT232B, FTDI's requests).
+//! FTDI chip between USB and the device's serial line, as seen by the host (FT232B, FTDI's requests).
 
 use flotor_hal::IndependentStop;
 use std::time::Duration;
 
-/// Vendor and product of a Falcon.
+/// USB vendor of a Falcon.
 pub const VENDOR: u16 = 0x0403;
-/// FTDI gave Novint this number.
+/// USB product of a Falcon, assigned to Novint by FTDI.
 pub const PRODUCT: u16 = 0xcb48;
 /// Largest packet of the chip's endpoints at full speed.
 pub const PACKET_BYTES: usize = 64;
-/// Each packet towards the host begins with the states of modem and line.
+/// Bytes of modem and line status at the head of each packet towards the host.
 pub const STATUS_BYTES: usize = 2;
-/// What fits beside them.
+/// Bytes of data per packet.
 pub const PAYLOAD_BYTES: usize = PACKET_BYTES - STATUS_BYTES;
 
 /// A request to the chip, by its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Value 0: everything; 1, 2: what waits towards the host, and from it.
+    /// Value 0 resets the chip; 1, 2: clear the buffer towards the host, from the host.
     Reset = 0,
     /// DTR in bit 0, RTS in bit 1, and in the high byte which of them to change.
     ModemLines = 1,
-    /// 0: none.
+    /// Flow control; 0: none.
     FlowControl = 2,
-    /// 3 MHz over this, eighths in the upper bits.
+    /// Divisor of 3 MHz, eighths in the upper bits.
     BaudRate = 3,
-    /// 8: eight bits, no parity, one stop bit.
+    /// Frame format; 8: eight bits, no parity, one stop bit.
     DataFormat = 4,
-    /// After so many ms the chip sends what it has, or its states alone.
+    /// Time after which the chip sends its buffer, or the status bytes alone, ms.
     LatencyTimer = 9,
 }
 
@@ -35,42 +35,42 @@ pub enum Request {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChipLost;
 
-/// A packet without the two bytes that each one has.
+/// A packet is shorter than its two status bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShortPacket;
 
-/// A chip; one thread may read while others write.
+/// Connection to an FTDI chip; one thread may read while others write.
 pub trait Chip: Send + Sync + 'static {
     /// Makes a request. Not real-time.
     ///
     /// # Errors
-    /// [`ChipLost`].
+    /// If the chip is gone.
     fn request(&self, request: Request, value: u16) -> Result<(), ChipLost>;
 
-    /// Sends bytes down the line, and waits until the chip has them. Not real-time: waits for the bus.
+    /// Sends bytes down the serial line, and waits until the chip has received them. Not real-time: waits for the bus.
     ///
     /// # Errors
-    /// [`ChipLost`].
+    /// If the chip is gone.
     fn write(&self, bytes: &[u8]) -> Result<(), ChipLost>;
 
-    /// Waits for packets, at most so long; the bytes of all of them, each of 64 bytes but the last. Not real-time: waits
-    /// for the bus.
+    /// Waits for packets, at most for `patience`; returns the number of bytes of all packets, 64 each except the last. Not real-time:
+    /// waits for the bus.
     ///
     /// # Errors
-    /// [`ChipLost`].
+    /// If the chip is gone.
     fn read(&self, packets: &mut [u8], patience: Duration) -> Result<usize, ChipLost>;
 
-    /// Returns the stop of a device that a process without this plugin stops with these bytes for the line. A chip on USB has none:
-    /// it takes bytes by calls that such a process does not make.
+    /// Returns the stop by which a process without this plugin stops the device, with these bytes for the line. A chip on USB has none:
+    /// it takes bytes by calls that such a process cannot make.
     fn independent_stop(&self, _rest: &[u8]) -> IndependentStop {
         IndependentStop::none()
     }
 }
 
-/// Passes what came down the line on, without the bytes of the chip itself. Real-time: bounded, no allocation.
+/// Passes the received bytes on without the status bytes. Real-time: bounded, no allocation.
 ///
 /// # Errors
-/// [`ShortPacket`].
+/// If a packet is shorter than its status bytes.
 pub fn payload(packets: &[u8], mut each: impl FnMut(u8)) -> Result<(), ShortPacket> {
     for packet in packets.chunks(PACKET_BYTES) {
         let bytes = packet.get(STATUS_BYTES..).ok_or(ShortPacket)?;

@@ -1,8 +1,8 @@
-//! Two threads between the tick and the chip: one does nothing but read, so that a transfer waits on the bus whenever the
-//! chip has something to say; the other keeps one command in flight.
+//! Two threads between the tick and the chip: the reader always has a read pending, so that the chip never waits with a packet;
+//! the writer has one command in flight.
 //!
-//! The firmware answers each command with one report. A command that was not sent yet is replaced by the next one. The
-//! device has no watchdog that is known: if no tick leaves a command for [`COMMAND_LIFE`], the motors are set to rest.
+//! The firmware answers each command with one report. A pending command is replaced by the next one. The device has no known
+//! watchdog: if no tick posts a command for [`COMMAND_LIFE`], the writer sets the motors to rest.
 
 use crate::chip::{Chip, payload};
 use crate::protocol::{Command, Frames, Heard, Report};
@@ -14,38 +14,38 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{JoinHandle, Thread};
 use std::time::{Duration, Instant};
 
-/// How long a command counts without another one.
+/// Validity of a command: without a newer one the motors are then set to rest.
 pub const COMMAND_LIFE: Duration = Duration::from_millis(100);
-/// Time without a report after which the next command goes out all the same.
+/// Report timeout, after which the next command is sent without a report.
 const FORGET: Duration = Duration::from_millis(20);
-/// How long a device may take to answer the last command.
+/// Timeout of a report to the last command.
 const LAST_REPORT: Duration = Duration::from_millis(200);
-/// How long a read waits before the thread looks whether it is still wanted.
+/// Timeout of a read, and poll interval for the end of the exchange.
 const LOOK: Duration = Duration::from_millis(20);
-/// Room for packets of one read.
+/// Buffer size of one read, bytes.
 const READ_BYTES: usize = 512;
-/// Bytes that belong to no report, since the last one, that are a fault: four frames.
+/// Limit on malformed bytes since the last report, above which the line is at fault: four frames.
 const MOST_NOISE: usize = 64;
 
-/// What tick and threads leave for each other.
+/// Data exchanged between tick and threads.
 #[derive(Debug, Default)]
 struct Slots {
-    /// The newest command that was not sent yet.
+    /// Newest command, not sent yet.
     command: Option<Command>,
-    /// The newest report that was not read yet.
+    /// Newest report, not read yet.
     report: Option<Report>,
-    /// Commands without a report, and since when there is one.
+    /// Commands without a report, and the start of the wait for it.
     unanswered: u32,
     silent_since: Option<Instant>,
 }
 
 #[derive(Default)]
 struct Shared {
-    /// Each holds it to copy a few numbers, and the tick never waits for it.
+    /// Locked only to copy a few numbers; the tick never waits for the lock.
     slots: Mutex<Slots>,
-    /// What went wrong first.
+    /// First fault.
     trouble: OnceLock<Trouble>,
-    /// Nobody wants it any more, and then: the last command is answered.
+    /// Requests the end of the threads; then: the last command is answered.
     is_over: AtomicBool,
     is_done: AtomicBool,
 }
@@ -56,7 +56,7 @@ impl Shared {
     }
 
     fn fail(&self, trouble: Trouble) {
-        // The first one counts.
+        // Only the first fault is stored.
         let _ = self.trouble.set(trouble);
     }
 
@@ -69,7 +69,7 @@ impl Shared {
     }
 }
 
-/// A device whose reports are read and whose commands are sent.
+/// Running report reader and command writer of a device.
 pub struct Exchange {
     shared: Arc<Shared>,
     writer: Option<JoinHandle<()>>,
@@ -80,7 +80,7 @@ impl Exchange {
     /// Starts the threads. A device that is silent for `timeout` is a fault. Not real-time.
     ///
     /// # Errors
-    /// If there is no thread.
+    /// If a thread cannot be created.
     pub fn start(chip: &Arc<dyn Chip>, switch: &ForceSwitch, timeout: Duration) -> io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let (theirs, chips, stop) = (Arc::clone(&shared), Arc::clone(chip), switch.clone());
@@ -94,19 +94,19 @@ impl Exchange {
         Ok(exchange)
     }
 
-    /// The newest report since the last call. Real-time: bounded, no allocation, waits for nothing.
+    /// Returns the newest report since the last call. Real-time: bounded, no allocation, no wait.
     ///
     /// # Errors
-    /// A [`Trouble`], from then on in each call.
+    /// The first [`Trouble`], from then on in each call.
     pub fn take(&self) -> Result<Option<Report>, Trouble> {
         match self.shared.trouble() {
             Some(trouble) => Err(trouble),
-            // Where it is locked a thread is leaving something.
+            // Contention: a thread is storing data.
             None => Ok(self.shared.slots.try_lock().ok().and_then(|mut slots| slots.report.take())),
         }
     }
 
-    /// Leaves a command for the thread; whether it could. Real-time: bounded, no allocation, waits for nothing.
+    /// Posts a command for the writer; returns false if the lock is contended. Real-time: bounded, no allocation, no wait.
     pub fn leave(&self, command: Command) -> bool {
         let Ok(mut slots) = self.shared.slots.try_lock() else { return false };
         slots.command = Some(command);
@@ -117,7 +117,7 @@ impl Exchange {
         true
     }
 
-    /// Sets the motors to rest and ends the threads; what went wrong, if anything did. Not real-time.
+    /// Sets the motors to rest and ends the threads; returns the first fault. Not real-time.
     pub fn end(&mut self) -> Option<Trouble> {
         self.shared.is_over.store(true, Ordering::Release);
         if let Some(writer) = self.writer.take() {
@@ -137,7 +137,7 @@ impl Drop for Exchange {
     }
 }
 
-/// Reads until the exchange is over, or something is wrong.
+/// Reads reports until the exchange ends or a fault occurs.
 fn read(chip: &dyn Chip, shared: &Shared, writer: &Thread) {
     let (mut frames, mut packets, mut noise) = (Frames::default(), [0; READ_BYTES], 0);
     while !shared.is_done.load(Ordering::Acquire) && shared.trouble().is_none() {
@@ -173,12 +173,12 @@ fn read(chip: &dyn Chip, shared: &Shared, writer: &Thread) {
     }
 }
 
-/// Sends commands until the exchange is over, or something is wrong; then rest, and waits for its report, which would be a
-/// stale one for whoever comes next.
+/// Sends commands until the exchange ends or a fault occurs; then sends rest and waits for a report, which the next session
+/// would otherwise receive as a stale one.
 fn write(chip: &dyn Chip, shared: &Shared, switch: &ForceSwitch, timeout: Duration) {
     send_commands(chip, shared, switch, timeout);
     shared.lock().unanswered += 1;
-    // If it still listens.
+    // Fails if the device is gone.
     let is_gone = chip.write(&Command::REST.bytes()).is_err();
     let since = Instant::now();
     let is_awaited = || shared.trouble().is_none() && shared.lock().unanswered > 0;

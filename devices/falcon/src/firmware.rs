@@ -1,4 +1,4 @@
-//! The user's own firmware file. This repository has none, and may have none: see the chapter of the book.
+//! Firmware file of the user. This repository contains none, and must not: see the chapter of the book.
 
 use flotor_hal::read_file;
 use sha2::{Digest, Sha256};
@@ -6,20 +6,19 @@ use std::fmt::Write;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// Largest file that is read: twice the known ones.
+/// Limit on the file's size, bytes: twice the known firmware.
 const MOST_BYTES: u64 = 20_000;
 
-/// Firmware that is known: its name, its size, and how its SHA-256 begins (libnifalcon, folder `firmware`).
+/// Known firmware: name, size, and first digits of the SHA-256 (libnifalcon, folder `firmware`).
 const KNOWN: [(&str, usize, &str); 2] =
     [("nvent", 8492, "1119e39c39fab1f3"), ("test_firmware", 7324, "b2700d5cd5ca217e")];
-/// Digits of a digest that are enough to know a file by.
+/// Minimum length of `firmware_sha256`, hex digits.
 const LEAST_DIGITS: usize = 16;
 
-/// Reads a file and checks that it is what it should be: one that is known, or one whose digest begins as `expected` says.
-/// Not real-time.
+/// Reads a firmware file and checks it: it must be known, or its SHA-256 must begin with `expected`. Not real-time.
 ///
 /// # Errors
-/// One sentence: what the file is instead, and what to do.
+/// One sentence with the cause and the remedy: the file cannot be read, is too large, or has another digest.
 pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
     let bytes = read_file(Path::new(path), MOST_BYTES).map_err(|error| match error.kind() {
         ErrorKind::FileTooLarge => {
@@ -57,11 +56,11 @@ pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
     })
 }
 
-/// The SHA-256 of bytes, in hex. Not real-time.
+/// Returns the SHA-256 of bytes in hex. Not real-time.
 #[must_use]
 pub fn digest(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
-        // Writing to a text cannot fail.
+        // Writing to a string cannot fail.
         let _ = write!(text, "{byte:02x}");
         text
     })

@@ -1,4 +1,4 @@
-//! The delta linkage: three arms turn in planes 120° apart; each carries the handle's platform by a parallelogram.
+//! Kinematics of the delta linkage: three arms turn in planes 120° apart; each carries the handle's platform by a parallelogram.
 //!
 //! In the frame of one arm (u outwards from its axis, v along its axis, w along the handle's axis), with the angle θ of the
 //! arm (Stamper 1997, and libnifalcon's numbers for the Falcon):
@@ -9,7 +9,7 @@
 //! g = (u + c - a cos θ)² + (w - a sin θ)² - L² = 0                  it joins elbow and platform
 //! ```
 //!
-//! The angles of a position follow in closed form; the position of three angles is the root of the three `g`, by Newton's
+//! The angles for a position follow in closed form; the position for three angles is the root of the three `g`, by Newton's
 //! method, to 1e-12 rad. With `G = ∂g/∂P` and `h = ∂g/∂θ`, `G dP + h dθ = 0`, and by virtual work the torques for a force
 //! `F` on the hand are `τ = -h G⁻ᵀ F`.
 //!
@@ -18,7 +18,7 @@
 use flotor_hal::glam::{DMat3, DVec3};
 use flotor_hal::math;
 
-/// Lengths of the linkage, m: the arm, the parallelogram, the platform, its two joints, and where its axes are.
+/// Lengths of the linkage, m: arm, parallelogram, platform, its two joints, and offsets of the axes.
 const A_M: f64 = 0.060;
 const B_M: f64 = 0.1025;
 const C_M: f64 = 0.01443;
@@ -30,41 +30,41 @@ const S_M: f64 = -0.02309;
 /// Directions of the arms, degrees.
 const ARMS_DEG: [f64; 3] = [105.0, -15.0, -135.0];
 
-/// The centre of the handle's range in the maker's frame, m.
+/// Centre of the handle's range in the maker's frame, m.
 pub const CENTRE_M: DVec3 = DVec3::new(0.0, 0.0, 0.125);
 /// Half the range along each axis, m.
 pub const RANGE_M: f64 = 0.05;
 
-/// Counts of an encoder for a turn of its motor, the gear between motor and arm, and the angle at zero counts.
+/// Counts of an encoder per turn of its motor, gear ratio between motor and arm, and angle of an arm at zero counts.
 const COUNTS_PER_TURN: f64 = 320.0 * 4.0;
 const GEAR: f64 = 110.0 / 14.25;
 const ZERO_DEG: f64 = 35.0;
 
-/// Angle of an arm that is as good as none.
+/// Tolerance of Newton's method, rad.
 const SOLVED_RAD: f64 = 1.0e-12;
-/// Angle up to which a solution counts.
+/// Tolerance that is accepted after the last step, rad.
 const ACCEPTED_RAD: f64 = 1.0e-9;
-/// Steps of Newton's method: from the centre of the range four are enough, wherever the handle is.
+/// Limit on the steps of Newton's method: from the centre of the range four are enough anywhere.
 const STEPS: u32 = 20;
-/// Length below which a lever is none, m: forces grow beyond bounds there.
+/// Shortest lever of an arm, m: forces grow beyond bounds below.
 const LEAST_LEVER_M: f64 = 1.0e-3;
 
-/// The linkage at three angles.
+/// Posture of the linkage at three angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posture {
     position_m: DVec3,
-    /// Change of position with the angles, m/rad.
+    /// Derivative of the position by the angles, m/rad.
     jacobian: DMat3,
 }
 
-/// Angles of the arms for counts of the encoders, rad. Real-time: bounded, no allocation.
+/// Returns the angles of the arms for encoder counts, rad. Real-time: bounded, no allocation.
 #[must_use]
 pub fn angles_rad(counts: [i16; 3]) -> DVec3 {
     let angle = |count: i16| (f64::from(count) * 360.0 / COUNTS_PER_TURN / GEAR + ZERO_DEG).to_radians();
     DVec3::from_array(counts.map(angle))
 }
 
-/// Counts of the encoders nearest to angles of the arms, rad. Real-time: bounded, no allocation.
+/// Returns the encoder counts nearest to angles of the arms, rad. Real-time: bounded, no allocation.
 #[must_use]
 pub fn counts(angles_rad: DVec3) -> [i16; 3] {
     angles_rad.to_array().map(|angle_rad| {
@@ -75,24 +75,24 @@ pub fn counts(angles_rad: DVec3) -> [i16; 3] {
     })
 }
 
-/// A count of an encoder at the end of its arm, m.
+/// Returns the length of the arc at the end of an arm per encoder count, m.
 #[must_use]
 pub fn resolution_m() -> f64 {
     A_M * std::f64::consts::TAU / COUNTS_PER_TURN / GEAR
 }
 
-/// Sine and cosine of an arm's direction.
+/// Returns sine and cosine of an arm's direction.
 fn direction(arm: usize) -> (f64, f64) {
     math::sin_cos(ARMS_DEG.get(arm).copied().unwrap_or(0.0).to_radians())
 }
 
-/// A position in the frame of an arm.
+/// Transforms a position into the frame of an arm.
 fn in_arm(position_m: DVec3, (sine, cosine): (f64, f64)) -> DVec3 {
     let DVec3 { x, y, z } = position_m;
     DVec3::new(x * cosine + y * sine - R_M, y * cosine - x * sine - S_M, z)
 }
 
-/// The angles of the arms with the handle at a position, m; `None` where an arm does not reach. Real-time: bounded, no
+/// Returns the angles of the arms, rad, for a position of the handle, m; `None` outside the reach of an arm. Real-time: bounded, no
 /// allocation.
 #[must_use]
 pub fn inverse(position_m: DVec3) -> Option<DVec3> {
@@ -103,7 +103,7 @@ pub fn inverse(position_m: DVec3) -> Option<DVec3> {
         let length_m = D_M + E_M + (B_M * B_M - aside * aside).sqrt();
         let (along, distance_m) = (u + C_M, math::hypot(u + C_M, w));
         let cosine = (A_M * A_M + distance_m * distance_m - length_m * length_m) / (2.0 * A_M * distance_m);
-        // False for NaN. Of both angles, the one with the elbow outside.
+        // False for NaN. Of both solutions, the elbow outside.
         let is_reached = cosine.abs() <= 1.0;
         if !is_reached {
             return None;
@@ -113,8 +113,7 @@ pub fn inverse(position_m: DVec3) -> Option<DVec3> {
     Some(DVec3::from_array(angles))
 }
 
-/// What the three parallelograms demand at a position and angles: `g`, its derivatives by the position (a row an arm) and
-/// by the angles.
+/// Returns the residuals `g` of the three loop closures, their derivatives by the position (one row per arm) and by the angles.
 fn closure(position_m: DVec3, angles_rad: DVec3) -> (DVec3, [DVec3; 3], DVec3) {
     let (mut g, mut rows, mut h) = ([0.0; 3], [DVec3::ZERO; 3], [0.0; 3]);
     let arms = g.iter_mut().zip(&mut rows).zip(&mut h).zip(angles_rad.to_array()).enumerate();
@@ -133,14 +132,14 @@ fn closure(position_m: DVec3, angles_rad: DVec3) -> (DVec3, [DVec3; 3], DVec3) {
     (g.into(), rows, h.into())
 }
 
-/// The linkage at angles of the arms, rad, with the handle near a position, m: the one before. `None` where the
+/// Solves the posture for angles of the arms, rad, from a nearby position, m, usually the previous one. `None` where the
 /// linkage does not close, or has no lever. Real-time: bounded, no allocation.
 #[must_use]
 pub fn posture(angles_rad: DVec3, near_m: DVec3) -> Option<Posture> {
     let mut position_m = near_m;
     for _ in 0..STEPS {
         let (g, rows, h) = closure(position_m, angles_rad);
-        // Levers shorter than a millimetre would make any solution one.
+        // With shorter levers any position would pass as a solution.
         if h.abs().min_element() < LEAST_LEVER_M * A_M {
             return None;
         }
@@ -155,7 +154,7 @@ pub fn posture(angles_rad: DVec3, near_m: DVec3) -> Option<Posture> {
         }
         position_m -= inverse * g;
     }
-    // Rounding kept it from the last digits.
+    // Rounding prevented convergence to the last digits.
     let (g, rows, h) = closure(position_m, angles_rad);
     let inverse = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose().inverse();
     ((g / h).abs().max_element() <= ACCEPTED_RAD)
@@ -163,19 +162,19 @@ pub fn posture(angles_rad: DVec3, near_m: DVec3) -> Option<Posture> {
 }
 
 impl Posture {
-    /// Where the handle is, m.
+    /// Returns the position of the handle, m, in the maker's frame.
     #[must_use]
     pub fn position_m(&self) -> DVec3 {
         self.position_m
     }
 
-    /// Torques of the arms, N·m, that exert a force on the hand. Real-time: bounded, no allocation.
+    /// Returns the torques of the arms, N·m, that exert a force on the hand. Real-time: bounded, no allocation.
     #[must_use]
     pub fn torques_nm(&self, force_n: DVec3) -> DVec3 {
         self.jacobian.transpose() * force_n
     }
 
-    /// The force on the hand that torques of the arms, N·m, exert. Real-time: bounded, no allocation.
+    /// Returns the force on the hand, N, that torques of the arms exert. Real-time: bounded, no allocation.
     #[must_use]
     pub fn force_n(&self, torques_nm: DVec3) -> DVec3 {
         self.jacobian.transpose().inverse() * torques_nm

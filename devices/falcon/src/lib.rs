@@ -1,4 +1,4 @@
-//! The Novint Falcon over raw USB: three driven axes and four buttons behind an FTDI chip.
+//! Device plugin for the Novint Falcon over raw USB: three driven axes and four buttons behind an FTDI chip.
 //!
 //! ```text
 //! encoders -> angles -> Delta -> position          force -> Delta -> torques -> words
@@ -6,13 +6,13 @@
 //!     +--------- frame <- bytes <- packets of the chip ~ USB ~ bytes <- frame <--+
 //! ```
 //!
-//! The device forgets its firmware with its power. The user has it; this plugin has none.
+//! The device loses its firmware at power-off. The user supplies the file; this plugin contains none.
 //!
 //! - [`protocol`]: commands and reports as frames of 16 bytes.
-//! - [`kinematics`]: the delta linkage: from angles to the handle, from force to torques, and back.
+//! - [`kinematics`]: the delta linkage: from angles to the handle's position, from force to torques, and back.
 //! - [`chip`]: the FTDI chip: its requests, and the status bytes in its packets.
-//! - [`boot`]: the handshake with the boot loader, and what may go wrong in it.
-//! - [`firmware`]: the user's file.
+//! - [`boot`]: the handshake with the boot loader, and the errors of a start.
+//! - [`firmware`]: the user's firmware file.
 //! - `usb`, `remote`: the chip on the bus, and an emulated one over TCP.
 //! - [`exchange`]: a thread that reads, and one that keeps one command in flight.
 //! - `plugin`: parameters and the contract.

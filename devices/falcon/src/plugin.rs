@@ -1,4 +1,4 @@
-//! The device as a plugin: positions from counts, words from wrenches, buttons.
+//! Implementation of the device contract for the Falcon: positions from encoder counts, motor words from wrenches, buttons.
 
 use crate::boot;
 use crate::chip::{Chip, PRODUCT, VENDOR};
@@ -19,17 +19,17 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What an address begins with.
+/// Prefixes of an address.
 const USB: &str = "usb";
 const TCP: &str = "tcp:";
-/// Change of force, N/s: from nothing to the default limit in a millisecond.
+/// Limit on the change of force, N/s: from zero to the default limit in a millisecond.
 const SLEW_N_PER_S: f64 = 8000.0;
-/// A command and its report over full-speed USB, a frame of 1 ms each, s.
+/// Latency, s: a command and its report over full-speed USB, a frame of 1 ms each.
 const LATENCY_S: f64 = 2.0e-3;
-/// What whoever cannot wait is told.
+/// Error without homing, with the remedy.
 const NOT_HOMED: &str = "the Falcon does not know where its handle is: start it with `homing_s` of 10 or more, and while its \
                          lamp is red, push the handle in as far as it goes, pull it out as far as it goes";
-/// Time between two commands while the device looks for its ends.
+/// Interval between two commands during homing.
 const HOMING_NAP: Duration = Duration::from_millis(2);
 
 const SCHEMA: &[Parameter] = &[
@@ -71,17 +71,17 @@ const SCHEMA: &[Parameter] = &[
     Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Silence of the device that is a fault"),
 ];
 
-/// The maker's frame (x right, y up, z towards the user) in the host's (x right, y away, z up).
+/// Transforms a vector from the maker's frame (x right, y up, z towards the user) to the host's (x right, y away, z up).
 fn to_host(maker: DVec3) -> DVec3 {
     DVec3::new(maker.x, -maker.z, maker.y)
 }
 
-/// The host's frame in the maker's.
+/// Transforms a vector from the host's frame to the maker's.
 fn to_maker(host: DVec3) -> DVec3 {
     DVec3::new(host.x, host.z, -host.y)
 }
 
-/// What of the parameters is in force.
+/// Parsed parameters.
 #[derive(Clone, Debug)]
 struct Options {
     address: String,
@@ -94,29 +94,29 @@ struct Options {
     parameters: [f64; SCHEMA.len()],
 }
 
-/// A Falcon, opened: its firmware runs, its motors are at rest.
+/// Opened Falcon: its firmware runs, its motors are at rest.
 pub struct FalconDevice {
     options: Options,
-    /// Gone after a fault: the next activation opens it anew.
+    /// `None` after a fault: the next activation opens the chip again.
     chip: Option<Arc<dyn Chip>>,
     calibration: VerticalCalibration,
     switch: ForceSwitch,
 }
 
-/// A Falcon whose motors follow the host.
+/// Active Falcon whose motors follow the host.
 pub struct DrivenDevice {
     opened: FalconDevice,
     exchange: Exchange,
     posture: Posture,
-    /// A report nobody has read yet.
+    /// First report, for the first read.
     first: Option<Report>,
     state: DeviceState,
-    /// When the last sample was taken, ns.
+    /// Time of the last sample, ns.
     sampled_ns: Option<u64>,
-    /// What the motors were told, as a force on the hand, and whether it is less than was wanted.
+    /// Last motor command as a force on the hand, and whether the words were clipped.
     force_n: DVec3,
     is_clipped: bool,
-    /// Why there is no force any more.
+    /// Fault that removed the force.
     trouble: Option<Trouble>,
 }
 
@@ -230,7 +230,7 @@ impl Device for FalconDevice {
 }
 
 impl FalconDevice {
-    /// Opens the chip, and brings the device to where it reports.
+    /// Opens the chip and starts the device up to its first report.
     fn connect(&mut self) -> Result<Arc<dyn Chip>, Refusal> {
         let chip = self.options.open()?;
         let firmware = self.options.firmware.as_deref();
@@ -270,7 +270,7 @@ impl FalconDevice {
         Ok((exchange, report, posture))
     }
 
-    /// Waits until all arms have met their ends.
+    /// Waits until all arms are homed.
     fn home(&self, exchange: &Exchange) -> Result<Report, Refusal> {
         let started = Instant::now();
         let mut newest = None;
@@ -304,7 +304,7 @@ impl ActiveDevice for DrivenDevice {
         };
         self.first = None;
         let Some(report) = report else {
-            // A device that is silent for too long is told by the thread.
+            // The thread reports a device that is silent for too long.
             *state = self.state;
             return Cycle::Stale;
         };
@@ -333,7 +333,7 @@ impl ActiveDevice for DrivenDevice {
         let height_m = self.state.pose.position().z;
         let share = self.opened.calibration.share(height_m);
         let command_n = wanted_n.with_z(self.opened.calibration.command_n(wanted_n.z, height_m));
-        // The motors pull the other way than the arms' angles count.
+        // The motors pull against the direction of the angles.
         let wanted = self.posture.torques_nm(to_maker(command_n)) * -words_per_nm;
         let clipped = clipped_words(wanted.to_array());
         let torques_nm = DVec3::from_array(clipped.words.map(f64::from)) / -words_per_nm;
@@ -356,14 +356,14 @@ impl ActiveDevice for DrivenDevice {
 }
 
 impl DrivenDevice {
-    /// Takes the posture as the sample of a time.
+    /// Updates the sample from the posture.
     fn sample(&mut self, buttons: u32, time_ns: u64) {
         let position_m = to_host(self.posture.position_m() - CENTRE_M);
         let before_m = self.state.pose.position();
         let velocity = match self.sampled_ns {
             Some(before_ns) if time_ns > before_ns => {
                 let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
-                // A first-order low pass, exact for a difference that is held over the interval.
+                // First-order low pass, exact for a difference that is constant over the interval.
                 let share = 1.0 - math::exp(-TAU * self.opened.options.cutoff_hz * dt_s);
                 self.state.twist.linear().lerp((position_m - before_m) / dt_s, share)
             }
@@ -373,7 +373,7 @@ impl DrivenDevice {
         self.state = DeviceState {
             pose: Pose::new(position_m, DQuat::IDENTITY),
             twist: Twist::new(velocity, DVec3::ZERO),
-            // What the motors were told: it measures no force.
+            // The commanded force: the device measures none.
             delivered: Wrench::from_force(self.force_n),
             sampled_ns: time_ns,
             buttons,
@@ -383,7 +383,7 @@ impl DrivenDevice {
 }
 
 impl CalibrationDevice for FalconDevice {
-    /// The firmware says no serial number: the address is all there is.
+    /// Returns the address, because the firmware has no serial number.
     fn serial(&self) -> String {
         self.options.address.clone()
     }
@@ -399,7 +399,7 @@ impl ConnectionDevice for FalconDevice {
 }
 
 impl IndependentStopDevice for FalconDevice {
-    /// Of the connection that was opened first; a device on USB has none.
+    /// Returns the stop of the open connection; a device on USB has none.
     fn independent_stop(&self) -> IndependentStop {
         let rest = Command::REST.bytes();
         self.chip.as_ref().map_or(IndependentStop::none(), |chip| chip.independent_stop(&rest))

@@ -1,84 +1,84 @@
-//! Commands and reports of the firmware: frames of 16 bytes, one report for one command. No input or output here.
+//! Commands and reports of the firmware: frames of 16 bytes, one report per command. No I/O here.
 //!
 //! ```text
 //! command  '<'  3 motors x 4 nibbles    lamps   'A'     '>'
 //! report   '<'  3 encoders x 4 nibbles  inputs  (any)   '>'
 //! ```
 //!
-//! Every number is sent as 0x41 plus a few bits, so that `<` and `>` are never part of one. Words have 16 bits, two's
-//! complement, the least nibble first (libnifalcon, firmware "nvent").
+//! Every number is sent as 0x41 plus a few bits, so that no number contains `<` or `>`. Words have 16 bits, two's
+//! complement, the lowest nibble first (libnifalcon, firmware "nvent").
 
 /// Bytes of a frame.
 pub const FRAME_BYTES: usize = 16;
 const START: u8 = b'<';
 const END: u8 = b'>';
-/// What is added to bits that are sent.
+/// Offset added to the bits of a number.
 const OFFSET: u8 = 0x41;
-/// Where the lamps or inputs are, and the byte that means nothing.
+/// Offsets of the lamps or inputs, of the unused byte and of the last one.
 const INPUTS: usize = 13;
 const FREE: usize = 14;
 const LAST: usize = FRAME_BYTES - 1;
-/// Largest motor word.
+/// Limit on the magnitude of a motor word.
 pub const MOST_WORD: i16 = 4095;
 
 /// Colour of the ring around the handle's arms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lamp {
-    /// Dark.
+    /// No light.
     Off = 0,
-    /// Green: force may come.
+    /// Green: force is possible.
     Green = 2,
     /// Blue: at rest.
     Blue = 4,
-    /// Red: the device wants to be homed.
+    /// Red: the device must be homed.
     Red = 8,
 }
 
-/// Whether the firmware looks for the ends of the arms' ranges, from which it counts.
+/// Homing bit: the firmware searches for the ends of the arms' ranges, the zero of its counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Homing {
-    /// It counts.
+    /// No homing requested.
     Done = 0,
-    /// It looks.
+    /// Homing requested.
     Wanted = 1,
 }
 
-/// A command.
+/// Command to the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Command {
-    /// Words of the motors: a torque each.
+    /// Motor words, a torque per arm.
     pub motors: [i16; 3],
-    /// The lamp.
+    /// Colour of the lamp.
     pub lamp: Lamp,
-    /// Whether to look for the ends.
+    /// Homing bit.
     pub homing: Homing,
 }
 
-/// A report.
+/// Report of the firmware.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Report {
-    /// Counts of the encoders.
+    /// Encoder counts, one per arm.
     pub encoders: [i16; 3],
     /// Buttons of the grip: plus, forward, centre, minus from bit 0.
     pub buttons: u32,
-    /// Which arms have met their ends, one bit each.
+    /// Homed arms, one bit each.
     pub homed: u8,
 }
 
-/// All arms have met their ends.
+/// Value of [`Report::homed`] with all arms homed.
 pub const ALL_HOMED: u8 = 0b111;
 
 impl Command {
-    /// No torque.
+    /// Command without torque.
     pub const REST: Self = Self { motors: [0; 3], lamp: Lamp::Blue, homing: Homing::Done };
 
-    /// Its bytes. Real-time: bounded, no allocation.
+    /// Encodes the command. Real-time: bounded, no allocation.
     #[must_use]
     pub fn bytes(&self) -> [u8; FRAME_BYTES] {
         frame(self.motors, self.lamp as u8 | self.homing as u8, OFFSET)
     }
 
-    /// What a frame commands; nothing if it is no command. Real-time: bounded, no allocation.
+    /// Decodes a command; `None` for an invalid lamp byte. Real-time: bounded, no allocation.
     #[must_use]
     pub fn read(bytes: &[u8; FRAME_BYTES]) -> Option<Self> {
         let (motors, bits) = (words(bytes), bytes[INPUTS].checked_sub(OFFSET)?);
@@ -95,7 +95,7 @@ impl Command {
 }
 
 impl Report {
-    /// Its bytes, as the firmware makes them. Real-time: bounded, no allocation.
+    /// Encodes this report as the firmware does. Real-time: bounded, no allocation.
     #[must_use]
     pub fn bytes(&self) -> [u8; FRAME_BYTES] {
         #[allow(clippy::cast_possible_truncation)] // four bits
@@ -103,7 +103,7 @@ impl Report {
         frame(self.encoders, buttons | (self.homed & ALL_HOMED) << 4, OFFSET)
     }
 
-    /// What a frame reports. Real-time: bounded, no allocation.
+    /// Decodes a report. Real-time: bounded, no allocation.
     #[must_use]
     pub fn read(bytes: &[u8; FRAME_BYTES]) -> Self {
         let bits = bytes[INPUTS].wrapping_sub(OFFSET);
@@ -123,7 +123,7 @@ fn frame(words: [i16; 3], bits: u8, free: u8) -> [u8; FRAME_BYTES] {
     bytes
 }
 
-/// The words of a frame whose bytes were checked as they came.
+/// Decodes the words of a frame that [`Frames`] has checked.
 fn words(bytes: &[u8; FRAME_BYTES]) -> [i16; 3] {
     let nibble = |place: usize| bytes.get(place).map_or(0, |byte| byte.wrapping_sub(OFFSET) & 0xf);
     [1, 5, 9].map(|first| {
@@ -133,18 +133,18 @@ fn words(bytes: &[u8; FRAME_BYTES]) -> [i16; 3] {
     })
 }
 
-/// What came of a byte.
+/// Result of a received byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// A frame is whole.
+    /// Completed frame.
     Frame([u8; FRAME_BYTES]),
-    /// More is to come.
+    /// Part of an incomplete frame.
     Part,
-    /// It belongs to no frame, and neither does what came before it.
+    /// Malformed data: the byte and the bytes collected before belong to no frame.
     Noise,
 }
 
-/// Puts frames together, byte by byte.
+/// Parser that assembles frames byte by byte.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Frames {
     bytes: [u8; FRAME_BYTES],
@@ -152,7 +152,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Takes the next byte. Real-time: bounded, no allocation.
+    /// Parses the next byte. Real-time: bounded, no allocation.
     pub fn push(&mut self, byte: u8) -> Heard {
         let fits = match self.length {
             0 => byte == START,
@@ -175,7 +175,7 @@ impl Frames {
         Heard::Frame(self.bytes)
     }
 
-    /// A frame that ended early: this byte may begin the next one, and so may the free one before it.
+    /// Drops an incomplete frame. The byte may start the next one, and so may the unused byte before it.
     fn begin_anew(&mut self, byte: u8) -> Heard {
         let was_free_start = self.length == LAST && self.bytes[FREE] == START;
         self.length = 0;
@@ -188,8 +188,8 @@ impl Frames {
     }
 }
 
-/// Words for torques in their proportion: if one of them is too large, all become smaller, and none wraps round.
-/// Real-time: bounded, no allocation.
+/// Rounds torques to motor words; scales all down together if one is too large, and none wraps round. Real-time: bounded, no
+/// allocation.
 #[must_use]
 pub fn clipped_words(wanted: [f64; 3]) -> Clipped {
     let most = f64::from(MOST_WORD);
@@ -205,12 +205,12 @@ pub fn clipped_words(wanted: [f64; 3]) -> Clipped {
     Clipped { words, is_clipped: largest > most || !is_finite }
 }
 
-/// Words that fit.
+/// Motor words within the limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clipped {
-    /// The words.
+    /// Motor words, at most [`MOST_WORD`] in magnitude.
     pub words: [i16; 3],
-    /// Less than was wanted.
+    /// True if the words were scaled down, or the torques were not finite.
     pub is_clipped: bool,
 }
 

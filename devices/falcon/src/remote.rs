@@ -1,4 +1,4 @@
-//! A chip at the other end of a TCP connection: an emulated device in another process, where no kernel lends a bus.
+//! Chip at the other end of a TCP connection: an emulated device in another process, for machines without an emulated USB bus.
 //!
 //! ```text
 //! host    'R' request u8 value u16     'W' length u8 bytes        little-endian
@@ -13,16 +13,16 @@ use std::net::TcpStream;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// First byte of a request, and of bytes for the line.
+/// First byte of a chip request.
 pub const REQUEST: u8 = b'R';
-/// First byte of bytes for the line.
+/// First byte of data for the serial line.
 pub const WRITE: u8 = b'W';
-/// Time in which an emulator has set its motors to rest, ns.
+/// Time in which an emulator has set its motors to rest, ns; declared for the independent stop.
 const STOP_NS: u64 = 5_000_000;
-/// Bytes that are sent at once at most.
+/// Limit on the data of one message, bytes.
 const PIECE_BYTES: usize = 255;
 
-/// An emulated chip.
+/// Connection to an emulated chip.
 #[derive(Debug)]
 pub struct RemoteChip {
     writer: Mutex<TcpStream>,
@@ -32,7 +32,7 @@ pub struct RemoteChip {
 #[derive(Debug)]
 struct Reader {
     stream: TcpStream,
-    /// What has come of the next packet, with its length before it.
+    /// Received part of the next packet, after its length byte.
     bytes: [u8; 1 + PACKET_BYTES],
     length: usize,
 }
@@ -41,7 +41,7 @@ impl RemoteChip {
     /// Connects to an emulator. Not real-time.
     ///
     /// # Errors
-    /// What the system says.
+    /// If the connection fails.
     pub fn connect(address: &str) -> io::Result<Self> {
         let stream = TcpStream::connect(address)?;
         stream.set_nodelay(true)?;

@@ -1,29 +1,29 @@
-//! What goes wrong while the device runs.
+//! Faults of a running device.
 
 use crate::chip::{ChipLost, ShortPacket};
 use flotor_hal::Fault;
 
-/// What went wrong, as a closed set; after each the motors are at rest, if the device still listens.
+/// Fault of a running device; after each the motors are set to rest, if the device still receives commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// It was unplugged, or its hub was reset.
+    /// The device was unplugged, or its hub was reset.
     Gone,
-    /// The chip sends its status alone: no report to any command.
+    /// No report to any command: the chip sends its status bytes alone.
     Silent,
-    /// A packet has no status.
+    /// A packet without status bytes.
     ShortPacket,
-    /// A report came that no command was sent for: those to come would be old ones.
+    /// A surplus report: all further ones would be late.
     StaleReport,
-    /// What comes down the line are no reports.
+    /// Malformed data on the serial line.
     Noise,
-    /// An arm counts from nowhere: the firmware has begun anew.
+    /// An arm is not homed: the firmware has restarted.
     NotHomed,
-    /// The counts are none that the linkage can have.
+    /// Encoder counts outside the linkage's geometry.
     NoPosture,
 }
 
 impl Trouble {
-    /// What a host is told.
+    /// Returns the fault of the contract that the host receives.
     #[must_use]
     pub const fn fault(self) -> Fault {
         match self {

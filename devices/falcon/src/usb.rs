@@ -1,19 +1,20 @@
-//! The chip on the bus, through libusb.
+//! FTDI chip on the USB bus, by libusb.
 
 use crate::chip::{Chip, ChipLost, PRODUCT, Request, VENDOR};
 use crate::platform::{OTHER_REMEDY, access_remedy, has_bus};
 use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbContext};
 use std::time::{Duration, Instant};
 
-/// A device node is there before the kernel has configured the device, and before udev has set its permissions.
+/// Timeout and retry interval of a claim: a device node exists before the kernel has configured the device and udev has set
+/// its permissions.
 const CLAIM_PATIENCE: Duration = Duration::from_secs(2);
 const CLAIM_NAP: Duration = Duration::from_millis(10);
-/// A device that takes nothing for so long is gone.
+/// Timeout of a write; a device that accepts nothing for so long is gone.
 const WRITE_PATIENCE: Duration = Duration::from_millis(200);
-/// To the device, by its vendor's own requests.
+/// Request type: to the device, vendor-specific.
 const VENDOR_OUT: u8 = 0x40;
 
-/// A chip whose interface is claimed.
+/// Open chip with its claimed interface.
 pub(crate) struct UsbChip {
     handle: DeviceHandle<Context>,
     interface: u8,
@@ -21,10 +22,10 @@ pub(crate) struct UsbChip {
     output: u8,
 }
 
-/// Opens and claims the device with this serial number, or the first one. Not real-time.
+/// Opens and claims the device with a serial number, or the first one. Not real-time.
 ///
 /// # Errors
-/// One sentence: what is wrong, and what to do.
+/// One sentence with the cause and the remedy.
 pub(crate) fn open(serial: Option<&str>) -> Result<UsbChip, String> {
     let context = Context::new().map_err(refused)?;
     let mut problem = Error::NotFound;
@@ -45,7 +46,7 @@ fn claim(device: &Device<Context>, serial: Option<&str>) -> Result<UsbChip, Erro
     let started = Instant::now();
     loop {
         match try_claim(device, serial) {
-            // Too early, or really so: time tells.
+            // Retry: the device may not be configured yet.
             Err(Error::NotFound | Error::Busy | Error::Access) if started.elapsed() < CLAIM_PATIENCE => {
                 std::thread::sleep(CLAIM_NAP);
             }
@@ -76,7 +77,7 @@ fn try_claim(device: &Device<Context>, serial: Option<&str>) -> Result<UsbChip, 
         })
         .next()
         .ok_or(Error::NotSupported)?;
-    // The kernel's ftdi_sio steps aside; where that is not supported there is none.
+    // Detaches the kernel's ftdi_sio; systems without support have no such driver.
     let _ = handle.set_auto_detach_kernel_driver(true);
     handle.claim_interface(interface)?;
     Ok(UsbChip { handle, interface, input, output })
@@ -98,7 +99,7 @@ impl Chip for UsbChip {
     }
 
     fn read(&self, packets: &mut [u8], patience: Duration) -> Result<usize, ChipLost> {
-        // For libusb, no time is for ever.
+        // For libusb, a timeout of zero means no timeout.
         match self.handle.read_bulk(self.input, packets, patience.max(Duration::from_millis(1))) {
             Ok(length) => Ok(length),
             Err(Error::Timeout | Error::Interrupted) => Ok(0),

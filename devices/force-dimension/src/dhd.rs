@@ -1,25 +1,25 @@
-//! A device of the SDK in the axes of the contract, and its errors with what to do.
+//! Device of the SDK in the axes of the contract, with its errors and their remedies.
 
 use crate::ffi::Functions;
 use flotor_hal::{DMat3, DQuat, DVec3, Fault, Pose, Refusal, Twist, Wrench};
 use flotor_vendor_sdk::{Library, LibraryProblem, Sdk, StandIn, without_signals};
 use std::ffi::c_int;
 
-/// The SDK, as far as its library has to be found. `libdrd` has the functions of both; `libdhd` cannot initialise.
+/// Library lookup of the SDK. `libdrd` has the functions of both libraries; `libdhd` cannot initialise.
 const SDK: Sdk = Sdk {
     name: "the Force Dimension SDK",
     files: &["libdrd.so.3", "libdrd.so", "libdhd.so.3", "libdhd.so"],
     files_on_windows: &["drdms64.dll", "drd64.dll", "dhdms64.dll", "dhd64.dll"],
     variables: &["FDSDK", "FORCEDIM_SDK", "FD_SDK_DIR", "ForceDimensionSDK_DIR"],
 };
-/// Oldest version of the SDK.
+/// Oldest supported version of the SDK, major and minor.
 const OLDEST: [c_int; 2] = [3, 14];
-/// Places of a status: connected, calibrated, error, why force is off.
+/// Indices of a status: calibrated, error, cause of disabled force.
 const CALIBRATED: usize = 3;
 const ERROR: usize = 9;
 const FORCE_OFF_CAUSE: usize = 14;
-/// Errors of the SDK: the link is lost, no driver, no device, a thing that this device has not, an answer that is late, a call
-/// that does nothing, a device of another program.
+/// Error codes of the SDK: link lost, no driver, no device, feature not available, late reply, call not implemented, device in
+/// use by another program.
 const COM: c_int = 2;
 const NO_DRIVER: c_int = 4;
 const NO_DEVICE: c_int = 5;
@@ -28,7 +28,7 @@ const TIMEOUT: c_int = 7;
 const NOT_IMPLEMENTED: c_int = 10;
 const IN_USE: c_int = 20;
 
-/// A call that failed.
+/// Failed call of the SDK.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Failed {
     code: c_int,
@@ -37,7 +37,7 @@ pub(crate) struct Failed {
 }
 
 impl Failed {
-    /// What it means while the loop runs.
+    /// Returns the fault of the contract while the loop runs.
     pub(crate) fn fault(&self) -> Fault {
         match self.code {
             COM | NO_DRIVER | NO_DEVICE => Fault::Disconnected,
@@ -46,7 +46,7 @@ impl Failed {
         }
     }
 
-    /// For people, before it runs.
+    /// Returns the refusal before a run, with the remedy.
     pub(crate) fn refusal(&self) -> Refusal {
         let remedy = match self.code {
             NO_DRIVER => {
@@ -64,14 +64,14 @@ impl Failed {
     }
 }
 
-/// A device that is open.
+/// Open device.
 pub(crate) struct Dhd {
     functions: Box<Functions>,
     id: i8,
     wrist: Wrist,
 }
 
-/// What there is beside the translations.
+/// Wrist of a device, in addition to the translations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wrist {
     None,
@@ -80,7 +80,7 @@ pub(crate) enum Wrist {
 }
 
 impl Dhd {
-    /// Opens the library, and the device of this serial number, or of this place in the list. Moves nothing. Not real-time.
+    /// Opens the library, and the first device or the one with a serial number. Causes no motion. Not real-time.
     pub(crate) fn open(path: Option<&str>, stand_in: StandIn, which: Which) -> Result<Self, Refusal> {
         let library = Library::open(&SDK, path, stand_in).map_err(Refusal::resource)?;
         let functions = Functions::load(&library).map_err(Refusal::resource)?;
@@ -96,7 +96,7 @@ impl Dhd {
         let indices = (0..).take(usize::try_from(count).unwrap_or(0));
         match which {
             Which::First => Self::opened(functions, 0),
-            // Those in use are not opened a second time.
+            // Devices in use are skipped, not opened a second time.
             Which::Serial(wanted) => {
                 let mut found = Vec::new();
                 for index in indices {
@@ -131,17 +131,17 @@ impl Dhd {
         checked(&self.functions, code, what)
     }
 
-    /// What the maker calls it.
+    /// Returns the maker's name of the device.
     pub(crate) fn name(&self) -> String {
         self.functions.system_name(self.id)
     }
 
-    /// Number of its type.
+    /// Returns the number of the device type.
     pub(crate) fn kind(&self) -> i32 {
         self.functions.system_type(self.id)
     }
 
-    /// Its serial number; 0 if it says none.
+    /// Returns the serial number; 0 if the device reports none.
     pub(crate) fn serial(&self) -> u16 {
         match self.functions.serial_number(self.id) {
             (0, serial) => serial,
@@ -153,14 +153,14 @@ impl Dhd {
         self.wrist
     }
 
-    /// Whether it knows where it is.
+    /// Returns whether the device is initialised, so that its positions are valid.
     pub(crate) fn is_initialized(&self) -> bool {
         let (code, status) = self.functions.status(self.id);
         let is_calibrated = code >= 0 && status.get(CALIBRATED) == Some(&1);
         self.functions.is_initialized(self.id).unwrap_or(is_calibrated)
     }
 
-    /// Moves the arm to find out where it is, and lets it go. Not real-time: seconds.
+    /// Initialises the device by moving its arm, and ends the regulation. Not real-time: seconds.
     pub(crate) fn initialize(&self) -> Result<(), Refusal> {
         let Some(code) = without_signals(|| self.functions.auto_init(self.id)) else {
             return Err(Refusal::resource(
@@ -173,12 +173,12 @@ impl Dhd {
         stopped.map(drop).map_err(|failed| failed.refusal())
     }
 
-    /// Limits, velocity, watchdog, then force on, at zero.
+    /// Sets limits, velocity windows and watchdog, then enables force, at zero.
     pub(crate) fn energize(&self, setup: &Setup) -> Result<(), Failed> {
         let Self { functions, id, wrist } = self;
         let [most_n, most_nm] = setup.most;
         match self.check(functions.set_gravity_compensation(true, *id), "gravity compensation") {
-            // Not every device has it.
+            // Optional: some devices have none.
             Err(failed) if [NOT_AVAILABLE, NOT_IMPLEMENTED].contains(&failed.code) => {}
             done => drop(done?),
         }
@@ -196,7 +196,7 @@ impl Dhd {
         self.send(&Wrench::ZERO).map(drop)
     }
 
-    /// Force off, brakes on. Whatever fails, the rest is done.
+    /// Disables force and applies the brakes; a failed call does not skip the next ones.
     pub(crate) fn relax(&self) {
         let Self { functions, id, .. } = self;
         let _ = functions.set_wrench([0.0; 3], [0.0; 3], *id);
@@ -204,14 +204,14 @@ impl Dhd {
         let _ = functions.set_brakes(true, *id);
     }
 
-    /// Pose, m and unit quaternion.
+    /// Reads the pose, m and unit quaternion.
     pub(crate) fn pose(&self) -> Result<Pose, Failed> {
         let (code, position, rows) = self.functions.pose(self.id);
         self.check(code, "reading the pose")?;
         Ok(Pose::new(from_dhd(position), orientation(&rows)))
     }
 
-    /// Velocity, m/s and rad/s; zero until its window is filled.
+    /// Reads the velocity, m/s and rad/s; zero until the window is filled.
     pub(crate) fn twist(&self) -> Result<Twist, Failed> {
         let vector = |(code, vector): (c_int, [f64; 3])| match self.check(code, "reading the velocity") {
             Ok(_) => Ok(from_dhd(vector)),
@@ -226,7 +226,7 @@ impl Dhd {
         Ok(Twist::new(linear, angular))
     }
 
-    /// What it says it gives, N and N·m.
+    /// Reads the wrench that the device reports, N and N·m.
     pub(crate) fn wrench(&self) -> Result<Wrench, Failed> {
         let (code, force, torque) = self.functions.wrench(self.id);
         self.check(code, "reading the force")?;
@@ -237,7 +237,7 @@ impl Dhd {
         self.functions.buttons(self.id)
     }
 
-    /// Sends a wrench and waits for the exchange; whether the motors cannot give all of it.
+    /// Sends a wrench and waits for the exchange; returns whether the motors saturate.
     pub(crate) fn send(&self, wrench: &Wrench) -> Result<Given, Failed> {
         const SATURATED: c_int = 2;
         let code = self.functions.set_wrench(to_dhd(wrench.force()), to_dhd(wrench.torque()), self.id);
@@ -245,7 +245,7 @@ impl Dhd {
         Ok(if code == SATURATED { Given::Saturated } else { Given::All })
     }
 
-    /// Why the device has switched its force off, if it has.
+    /// Reads the cause of disabled force; `None` while force is enabled.
     pub(crate) fn force_off(&self) -> Result<Option<Fault>, Failed> {
         let (code, status) = self.functions.status(self.id);
         self.check(code, "reading the status")?;
@@ -253,7 +253,7 @@ impl Dhd {
             return Ok(Some(Fault::Protocol));
         }
         Ok(match status[FORCE_OFF_CAUSE] {
-            // A button at the device, or a handle that nobody holds.
+            // A button at the device, or a released handle.
             1 | 6 => Some(Fault::EmergencyStop),
             2 => Some(Fault::OverSpeed),
             3 => Some(Fault::Timeout),
@@ -270,23 +270,23 @@ impl Drop for Dhd {
     }
 }
 
-/// Which device.
+/// Device selection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Which {
-    /// The first.
+    /// First device of the list.
     First,
-    /// That of a serial number.
+    /// Device with this serial number.
     Serial(u16),
 }
 
-/// Whether the motors give what is commanded.
+/// Saturation of the motors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Given {
     All,
     Saturated,
 }
 
-/// How a device is to be energised.
+/// Settings for enabling force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Setup {
     /// Largest force, N, and torque, N·m.
@@ -305,7 +305,7 @@ fn checked(functions: &Functions, code: c_int, what: &'static str) -> Result<c_i
     Err(Failed { code, words, what })
 }
 
-/// Theirs: x towards the user, y right, z up. Ours: x right, y away, z up.
+/// Transforms a vector from the SDK's axes (x towards the user, y right, z up) to the host's (x right, y away, z up).
 fn from_dhd([x, y, z]: [f64; 3]) -> DVec3 {
     DVec3::new(y, -x, z)
 }
@@ -314,7 +314,7 @@ fn to_dhd(vector: DVec3) -> [f64; 3] {
     [-vector.y, vector.x, vector.z]
 }
 
-/// The orientation of a matrix of theirs, by its rows.
+/// Converts a rotation matrix of the SDK, given by rows, to a quaternion in the host's axes.
 fn orientation(rows: &[[f64; 3]; 3]) -> DQuat {
     let theirs = DMat3::from_cols_array_2d(rows).transpose();
     let columns = [DVec3::X, DVec3::Y, DVec3::Z]

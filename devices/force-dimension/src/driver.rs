@@ -1,4 +1,4 @@
-//! The thread that follows the SDK: pose, velocity, buttons; then the loop's wrench, whose call waits for the exchange.
+//! Thread that polls the SDK: reads pose, velocity and buttons, then sends the loop's wrench, a call that waits for the exchange.
 
 use crate::dhd::{Dhd, Failed, Given, Setup};
 use flotor_hal::{Conditions, Fault, Wrench};
@@ -8,12 +8,12 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Shortest cycle: the fastest device answers at 4 kHz, and a call that does not wait must not make the thread spin.
+/// Shortest cycle: the fastest device replies at 4 kHz, and a call that does not wait must not make the thread spin.
 const SHORTEST: Duration = Duration::from_micros(250);
-/// Every so many cycles the device is asked whether it has switched its force off.
+/// Interval of the check for disabled force, cycles.
 const STATUS_EVERY: u64 = 16;
 
-/// The thread, and the device at its end.
+/// Running thread that owns the device.
 pub(crate) struct Driver {
     thread: Option<JoinHandle<Dhd>>,
     exchange: Arc<Exchange>,
@@ -40,7 +40,7 @@ impl Driver {
         }
     }
 
-    /// Waits for the end of the thread; the device, relaxed, unless the thread panicked. Not real-time.
+    /// Ends the thread and returns the device, relaxed; `None` if the thread panicked. Not real-time.
     pub(crate) fn end(&mut self) -> Option<Dhd> {
         self.exchange.end();
         self.thread.take()?.join().ok()
@@ -53,7 +53,7 @@ impl Drop for Driver {
     }
 }
 
-/// Why a device was not energised.
+/// Reason why a device was not energised.
 #[derive(Debug)]
 pub(crate) enum Why {
     Failed(Failed),
@@ -82,7 +82,7 @@ fn follow(dhd: Dhd, exchange: &Exchange, mut orders: Orders) -> Dhd {
     dhd
 }
 
-/// One cycle; whether the motors give all of it.
+/// Runs one cycle; returns whether the motors saturate.
 fn step(
     dhd: &Dhd,
     exchange: &Exchange,

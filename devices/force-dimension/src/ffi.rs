@@ -1,4 +1,4 @@
-//! The functions of DHD and DRD that are used, as their public interface declares them (version 3.17): names, numbers and types
+//! Functions of DHD and DRD used by the plugin, as declared by their public interface (version 3.17): names, numbers and types
 //! only. All return `int`, 0 or a greater number for success and -1 for failure, unless the type says otherwise.
 //!
 //! Every call takes the id of a device as its last argument. Pointers lead to as many numbers as the call writes; each is a
@@ -8,11 +8,11 @@
 use flotor_vendor_sdk::sdk_functions;
 use std::ffi::{CStr, c_char, c_double, c_int, c_uint, c_ushort};
 
-/// A truth value of C, which an SDK of C++ returns: anything but 0 is true.
+/// C++ `bool` of the SDK, passed as a byte: any value but 0 is true.
 type Truth = u8;
 
 sdk_functions! {
-    /// Where the functions are.
+    /// Function pointers of the loaded library.
     pub(crate) struct Functions needs "version 3.14 of the Force Dimension SDK" {
         fn dhdGetSDKVersion(*mut c_int, *mut c_int, *mut c_int, *mut c_int);
         fn dhdErrorGetLast() -> c_int;
@@ -55,14 +55,14 @@ sdk_functions! {
     }
 }
 
-/// The estimator of the velocity that takes a window.
+/// Velocity estimator with a window.
 const WINDOWING: c_int = 0;
-/// Room for the numbers of a status: 17 in version 3.17, and some that a later one may add.
+/// Buffer length for a status: 17 numbers in version 3.17, and a reserve for later versions.
 pub(crate) const STATUS: usize = 64;
 
-/// Safe calls: each passes numbers, and pointers to locals of its own.
+/// Safe wrappers: each call passes numbers, and pointers to its own locals.
 impl Functions {
-    /// Version of the SDK: major, minor, release, revision.
+    /// Returns the version of the SDK: major, minor, release, revision.
     pub(crate) fn version(&self) -> [c_int; 4] {
         let mut version = [0; 4];
         let [major, minor, release, revision] = &mut version;
@@ -71,7 +71,7 @@ impl Functions {
         version
     }
 
-    /// Number and words of the newest error of this thread.
+    /// Returns number and text of the last error of this thread.
     pub(crate) fn last_error(&self) -> (c_int, String) {
         // SAFETY: functions without preconditions; the words are a static text, or null.
         unsafe { ((self.dhdErrorGetLast)(), text((self.dhdErrorGetLastStr)())) }
@@ -124,19 +124,19 @@ impl Functions {
         (unsafe { (self.dhdGetStatus)(status.as_mut_ptr(), id) }, status)
     }
 
-    /// Whether the device knows where it is; `None` if the library cannot tell.
+    /// Returns whether the device is initialised; `None` if the library has no such function.
     pub(crate) fn is_initialized(&self, id: i8) -> Option<bool> {
         // SAFETY: any id is legal.
         self.drdIsInitialized.map(|is_initialized| unsafe { is_initialized(id) != 0 })
     }
 
-    /// Moves the arm to find out where it is, for seconds; `None` if the library cannot.
+    /// Initialises the device by moving its arm, for seconds; `None` if the library has no such function.
     pub(crate) fn auto_init(&self, id: i8) -> Option<c_int> {
         // SAFETY: any id is legal.
         self.drdAutoInit.map(|auto_init| unsafe { auto_init(id) })
     }
 
-    /// Ends the regulation that holds the arm; force may stay on.
+    /// Ends the regulation of the arm; force may stay enabled.
     pub(crate) fn stop_regulation(&self, id: i8) -> c_int {
         // SAFETY: any id is legal.
         self.drdStop.map_or(0, |stop| unsafe { stop(1, id) })
@@ -172,19 +172,19 @@ impl Functions {
         unsafe { (self.dhdSetMaxTorque)(most_nm, id) }
     }
 
-    /// Velocity from a window of so many ms.
+    /// Sets the window of the velocity, ms.
     pub(crate) fn config_velocity(&self, window_ms: c_int, id: i8) -> c_int {
         // SAFETY: any id is legal.
         unsafe { (self.dhdConfigLinearVelocity)(window_ms, WINDOWING, id) }
     }
 
-    /// The same of the angular velocity.
+    /// Sets the window of the angular velocity, ms.
     pub(crate) fn config_angular_velocity(&self, window_ms: c_int, id: i8) -> c_int {
         // SAFETY: any id is legal.
         unsafe { (self.dhdConfigAngularVelocity)(window_ms, WINDOWING, id) }
     }
 
-    /// Force goes when no other one comes for so long, in units of 125 µs.
+    /// Sets the watchdog, which removes the force after this time without a command, in units of 125 µs.
     pub(crate) fn set_watchdog(&self, units: u8, id: i8) -> c_int {
         // SAFETY: any id is legal. Expert mode belongs to the process, and lasts for this call only.
         unsafe {
@@ -195,7 +195,7 @@ impl Functions {
         }
     }
 
-    /// Position, m, and rows of the rotation matrix.
+    /// Reads the position, m, and the rotation matrix, by rows.
     pub(crate) fn pose(&self, id: i8) -> (c_int, [f64; 3], [[f64; 3]; 3]) {
         let (mut position, mut rows) = ([0.0; 3], [[0.0; 3]; 3]);
         let [x, y, z] = &mut position;
@@ -218,7 +218,7 @@ impl Functions {
         (unsafe { (self.dhdGetAngularVelocityRad)(x, y, z, id) }, velocity)
     }
 
-    /// Force, N, and torque, N·m.
+    /// Reads force, N, and torque, N·m.
     pub(crate) fn wrench(&self, id: i8) -> (c_int, [f64; 3], [f64; 3]) {
         let (mut force, mut torque) = ([0.0; 3], [0.0; 3]);
         let ([x, y, z], [a, b, g]) = (&mut force, &mut torque);
@@ -231,14 +231,14 @@ impl Functions {
         unsafe { (self.dhdGetButtonMask)(id) }
     }
 
-    /// Force, N, and torque, N·m, and none of a gripper; waits for the exchange with the device.
+    /// Sends force, N, and torque, N·m, with zero gripper force; waits for the exchange with the device.
     pub(crate) fn set_wrench(&self, [x, y, z]: [f64; 3], [a, b, g]: [f64; 3], id: i8) -> c_int {
         // SAFETY: any id is legal.
         unsafe { (self.dhdSetForceAndTorqueAndGripperForce)(x, y, z, a, b, g, 0.0, id) }
     }
 }
 
-/// A text of the SDK.
+/// Copies a static text of the SDK; empty for a null pointer.
 fn text(place: *const c_char) -> String {
     if place.is_null() {
         return String::new();

@@ -1,4 +1,4 @@
-//! What the devices can do, by the number that the SDK gives them.
+//! Ranges and limits of the devices, by the type number of the SDK.
 //!
 //! Compared with CHAI3D (`CDeltaDevices.cpp`, BSD): the numbers 31 to 37, 60 to 64 and 104 to 107, and the 12 N of an omega.3
 //! and 20 N of a delta.3. CHAI3D takes 31 for an early delta and gives a delta.6 (61, 62, 64) 0.2 N·m; both have less here. The
@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-/// What a device can do.
+/// Range and limits of a device type.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Kind {
     /// Half the range to the right, away from the user, and up, m.
@@ -27,7 +27,7 @@ const LAMBDA: Kind = Kind { range_m: [0.12, 0.085, 0.12], range_rad: 1.2, force_
 const FALCON: Kind = Kind { range_m: [0.05, 0.05, 0.05], range_rad: PI, force_n: 8.0, torque_nm: 0.0 };
 
 impl Kind {
-    /// By its number; an unknown one is taken for the weakest.
+    /// Returns the entry of a type number; an unknown type gets the lowest limits.
     pub(crate) fn of_number(number: i32) -> Self {
         match number {
             60 => FALCON,

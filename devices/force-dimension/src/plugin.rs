@@ -1,4 +1,4 @@
-//! The device as a plugin: parameters and the contract.
+//! Implementation of the device contract for Force Dimension's devices, with their parameters.
 
 use crate::dhd::{Dhd, Setup, Which, Wrist};
 use crate::driver::{Driver, Why};
@@ -16,11 +16,11 @@ const NO_YES: Choices = choices!["false", "true"];
 const INITIALISE: Choices = choices!["never", "automatic"];
 const PACES: Choices = choices!["real", "lockstep"];
 
-/// Fastest exchange of the devices, Hz.
+/// Highest exchange rate of the devices, Hz.
 const FASTEST_HZ: f64 = 4000.0;
 /// Unit of the watchdog, ms; it has eight bits.
 const WATCHDOG_UNIT_MS: f64 = 0.125;
-/// Steps of the encoders at the handle, m: the coarsest of the family.
+/// Resolution of the encoders at the handle, m: the coarsest of the family.
 const RESOLUTION_M: f64 = 3.0e-5;
 
 const SCHEMA: &[Parameter] = &[
@@ -76,9 +76,9 @@ const SCHEMA: &[Parameter] = &[
     ),
 ];
 
-/// A device of Force Dimension, opened: known, without force.
+/// Opened device of Force Dimension: identified, without force.
 pub struct ForceDimensionDevice {
-    /// Nothing once the thread that had it is lost.
+    /// `None` after a panic of the thread that owned the device.
     dhd: Option<Dhd>,
     exchange: Arc<Exchange>,
     kind: Kind,
@@ -89,7 +89,7 @@ pub struct ForceDimensionDevice {
     parameters: [f64; SCHEMA.len()],
 }
 
-/// The same, energised.
+/// Active device, energised.
 pub struct EnergizedDevice {
     opened: ForceDimensionDevice,
     driver: Driver,
@@ -177,13 +177,13 @@ impl Device for ForceDimensionDevice {
             resolution_m: RESOLUTION_M,
             max_force_n: [force_n; 3],
             max_torque_nm: [torque_nm; 3],
-            // From nothing to the most in a millisecond: the motors are driven directly.
+            // Slew: from zero to the maximum in a millisecond, as the motors are driven directly.
             max_force_slew_n_per_s: force_n * 1.0e3,
             max_torque_slew_nm_per_s: if torque_nm > 0.0 { torque_nm * 1.0e3 } else { f64::INFINITY },
-            // The maker states it for the closed loop at 4 kHz, not for this one.
+            // The maker's figure is for the closed loop at 4 kHz, not for this one.
             max_stiffness_n_per_m: 0.0,
             rate_hz: [100.0, FASTEST_HZ],
-            // The wrench waits for the next exchange, which brings the sample after it.
+            // A wrench waits for the next exchange, in which the sample after the wrench is read.
             latency_s: 1.0 / 1000.0,
         }
     }
@@ -229,7 +229,7 @@ impl Device for ForceDimensionDevice {
     }
 }
 
-/// The device of a serial number.
+/// Converts the parameter `serial` to a device selection.
 fn which(serial: f64) -> Result<Which, Refusal> {
     if serial == 0.0 {
         return Ok(Which::First);
@@ -267,7 +267,7 @@ impl PacingDevice for EnergizedDevice {
 }
 
 impl IndependentStopDevice for ForceDimensionDevice {
-    /// The device's own watchdog.
+    /// Declares the device's own watchdog.
     fn independent_stop(&self) -> IndependentStop {
         let within_ns = u64::from(self.setup.watchdog_units) * 125_000;
         IndependentStop::by_itself(StoppedState::Zero, within_ns)

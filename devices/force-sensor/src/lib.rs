@@ -1,14 +1,14 @@
-//! A force sensor on a serial port: a device that measures a vertical force and exerts none.
+//! Device plugin for a force sensor on a serial port: measures a vertical force and exerts none.
 //!
 //! ```text
 //! host: R  ->  sensor: F 1.234   (N, upwards positive)
 //! ```
 //!
-//! It senses no pose and drives no axis; what it measures is the `delivered` force of its state. `flotor calibrate vertical`
-//! reads it, and a scene may hold it as one more device, so that a recording has what a handle really pressed with.
+//! The device senses no pose and drives no axis; its measurement is the `delivered` force of its state. `flotor calibrate
+//! vertical` reads it, and a scene may include it as a further device, so that a recording contains the real force on a handle.
 //!
-//! - [`protocol`]: questions and answers as bytes.
-//! - [`mod@line`]: one question at a time over a serial port.
+//! - [`protocol`]: requests and replies as bytes.
+//! - [`mod@line`]: one request at a time over a serial port.
 //! - `plugin`: parameters and the contract.
 
 pub mod line;

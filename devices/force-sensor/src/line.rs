@@ -1,35 +1,35 @@
-//! One question at a time over a serial port.
+//! Serial line to the sensor with one request in flight.
 
 use crate::protocol::{Lines, QUESTION, parse};
 use flotor_serial::Port;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
-/// Speed of the line, baud: what microcontrollers' boards start with.
+/// Speed of the line, baud: the default of microcontroller boards.
 const BAUD: u32 = 115_200;
-/// Bytes looked at at once: several answers.
+/// Buffer size of one read, bytes: several replies.
 const CHUNK_BYTES: usize = 256;
 
-/// The port is closed, or the sensor unplugged.
+/// The port is closed, or the sensor is unplugged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineLost;
 
-/// What came of a look at the line.
+/// Result of polling the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Heard {
-    /// Nothing yet.
+    /// No complete line yet.
     Nothing,
     /// A force, N.
     Force(f64),
-    /// A line that is no force: [`SensorLine::last`] has it.
+    /// Malformed line; [`SensorLine::last`] returns it.
     Nonsense,
 }
 
-/// A sensor at the other end of a serial port.
+/// Force sensor at the other end of a serial port.
 pub struct SensorLine {
     port: Port,
     lines: Lines,
-    /// When the question that waits for its answer was asked.
+    /// Time of the pending request.
     asked: Option<Instant>,
 }
 
@@ -37,38 +37,39 @@ impl SensorLine {
     /// Opens a port. Not real-time.
     ///
     /// # Errors
-    /// One sentence: port, cause and remedy.
+    /// One sentence with port, cause and remedy.
     pub fn open(path: &str) -> Result<Self, String> {
         let port = Port::open(path, BAUD).map_err(|reason| format!("no force sensor at {path}: {reason}"))?;
-        // What it said before anybody asked.
+        // Discard input from before the first request.
         let _ = port.forget_input();
         Ok(Self { port, lines: Lines::default(), asked: None })
     }
 
-    /// Asks, unless a question waits for its answer. Real-time: bounded, no allocation; one call of the system.
+    /// Requests a reading unless a request is pending. Real-time: bounded, no allocation; one call of the system.
     ///
     /// # Errors
-    /// [`LineLost`].
+    /// If the sensor is gone.
     pub fn ask(&mut self) -> Result<(), LineLost> {
         if self.asked.is_some() {
             return Ok(());
         }
         match self.port.write_all(QUESTION) {
             Ok(()) => self.asked = Some(Instant::now()),
-            // The port is full: asked again next time.
+            // The port is full: retry at the next call.
             Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) => {}
             Err(_) => return Err(LineLost),
         }
         Ok(())
     }
 
-    /// What has arrived; the last line counts. Real-time: bounded, no allocation; two calls of the system.
+    /// Reads the received bytes and returns the result of the last complete line. Real-time: bounded, no allocation; two calls of the
+    /// system.
     ///
     /// # Errors
-    /// [`LineLost`].
+    /// If the sensor is gone.
     pub fn hear(&mut self) -> Result<Heard, LineLost> {
-        // Asked beforehand: a read without anything to read would make an error, and an error is an allocation; and a system may wait
-        // for more than there is.
+        // Query the count first: a read without data would return an error, which allocates; and a system may wait for more bytes than
+        // there are.
         let waiting = self.port.waiting().map_err(|_| LineLost)?;
         if waiting == 0 {
             return Ok(Heard::Nothing);
@@ -89,13 +90,13 @@ impl SensorLine {
         Ok(heard)
     }
 
-    /// The last line, as far as it has come.
+    /// Returns the last line, complete or not.
     #[must_use]
     pub fn last(&self) -> String {
         String::from_utf8_lossy(self.lines.last()).into_owned()
     }
 
-    /// How long a question has been without an answer. Real-time: bounded, no allocation.
+    /// Returns the age of the pending request; zero without one. Real-time: bounded, no allocation.
     #[must_use]
     pub fn silence(&self) -> Duration {
         self.asked.map_or(Duration::ZERO, |asked| asked.elapsed())

@@ -1,4 +1,4 @@
-//! The sensor as a plugin: a device without axes, whose state holds a measured force.
+//! Implementation of the device contract for the sensor: a device without axes, whose state contains a measured force.
 
 use crate::line::{Heard, LineLost, SensorLine};
 use flotor_hal::{
@@ -20,24 +20,24 @@ const SCHEMA: &[Parameter] = &[
     ),
 ];
 
-/// How often a sensor that is waited for is looked at.
+/// Poll interval for the first reading.
 const LOOK_AGAIN: Duration = Duration::from_millis(1);
 
-/// A force sensor, known to answer.
+/// Opened force sensor that has replied once.
 pub struct ForceSensor {
     line: SensorLine,
     timeout: Duration,
 }
 
-/// A force sensor that is asked all the time.
+/// Active force sensor, polled in each tick.
 pub struct AskedSensor {
     opened: ForceSensor,
-    /// The reading held since it was new.
+    /// Newest reading.
     state: DeviceState,
 }
 
 impl ForceSensor {
-    /// Waits for the first reading: what is wrong with a sensor is to be said before it is needed.
+    /// Waits for the first reading, so that a faulty sensor is reported at open.
     fn prove(&mut self, port: &str) -> Result<(), String> {
         let gone =
             |LineLost| format!("the force sensor at {port} is disconnected; plug it in and measure again");
@@ -85,7 +85,7 @@ impl Device for ForceSensor {
     }
 
     fn capabilities(&self) -> Capabilities {
-        // A question and its answer over USB, a frame each.
+        // A request and its reply over USB, a frame each.
         Capabilities { latency_s: 2.0e-3, ..Capabilities::UNDRIVEN }
     }
 
@@ -109,7 +109,7 @@ impl Device for ForceSensor {
 impl ActiveDevice for AskedSensor {
     type Opened = ForceSensor;
 
-    /// Fresh with each reading; the force is that on the sensor, N.
+    /// Reads the force on the sensor, N; fresh with each reading.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         let heard = self.opened.line.hear().and_then(|heard| self.opened.line.ask().map(|()| heard));
         let cycle = match heard {

@@ -1,20 +1,20 @@
-//! The protocol: lines of ASCII, so that a terminal program and a twenty-line sketch on a microcontroller speak it.
+//! Serial protocol of the sensor: lines of ASCII, simple enough for a terminal program and a twenty-line sketch on a microcontroller.
 //!
 //! | host | sensor | |
 //! |---|---|---|
 //! | `R` | `F 1.234` | read: the vertical force on the sensor, N, upwards positive |
-//! | anything else, or out of range | `E words` | what is wrong |
+//! | anything else, or out of range | `E words` | cause of the error |
 //!
-//! Lines end in a line feed; a carriage return before it is not looked at.
+//! Lines end in a line feed; a carriage return before it is ignored.
 
-/// Asks for a reading.
+/// Request of a reading.
 pub const QUESTION: &[u8] = b"R\n";
-/// Longest line: a number of any precision, or a sentence.
+/// Longest line, bytes: a number of any precision, or a sentence.
 pub const LONGEST_LINE_BYTES: usize = 200;
-/// More than any sensor for this has, N.
+/// Limit of plausible forces, N: more than any such sensor measures.
 pub const PLAUSIBLE_N: f64 = 500.0;
 
-/// The force in an answer, N; `None` if it is none. Real-time: bounded, no allocation.
+/// Parses the force of a reply, N; `None` for any other text. Real-time: bounded, no allocation.
 #[must_use]
 pub fn parse(answer: &[u8]) -> Option<f64> {
     let answer = std::str::from_utf8(answer).ok()?;
@@ -22,12 +22,12 @@ pub fn parse(answer: &[u8]) -> Option<f64> {
     (force_n.abs() <= PLAUSIBLE_N).then_some(force_n) // false for NaN
 }
 
-/// Lines out of bytes, as they come.
+/// Parser that splits received bytes into lines.
 #[derive(Clone, Debug)]
 pub struct Lines {
     text: [u8; LONGEST_LINE_BYTES],
     length: usize,
-    /// The last byte ended a line: the next one begins another.
+    /// True if the last byte completed a line: the next byte begins a new one.
     is_whole: bool,
 }
 
@@ -38,12 +38,13 @@ impl Default for Lines {
 }
 
 impl Lines {
-    /// Forgets a line that has begun. Real-time: bounded, no allocation.
+    /// Discards an incomplete line. Real-time: bounded, no allocation.
     pub fn clear(&mut self) {
         (self.length, self.is_whole) = (0, false);
     }
 
-    /// Takes a byte; the line it ends, if it does, or one that is too long so far. Real-time: bounded, no allocation.
+    /// Appends a byte; returns the line that the byte completes, or a line that has reached its maximum length. Real-time: bounded, no
+    /// allocation.
     pub fn push(&mut self, byte: u8) -> Option<&[u8]> {
         if std::mem::take(&mut self.is_whole) {
             self.length = 0;
@@ -58,7 +59,7 @@ impl Lines {
         self.is_whole.then(|| self.last())
     }
 
-    /// The line that ended last, or the one that has begun, without what ends it.
+    /// Returns the last line, complete or not, without its line end.
     #[must_use]
     pub fn last(&self) -> &[u8] {
         let line = self.text.get(..self.length).unwrap_or_default();

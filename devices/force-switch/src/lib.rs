@@ -1,4 +1,4 @@
-//! A switch that any thread uses to end the force of a device whose I/O runs on a thread of the plugin: it wakes this I/O thread,
+//! Switch by which any thread removes the force of a device whose I/O runs on a thread of the plugin: wakes the I/O thread,
 //! which then commands zero force.
 
 use flotor_hal::SafeStop;
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Thread;
 
-/// Takes the force away, from any thread. Its clones are the same switch.
+/// Force switch, usable from any thread; clones share the state.
 #[derive(Clone, Debug, Default)]
 pub struct ForceSwitch {
     is_stopped: Arc<AtomicBool>,
@@ -14,18 +14,18 @@ pub struct ForceSwitch {
 }
 
 impl ForceSwitch {
-    /// Whether no force may be commanded. Real-time: bounded, no allocation.
+    /// Returns true while no force may be commanded. Real-time: bounded, no allocation.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.is_stopped.load(Ordering::Acquire)
     }
 
-    /// Force may begin again. Real-time: bounded, no allocation.
+    /// Permits force again. Real-time: bounded, no allocation.
     pub fn rearm(&self) {
         self.is_stopped.store(false, Ordering::Release);
     }
 
-    /// A stop wakes this thread from now on, and no other. Not real-time.
+    /// Sets the thread to wake on a stop, replacing an earlier one. Not real-time.
     pub fn wakes(&self, thread: Thread) {
         *self.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
     }
@@ -34,7 +34,7 @@ impl ForceSwitch {
 impl SafeStop for ForceSwitch {
     fn safe_stop(&self) {
         self.is_stopped.store(true, Ordering::Release);
-        // Never waits. Who is not woken looks by itself.
+        // Never waits: on contention the I/O thread sees the flag at its next poll.
         if let Ok(thread) = self.thread.try_lock()
             && let Some(thread) = &*thread
         {

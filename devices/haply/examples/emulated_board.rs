@@ -19,10 +19,10 @@ use std::time::{Duration, Instant};
 
 const LINKAGE: Pantograph = Pantograph { inner_m: 0.07, outer_m: 0.09, base_m: 0.038 };
 const PERIOD_S: f64 = 2.0;
-/// Half the way.
+/// Amplitude of the motion.
 const AMPLITUDE_M: f64 = 0.02;
 
-/// Makes a link to the port, in the place of an earlier one.
+/// Creates a link to the port, replacing an earlier link.
 fn point(link: &Path, port: &str) -> std::io::Result<()> {
     if link.is_symlink() {
         std::fs::remove_file(link)?;

@@ -1,32 +1,31 @@
-//! A board behind a serial port: one request on its way at a time, nothing waits.
+//! Board behind a serial port, with one request in flight and no waits.
 //!
-//! An answer that does not come is not waited for: after [`FORGET`] what came of it is forgotten and the next request
-//! goes out, which also finds the beginning of an answer again when a byte was lost.
+//! A missing reply does not block: after [`FORGET`] the request and the partial reply are dropped and the next request is sent,
+//! which also resynchronises after a lost byte.
 
 use crate::protocol::{Answers, Arm, Heard, RESET, setup, torques};
 use flotor_serial::Port;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
-/// The port is a USB CDC port, to which the number means nothing; a board on a real UART would need it: 20 bytes a
-/// millisecond are 200 kbit/s with start and stop bits.
+/// Baud rate. A USB CDC port ignores it; a board on a real UART needs it: 20 bytes a millisecond are 200 kbit/s with start and
+/// stop bits.
 const BAUD: u32 = 250_000;
-/// Time without an answer after which a request is given up: a few times what the slowest board takes (4 ms at
-/// 57 600 baud).
+/// Reply timeout: a few times the reply time of the slowest board (4 ms at 57 600 baud).
 pub const FORGET: Duration = Duration::from_millis(20);
-/// Bytes taken from the system at once: a few answers.
+/// Buffer size of one read, bytes: a few replies.
 const CHUNK_BYTES: usize = 64;
 
 /// The board is gone: unplugged, or its port is closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LinkLost;
 
-/// No answer came in time.
+/// Failure of the first request to a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoAnswer {
     /// The board is gone.
     Lost,
-    /// Something else is at this port, or the board is off.
+    /// Timeout: another device is at this port, or the board is off.
     Silent,
 }
 
@@ -36,14 +35,14 @@ impl From<LinkLost> for NoAnswer {
     }
 }
 
-/// A board behind a serial port.
+/// Connection to a board behind a serial port.
 #[derive(Debug)]
 pub struct Board {
     port: Port,
     answers: Answers,
-    /// When the request that is on its way was sent.
+    /// Time of the pending request.
     asked: Option<Instant>,
-    /// When the first request without an answer was sent.
+    /// Time of the first request without a reply.
     silent_since: Option<Instant>,
     lost_answers: u64,
     noise_bytes: u64,
@@ -53,14 +52,14 @@ impl Board {
     /// Opens a port by its path. Not real-time.
     ///
     /// # Errors
-    /// One sentence: why not, and what to do.
+    /// One sentence with the cause and the remedy.
     pub fn open(path: &str) -> Result<Self, String> {
         let port =
             Port::open(path, BAUD).map_err(|reason| format!("no board at {path}, the `port`: {reason}"))?;
         Ok(Self::on(port))
     }
 
-    /// A board behind a port that is open.
+    /// Wraps an open port.
     fn on(port: Port) -> Self {
         Self {
             port,
@@ -72,18 +71,18 @@ impl Board {
         }
     }
 
-    /// The same port once more, for another thread. Not real-time.
+    /// Returns a second handle of the port, for another thread. Not real-time.
     ///
     /// # Errors
-    /// What the system says.
+    /// Errors of the system.
     pub fn second_port(&self) -> io::Result<Port> {
         self.port.second()
     }
 
-    /// Tells the board about its arms, without force, and waits for its first answer: angles, °. Not real-time.
+    /// Configures the arms, without force, and waits for the first reply: returns the angles, °. Not real-time.
     ///
     /// # Errors
-    /// [`NoAnswer`] after `patience`.
+    /// [`NoAnswer::Silent`] after `patience`, or [`NoAnswer::Lost`] if the board is gone.
     pub fn start(&mut self, arms: &[Arm; 2], patience: Duration) -> Result<[f64; 2], NoAnswer> {
         let started = Instant::now();
         let _ = self.port.forget_input();
@@ -103,11 +102,11 @@ impl Board {
         }
     }
 
-    /// Asks for torques of the arms, N·m, unless the last request is still on its way: then this one is dropped, as a
-    /// newer one will follow. Real-time: bounded, no allocation; one or two calls of the system.
+    /// Requests torques of the arms, N·m; drops the request while the last one is pending, because a newer one will follow.
+    /// Real-time: bounded, no allocation; one or two calls of the system.
     ///
     /// # Errors
-    /// [`LinkLost`].
+    /// If the board is gone.
     pub fn ask(&mut self, torques_nm: [f64; 2]) -> Result<(), LinkLost> {
         if let Some(asked) = self.asked {
             if asked.elapsed() < FORGET {
@@ -125,15 +124,15 @@ impl Board {
         Ok(())
     }
 
-    /// The newest answer that has arrived: angles of the arms, °. Real-time: bounded, no allocation; two calls of the
+    /// Returns the angles of the arms, °, of the newest received reply. Real-time: bounded, no allocation; two calls of the
     /// system.
     ///
     /// # Errors
-    /// [`LinkLost`].
+    /// If the board is gone.
     pub fn hear(&mut self) -> Result<Option<[f64; 2]>, LinkLost> {
         let mut newest = None;
-        // Asked beforehand: a read without anything to read would make an error, and an error is an allocation; and a system may wait
-        // for more than there is.
+        // Query the count first: a read without data would return an error, which allocates; and a system may wait for more bytes than
+        // there are.
         let waiting = self.port.waiting().map_err(|_| LinkLost)?;
         if waiting == 0 {
             return Ok(None);
@@ -154,13 +153,13 @@ impl Board {
         Ok(newest)
     }
 
-    /// How long the board has not answered. Real-time: bounded, no allocation.
+    /// Returns the time since the first unanswered request; zero without one. Real-time: bounded, no allocation.
     #[must_use]
     pub fn silence(&self) -> Duration {
         self.silent_since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 
-    /// Requests without an answer, and bytes that belonged to none.
+    /// Returns the number of requests without a reply, and of bytes that belong to no reply.
     #[must_use]
     pub fn losses(&self) -> (u64, u64) {
         (self.lost_answers, self.noise_bytes)
@@ -169,7 +168,7 @@ impl Board {
     fn send(&mut self, bytes: &[u8]) -> Result<(), LinkLost> {
         match self.port.write_all(bytes) {
             Ok(()) => Ok(()),
-            // The port is full: the request is lost, and its answer will be missed.
+            // The port is full: the request is lost, and its reply will time out.
             Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) => {
                 Ok(())
             }

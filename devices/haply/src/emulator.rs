@@ -1,11 +1,10 @@
-//! A board without hardware: it answers as the maker's firmware does, and a hand that cannot be pushed holds the handle.
-//! Not real-time.
+//! Emulated board without hardware: replies as the maker's firmware does; a rigid hand holds the handle. Not real-time.
 
 use crate::pantograph::Pantograph;
 use crate::protocol::{Arm, Request, answer};
 use flotor_hal::glam::DVec2;
 
-/// An emulated board.
+/// Emulated board with its linkage and a held handle.
 #[derive(Clone, Debug)]
 pub struct EmulatedBoard {
     linkage: Pantograph,
@@ -16,18 +15,18 @@ pub struct EmulatedBoard {
 }
 
 impl EmulatedBoard {
-    /// A board whose handle is held at a place in the board's frame, m. It has to be told about its arms first.
+    /// Creates a board whose handle is held at a position in the board's frame, m. A host must configure the arms first.
     #[must_use]
     pub fn new(linkage: Pantograph, handle_m: DVec2) -> Self {
         Self { linkage, handle_m, arms: None, torques_nm: [0.0; 2], heard: Vec::new() }
     }
 
-    /// The hand goes elsewhere.
+    /// Moves the handle to a position in the board's frame, m.
     pub fn move_handle(&mut self, handle_m: DVec2) {
         self.handle_m = handle_m;
     }
 
-    /// What the board says to some bytes; requests may be in pieces.
+    /// Receives bytes and returns the replies; requests may be split.
     pub fn hear(&mut self, bytes: &[u8]) -> Vec<u8> {
         self.heard.extend_from_slice(bytes);
         let mut said = Vec::new();
@@ -48,7 +47,7 @@ impl EmulatedBoard {
             Request::Reset => (self.arms, self.torques_nm) = (None, [0.0; 2]),
             Request::Setup(arms) => self.arms = Some(arms),
             Request::Torques(torques_nm) => {
-                // A board that was not told about its arms has nothing to say.
+                // Without configured arms the board does not reply.
                 if self.arms.is_some()
                     && let Some(angles_rad) = self.linkage.angles_rad(self.handle_m)
                 {
@@ -61,13 +60,13 @@ impl EmulatedBoard {
         Vec::new()
     }
 
-    /// What the board was told about its arms.
+    /// Returns the configured arms; `None` before a setup request.
     #[must_use]
     pub fn arms(&self) -> Option<&[Arm; 2]> {
         self.arms.as_ref()
     }
 
-    /// The force on the hand in the board's frame, N; `None` where the linkage has no posture.
+    /// Returns the force on the hand in the board's frame, N; `None` where the linkage has no posture.
     #[must_use]
     pub fn force_n(&self) -> Option<DVec2> {
         let posture = self.linkage.posture(self.linkage.angles_rad(self.handle_m)?)?;

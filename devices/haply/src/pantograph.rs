@@ -1,4 +1,4 @@
-//! The five-bar linkage: where the handle is, and which torques push it.
+//! Kinematics of the five-bar linkage: position of the handle, and torques for a force.
 //!
 //! Two inner arms of length `l` turn about (0, 0) and (d, 0); two outer arms of length `L` join their ends `A` and `B` to
 //! the handle `E`. With `u = E - A` and `w = E - B`, both of length `L`, moving the arms by `dθ` moves the handle so
@@ -19,15 +19,15 @@ use flotor_hal::math;
 /// Lengths of the linkage, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pantograph {
-    /// Inner arms, from motor to elbow.
+    /// Length of the inner arms, from motor to elbow, m.
     pub inner_m: f64,
-    /// Outer arms, from elbow to handle.
+    /// Length of the outer arms, from elbow to handle, m.
     pub outer_m: f64,
-    /// From one motor to the other.
+    /// Distance between the motors, m.
     pub base_m: f64,
 }
 
-/// The linkage at two angles.
+/// Posture of the linkage at two angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posture {
     handle_m: DVec2,
@@ -37,12 +37,11 @@ pub struct Posture {
     levers_m2: DVec2,
 }
 
-/// Sine of the angle between the outer arms below which they count as stretched out: forces along them grow
-/// beyond bounds there.
+/// Smallest sine of the angle between the outer arms: below, forces along them grow beyond bounds.
 const LEAST_SINE: f64 = 0.05;
 
 impl Pantograph {
-    /// The linkage at angles of the arms, rad; `None` where the outer arms cannot meet, or lie in one line. Real-time:
+    /// Solves the posture for angles of the arms, rad; `None` where the outer arms cannot meet, or lie in one line. Real-time:
     /// bounded, no allocation.
     #[must_use]
     pub fn posture(&self, angles_rad: [f64; 2]) -> Option<Posture> {
@@ -53,7 +52,7 @@ impl Pantograph {
         let handle_m = a + 0.5 * across + across.perp().normalize_or_zero() * height_m;
         let (u, w) = (handle_m - a, handle_m - b);
         let least_m2 = LEAST_SINE * self.outer_m * self.outer_m;
-        // False for NaN: arms that cannot meet.
+        // False for NaN, the result for arms that cannot meet.
         if u.perp_dot(w).abs() >= least_m2 {
             // Columns of the transpose are the rows.
             let pulls_per_m = DMat2::from_cols(u, w).inverse();
@@ -64,7 +63,7 @@ impl Pantograph {
         None
     }
 
-    /// Angles of the arms with the handle at a place, elbows outwards, rad; `None` outside the workspace. Not
+    /// Returns the angles of the arms, rad, for a position of the handle, m, elbows outwards; `None` outside the workspace. Not
     /// real-time: for emulators.
     #[must_use]
     pub fn angles_rad(&self, handle_m: DVec2) -> Option<[f64; 2]> {
@@ -79,19 +78,19 @@ impl Pantograph {
 }
 
 impl Posture {
-    /// Where the handle is, m.
+    /// Returns the position of the handle in the board's frame, m.
     #[must_use]
     pub fn handle_m(&self) -> DVec2 {
         self.handle_m
     }
 
-    /// Torques of the motors, N·m, that exert a force on the hand. Real-time: bounded, no allocation.
+    /// Returns the torques of the motors, N·m, that exert a force on the hand. Real-time: bounded, no allocation.
     #[must_use]
     pub fn torques_nm(&self, force_n: DVec2) -> [f64; 2] {
         (self.levers_m2 * (self.pulls_per_m * force_n)).to_array()
     }
 
-    /// The force on the hand that torques of the motors, N·m, exert; not finite where an arm has no lever. Not
+    /// Returns the force on the hand, N, that torques of the motors exert; not finite where an arm has no lever. Not
     /// real-time: for emulators.
     #[must_use]
     pub fn force_n(&self, torques_nm: [f64; 2]) -> DVec2 {

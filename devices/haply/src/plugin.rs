@@ -1,4 +1,4 @@
-//! The device as a plugin: poses from angles, torques from wrenches, on one plane.
+//! Implementation of the device contract for the pantograph: poses from angles, torques from wrenches, on one plane.
 
 use crate::board::{Board, LinkLost, NoAnswer};
 use crate::pantograph::{Pantograph, Posture};
@@ -16,20 +16,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// How long a board may take to answer for the first time: one that begins anew with the opening of its port is
-/// back within a second or two.
+/// Timeout of the first reply: a board that resets when its port opens is back within a second or two.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Time from a request to the torque, ns: what the slowest board takes (4 ms at 57 600 baud), and a frame of USB.
+/// Time from a request to the torque, ns: the slowest board (4 ms at 57 600 baud), and a frame of USB.
 const STOP_NS: u64 = 5_000_000;
 /// Lengths of the arms of both hardware versions, m (hAPI, `Pantograph`).
 const INNER_M: f64 = 0.07;
 const OUTER_M: f64 = 0.09;
-/// From motor to motor in the second and the third hardware version, m (hAPI, `Pantograph`).
+/// Distance between the motors of the second and the third hardware version, m (hAPI, `Pantograph`).
 const BASE_M: [f64; 2] = [0.0, 0.038];
-/// Where the host's centre is, from the line of the motors towards the user, m: the arms reach from there as far as
-/// [`RANGE_M`] on either version without being stretched out.
+/// Distance of the host's centre from the line of the motors, towards the user, m: the whole of [`RANGE_M`] is within reach
+/// on either version without stretched arms.
 const CENTRE_M: f64 = 0.1;
-/// Half the range along x and y, m; it cannot move along z.
+/// Half the range along x and y, m; no motion along z.
 const RANGE_M: [f64; 3] = [0.05, 0.04, 0.0];
 /// Stiffness of the wall in the maker's first example, N/m.
 const MAX_STIFFNESS_N_PER_M: f64 = 450.0;
@@ -51,15 +50,15 @@ const SCHEMA: &[Parameter] = &[
     Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Silence of the board that is a fault"),
 ];
 
-/// A version of the hardware, as the maker's examples describe it.
+/// Hardware version, as described by the maker's examples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Hardware {
     linkage: Pantograph,
-    /// What the board is told; the handle rests where the examples begin while the board starts.
+    /// Configuration sent to the board; the handle must rest at the examples' start position while the board starts.
     arms: [Arm; 2],
 }
 
-/// In the order of [`VERSIONS`] (hAPI, examples: `add_actuator`, `add_encoder`).
+/// Hardware by version, in the order of [`VERSIONS`] (hAPI, examples: `add_actuator`, `add_encoder`).
 const HARDWARE: [Hardware; 2] = {
     use Direction::{Clockwise, Counterclockwise};
     const fn arm(direction: Direction, start_deg: f32, counts_per_turn: f32) -> Arm {
@@ -81,13 +80,13 @@ const HARDWARE: [Hardware; 2] = {
 };
 
 impl Hardware {
-    /// A place in the board's frame (x to the left, y towards the user) in the host's, m.
+    /// Transforms a position, m, from the board's frame (x to the left, y towards the user) to the host's.
     fn to_host_m(self, handle_m: DVec2) -> DVec2 {
         DVec2::new(0.5 * self.linkage.base_m, CENTRE_M) - handle_m
     }
 }
 
-/// A pantograph, opened: its port is ours, its motors are not driven.
+/// Opened pantograph: its port is open, its motors are not driven.
 pub struct HaplyDevice {
     board: Board,
     hardware: Hardware,
@@ -95,33 +94,33 @@ pub struct HaplyDevice {
     cutoff_hz: f64,
     timeout: Duration,
     parameters: [f64; SCHEMA.len()],
-    /// Of the port of `stop`.
+    /// Descriptor of the port of `stop`.
     descriptor: i32,
     stop: Arc<Stop>,
 }
 
-/// A pantograph whose motors follow the host.
+/// Active pantograph whose motors follow the host.
 pub struct DrivenDevice {
     opened: HaplyDevice,
     posture: Posture,
-    /// A posture nobody has read yet.
+    /// True for a posture that was not read yet.
     is_fresh: bool,
     state: DeviceState,
-    /// When the last sample was taken, ns.
+    /// Time of the last sample, ns.
     sampled_ns: Option<u64>,
     force_n: DVec2,
 }
 
-/// What the loop and whoever stops it share.
+/// State shared by the loop and the threads that stop it.
 struct Stop {
     is_stopped: AtomicBool,
-    /// The port once more: the board keeps the last torque for ever, so that somebody has to tell it to let go even
-    /// if the loop never comes back.
+    /// Second handle of the port: the board holds the last torque indefinitely, so that zero must be sent even if the loop has
+    /// stopped.
     port: Mutex<Port>,
 }
 
 impl Stop {
-    /// Takes the torque away, whatever else is on its way. Never waits: who holds the lock is doing the same.
+    /// Sends zero torque, also while a request is pending. Never waits: the holder of the lock is sending zero as well.
     fn let_go(&self) {
         if let Ok(mut port) = self.port.try_lock() {
             let _ = port.write_all(&torques([0.0; 2]));
@@ -129,7 +128,7 @@ impl Stop {
     }
 }
 
-/// Takes the torque away, from any thread.
+/// Stop of the torques, usable from any thread.
 pub struct TorqueSwitch(Arc<Stop>);
 
 impl SafeStop for TorqueSwitch {
@@ -183,16 +182,16 @@ impl Device for HaplyDevice {
             actuated: Axes::PLANE,
             range_m: RANGE_M,
             range_rad: [0.0; 3],
-            // A count at the end of a stretched arm.
+            // An encoder count at the end of a stretched arm.
             resolution_m: TAU / counts_per_turn * (INNER_M + OUTER_M),
             max_force_n: [max_force_n, max_force_n, 0.0],
             max_torque_nm: [0.0; 3],
-            // From nothing to the default limit in a millisecond: the motors are driven directly.
+            // Slew: from zero to the default limit in a millisecond, as the motors are driven directly.
             max_force_slew_n_per_s: 3000.0,
             max_torque_slew_nm_per_s: f64::INFINITY, // of nothing
             max_stiffness_n_per_m: MAX_STIFFNESS_N_PER_M,
             rate_hz: [100.0, 1000.0],
-            // A request and its answer over USB, a frame each.
+            // A request and its reply over USB, a frame each.
             latency_s: 2.0e-3,
         }
     }
@@ -255,7 +254,7 @@ impl ActiveDevice for DrivenDevice {
             Ok(heard) => heard,
             Err(LinkLost) => return Cycle::Fault(Fault::Disconnected),
         };
-        // Angles no arms can have are noise that looks like an answer: the next one will be right.
+        // Angles outside the linkage's geometry are malformed data: the next reply will be right.
         if let Some(posture) = heard.and_then(|angles_deg| self.opened.posture(angles_deg)) {
             (self.posture, self.is_fresh) = (posture, true);
         }
@@ -278,7 +277,7 @@ impl ActiveDevice for DrivenDevice {
             true => asked_n.clamp_length_max(self.opened.max_force_n),
             false => DVec2::ZERO,
         };
-        // The board's x and y are the host's turned by half a turn.
+        // The board's x and y are the host's, rotated by half a turn.
         let torques_nm = self.posture.torques_nm(-self.force_n);
         match self.opened.board.ask(torques_nm) {
             Ok(()) => Cycle::Fresh,
@@ -293,14 +292,14 @@ impl ActiveDevice for DrivenDevice {
 }
 
 impl DrivenDevice {
-    /// Takes the posture as the sample of a time.
+    /// Updates the sample from the posture.
     fn sample(&mut self, time_ns: u64) {
         let position_m = self.opened.hardware.to_host_m(self.posture.handle_m()).extend(0.0);
         let before_m = self.state.pose.position();
         let velocity = match self.sampled_ns {
             Some(before_ns) if time_ns > before_ns => {
                 let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
-                // A first-order low pass, exact for a difference that is held over the interval.
+                // First-order low pass, exact for a difference that is constant over the interval.
                 let share = 1.0 - math::exp(-TAU * self.opened.cutoff_hz * dt_s);
                 self.state.twist.linear().lerp((position_m - before_m) / dt_s, share)
             }
@@ -310,7 +309,7 @@ impl DrivenDevice {
         self.state = DeviceState {
             pose: Pose::new(position_m, DQuat::IDENTITY),
             twist: Twist::new(velocity, DVec3::ZERO),
-            // What the board was told: it measures no force.
+            // The commanded force: the board measures none.
             delivered: Wrench::from_force(self.force_n.extend(0.0)),
             sampled_ns: time_ns,
             buttons: 0,
@@ -326,7 +325,8 @@ impl Drop for HaplyDevice {
 }
 
 impl IndependentStopDevice for HaplyDevice {
-    /// The board keeps the last torque for ever. What is left of half a request is cut off by what comes again.
+    /// Declares a message of zero torque, as the board holds the last torque indefinitely. A partial request before the message
+    /// resynchronises with the bytes that follow.
     fn independent_stop(&self) -> IndependentStop {
         IndependentStop::by_message(self.descriptor, &torques([0.0; 2]), StoppedState::Zero, STOP_NS)
     }

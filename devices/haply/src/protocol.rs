@@ -1,4 +1,4 @@
-//! The board's serial protocol: what is sent and what comes back, as bytes. No input or output here.
+//! Serial protocol of the board: requests and replies as bytes. No I/O here.
 //!
 //! ```text
 //! request  [kind u8][device u8][bytes ...][f32 little-endian ...]
@@ -6,11 +6,10 @@
 //! ```
 //!
 //! There is no length, no checksum and no mark between messages (hAPI, Haply Robotics 2018 and later: `Board`, `Device`). A
-//! byte that is lost shifts everything behind it; that is why a host keeps one request on its way and forgets what
-//! it has when no answer comes ([`crate::board`]). Numbers are in the order of the ports, and motor 1 of the
-//! pantograph is on port 2.
+//! lost byte shifts all later ones; a host therefore has one request in flight and discards a partial reply after a timeout
+//! ([`crate::board`]). Numbers are in the order of the ports, and motor 1 of the pantograph is on port 2.
 
-/// Number of the pantograph on its board: what the maker's examples use.
+/// Number of the pantograph on its board, as in the maker's examples.
 pub const DEVICE: u8 = 5;
 /// Bytes of an answer: the number of the device and two angles.
 pub const ANSWER_BYTES: usize = 1 + 2 * 4;
@@ -18,17 +17,17 @@ pub const ANSWER_BYTES: usize = 1 + 2 * 4;
 pub const TORQUES_BYTES: usize = 2 + 2 * 4;
 /// Bytes of the request that sets up two motors and two encoders.
 pub const SETUP_BYTES: usize = 2 + 3 + 3 + 2 + 4 * 4;
-/// Forgets everything the board was told.
+/// Request that clears the configuration of the board.
 pub const RESET: [u8; 2] = [0, 0];
 
 const SETUP: u8 = 1;
 const TORQUES: u8 = 2;
-/// Ports 1 and 2 are used.
+/// Bit mask of the ports in use, 1 and 2.
 const BOTH_PORTS: u8 = 0b11;
-/// An angle beyond this is noise: the arms cannot turn round, °.
+/// Limit of plausible angles, °: the arms cannot turn round.
 const LARGEST_DEG: f64 = 720.0;
 
-/// Which way a motor or an encoder counts.
+/// Positive direction of a motor or an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Clockwise.
@@ -37,20 +36,20 @@ pub enum Direction {
     Counterclockwise = 1,
 }
 
-/// One arm as the board is told about it.
+/// Configuration of one arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arm {
-    /// Which way its motor turns for a positive torque.
+    /// Direction of the motor for a positive torque.
     pub motor: Direction,
-    /// Which way its encoder counts.
+    /// Counting direction of the encoder.
     pub encoder: Direction,
-    /// Its angle where the handle rests while the board starts, °.
+    /// Angle of the arm at the rest position, where the handle must be while the board starts, °.
     pub start_deg: f32,
-    /// Counts of its encoder in a turn.
+    /// Encoder counts per turn.
     pub counts_per_turn: f32,
 }
 
-/// The request that tells the board about both arms. Not real-time.
+/// Encodes the request that configures both arms. Not real-time.
 #[must_use]
 pub fn setup(arms: &[Arm; 2]) -> [u8; SETUP_BYTES] {
     let [first, second] = arms;
@@ -74,7 +73,7 @@ pub fn setup(arms: &[Arm; 2]) -> [u8; SETUP_BYTES] {
     bytes
 }
 
-/// The request for torques, N·m, of the first and the second arm. Real-time: bounded, no allocation.
+/// Encodes the request for torques of the first and the second arm, N·m. Real-time: bounded, no allocation.
 #[must_use]
 pub fn torques(torques_nm: [f32; 2]) -> [u8; TORQUES_BYTES] {
     let [first, second] = torques_nm;
@@ -88,19 +87,19 @@ fn put(bytes: &mut [u8], head: &[u8], numbers: impl Iterator<Item = f32>) {
     bytes.iter_mut().zip(head.iter().copied().chain(tail)).for_each(|(place, byte)| *place = byte);
 }
 
-/// What was requested of a board: the other side of [`setup`] and [`torques`].
+/// Request as received by a board: the inverse of [`setup`] and [`torques`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// Forget everything.
+    /// Clear the configuration.
     Reset,
-    /// These are the arms.
+    /// Configure the arms.
     Setup([Arm; 2]),
-    /// Exert these torques on the arms, N·m, and answer.
+    /// Exert these torques on the arms, N·m, and reply.
     Torques([f32; 2]),
 }
 
 impl Request {
-    /// The first request in some bytes and its length; `None` if there is none yet.
+    /// Parses the first request in a buffer; returns the request and its length, `None` while it is incomplete.
     ///
     /// # Errors
     /// The number of bytes that belong to no request.
@@ -137,7 +136,7 @@ impl Request {
     }
 }
 
-/// The answer to a request for torques: angles of the first and the second arm, °.
+/// Encodes the reply to a request for torques: angles of the first and the second arm, °.
 #[must_use]
 pub fn answer(angles_deg: [f32; 2]) -> [u8; ANSWER_BYTES] {
     let [first, second] = angles_deg;
@@ -146,18 +145,18 @@ pub fn answer(angles_deg: [f32; 2]) -> [u8; ANSWER_BYTES] {
     bytes
 }
 
-/// What came of a byte.
+/// Result of a received byte.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Heard {
-    /// An answer is whole: angles of the first and the second arm, °.
+    /// Completed reply: angles of the first and the second arm, °.
     Angles([f64; 2]),
-    /// It belongs to no answer.
+    /// Malformed data that belongs to no reply.
     Noise,
-    /// There is more to come.
+    /// Part of an incomplete reply.
     Part,
 }
 
-/// Puts answers together, byte by byte.
+/// Parser that assembles replies byte by byte.
 #[derive(Clone, Debug, Default)]
 pub struct Answers {
     bytes: [u8; ANSWER_BYTES],
@@ -165,7 +164,7 @@ pub struct Answers {
 }
 
 impl Answers {
-    /// Takes the next byte. Real-time: bounded, no allocation.
+    /// Parses the next byte. Real-time: bounded, no allocation.
     pub fn push(&mut self, byte: u8) -> Heard {
         if self.length == 0 && byte != DEVICE {
             return Heard::Noise;
@@ -189,7 +188,7 @@ impl Answers {
         }
     }
 
-    /// Forgets what has come of an answer. Real-time: bounded, no allocation.
+    /// Discards an incomplete reply. Real-time: bounded, no allocation.
     pub fn clear(&mut self) {
         self.length = 0;
     }

@@ -1,4 +1,4 @@
-//! How long a tick of the thread takes (message, answer, sample) on this machine's loopback.
+//! Measures the time of a tick of the thread (message, reply, sample) on this machine's loopback.
 //!
 //! ```text
 //! $ cargo run --release -p flotor-inverse3 --example round_trip
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const EXCHANGES: usize = 20_000;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // Prepared beforehand: what is measured is the plugin, and a service that has nothing to do.
+    // Prepared beforehand, so that the measurement contains the plugin and an idle service only.
     let answer = state(DVec3::new(0.0123, -0.0456, 0.0789), DVec3::ZERO);
     let bytes = answer.len();
     let service = StandIn::start(move |number, _| {

@@ -1,7 +1,7 @@
-//! The thread that keeps one message in flight, and what it shares with the tick.
+//! Thread that keeps one message in flight, and its data exchange with the tick.
 //!
-//! A tick leaves its force and takes the newest sample; neither waits. A force that was not sent yet is replaced by the
-//! next one: a queue of commands would be a queue of old forces.
+//! A tick posts its force and takes the newest sample; neither waits. A pending force is replaced by the next one: a queue of
+//! commands would delay the newest behind old ones.
 
 use crate::message::Sample;
 use crate::session::Session;
@@ -14,28 +14,28 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How often a thread without a command looks whether it is still wanted.
+/// Poll interval for the end of the exchange while no command is pending.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// What the tick and the thread leave for each other.
+/// Data exchanged between tick and thread.
 #[derive(Debug, Default)]
 struct Slots {
-    /// The newest force that was not sent yet, N.
+    /// Newest force, not sent yet, N.
     force_n: Option<DVec3>,
-    /// The newest sample that was not read yet.
+    /// Newest sample, not read yet.
     sample: Option<Sample>,
-    /// Why there will be no more.
+    /// Fault that ended the exchange.
     trouble: Option<Trouble>,
 }
 
 #[derive(Debug, Default)]
 struct Shared {
-    /// Each side holds it to copy a few numbers, and the tick's side never waits for it.
+    /// Locked only to copy a few numbers; the tick never waits for the lock.
     slots: Mutex<Slots>,
     is_over: AtomicBool,
 }
 
-/// A session in a thread of its own.
+/// Session that runs in its own thread.
 #[derive(Debug)]
 pub(crate) struct Exchange {
     shared: Arc<Shared>,
@@ -53,16 +53,16 @@ impl Exchange {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// The newest sample since the last call. Real-time: bounded, no allocation, waits for nothing.
+    /// Returns the newest sample since the last call. Real-time: bounded, no allocation, no wait.
     pub(crate) fn take(&self) -> Result<Option<Sample>, Trouble> {
         match self.shared.slots.try_lock() {
             Ok(mut slots) => slots.trouble.map_or(Ok(slots.sample.take()), Err),
-            // The thread is leaving one.
+            // Contention: the thread is storing a sample.
             Err(_) => Ok(None),
         }
     }
 
-    /// Leaves a force for the thread; whether it could. Real-time: bounded, no allocation, waits for nothing.
+    /// Posts a force for the thread; returns false if the lock is contended. Real-time: bounded, no allocation, no wait.
     pub(crate) fn leave(&self, force_n: DVec3) -> bool {
         let Ok(mut slots) = self.shared.slots.try_lock() else { return false };
         slots.force_n = Some(force_n);
@@ -73,7 +73,7 @@ impl Exchange {
         true
     }
 
-    /// Takes the force away and ends the thread; the session, if it is still good. Waits for the message in flight.
+    /// Removes the force and ends the thread; returns the session unless it has failed. Waits for the message in flight.
     pub(crate) fn end(&mut self) -> Option<Session> {
         self.shared.is_over.store(true, Ordering::Release);
         let thread = self.thread.take()?;
@@ -97,7 +97,7 @@ fn run(mut session: Session, shared: &Shared, switch: &ForceSwitch) -> Option<Se
         let force_n = match (left, is_over || switch.is_stopped()) {
             (_, true) if last_n != DVec3::ZERO => DVec3::ZERO,
             _ if is_over => return Some(session),
-            // A stopped device still says where it is.
+            // A stopped device still returns samples.
             (Some(_), true) => DVec3::ZERO,
             (Some(force_n), false) => force_n,
             (None, _) => {
@@ -109,7 +109,7 @@ fn run(mut session: Session, shared: &Shared, switch: &ForceSwitch) -> Option<Se
         match session.exchange(force_n) {
             Ok(sample) => lock().sample = Some(sample),
             Err(trouble) => {
-                // Before anybody is told: the force is gone when they hear of it.
+                // End first: the force is gone when the host receives the fault.
                 session.end();
                 lock().trouble = Some(trouble);
                 return None;

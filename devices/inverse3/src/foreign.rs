@@ -1,17 +1,17 @@
-//! Force that no command of this session explains.
+//! Detection of force that no command of this session explains.
 //!
 //! The service adds up the forces of all its sessions, so another program can push the hand beyond every limit of this
-//! one. A device may delay, limit and fade what it is commanded, but whatever it does so, each component of its force lies
-//! between zero and a component that was commanded a moment ago. What lies outside comes from somebody else.
+//! session. A device may delay, limit and fade the commanded force, but each component of its force then lies between zero
+//! and a recently commanded component. A component outside is the force of another program.
 
 use flotor_hal::DVec3;
 
-/// Messages over which commands count: a service fades what is not renewed within 0.1 s, which are 100 at 1 kHz.
+/// Length of the command history, messages: a service fades unrenewed commands within 0.1 s, 100 messages at 1 kHz.
 const MESSAGES: u32 = 200;
-/// Samples in a row before somebody is blamed: one may be noise.
+/// Consecutive unexplained samples that are a fault: a single one may be noise.
 const SAMPLES: u32 = 3;
 
-/// The smallest and the largest components of commands, and zero, N.
+/// Smallest and largest components of commands, and zero, N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extent {
     least_n: DVec3,
@@ -30,11 +30,11 @@ impl Extent {
     }
 }
 
-/// Watches the force of a device.
+/// Detector of foreign force on a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForeignForce {
     tolerance_n: f64,
-    /// Of the messages since the last change, and of those before it.
+    /// Extents of the commands in the current and the previous [`MESSAGES`].
     newest: Extent,
     older: Extent,
     messages: u32,
@@ -42,14 +42,13 @@ pub struct ForeignForce {
 }
 
 impl ForeignForce {
-    /// Nothing was commanded. A force counts if a component is off by more than this, N.
+    /// Creates a detector without commands. A component counts as foreign beyond the tolerance, N.
     #[must_use]
     pub fn new(tolerance_n: f64) -> Self {
         Self { tolerance_n, newest: Extent::NONE, older: Extent::NONE, messages: 0, unexplained: 0 }
     }
 
-    /// Whether the force that a device exerts, N, comes from somebody else, too, now that this one was commanded.
-    /// Real-time: bounded, no allocation.
+    /// Records a command and returns whether the exerted force, N, includes a foreign one. Real-time: bounded, no allocation.
     pub fn is_there(&mut self, commanded_n: DVec3, exerted_n: DVec3) -> bool {
         self.newest = self.newest.with(commanded_n);
         self.messages += 1;

@@ -1,17 +1,17 @@
-//! A reader of JSON that walks over a text once and copies nothing.
+//! JSON parser that reads a text once, in place, without copies.
 //!
-//! A caller says what it expects at each place: the fields of an object, the elements of an array, a number. Whatever else
-//! is there is [skipped](Cursor::skip) if it is JSON, and [`Malformed`] if it is not. Real-time: bounded by the length of
-//! the text, no allocation.
+//! The caller states the expected value at each place: the fields of an object, the elements of an array, a number. Any other
+//! value is [skipped](Cursor::skip) if it is valid JSON, and [`Malformed`] otherwise. Real-time: bounded by the length of the
+//! text, no allocation.
 
-/// The text is no JSON, or holds another kind of value than expected.
+/// The text is not JSON, or contains another kind of value than expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Malformed;
 
-/// Deepest nesting that is read: a state has five levels.
+/// Limit on the nesting depth: a state has five levels.
 const DEEPEST: u32 = 32;
 
-/// A place in a text.
+/// Read position in a text.
 #[derive(Clone, Copy, Debug)]
 pub struct Cursor<'a> {
     text: &'a [u8],
@@ -19,12 +19,12 @@ pub struct Cursor<'a> {
     depth: u32,
 }
 
-/// A value that is no object and no array.
+/// Scalar value: neither object nor array.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scalar<'a> {
     /// A number; infinite if it is too large for an `f64`.
     Number(f64),
-    /// A text, its escapes as they stand.
+    /// A string with its escapes undecoded.
     Text(&'a str),
     /// `true` or `false`.
     Flag(bool),
@@ -44,13 +44,13 @@ impl std::fmt::Display for Scalar<'_> {
 }
 
 impl<'a> Cursor<'a> {
-    /// At the beginning of a text.
+    /// Creates a cursor at the beginning of a text.
     #[must_use]
     pub fn new(text: &'a [u8]) -> Self {
         Self { text, at: 0, depth: 0 }
     }
 
-    /// The next byte that is not white space.
+    /// Returns the next byte after white space without consuming it.
     fn peek(&mut self) -> Result<u8, Malformed> {
         while let Some(byte) = self.text.get(self.at) {
             if !b" \t\r\n".contains(byte) {
@@ -69,7 +69,7 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    /// The items between two brackets, each read by `item`.
+    /// Reads the comma-separated items between two brackets, each with `item`.
     fn items(
         &mut self,
         [open, close]: [u8; 2],
@@ -96,7 +96,7 @@ impl<'a> Cursor<'a> {
     /// Reads an object: `field` is called with each name, and must read or skip the value.
     ///
     /// # Errors
-    /// [`Malformed`], and what `field` says.
+    /// [`Malformed`], and errors of `field`.
     pub fn fields(
         &mut self,
         mut field: impl FnMut(&str, &mut Self) -> Result<(), Malformed>,
@@ -111,7 +111,7 @@ impl<'a> Cursor<'a> {
     /// Reads an array: `element` must read or skip a value each time.
     ///
     /// # Errors
-    /// [`Malformed`], and what `element` says.
+    /// [`Malformed`], and errors of `element`.
     pub fn elements(
         &mut self,
         element: impl FnMut(&mut Self) -> Result<(), Malformed>,
@@ -119,10 +119,10 @@ impl<'a> Cursor<'a> {
         self.items(*b"[]", element)
     }
 
-    /// Reads a text.
+    /// Reads a string; its escapes stay undecoded.
     ///
     /// # Errors
-    /// [`Malformed`].
+    /// If the value is no string.
     pub fn text(&mut self) -> Result<&'a str, Malformed> {
         self.expect(b'"')?;
         let start = self.at;
@@ -142,7 +142,7 @@ impl<'a> Cursor<'a> {
     /// Reads a number.
     ///
     /// # Errors
-    /// [`Malformed`].
+    /// If the value is no number.
     pub fn number(&mut self) -> Result<f64, Malformed> {
         match self.scalar()? {
             Scalar::Number(number) => Ok(number),
@@ -153,7 +153,7 @@ impl<'a> Cursor<'a> {
     /// Reads `true` or `false`.
     ///
     /// # Errors
-    /// [`Malformed`].
+    /// If the value is neither `true` nor `false`.
     pub fn flag(&mut self) -> Result<bool, Malformed> {
         match self.scalar()? {
             Scalar::Flag(flag) => Ok(flag),
@@ -161,10 +161,10 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Reads a value that is no object and no array.
+    /// Reads a scalar value.
     ///
     /// # Errors
-    /// [`Malformed`].
+    /// If the value is an object, an array or no JSON.
     pub fn scalar(&mut self) -> Result<Scalar<'a>, Malformed> {
         if self.peek()? == b'"' {
             return self.text().map(Scalar::Text);
@@ -178,7 +178,7 @@ impl<'a> Cursor<'a> {
             "true" => Ok(Scalar::Flag(true)),
             "false" => Ok(Scalar::Flag(false)),
             "null" => Ok(Scalar::Null),
-            // Rust would read `NaN` and `inf`, too: a number of JSON begins with a digit.
+            // Rust's parser also accepts `NaN` and `inf`; a JSON number begins with a digit.
             number if number.trim_start_matches('-').starts_with(|first: char| first.is_ascii_digit()) => {
                 number.parse().map(Scalar::Number).map_err(|_| Malformed)
             }
@@ -186,10 +186,10 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Goes past a value of any kind.
+    /// Skips a value of any kind.
     ///
     /// # Errors
-    /// [`Malformed`].
+    /// If the value is not valid JSON.
     pub fn skip(&mut self) -> Result<(), Malformed> {
         match self.peek()? {
             b'{' => self.fields(|_, cursor| cursor.skip()),
@@ -198,19 +198,19 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Nothing but white space is left.
+    /// Checks that only white space follows.
     ///
     /// # Errors
-    /// [`Malformed`].
+    /// If another byte follows.
     pub fn end(&mut self) -> Result<(), Malformed> {
         if self.peek().is_ok() { Err(Malformed) } else { Ok(()) }
     }
 
-    /// The value at a path of names from here, which stays where it is; nothing if there is none, or an object or an
-    /// array.
+    /// Looks up the scalar at a path of field names without moving the cursor; `None` if there is none, or if the value is an
+    /// object or an array.
     ///
     /// # Errors
-    /// [`Malformed`].
+    /// If the text is not valid JSON.
     pub fn at(mut self, path: &[&str]) -> Result<Option<Scalar<'a>>, Malformed> {
         let Some((first, rest)) = path.split_first() else {
             return match self.peek()? {

@@ -1,6 +1,6 @@
-//! Haply's Inverse3 and VerseGrip, through the WebSocket that Haply's Inverse Service documents.
+//! Device plugin for Haply's Inverse3 and VerseGrip, through the documented WebSocket of Haply's Inverse Service.
 //!
-//! The service answers each message with one state, so that a thread of its own keeps one message in flight:
+//! The service replies to each message with one state; a thread of the plugin keeps one message in flight:
 //!
 //! ```text
 //! tick: write -> newest force --> thread: message -> service -> state --> newest sample -> tick: read
@@ -8,14 +8,14 @@
 //!
 //! - [`json`]: reads JSON in place, without allocation.
 //! - [`socket`]: a WebSocket as frames in two buffers that never grow.
-//! - [`message`]: what is said to the service, and what its states say.
+//! - [`message`]: messages to the service, and its states.
 //! - [`session`]: opens a session, sets its filters and reads them back; then one force for one sample.
-//! - [`foreign`]: finds force that no command of this session explains.
-//! - `exchange`: the thread.
+//! - [`foreign`]: detects force that no command of this session explains.
+//! - `exchange`: the thread and its data exchange with the tick.
 //! - `plugin`: parameters and the contract.
-//! - [`stand_in`]: a service of a few lines that answers what a test wants.
+//! - [`stand_in`]: scripted service for tests.
 //!
-//! `flotor emulate haply-service` is a whole service without hardware.
+//! `flotor emulate haply-service` is a complete service without hardware.
 
 mod exchange;
 pub mod foreign;

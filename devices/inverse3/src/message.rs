@@ -1,78 +1,78 @@
-//! What is said to the service, and what its messages say.
+//! Messages to the service, and parsers of its messages.
 //!
 //! Names and shapes are those of the Inverse Service 3.5 (Haply Robotics, "WebSocket protocol" and "Control commands" of
-//! its documentation). A state has everything of all devices; only the named arm and grip are looked at.
+//! its documentation). A state contains all devices; only the selected arm and grip are read.
 
 use crate::json::{Cursor, Malformed, Scalar};
 use crate::trouble::Trouble;
 use flotor_hal::{DQuat, DVec3};
 use std::io::Write;
 
-/// Where the arms are in a message, and where the grips may be.
+/// Names of the lists of arms and grips.
 const ARMS: &str = "inverse3";
 const GRIPS: [&str; 3] = ["verse_grip", "wireless_verse_grip", "custom_verse_grip"];
 /// Buttons of a grip, from bit 0.
 const BUTTONS: [&str; 3] = ["a", "b", "c"];
-/// What a status must not deny.
+/// Status flags that must not be false.
 const READY: [&str; 3] = ["calibrated", "power_supply", "ready"];
-/// A message that changes nothing: it is answered with a state.
+/// Message without changes, answered with a state.
 pub const LOOK: &[u8] = b"{}";
-/// Shortest quaternion that has a direction.
+/// Smallest norm of a valid quaternion.
 const SHORTEST: f64 = 1.0e-3;
 
-/// A grip: the list that it is in, and its id.
+/// Grip, identified by its list and its id.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grip {
     /// Name of the list.
     pub kind: &'static str,
-    /// Id, as the service says it.
+    /// Id, as sent by the service.
     pub id: String,
 }
 
-/// The devices of a service.
+/// Devices of a service.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Inventory {
     /// Ids of the arms.
     pub arms: Vec<String>,
-    /// The grips.
+    /// Grips of all kinds.
     pub grips: Vec<Grip>,
 }
 
-/// The devices of a session.
+/// Devices selected for a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chosen {
-    /// Id of the arm.
+    /// Id of the selected arm.
     pub arm: String,
-    /// The grip, if there is one.
+    /// Selected grip; `None` without one.
     pub grip: Option<Grip>,
 }
 
-/// What a state says of the chosen devices.
+/// State of the selected devices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Where the cursor is, m.
+    /// Position of the cursor, m.
     pub position_m: DVec3,
-    /// Its velocity, m/s.
+    /// Velocity of the cursor, m/s.
     pub velocity_m_per_s: DVec3,
-    /// The force that the device exerts on the hand, N, whoever commands it.
+    /// Force of the device on the hand, N, including commands of other programs.
     pub force_n: DVec3,
-    /// Orientation of the grip; none without one.
+    /// Orientation of the grip; identity without one.
     pub orientation: DQuat,
     /// Buttons of the grip, a to c from bit 0.
     pub buttons: u32,
-    /// A session commands the device.
+    /// True while any session commands the device.
     pub is_commanded: bool,
 }
 
-/// Reads the devices of a message. Not real-time.
+/// Parses the devices of a message. Not real-time.
 ///
 /// # Errors
-/// [`Malformed`].
+/// If the message is not JSON, or a list has another shape.
 pub fn inventory(text: &[u8]) -> Result<Inventory, Malformed> {
     let mut found = Inventory::default();
     let id = |cursor: &mut Cursor<'_>| -> Result<Option<String>, Malformed> {
         let id = match cursor.at(&["device_id"])? {
-            // It is said back as it is: none with escapes.
+            // Ids are sent back verbatim: reject ids with escapes.
             Some(Scalar::Text(id)) if !id.contains('\\') => Some(id.to_owned()),
             _ => None,
         };
@@ -94,27 +94,27 @@ pub fn inventory(text: &[u8]) -> Result<Inventory, Malformed> {
     Ok(found)
 }
 
-/// A setting of the arm as it is to be.
+/// Required value of a setting of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// Where its value is in what a state says of the arm.
+    /// Path of the value within the arm's element of a state.
     pub path: &'static [&'static str],
-    /// The value; a setting that is not said has it.
+    /// Required value; also the default of an absent optional setting.
     pub value: Scalar<'static>,
-    /// Whether the service has to say it.
+    /// Whether the setting may be absent.
     pub presence: Presence,
 }
 
-/// Whether a setting has to be in a state.
+/// Presence of a setting in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Presence {
-    /// It is always said.
+    /// Must be present.
     Required,
-    /// What is plain may be left out.
+    /// May be absent; then the service's default applies.
     Optional,
 }
 
-/// What the settings of the arm are to be, with the gain of the force gate.
+/// Returns the required settings of the arm, with the gain of the force gate.
 #[must_use]
 pub fn settings(force_gate: f64) -> [Setting; 15] {
     use Presence::{Optional, Required};
@@ -139,7 +139,7 @@ pub fn settings(force_gate: f64) -> [Setting; 15] {
     ]
 }
 
-/// The message that sets them, and asks for all settings. Not real-time.
+/// Encodes the message that changes the settings and requests all of them. Not real-time.
 #[must_use]
 pub fn configure(chosen: &Chosen, force_gate: f64) -> String {
     let view = "\"preset\":\"arm_front_centered\",\"basis\":{\"permutation\":\"XYZ\"}";
@@ -159,10 +159,10 @@ pub fn configure(chosen: &Chosen, force_gate: f64) -> String {
     )
 }
 
-/// The first setting that is not as it is to be, and what the service says of it. Not real-time.
+/// Returns path and value of the first setting that differs from its required value. Not real-time.
 ///
 /// # Errors
-/// [`Trouble`] of a message that does not have the arm.
+/// [`Trouble`] if the message is malformed or does not contain the arm.
 pub fn differing(
     text: &[u8],
     arm: &str,
@@ -191,8 +191,7 @@ pub fn differing(
     Ok(None)
 }
 
-/// Writes the message that commands a force, N, in place of what was in `text`. Real-time: bounded, no allocation beyond
-/// the first.
+/// Encodes the command of a force, N, replacing the contents of `text`. Real-time: bounded, no allocation beyond the first.
 pub fn force(text: &mut Vec<u8>, arm: &str, force_n: DVec3) {
     let DVec3 { x, y, z } = force_n;
     text.clear();
@@ -204,7 +203,7 @@ pub fn force(text: &mut Vec<u8>, arm: &str, force_n: DVec3) {
     );
 }
 
-/// Numbers by their names; NaN, which no JSON has, for one that is missing.
+/// Reads the fields of an object by name; NaN, which no JSON has, for a missing field.
 fn parts<const N: usize>(cursor: &mut Cursor<'_>, names: [&str; N]) -> Result<[f64; N], Malformed> {
     let mut parts = [f64::NAN; N];
     cursor.fields(|name, cursor| {
@@ -227,7 +226,7 @@ fn whole<const N: usize>(field: &'static str, parts: [f64; N]) -> Result<[f64; N
     }
 }
 
-/// What an element says of an arm.
+/// Parsed element of an arm.
 struct Arm {
     is_chosen: bool,
     position: [f64; 3],
@@ -237,7 +236,7 @@ struct Arm {
     is_commanded: bool,
 }
 
-/// What an element says of a grip.
+/// Parsed element of a grip.
 struct Held {
     is_chosen: bool,
     orientation: [f64; 4],
@@ -305,10 +304,10 @@ fn held(cursor: &mut Cursor<'_>, chosen: &str) -> Result<Held, Malformed> {
     Ok(held)
 }
 
-/// Reads what a state says of the chosen devices. Real-time: bounded by the length of the message, no allocation.
+/// Parses the state of the selected devices. Real-time: bounded by the length of the message, no allocation.
 ///
 /// # Errors
-/// A [`Trouble`].
+/// A [`Trouble`]: the state is malformed, a device is missing or not ready, or a number is missing or infinite.
 pub fn sample(text: &[u8], chosen: &Chosen) -> Result<Sample, Trouble> {
     let (mut of_arm, mut of_grip) = (None, None);
     let mut cursor = Cursor::new(text);
@@ -334,7 +333,7 @@ pub fn sample(text: &[u8], chosen: &Chosen) -> Result<Sample, Trouble> {
         (Some(_), Some(held)) => {
             let [w, x, y, z] = whole("orientation", held.orientation)?;
             let turned = DQuat::from_xyzw(x, y, z, w);
-            // Numbers of single precision: nearly one, and never zero.
+            // Single precision: the norm is nearly one, and never zero.
             if turned.length() < SHORTEST {
                 return Err(Trouble::Missing("orientation"));
             }

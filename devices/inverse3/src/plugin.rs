@@ -1,4 +1,4 @@
-//! The device as a plugin: positions from the service, forces to it, the grip's orientation and buttons.
+//! Implementation of the device contract for the Inverse3: positions, orientation and buttons from the service, forces to the service.
 
 use crate::exchange::Exchange;
 use crate::message::Sample;
@@ -12,21 +12,21 @@ use flotor_hal::{
 use std::f64::consts::{PI, TAU};
 use std::time::{Duration, Instant};
 
-/// Where the service listens.
+/// Default address of the service.
 const ADDRESS: &str = "127.0.0.1:10001";
-/// The word for no grip.
+/// Value of `grip` for no grip.
 const NO_GRIP: &str = "none";
-/// Smallest step of the cursor, m: the maker's number.
+/// Resolution of the cursor, m: the maker's figure.
 const RESOLUTION_M: f64 = 1.0e-5;
-/// Change of force, N/s: from nothing to the default limit in a millisecond.
+/// Limit on the change of force, N/s: from zero to the default limit in a millisecond.
 const SLEW_N_PER_S: f64 = 5000.0;
-/// From a tick to the force that answers it, beyond one period: to the service and to the device, s.
+/// Latency from a tick to its force, in addition to one period, s: to the service and to the device.
 const LATENCY_S: f64 = 1.0e-3;
-/// How long commands that are not renewed may count, several times over.
+/// Timeout for commands of earlier sessions to expire: several times their validity.
 const COMMANDS_FADE: Duration = Duration::from_millis(500);
 const LOOK: Duration = Duration::from_millis(5);
-/// Time after which a service takes the force of a session without messages away: documented as a return to idle, without
-/// a number; Flotor's own service takes 0.1 s. Of a host that is gone the connection ends at once.
+/// Time after which a service removes the force of a silent session, ns: documented as a return to idle, without a number;
+/// Flotor's own service takes 0.1 s. If the host's process ends, the connection ends at once.
 const STOP_NS: u64 = 100_000_000;
 
 const SCHEMA: &[Parameter] = &[
@@ -58,7 +58,7 @@ const SCHEMA: &[Parameter] = &[
     Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Silence of the service that is a fault"),
 ];
 
-/// What of the parameters is in force.
+/// Parsed parameters.
 #[derive(Clone, Debug)]
 struct Options {
     request: Request,
@@ -96,14 +96,14 @@ impl Options {
         }
     }
 
-    /// Opens a session on a device that nobody commands.
+    /// Opens a session on a device that no program commands.
     fn open(&self) -> Result<Session, Refusal> {
         let mut session = Session::open(&self.request).map_err(Refusal::resource)?;
         self.idle(&mut session)?;
         Ok(session)
     }
 
-    /// A sample of the device without commands; those of an earlier session are valid for a moment.
+    /// Returns a sample of the device without commands; waits for those of an earlier session to expire.
     fn idle(&self, session: &mut Session) -> Result<Sample, Refusal> {
         let started = Instant::now();
         loop {
@@ -123,23 +123,23 @@ impl Options {
     }
 }
 
-/// An Inverse3, opened: a session of the service that commands nothing.
+/// Opened Inverse3: a session of the service without commands.
 pub struct Inverse3Device {
     options: Options,
-    /// Gone after a fault: the next activation opens another.
+    /// `None` after a fault: the next activation opens another session.
     session: Option<Session>,
     has_grip: bool,
     switch: ForceSwitch,
 }
 
-/// An Inverse3 that follows the host.
+/// Active Inverse3 that follows the host.
 pub struct DrivenDevice {
     opened: Inverse3Device,
     exchange: Exchange,
-    /// The sample of the activation, until it is read.
+    /// Sample of the activation, until it is read.
     first: Option<Sample>,
     state: DeviceState,
-    /// When the last sample was taken, ns.
+    /// Time of the last sample, ns.
     sampled_ns: Option<u64>,
 }
 
@@ -229,7 +229,7 @@ impl ActiveDevice for DrivenDevice {
                 self.sample(&sample, tick.time_ns);
                 Cycle::Fresh
             }
-            // A service that is silent for too long is told by the thread.
+            // The thread reports a service that is silent for too long.
             None => Cycle::Stale,
         };
         *state = self.state;
@@ -252,7 +252,7 @@ impl ActiveDevice for DrivenDevice {
 }
 
 impl DrivenDevice {
-    /// Takes what the service says as the sample of a time.
+    /// Updates the sample from a state of the service.
     fn sample(&mut self, sample: &Sample, time_ns: u64) {
         let pose = Pose::new(sample.position_m, sample.orientation);
         let angular = match self.sampled_ns {
@@ -260,7 +260,7 @@ impl DrivenDevice {
                 let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
                 let before = self.state.pose.orientation();
                 let turned_rad = rotation_vector(sample.orientation * before.conjugate());
-                // A first-order low pass, exact for a difference that is held over the interval.
+                // First-order low pass, exact for a difference that is constant over the interval.
                 let share = 1.0 - math::exp(-TAU * self.opened.options.spin_cutoff_hz * dt_s);
                 self.state.twist.angular().lerp(turned_rad / dt_s, share)
             }
@@ -279,14 +279,14 @@ impl DrivenDevice {
 }
 
 impl IndependentStopDevice for Inverse3Device {
-    /// The connection ends with the host's process, and the session and its force with the connection.
+    /// Declares a stop by the service: the connection ends with the host's process, and the session and its force with the connection.
     fn independent_stop(&self) -> IndependentStop {
         IndependentStop::by_itself(StoppedState::Zero, STOP_NS)
     }
 }
 
 impl ConnectionDevice for Inverse3Device {
-    /// The service has these ports: of the arm, and of the receiver of a grip.
+    /// Serial ports that the service uses: arm, and receiver of a grip.
     const USB: &'static [UsbKind] =
         &[UsbKind::new(0x16c0, 0x0483, UsbAccess::Serial), UsbKind::new(0x2fe3, 0x0100, UsbAccess::Serial)];
 }

@@ -1,4 +1,4 @@
-//! A session of the service: opened with settings that are read back, then one sample for each force.
+//! Session of the service: opened with settings that are read back, then one sample per force.
 
 use crate::foreign::ForeignForce;
 use crate::message::{self, Chosen, Grip, Inventory, Sample};
@@ -7,40 +7,40 @@ use crate::trouble::Trouble;
 use flotor_hal::DVec3;
 use std::time::Duration;
 
-/// How long the service may take to agree to a session.
+/// Timeout of the replies that open a session.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Room for a message that commands a force: the longest has some 200 bytes.
+/// Buffer size of a command, bytes: the longest has some 200.
 const MESSAGE_BYTES: usize = 512;
 
-/// What a session is to be.
+/// Configuration of a session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
     /// `host:port` of the service.
     pub address: String,
-    /// Id of the arm; the only one if not said.
+    /// Id of the arm; `None` for the only one.
     pub arm: Option<String>,
-    /// Which grip.
+    /// Selection of the grip.
     pub grip: GripRequest,
     /// Gain of the service's force gate.
     pub force_gate: f64,
-    /// Silence of the service that is a fault.
+    /// Timeout of a reply of the service, after which it is at fault.
     pub timeout: Duration,
-    /// Force of the device beyond this session's own that is a fault, N.
+    /// Tolerance of force beyond this session's own, N; more is a fault.
     pub foreign_force_n: f64,
 }
 
-/// Which grip a session is to have.
+/// Selection of a grip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GripRequest {
-    /// The only one; none if there is none.
+    /// The only grip, or none if the service has none.
     OnlyOne,
-    /// None.
+    /// No grip.
     None,
-    /// The one with this id.
+    /// The grip with this id.
     Named(String),
 }
 
-/// An open session.
+/// Open session with its selected devices.
 #[derive(Debug)]
 pub struct Session {
     socket: Socket,
@@ -50,10 +50,10 @@ pub struct Session {
 }
 
 impl Session {
-    /// Opens a session, sets what is to be set, and reads it back. Not real-time.
+    /// Opens a session, changes the settings and reads them back. Not real-time.
     ///
     /// # Errors
-    /// One sentence: what is wrong, and what to do.
+    /// One sentence with the cause and the remedy.
     pub fn open(request: &Request) -> Result<Self, String> {
         let address = &request.address;
         let of_service = |cause: String| format!("the Inverse Service at {address}: {cause}");
@@ -69,7 +69,7 @@ impl Session {
             socket.receive().map(<[u8]>::to_vec)
         };
         let failed = |trouble: Trouble| of_service(trouble.to_string());
-        // The service speaks first.
+        // The service sends the first message.
         let first = talk("").map_err(failed)?;
         let inventory = message::inventory(&first).map_err(|malformed| failed(malformed.into()))?;
         let chosen = choose(request, &inventory).map_err(of_service)?;
@@ -88,26 +88,25 @@ impl Session {
         Ok(Self { socket, chosen, message, foreign: ForeignForce::new(request.foreign_force_n) })
     }
 
-    /// The devices it has.
+    /// Returns the selected devices.
     #[must_use]
     pub fn chosen(&self) -> &Chosen {
         &self.chosen
     }
 
-    /// Reads a sample without a command. Real-time but for the waiting: no allocation.
+    /// Reads a sample without a command. Real-time except for the wait: no allocation.
     ///
     /// # Errors
-    /// A [`Trouble`].
+    /// A [`Trouble`] of the connection or of the state.
     pub fn look(&mut self) -> Result<Sample, Trouble> {
         self.socket.send(message::LOOK)?;
         message::sample(self.socket.receive()?, &self.chosen)
     }
 
-    /// Commands a force on the hand, N, and waits for the sample that answers it. Real-time but for the waiting: no
-    /// allocation.
+    /// Commands a force on the hand, N, and waits for the sample of the reply. Real-time except for the wait: no allocation.
     ///
     /// # Errors
-    /// A [`Trouble`]; end the session then, with which its force ends.
+    /// A [`Trouble`]; end the session then, which removes its force.
     pub fn exchange(&mut self, force_n: DVec3) -> Result<Sample, Trouble> {
         message::force(&mut self.message, &self.chosen.arm, force_n);
         self.socket.send(&self.message)?;
@@ -118,10 +117,10 @@ impl Session {
         }
     }
 
-    /// Takes the force away and ends the session, whatever became of it.
+    /// Removes the force and ends the session, also after a fault.
     pub fn end(&mut self) {
         message::force(&mut self.message, &self.chosen.arm, DVec3::ZERO);
-        // One that is gone has taken its force along.
+        // A closed connection has removed its force already.
         let _ = self.socket.send(&self.message);
         self.socket.close();
     }

@@ -1,7 +1,7 @@
-//! A WebSocket to the service: whole text messages, one way and the other, in buffers that never grow.
+//! WebSocket to the service: whole text messages in both directions, in buffers of fixed size.
 //!
-//! The frames are tungstenite's (RFC 6455). Its own reader would take a message of any length up to its limit before it
-//! is asked; here the header of a message that is too long is enough to refuse it.
+//! The frames are tungstenite's (RFC 6455). Tungstenite's own reader would first receive a message up to its size limit; here
+//! the header of a too long message suffices to refuse it.
 
 use crate::trouble::Trouble;
 use std::io::{self, Cursor, ErrorKind, Read, Write};
@@ -12,34 +12,34 @@ use tungstenite::handshake::derive_accept_key;
 use tungstenite::protocol::frame::FrameHeader;
 use tungstenite::protocol::frame::coding::{Control, Data, OpCode};
 
-/// Longest message of the service: a state of one device has about a kilobyte, an inventory a few for each.
+/// Limit on a message of the service, bytes: a state of one device has about a kilobyte, an inventory a few per device.
 pub const LONGEST_BYTES: usize = 256 << 10;
-/// Room for a message to the service: the longest configures a session.
+/// Buffer size of a message to the service, bytes: the longest configures a session.
 const SENT_BYTES: usize = 2048;
-/// Longest answer to the request for a WebSocket.
+/// Limit on the reply to the upgrade request, bytes.
 const LONGEST_HEAD: usize = 8 << 10;
-/// Longest control frame (RFC 6455, section 5.5).
+/// Limit on a control frame, bytes (RFC 6455, section 5.5).
 const LONGEST_CONTROL: usize = 125;
 
-/// A connection on which one message waits for one answer.
+/// WebSocket connection with one pending message.
 #[derive(Debug)]
 pub struct Socket {
     stream: TcpStream,
     patience: Duration,
-    /// What has arrived lies between `start` and `end`.
+    /// Receive buffer; the received bytes are `start..end`.
     buffer: Box<[u8]>,
     start: usize,
     end: usize,
     sent: Vec<u8>,
-    /// What the next frame is masked with.
+    /// Mask of the next frame.
     mask: u32,
 }
 
 impl Socket {
-    /// Connects, and waits for the service to agree. Not real-time.
+    /// Connects and performs the WebSocket upgrade; `patience` limits each wait. Not real-time.
     ///
     /// # Errors
-    /// One clause: what the system or the other end says.
+    /// One clause with the error of the system or of the upgrade.
     pub fn connect(address: &str, patience: Duration) -> Result<Self, String> {
         let lookup = address.to_socket_addrs().map_err(|error| error.to_string())?;
         let mut failed = "no host has that name".to_owned();
@@ -57,7 +57,7 @@ impl Socket {
         stream.set_read_timeout(Some(patience))?;
         stream.set_write_timeout(Some(patience))?;
         let key = generate_key();
-        // Masks are there for old proxies: on the way to a service of this machine any will do, each frame its own.
+        // Masks protect old proxies: for a service on this machine any mask will do, a new one per frame.
         let mask = key.bytes().fold(0x9e37_79b9, |mask: u32, byte| mask.rotate_left(5) ^ u32::from(byte));
         let buffer = vec![0; LONGEST_BYTES + LONGEST_CONTROL].into_boxed_slice();
         let sent = Vec::with_capacity(SENT_BYTES);
@@ -99,10 +99,10 @@ impl Socket {
         if is_agreed && lines.any(proves_it) { Ok(()) } else { Err(no_service()) }
     }
 
-    /// Sends a text. Real-time except for the system call: bounded, no allocation.
+    /// Sends a text message. Real-time except for the system call: bounded, no allocation.
     ///
     /// # Errors
-    /// [`Trouble::Gone`].
+    /// If the connection is closed.
     pub fn send(&mut self, text: &[u8]) -> Result<(), Trouble> {
         self.send_frame(OpCode::Data(Data::Text), text)
     }
@@ -120,11 +120,11 @@ impl Socket {
         self.stream.write_all(&self.sent).map_err(|_| Trouble::Gone)
     }
 
-    /// Waits for the next text, which stays in the buffer until the next call. Real-time but for the waiting: bounded, no
-    /// allocation.
+    /// Waits for the next text message, which stays in the buffer until the next call. Real-time except for the wait: bounded,
+    /// no allocation.
     ///
     /// # Errors
-    /// A [`Trouble`]: the other end is gone, silent, or sends what is no whole message.
+    /// A [`Trouble`]: the connection is closed, silent, or sends malformed or fragmented messages.
     pub fn receive(&mut self) -> Result<&[u8], Trouble> {
         let until = Instant::now() + self.patience;
         loop {
@@ -151,7 +151,7 @@ impl Socket {
         }
     }
 
-    /// The next frame: its kind, and where its payload begins and ends.
+    /// Waits for the next frame; returns its opcode and the start and end of its payload in the buffer.
     fn next_frame(&mut self, until: Instant) -> Result<(OpCode, usize, usize), Trouble> {
         loop {
             let arrived = self.buffer.get(self.start..self.end).unwrap_or_default();
@@ -176,9 +176,9 @@ impl Socket {
         }
     }
 
-    /// Waits for more bytes.
+    /// Waits for more bytes in the receive buffer.
     fn fill(&mut self, until: Instant) -> Result<(), Trouble> {
-        // The frame that is being read goes to the beginning: there is room for the longest.
+        // Move the partial frame to the front, to have room for the longest.
         self.buffer.copy_within(self.start..self.end, 0);
         (self.start, self.end) = (0, self.end - self.start);
         let late = if self.end == 0 { Trouble::Silent } else { Trouble::Unfinished };
@@ -198,17 +198,17 @@ impl Socket {
         }
     }
 
-    /// How long to wait for a message from now on. Not real-time.
+    /// Sets the timeout of a reply. Not real-time.
     ///
     /// # Errors
-    /// What the system says.
+    /// Errors of the system.
     pub fn set_patience(&mut self, patience: Duration) -> io::Result<()> {
         self.patience = patience;
         self.stream.set_read_timeout(Some(patience))?;
         self.stream.set_write_timeout(Some(patience))
     }
 
-    /// Ends the connection, at once and for both ends.
+    /// Closes the connection in both directions.
     pub fn close(&self) {
         let _ = self.stream.shutdown(Shutdown::Both);
     }

@@ -1,6 +1,6 @@
-//! A service of a few lines: it says what a test wants, when it wants, and remembers what it was told. Not real-time.
+//! Scripted service for tests: a callback decides each reply, and all messages are recorded. Not real-time.
 //!
-//! `flotor emulate haply-service` is a service that keeps its promises; this one breaks them.
+//! `flotor emulate haply-service` is a correct service; this one simulates faulty ones.
 
 use flotor_hal::DVec3;
 use std::io::{self, Read, Write};
@@ -9,20 +9,20 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use tungstenite::handshake::derive_accept_key;
 
-/// Ids of its devices: two arms and a grip.
+/// Id of the arm under test.
 pub const ARM: &str = "049D";
-/// The other arm.
+/// Id of the other arm.
 pub const OTHER_ARM: &str = "0001";
-/// The grip.
+/// Id of the grip.
 pub const GRIP: &str = "61B8";
 
-/// Its state with the cursor here, m, and this force on the hand, N.
+/// Returns a state with the cursor at a position, m, and a force on the hand, N.
 #[must_use]
 pub fn state(position_m: DVec3, force_n: DVec3) -> String {
     told(position_m, force_n, "")
 }
 
-/// Its answer to who sets everything as it is to be, with this gain of the force gate.
+/// Returns the reply to a configuration with all required settings, for a gain of the force gate.
 #[must_use]
 pub fn configured(force_gate: f64) -> String {
     let config = format!(
@@ -56,30 +56,30 @@ fn told(position_m: DVec3, force_n: DVec3, config: &str) -> String {
     )
 }
 
-/// What is sent for a message.
+/// Reply to a message.
 #[derive(Clone, Debug)]
 pub enum Said {
     /// A text message.
     Text(String),
-    /// These bytes.
+    /// Raw bytes, for malformed frames.
     Raw(Vec<u8>),
-    /// Nothing, and the connection stays.
+    /// No reply; the connection stays open.
     Nothing,
-    /// The connection is closed.
+    /// No reply; the connection is closed.
     Close,
 }
 
-/// The service, on a port of this machine, for one client after another.
+/// Scripted service on a port of this machine, for one client after another.
 #[derive(Debug)]
 pub struct StandIn {
-    /// Where it listens.
+    /// Address, `host:port`.
     pub address: String,
     heard: Arc<Mutex<Vec<String>>>,
     ended: Arc<AtomicUsize>,
 }
 
 impl StandIn {
-    /// Starts one. `answer` gets each message of a client, and its number in the connection: 0 for the connection itself.
+    /// Starts a service. `answer` receives the number of the message in its connection, 0 for the connection itself, and the message.
     ///
     /// # Errors
     /// If there is no port, or no thread.
@@ -91,7 +91,7 @@ impl StandIn {
         let (mut answer, hearing, ending) = (answer, Arc::clone(&heard), Arc::clone(&ended));
         std::thread::Builder::new().name("stand-in".to_owned()).spawn(move || {
             while let Ok((stream, _)) = listener.accept() {
-                // A client that goes is no failure.
+                // A client that disconnects is no failure.
                 let _ = serve(stream, &mut answer, &hearing);
                 ending.fetch_add(1, Ordering::Release);
             }
@@ -99,20 +99,20 @@ impl StandIn {
         Ok(Self { address, heard, ended })
     }
 
-    /// How many sessions have ended, and their forces with them.
+    /// Returns the number of ended connections, whose forces are gone.
     #[must_use]
     pub fn ended(&self) -> usize {
         self.ended.load(Ordering::Acquire)
     }
 
-    /// All messages so far.
+    /// Returns all received messages.
     #[must_use]
     pub fn heard(&self) -> Vec<String> {
         self.heard.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
-/// A frame of the service: a text, whole.
+/// Encodes a text as an unfragmented frame of a server.
 #[must_use]
 pub fn frame(text: &str) -> Vec<u8> {
     let mut frame = vec![0x81];
@@ -166,7 +166,7 @@ fn serve(
     Ok(())
 }
 
-/// The next text of the client.
+/// Receives the next text of the client.
 fn receive(stream: &mut TcpStream) -> io::Result<String> {
     let mut head = [0; 2];
     stream.read_exact(&mut head)?;

@@ -1,41 +1,41 @@
-//! What goes wrong between the plugin and the service.
+//! Faults between the plugin and the service.
 
 use crate::json::Malformed;
 use flotor_hal::Fault;
 use std::fmt;
 
-/// What to do about messages that are not those of the documented interface.
+/// Remedy for messages outside the documented interface.
 const UPDATE: &str = "update the service to 3.5 or newer";
 
-/// What went wrong, as a closed set; after each the session is over and its force with it.
+/// Fault of a session; after each the session and its force have ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
     /// The service closed the connection, or is gone.
     Gone,
-    /// No state came in time.
+    /// Timeout: no state came.
     Silent,
-    /// A state began and did not go on in time.
+    /// Timeout: a state is incomplete.
     Unfinished,
     /// A message is longer than any state, bytes.
     TooLong(u64),
-    /// What came is no frame of a WebSocket from a server, or a piece of a message.
+    /// A malformed or fragmented WebSocket frame, or one with a client's mask.
     NoFrame,
-    /// A state is no JSON, or a field of it is of another kind.
+    /// A state is not JSON, or a field has another kind of value.
     NoState,
     /// A field of the state is missing.
     Missing(&'static str),
     /// A field of the state is infinite.
     Infinite(&'static str),
-    /// The device, or its grip, is no longer among those of the service.
+    /// The device or its grip is no longer connected to the service.
     Unplugged,
-    /// The service says that the device is not ready: no power, or not calibrated.
+    /// The service reports that the device is not ready: no power, or not calibrated.
     NotReady,
-    /// The device exerts a force that this session did not command: another program pushes, too.
+    /// The device exerts a force that this session did not command: another program also commands it.
     ForeignForce,
 }
 
 impl Trouble {
-    /// What a host is told.
+    /// Returns the fault of the contract that the host receives.
     #[must_use]
     pub const fn fault(self) -> Fault {
         match self {

@@ -1,4 +1,4 @@
-//! How deep a push gets into the wall of the device: at rest, and at most on the way there.
+//! Penetration of a push into the wall of the device: at rest, and upper bound on the way there.
 //!
 //! `cargo run --release -p flotor-maglev --example penetration [PUSH_N]`
 
@@ -6,7 +6,7 @@ use flotor_hal::SampledLoop;
 use flotor_maglev::boundary::Walls;
 use flotor_maglev::facts;
 
-/// From the wall to the edge of what the sensors see, m, where the wall begins by default.
+/// Radius at which the wall begins, m: the default.
 const RADIUS_M: f64 = 11.0e-3;
 const PERIOD_S: f64 = 1.0e-3;
 
@@ -15,7 +15,7 @@ fn main() {
     table(push_n).iter().for_each(|line| println!("{line}"));
 }
 
-/// Computes how far a push (N) gets, by the delay of the loop.
+/// Computes the penetration of a push (N), by the delay of the loop.
 pub(crate) fn table(push_n: f64) -> Vec<String> {
     let margin_mm = (facts::RANGE_M - RADIUS_M) * 1.0e3;
     let head = [

@@ -19,7 +19,7 @@ pub const MAX_STIFFNESS_NM_PER_RAD: f64 = 50.0;
 pub const RESOLUTION_M: [f64; 2] = [5.0e-6, 10.0e-6];
 /// Closed-loop position bandwidth at ±3 dB, Hz (thesis).
 pub const POSITION_BANDWIDTH_HZ: f64 = 125.0;
-/// Slowest and fastest servo rate the controller accepts, Hz (client).
+/// Slowest and fastest servo rate of the controller, Hz (client).
 pub const SERVO_RATE_HZ: [f64; 2] = [100.0, 10_000.0];
 /// Largest current per coil, A (client).
 pub const MAX_COIL_CURRENT_A: f64 = 3.5;

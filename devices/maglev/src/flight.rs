@@ -1,12 +1,11 @@
-//! Taking off and landing: before the scene becomes active the handle is caught, brought home, and weighed; after
-//! it, it is let down.
+//! Take-off and landing: homing and weighing of the handle before the scene becomes active, and lowering it afterwards.
 //!
-//! A spring and a damper about a target hold the handle (the gains of the device's client program, made stable for
-//! period and delay). On the way up the target moves home along a minimum-jerk curve (Flash and Hogan 1985), so that the
-//! first force is none; on the way down the gains fade. What the spring carries at rest is the weight, whatever it is
-//! made of (D5: three numbers are published for one flotor), and the device carries it from then on.
+//! A spring and a damper about a target hold the handle (the gains of the device's client program, made stable for period
+//! and delay). During take-off the target moves home along a minimum-jerk curve (Flash and Hogan 1985), so that the force
+//! starts at zero; during landing the gains fade. The spring force at rest is the weight (D5: the literature gives three
+//! masses for one flotor); the device applies it as a feedforward from then on.
 //!
-//! Not real-time: a procedure of its own, before and after the loop.
+//! Not real-time: runs before and after the loop.
 
 use crate::boundary::Wall;
 use crate::host_link::HostLink;
@@ -15,7 +14,7 @@ use crate::transport::LinkLost;
 use flotor_hal::{DVec3, SampledLoop, Wrench};
 use std::time::{Duration, Instant};
 
-/// Stiffness and damping about home along each axis, N/m and N·s/m, and about each, N·m/rad and N·m·s/rad (client
+/// Stiffness and damping about home along each axis, N/m and N·s/m, and about each axis, N·m/rad and N·m·s/rad (client
 /// program of the University of Utah: x and y softer than z).
 const LINEAR: [Wall; 3] = [gain(2400.0, 15.0), gain(2400.0, 15.0), gain(10_000.0, 15.0)];
 const ANGULAR: [Wall; 3] = [gain(50.0, 0.15), gain(50.0, 0.15), gain(10.0, 0.15)];
@@ -24,21 +23,21 @@ const fn gain(stiffness: f64, damping: f64) -> Wall {
     Wall { limit: 0.0, stiffness, damping }
 }
 
-/// Share of the time in the air that is for coming to rest at home; the last half of that is weighed.
+/// Fraction of the take-off time reserved for settling at home; weighing takes the second half of that fraction.
 const SETTLING: f64 = 0.5;
-/// How long an answer may take.
+/// Reply timeout.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Periods a command is valid for.
+/// Validity of a command, in periods.
 const VALID_PERIODS: u32 = 3;
 
-/// Why homing failed.
+/// Cause of a failed homing or landing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Aborted {
     /// The link broke.
     Lost,
-    /// Nothing was heard in time.
+    /// No reply within the timeout.
     Silent,
-    /// The controller does not obey any more.
+    /// The controller left the mode [`Mode::Levitating`].
     Faulted(Condition),
 }
 
@@ -52,17 +51,17 @@ impl std::fmt::Display for Aborted {
     }
 }
 
-/// How the handle is held.
+/// Position controller of the handle for take-off and landing.
 pub(crate) struct Holder {
     pub(crate) period_us: u32,
     pub(crate) delay_s: f64,
-    /// Each command waits for its answer: an emulator on a virtual clock.
+    /// True: wait for the reply to each command (emulator on a virtual clock).
     pub(crate) lockstep: bool,
 }
 
 impl Holder {
-    /// Brings the handle home within `duration` and weighs it; the last status, and the weight in N (0 if the time is
-    /// too short to tell).
+    /// Moves the handle home within `duration` and weighs it; returns the last status and the weight in N (0 if `duration`
+    /// is too short for weighing).
     pub(crate) fn take_off(
         &self,
         link: &mut HostLink,
@@ -90,7 +89,7 @@ impl Holder {
         Ok((last, if ticks == 0 { 0.0 } else { weighed_n / f64::from(ticks) }))
     }
 
-    /// Lets the handle down within `duration`, from where it is carried with `weight_n`.
+    /// Lowers the handle within `duration`, starting from the pose in `first` and the feedforward `weight_n`.
     pub(crate) fn land(
         &self,
         link: &mut HostLink,
@@ -106,7 +105,7 @@ impl Holder {
         self.hold(link, first, duration, target, |_, _| {}).map(|_| ())
     }
 
-    /// Holds for a time; `target` and `seen` get how much of it is over.
+    /// Runs the position controller for `duration`; `target` and `seen` get the progress, 0 to 1.
     fn hold(
         &self,
         link: &mut HostLink,
@@ -152,7 +151,7 @@ impl Holder {
         };
         let wide = |steps: [i16; 3], step: f64| DVec3::from_array(steps.map(f64::from)) * step;
         let off_m = DVec3::from_array(status.position_m.map(f64::from)) - target.position_m;
-        // Twice the vector part: the rotation, for the small ones there are.
+        // Twice the vector part is the rotation vector, for small rotations.
         let off_rad = DVec3::from_array(status.rotation_xyz.map(f64::from)) * 2.0;
         let force = axes(LINEAR, off_m, wide(status.velocity_steps, Status::VELOCITY_STEP_M_PER_S));
         let torque = axes(ANGULAR, off_rad, wide(status.spin_steps, Status::SPIN_STEP_RAD_PER_S));
@@ -160,17 +159,17 @@ impl Holder {
     }
 }
 
-/// Where the handle should be, and how strongly.
+/// Target position of the handle, with stiffness and feedforward.
 struct Target {
     position_m: DVec3,
-    /// Share of the stiffness, 0 to 1; damping stays.
+    /// Fraction of the stiffness, 0 to 1; damping is not scaled.
     strength: f64,
     carried_n: f64,
 }
 
 fn request(command: &Wrench, period_us: u32) -> Request {
     let (force, torque) = (command.force(), command.torque());
-    #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+    #[allow(clippy::cast_possible_truncation)] // the wire format is f32
     let wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z].map(|value| value as f32);
     Request::Command { wrench, valid_us: u16::try_from(VALID_PERIODS * period_us).unwrap_or(u16::MAX) }
 }

@@ -1,4 +1,4 @@
-//! The host's end of a link: numbers what is asked, takes what is answered, keeps the newest.
+//! Host end of a link: numbers requests, validates replies, stores the newest status.
 
 use crate::protocol::description::PAGES;
 use crate::protocol::{
@@ -8,21 +8,21 @@ use crate::transport::{Incoming, LinkLost, Transport};
 use std::hash::{BuildHasher, RandomState};
 use std::time::{Duration, Instant};
 
-/// Answers taken in one look: a controller gives one for each request, so more is a backlog after a stop.
+/// Limit of replies read per tick: a controller sends one for each request, so more is a backlog after a stop.
 const ANSWERS_PER_LOOK: usize = 32;
-/// How long a question that is not real-time waits before it is asked again.
+/// Retry interval of requests outside the real-time loop.
 const ASK_AGAIN: Duration = Duration::from_millis(20);
 
-/// Why a question got no answer.
+/// Cause of a missing reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unanswered {
-    /// There is no other side any more.
+    /// The link broke.
     Lost,
-    /// Nothing was heard in time.
+    /// No reply within the timeout.
     Silent,
 }
 
-/// The newest status, and what it answers.
+/// The newest status, with the sequence number of the request that it answers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Heard {
     pub(crate) status: Status,
@@ -31,8 +31,8 @@ pub(crate) struct Heard {
 
 /// A link with its session.
 pub(crate) struct HostLink {
-    /// Nothing once the other side was found gone: the system gives the port's name to the next device only when this
-    /// one is closed.
+    /// `None` once the link is lost: the system gives the name of the port to the next device only after this one is
+    /// closed.
     transport: Option<Box<dyn Transport>>,
     sequence: u32,
     /// 0 until armed.
@@ -46,17 +46,17 @@ impl HostLink {
         Self { transport: Some(transport), sequence: 0, session: 0, intake: Intake::default(), newest: None }
     }
 
-    /// Answers that were not used, by reason.
+    /// Returns the numbers of rejected replies, by reason.
     pub(crate) fn rejections(&self) -> &Rejections {
         self.intake.rejections()
     }
 
-    /// Sequence number of the newest request.
+    /// Returns the sequence number of the newest request.
     pub(crate) fn sequence(&self) -> u32 {
         self.sequence
     }
 
-    /// Sends a request. Real-time: bounded, no allocation; one call of the system.
+    /// Sends a request. Real-time: bounded, no allocation; one system call.
     pub(crate) fn send(&mut self, request: Request, time_us: u32) -> Result<(), LinkLost> {
         self.sequence = self.sequence.wrapping_add(1);
         let frame = RequestFrame {
@@ -69,7 +69,7 @@ impl HostLink {
         self.transport.as_mut().ok_or(LinkLost)?.send(&frame.encode())
     }
 
-    /// Takes what has arrived; the newest status that has not been taken yet. Real-time: bounded, no allocation.
+    /// Reads all pending replies and returns the newest status not returned before. Real-time: bounded, no allocation.
     pub(crate) fn take(&mut self) -> Result<Option<Heard>, LinkLost> {
         for _ in 0..ANSWERS_PER_LOOK {
             match self.receive()? {
@@ -81,7 +81,7 @@ impl HostLink {
         Ok(self.newest.take())
     }
 
-    /// The status that answers this request; nothing if it does not come in time. Spins: for hosts on a virtual clock.
+    /// Returns the status that answers the request `awaited`; `None` on timeout. Spins: for hosts on a virtual clock.
     pub(crate) fn wait_for(&mut self, awaited: u32, patience: Duration) -> Result<Option<Heard>, LinkLost> {
         let started = Instant::now();
         loop {
@@ -99,7 +99,7 @@ impl HostLink {
         Ok(self.judge(&incoming))
     }
 
-    /// Uses what came in, if it may be used.
+    /// Validates an incoming packet and decodes it.
     fn judge(&mut self, incoming: &Incoming) -> Received {
         let packet = match incoming {
             Incoming::Nothing => return Received::Nothing,
@@ -125,7 +125,7 @@ impl HostLink {
         }
     }
 
-    /// Asks until the answer satisfies, or time is over. Not real-time.
+    /// Repeats a request until `satisfies` returns a value, or until the timeout. Not real-time.
     fn ask<T>(
         &mut self,
         request: Request,
@@ -148,7 +148,7 @@ impl HostLink {
         Err(Unanswered::Silent)
     }
 
-    /// What the controller says about itself. Not real-time.
+    /// Requests the description of the controller. Not real-time.
     pub(crate) fn describe(&mut self, patience: Duration) -> Result<Description, Unanswered> {
         let mut pages = Vec::new();
         for number in 0..PAGES {
@@ -172,14 +172,14 @@ impl HostLink {
         watchdog_us: u32,
         patience: Duration,
     ) -> Result<Status, Unanswered> {
-        // Whoever was here before is over; a fault is cleared by switching off.
+        // Ends the session of an earlier host; disarming also clears a fault.
         self.disarm(patience)?;
         self.session = nonce();
         self.ask_mode(Request::Arm { period_us, watchdog_us }, Mode::Armed, patience)?;
         self.ask_mode(Request::TakeOff, Mode::Levitating, patience)
     }
 
-    /// Switches the coils off and ends the session; a link without another side is closed. Not real-time.
+    /// Switches the coils off and ends the session; closes a lost link. Not real-time.
     pub(crate) fn disarm(&mut self, patience: Duration) -> Result<(), Unanswered> {
         let off = self.ask_mode(Request::Disarm, Mode::Disarmed, patience).map(|_| ());
         if off == Err(Unanswered::Lost) {
@@ -197,7 +197,7 @@ impl HostLink {
     }
 }
 
-/// What a look at the link found.
+/// Result of one read of the link.
 #[derive(Clone, Copy, Debug)]
 enum Received {
     Nothing,
@@ -206,9 +206,9 @@ enum Received {
     Page(crate::protocol::description::Page),
 }
 
-/// A number no host before has used, but by a chance of one in four thousand million; never 0.
+/// Returns a random session number, never 0; the chance of a collision with an earlier host is 2⁻³².
 fn nonce() -> u32 {
-    #[allow(clippy::cast_possible_truncation)] // any 32 of its bits
+    #[allow(clippy::cast_possible_truncation)] // any 32 bits of the hash
     let random = RandomState::new().hash_one(std::process::id()) as u32;
     random.max(1)
 }

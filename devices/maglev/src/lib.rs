@@ -4,14 +4,14 @@
 //! host <-> plugin -> boundary -> calibration -> protocol -> transport ~~~ controller -> limits -> coils
 //! ```
 //!
-//! - [`protocol`]: frames of 64 bytes, and which of them may be acted on.
-//! - [`ml_api`]: the ML API of the Maglev 200, the other protocol a controller may speak.
-//! - [`transport`]: what carries them: TCP, serial, USB, HID.
+//! - [`protocol`]: frames of 64 bytes and their replay protection.
+//! - [`ml_api`]: the ML API of the Maglev 200, the alternative protocol of a controller.
+//! - [`transport`]: links for frames: TCP, serial, USB, HID.
 //! - [`boundary`]: walls and angle limits on the host's side.
-//! - [`warning`]: when the person who holds it should be warned.
-//! - [`facts`]: what is published about the device.
+//! - [`warning`]: warning of excess force.
+//! - [`facts`]: published numbers of the device.
 //!
-//! The controller at the other end is a crate of its own: `flotor-maglev-emulator`.
+//! The emulated controller is in the crate `flotor-maglev-emulator`.
 
 pub mod boundary;
 pub mod facts;

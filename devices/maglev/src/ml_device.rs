@@ -14,20 +14,20 @@ use flotor_hal::{
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// From a tick to the force that answers it, beyond one period: a round trip on a network of its own, s.
+/// Latency from a tick to the resulting force, beyond one period, s: a round trip on a dedicated network.
 const LATENCY_S: f64 = 1.0e-3;
-/// Share of a period that a command may wait for its confirmation.
+/// Divisor of the period: time that a command may wait for its confirmation.
 const CONFIRMATION_SHARE: u32 = 2;
-/// How long a lockstep tick waits: a delayed emulator is not a fault.
+/// Timeout of a lockstep tick: a delayed emulator is not a fault.
 const LOCKSTEP_PATIENCE: Duration = Duration::from_secs(10);
-/// Reads in which an event may come that explains why a command was refused: it is sent after the tick is acknowledged.
+/// Reads within which an event may explain a rejected command: the event is sent after the tick is acknowledged.
 const EXPLAINED_WITHIN: u32 = 2;
-/// Events looked at in one tick: a controller that does not wait for acknowledgements has a backlog after a stop.
+/// Limit of events read per tick: a controller that does not wait for acknowledgements has a backlog after a stop.
 const EVENTS_PER_LOOK: usize = 32;
-/// Change of force and torque, N/s and N·m/s: full scale in a millisecond.
+/// Slew rate of force and torque, N/s and N·m/s: full scale in a millisecond.
 const SLEW: [f64; 2] = [55.0e3, 6.3e3];
 
-/// The device, opened: the controller has said who it is; the flotor lies on its stator.
+/// The opened device: the controller has identified itself; the flotor lies on its stator.
 pub(crate) struct MlDevice {
     session: Session,
     facts: Facts,
@@ -43,16 +43,16 @@ pub(crate) struct MlActive {
     timeout: Duration,
     budget: Duration,
     smoothing_s: f64,
-    /// A tick that nobody has read yet.
+    /// The newest tick, until [`read`](Self::read) takes it.
     pending: Option<WirePose>,
     newest: WirePose,
     state: DeviceState,
-    /// When the last tick was read, on the loop's clock and on the machine's.
+    /// Loop time of the last used tick, ns; `heard`: arrival of the newest tick on the machine's clock.
     sampled_ns: Option<u64>,
     heard: Instant,
     at_boundary: bool,
     fault: Option<Fault>,
-    /// Reads since a command was refused that nothing explains yet.
+    /// Reads since an unexplained rejection of a command; `None` without one.
     refused: Option<u32>,
 }
 
@@ -80,12 +80,12 @@ impl MlDevice {
         &self.stop
     }
 
-    /// The protocol has no serial number: the version is all that a controller says of itself.
+    /// Returns the version of the controller as its serial number: the protocol has none.
     pub(crate) fn serial(&self) -> String {
         format!("ml-api {}", self.facts.version.text())
     }
 
-    /// The smaller of what the controller says and what is published.
+    /// Returns the smaller of the controller's limits and the published ones.
     pub(crate) fn capabilities(&self, lockstep: bool) -> Capabilities {
         let share = self.facts.current_limits_a.iter().fold(1.0_f64, |share, limit| {
             let limit = f64::from(*limit) / facts::MAX_COIL_CURRENT_A;
@@ -109,7 +109,7 @@ impl MlDevice {
         }
     }
 
-    /// From a tick to the force that answers it, beyond one period, s.
+    /// Returns the latency from a tick to the resulting force, beyond one period, s.
     pub(crate) fn latency_s(lockstep: bool) -> f64 {
         if lockstep { 0.0 } else { LATENCY_S }
     }
@@ -120,7 +120,7 @@ impl MlDevice {
         values: &Values,
         config: &LoopConfig,
     ) -> Result<Box<MlActive>, (Box<Self>, Refusal)> {
-        #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+        #[allow(clippy::cast_possible_truncation)] // the wire format is f32
         let plan = Plan {
             rate_hz: (1.0e9 / config.period_ns as f64) as f32,
             boundary_m: values.value("boundary_mm") as f32 * 1.0e-3,
@@ -140,7 +140,7 @@ impl MlDevice {
         let period = Duration::from_nanos(config.period_ns);
         let [fx, fy, fz, tx, ty, tz] = gravity.map(f64::from);
         let weight = Wrench::new(DVec3::new(fx, fy, fz), DVec3::new(tx, ty, tz));
-        // First order: a cut-off of f smooths over 1 / (2 pi f).
+        // First-order filter: a cut-off of f has the time constant 1 / (2 pi f).
         let smoothing_s = 1.0 / (std::f64::consts::TAU * values.value("velocity_cutoff_hz"));
         Ok(Box::new(MlActive {
             shaping: Shaping::new(self.calibration, weight, options.feedforward_n),
@@ -160,7 +160,7 @@ impl MlDevice {
         }))
     }
 
-    /// Takes off; a session that was lost since (unplugged, plugged in again) is opened anew.
+    /// Takes off; reopens a session that was lost since (unplugged, plugged in again).
     fn take_off(&mut self, options: &Options, plan: &Plan) -> Result<TakenOff, Refusal> {
         let address = &*options.address;
         if self.session.is_lost() {
@@ -181,12 +181,12 @@ impl MlDevice {
 }
 
 impl MlActive {
-    /// Ticks that were older than the one that was used.
+    /// Returns the number of ticks superseded by a newer tick before use.
     pub(crate) fn dropped_ticks(&self) -> u64 {
         self.opened.session.dropped_ticks()
     }
 
-    /// Takes what has arrived, waiting for a tick at most so long; true if there is one.
+    /// Reads the pending events and waits for a tick until the timeout; returns the number of ticks read.
     fn look(&mut self, patience: Duration) -> Result<u64, NoResults> {
         let until = Instant::now() + patience;
         let mut ticks = 0;
@@ -202,7 +202,7 @@ impl MlActive {
                     self.heard = Instant::now();
                     ticks += 1;
                 }
-                // The first is what happened; a fall, say, comes of it.
+                // The first fault is the cause; later ones, such as a fall, may result from it.
                 Some(Event::Fault(bits)) => self.fault = self.fault.or(fault(bits)),
                 Some(Event::Overtemp(_)) => self.fault = self.fault.or(Some(Fault::OverTemperature)),
                 Some(Event::Boundary(sides)) => self.at_boundary = sides.iter().any(|side| *side != 0),
@@ -224,7 +224,7 @@ impl MlActive {
             Ok(_) if self.pending.is_some() => {
                 SampleWait::Arrived { samples: 1 + self.dropped_ticks() - dropped }
             }
-            // What is wrong is told by the next read.
+            // The next read reports the fault.
             Err(_) => SampleWait::Arrived { samples: 1 },
             Ok(_) => SampleWait::TimedOut,
         }
@@ -247,14 +247,14 @@ impl MlActive {
         }
         self.refused = self.refused.map(|reads| reads + 1);
         match self.fault {
-            // It lands because somebody asked for it: the pose is still worth having.
+            // Stopped on request: the flotor is landing, and the pose is still valid.
             _ if self.opened.stop.is_stopped() => verdict,
             Some(fault) => Cycle::Fault(fault),
             None => verdict,
         }
     }
 
-    /// Pose and velocity of a tick.
+    /// Updates pose and velocity from a tick.
     fn sample(&mut self, pose: &WirePose, tick: &Tick) -> Cycle {
         if !pose.at.iter().all(|value| value.is_finite()) {
             return Cycle::Fault(Fault::Protocol);
@@ -279,7 +279,7 @@ impl MlActive {
         Cycle::Fresh
     }
 
-    /// Velocity: the difference of two poses, smoothed.
+    /// Estimates the velocity as the smoothed difference of two poses.
     fn twist(&self, pose: &Pose, elapsed_s: f64) -> Twist {
         if elapsed_s <= 0.0 {
             return self.state.twist;
@@ -295,7 +295,7 @@ impl MlActive {
 
     pub(crate) fn write(&mut self, wrench: &Wrench) -> Cycle {
         let commanded = if self.opened.stop.is_stopped() {
-            // It lands: no force command may come in between.
+            // Landing: a force command would interrupt it.
             self.shaping.commanded = Wrench::ZERO;
             self.state.delivered = Wrench::ZERO;
             Ok(true)
@@ -306,9 +306,9 @@ impl MlActive {
         let overdue = self.opened.session.unconfirmed_since().map(|since| since.elapsed());
         let acknowledged = self.opened.session.acknowledge_ticks();
         match (commanded, acknowledged) {
-            // Whatever is refused while it lands was on its way before.
+            // A rejection while landing belongs to an earlier command.
             (Err(NoResults::Refused(_)), _) if self.opened.stop.is_stopped() => Cycle::Fresh,
-            // The event that says why comes after the tick is acknowledged.
+            // The event with the cause follows the acknowledgement of the tick.
             (Err(NoResults::Refused(_)), Ok(())) => {
                 self.refused.get_or_insert(0);
                 Cycle::Stale
@@ -332,12 +332,12 @@ impl MlActive {
 }
 
 impl NoResults {
-    /// What it means to the host.
+    /// Returns the fault that the device reports.
     fn fault(self) -> Fault {
         match self {
             Self::Lost => Fault::Disconnected,
             Self::Silent => Fault::Timeout,
-            // A force that is refused: somebody else commands, or it has landed.
+            // A rejected force: another client commands, or the flotor has landed.
             Self::Malformed | Self::Refused(_) => Fault::Protocol,
         }
     }

@@ -14,17 +14,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How long a controller may take to describe itself, to arm and take off, and to switch off.
+/// Timeout of the description, of arming, of take-off and of switching off.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How long a lockstep tick waits: a delayed emulator is not a fault.
+/// Timeout of a lockstep tick: a delayed emulator is not a fault.
 const LOCKSTEP_PATIENCE: Duration = Duration::from_secs(10);
-/// Periods a command is valid for: one more than it takes to replace it. A host that has missed two deadlines has
-/// no say until it is back, long before the watchdog ends its session.
+/// Validity of a command in periods: one more than its replacement takes. After two missed deadlines the force of the host
+/// ends, long before the watchdog ends the session.
 const VALID_PERIODS: u64 = 3;
-/// Rounding of a unit quaternion's vector part in `f32`, squared.
+/// Rounding tolerance of the squared length of a quaternion's vector part in `f32`.
 const LENGTH_TOLERANCE: f64 = 1.0e-5;
 
-/// The device, opened: the controller has described itself, its coils are off.
+/// The opened device: the controller has described itself; the coils are off.
 pub(crate) struct OwnDevice {
     options: Options,
     link: HostLink,
@@ -38,17 +38,17 @@ pub(crate) struct OwnActive {
     opened: Box<OwnDevice>,
     pub(crate) shaping: Shaping,
     period_us: u64,
-    /// Sequence number of the command whose answer a lockstep tick waits for.
+    /// Sequence number of the command awaited by a lockstep tick.
     awaited: Option<u32>,
-    /// The status of take-off, until a newer one comes.
+    /// The status of take-off, until a newer one arrives.
     first: Option<Status>,
-    /// The newest status: where landing begins.
+    /// The newest status: the start of a landing.
     newest: Status,
     state: DeviceState,
     heard_ns: u64,
 }
 
-/// Asks the device to switch off at its next tick; if there is none, the controller's watchdog sees to it.
+/// Requests that the device switch off at its next tick; without a next tick the controller's watchdog switches it off.
 pub struct CoilSwitch(Arc<AtomicBool>);
 
 impl SafeStop for CoilSwitch {
@@ -99,8 +99,8 @@ impl OwnDevice {
         self.description.serial_text()
     }
 
-    /// The controller obeys a command for three periods and then only damps; after its watchdog it lands. A message from
-    /// elsewhere would not be heard: a frame bears the session, which begins with activation, and a sequence number.
+    /// Describes the controller's own stop: three periods after a command it only damps, and after its watchdog it lands. A
+    /// stop message from another process would be rejected for its session and sequence number.
     pub(crate) fn independent_stop(&self) -> IndependentStop {
         let watchdog_us = self.options.watchdog_us.min(self.description.longest_watchdog_us);
         IndependentStop::by_itself(StoppedState::Landed, u64::from(watchdog_us) * 1000)
@@ -129,8 +129,8 @@ impl OwnDevice {
         }
     }
 
-    /// Begins a session, brings the handle home if that is wanted, and weighs it; a link that broke since (unplugged,
-    /// plugged in again) is opened anew.
+    /// Begins a session, homes the handle if configured, and weighs it; reopens a link that broke since (unplugged, plugged
+    /// in again).
     fn take_off(&mut self, config: &LoopConfig) -> Result<(Status, f64), Refusal> {
         let period_us = u32::try_from(config.period_ns / 1000).unwrap_or(u32::MAX);
         let watchdog_us = self.options.watchdog_us;
@@ -165,7 +165,7 @@ impl OwnDevice {
     }
 }
 
-/// Opens the link and asks who is there.
+/// Opens the link and requests the controller's description.
 fn connect(options: &Options) -> Result<(HostLink, Description), Refusal> {
     let transport = transport::open(options.kind, &options.address).map_err(Refusal::resource)?;
     let mut link = HostLink::new(transport);
@@ -226,7 +226,7 @@ impl OwnActive {
         };
         *state = self.state;
         match fault(&status) {
-            // Switched off because somebody asked for it: the pose is still worth having.
+            // Switched off on request: the pose is still valid.
             _ if self.is_stopped() => Cycle::Fresh,
             Some(fault) => Cycle::Fault(fault),
             None => Cycle::Fresh,
@@ -235,7 +235,7 @@ impl OwnActive {
 
     pub(crate) fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
         let request = if self.is_stopped() {
-            // Whatever the next status still says: nothing is asked of the coils any more.
+            // Stopped: no force from now on, whatever the next status contains.
             self.shaping.commanded = Wrench::ZERO;
             self.state.delivered = Wrench::ZERO;
             Request::Disarm
@@ -257,15 +257,15 @@ impl OwnActive {
         if !self.opened.options.landing.is_zero() && !self.is_stopped() && fault(&self.newest).is_none() {
             let holder = self.opened.holder(u32::try_from(self.period_us).unwrap_or(u32::MAX));
             let (landing, weight_n) = (self.opened.options.landing, self.shaping.weight.force().z);
-            // Whatever goes wrong: it is switched off next.
+            // On any error: the device is switched off next.
             let _ = holder.land(&mut self.opened.link, self.newest, landing, weight_n);
         }
-        // Gone or silent: its own watchdog switches it off.
+        // If the controller is gone or silent, its own watchdog switches it off.
         let _ = self.opened.link.disarm(PATIENCE);
         self.opened
     }
 
-    /// Answers of the controller that were not used, by reason.
+    /// Returns the numbers of rejected replies of the controller, by reason.
     pub(crate) fn rejections(&self) -> &Rejections {
         self.opened.link.rejections()
     }
@@ -278,7 +278,7 @@ impl OwnActive {
         self.opened.stopped.load(Ordering::Acquire)
     }
 
-    /// The newest status, if there is one; in lockstep, the one that answers the last command.
+    /// Reads the newest status, if any; in lockstep, waits for the status that answers the last command.
     fn look(&mut self) -> Result<Option<Heard>, LinkLost> {
         let awaited = self.awaited.take().filter(|_| self.opened.options.lockstep);
         match awaited {
@@ -288,7 +288,7 @@ impl OwnActive {
     }
 }
 
-/// Pose and velocity of a status; nothing if its rotation is none.
+/// Converts a status to pose and velocity; `None` if its rotation is not part of a unit quaternion.
 fn sample(status: &Status) -> Option<DeviceState> {
     let vector = DVec3::from_array(status.rotation_xyz.map(f64::from));
     let rest = 1.0 - vector.length_squared();
@@ -307,7 +307,7 @@ fn sample(status: &Status) -> Option<DeviceState> {
     })
 }
 
-/// What a status means to the host: anything but obeying is a fault.
+/// Returns the fault in a status: every mode but [`Mode::Levitating`] is one.
 fn fault(status: &Status) -> Option<Fault> {
     if status.mode == Mode::Levitating {
         return None;
@@ -322,6 +322,6 @@ fn fault(status: &Status) -> Option<Fault> {
         (Condition::LINK_LOST, Fault::Disconnected),
     ];
     let found = FAULTS.iter().find(|(condition, _)| status.condition.contains(*condition));
-    // Disarmed by somebody else, and nothing is wrong.
+    // Disarmed by another host, without a fault.
     Some(found.map_or(Fault::Protocol, |(_, fault)| *fault))
 }

@@ -1,4 +1,4 @@
-//! What the device can be told.
+//! Parameters of the device.
 
 use crate::boundary::{Walls, thesis_nm_per_rad};
 use crate::facts;
@@ -14,7 +14,7 @@ const PACES: Choices = choices!["real", "lockstep"];
 const GRAVITY: Choices = choices!["auto", "off", "defy"];
 const WALLS: Choices = choices!["off", "maker", "thesis"];
 
-/// The schema.
+/// Schema of the parameters, in the order of their indices.
 pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice(
         "protocol",
@@ -162,23 +162,23 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     .live(),
 ];
 
-/// What the controller speaks.
+/// Protocol of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Protocol {
     Flotor,
     MlApi,
 }
 
-/// Who carries the handle.
+/// Gravity compensation by the plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Gravity {
-    /// What the protocol's controllers need.
+    /// [`Off`](Self::Off) for Flotor's protocol, [`Defy`](Self::Defy) for the ML API.
     Auto,
     Off,
     Defy,
 }
 
-/// Everything but the walls, which change while the loop runs.
+/// Options fixed while the loop runs: all parameters but the walls.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Options {
     pub(crate) protocol: Protocol,
@@ -188,11 +188,11 @@ pub(crate) struct Options {
     pub(crate) watchdog_us: u32,
     pub(crate) timeout: Duration,
     pub(crate) feedforward_n: f64,
-    /// Time for coming home; none: at once.
+    /// Homing time; zero: no homing.
     pub(crate) take_off: Duration,
     pub(crate) landing: Duration,
     pub(crate) gravity: Gravity,
-    /// Time in which gains fade.
+    /// Time in which the gains fade.
     pub(crate) fade: Duration,
 }
 
@@ -237,8 +237,8 @@ impl Options {
         })
     }
 
-    /// Whether gravity is measured at take-off, and carried by the plugin. Under force commands the controller of the ML API
-    /// carries nothing by itself.
+    /// Returns true if the plugin measures gravity at take-off and compensates it. Under force commands the controller of
+    /// the ML API compensates nothing by itself.
     pub(crate) fn finds_gravity(&self) -> bool {
         match self.gravity {
             Gravity::Auto => self.protocol == Protocol::MlApi,
@@ -248,14 +248,14 @@ impl Options {
     }
 }
 
-/// Every number of the schema, in its order, and what walls they make.
+/// Values of all numeric parameters, in the order of the schema.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Values {
     values: Vec<f64>,
 }
 
 impl Values {
-    /// What the scene sets, else what a first contact has found, else the defaults.
+    /// Collects the values: from the scene, else from a first-contact report, else the defaults.
     pub(crate) fn new(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let mut values = Self { values: SCHEMA.iter().map(Parameter::default).collect() };
         if let Some(report) = settings.text("first_contact") {
@@ -269,7 +269,7 @@ impl Values {
         Ok(values)
     }
 
-    /// Takes over the numbers of the table `device.parameters` of what a first contact has found.
+    /// Reads the table `device.parameters` from a first-contact report.
     fn learn(&mut self, report: &Path) -> Result<(), Refusal> {
         let wrong = |why: &dyn std::fmt::Display| {
             Refusal::parameter(format!("first_contact = \"{}\": {why}", report.display()))
@@ -286,7 +286,7 @@ impl Values {
             let Some(index) = SCHEMA.iter().position(|parameter| parameter.id() == id) else {
                 return Err(wrong(&format_args!("the device has no parameter `{id}`")));
             };
-            #[allow(clippy::cast_precision_loss)] // numbers that people write
+            #[allow(clippy::cast_precision_loss)] // numbers written by people
             let number = value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64));
             let checked = number.ok_or("a number is expected".to_owned()).and_then(|number| {
                 SCHEMA[index].check(number).map_err(|error| error.to_string()).map(|_| number)
@@ -310,10 +310,10 @@ impl Values {
         SCHEMA.iter().position(|parameter| parameter.id() == id).map_or(f64::NAN, |index| self.get(index))
     }
 
-    /// The walls as asked for; nothing if they are off. Real-time: bounded, no allocation.
+    /// Returns the configured walls; `None` if they are off. Real-time: bounded, no allocation.
     pub(crate) fn walls(&self) -> Option<Walls> {
         const MM: f64 = 1.0e-3;
-        /// Places in the list of choices.
+        /// Indices in the list of choices.
         const OFF: f64 = 0.0;
         const THESIS: f64 = 2.0;
         let choice = self.value("walls");

@@ -1,4 +1,4 @@
-//! The device as a plugin, whichever protocol its controller speaks: this file is the choice between the two.
+//! The device plugin over either of the two protocols.
 
 use crate::ml_client::stop::LandSwitch;
 use crate::ml_device::{MlActive, MlDevice};
@@ -13,20 +13,20 @@ use flotor_hal::{
 };
 use std::sync::Arc;
 
-/// The magnetic-levitation device, opened: the controller has said who it is, its coils are off.
+/// The magnetic-levitation device, opened: the controller has identified itself; its coils are off.
 pub struct MaglevDevice {
     options: Options,
     values: Values,
     opened: Opened,
 }
 
-/// Behind one of the protocols.
+/// The opened device, by protocol.
 enum Opened {
     Own(Box<OwnDevice>),
     MlApi(Box<MlDevice>),
 }
 
-/// The device, levitating.
+/// The levitating device.
 pub struct LevitatingDevice {
     options: Options,
     values: Values,
@@ -39,11 +39,11 @@ enum Active {
     MlApi(Box<MlActive>),
 }
 
-/// Stops the device from any thread.
+/// Stop handle of the device, usable from any thread.
 pub enum Switch {
-    /// Coils off at the next tick.
+    /// Switches the coils off at the next tick.
     Coils(CoilSwitch),
-    /// A Land frame, at once.
+    /// Sends a Land frame at once.
     Land(LandSwitch),
 }
 
@@ -177,7 +177,7 @@ impl ActiveDevice for LevitatingDevice {
 }
 
 impl PacingDevice for LevitatingDevice {
-    /// The ticks of the ML API set a pace; the controller of the other protocol answers commands, and has none of its own.
+    /// Waits for a tick of the ML API; the other protocol has no pace, as its controller only replies to commands.
     fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
         match &mut self.active {
             Active::Own(_) => SampleWait::NotPaced,
@@ -187,7 +187,7 @@ impl PacingDevice for LevitatingDevice {
 }
 
 impl LevitatingDevice {
-    /// Answers of the controller that were not used, by reason; the ML API has none.
+    /// Returns the numbers of rejected replies of the controller, by reason; `None` with the ML API, which counts none.
     #[must_use]
     pub fn rejections(&self) -> Option<&Rejections> {
         match &self.active {
@@ -196,7 +196,7 @@ impl LevitatingDevice {
         }
     }
 
-    /// Ticks of the controller that were older than the one that was used; nothing where there are no ticks.
+    /// Returns the number of ticks superseded before use; `None` with Flotor's protocol, which has no ticks.
     #[must_use]
     pub fn dropped_ticks(&self) -> Option<u64> {
         match &self.active {

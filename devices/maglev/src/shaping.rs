@@ -1,20 +1,19 @@
-//! From the scene's wrench to the one the controller is told: walls, warning, weight, correction. The same for every
-//! protocol.
+//! Conversion of the scene's wrench to the commanded wrench: walls, warning, weight, correction. Common to both protocols.
 
 use crate::boundary::Walls;
 use crate::warning::ExcessForce;
 use flotor_hal::{DVec3, DeviceState, VerticalCalibration, Wrench};
 
-/// What shapes a command.
+/// State of the command shaping.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shaping {
     pub(crate) walls: Option<Walls>,
     pub(crate) calibration: VerticalCalibration,
-    /// What carries the handle.
+    /// Wrench that balances the weight of the flotor.
     pub(crate) weight: Wrench,
-    /// What the controller adds by itself, N.
+    /// Vertical force that the controller adds by itself, N.
     pub(crate) own_n: f64,
-    /// What was commanded last, as the scene sees it: walls included, weight and correction not.
+    /// Last commanded wrench as the scene sees it: with walls, without weight and correction.
     pub(crate) commanded: Wrench,
     pub(crate) warning: ExcessForce,
 }
@@ -25,8 +24,8 @@ impl Shaping {
         Self { walls: None, calibration, weight, own_n, commanded: Wrench::ZERO, warning }
     }
 
-    /// The wrench to tell the controller: walls added, weight carried, the total vertical force corrected. Real-time:
-    /// bounded, no allocation.
+    /// Returns the wrench to command: walls and weight added, total vertical force corrected. Real-time: bounded, no
+    /// allocation.
     pub(crate) fn command(&mut self, wrench: &Wrench, state: &DeviceState) -> [f32; 6] {
         let wrench = if wrench.is_finite() { *wrench } else { Wrench::ZERO };
         let walls = self.walls.as_ref().map_or(Wrench::ZERO, |walls| walls.wrench(state));
@@ -36,7 +35,7 @@ impl Shaping {
         let height_m = state.pose.position().z;
         let z = self.calibration.command_n(total.force().z + self.own_n, height_m) - self.own_n;
         let (DVec3 { x, y, .. }, [tx, ty, tz]) = (total.force(), total.torque_nm);
-        #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+        #[allow(clippy::cast_possible_truncation)] // the wire format is f32
         [x, y, z, tx, ty, tz].map(|value| value as f32)
     }
 }

@@ -1,29 +1,28 @@
-//! The warning of excess force: the thesis's beep (Varadharajan 2007, appendix A), once for each time and not for each
-//! tick.
+//! Warning of excess force: the thesis's beep (Varadharajan 2007, appendix A), once per event instead of once per tick.
 //!
 //! Real-time: bounded, no allocation.
 
 use flotor_hal::DVec3;
 
-/// Force along each axis from which on the thesis's program beeps, N.
+/// Force along each axis above which the thesis's program beeps, N.
 const LIMIT_N: DVec3 = DVec3::new(10.0, 10.0, 50.0);
-/// Share of the limit below which the warning ends: a force that trembles about the limit is one warning.
+/// Fraction of the limit below which the warning ends: a force that trembles about the limit gives one warning.
 const RELEASE: f64 = 0.9;
 
-/// Whether the force is more than the device should be used with, with hysteresis.
+/// Detector of a force above the device's recommended limits, with hysteresis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ExcessForce {
     active: bool,
 }
 
 impl ExcessForce {
-    /// Looks at a commanded force, N; a component that is not a number counts as none.
+    /// Updates the warning from a commanded force, N; a component that is NaN counts as zero.
     pub fn look(&mut self, force_n: DVec3) {
         let limit_n = if self.active { LIMIT_N * RELEASE } else { LIMIT_N };
         self.active = force_n.abs().cmpgt(limit_n).any();
     }
 
-    /// True from the tick the limit was passed until the force is well below it.
+    /// Returns true from the tick that exceeds the limit until the force is below 90 % of the limit.
     #[must_use]
     pub fn is_active(self) -> bool {
         self.active

@@ -1,5 +1,5 @@
-//! Reads from front to back and never needs the index at the end, so that a file without an end is no special case.
-//! Nothing in a file can make the reader panic or allocate without bound: a length counts only as far as there are bytes.
+//! Sequential reader that never needs the index at the end, so that a truncated file is no special case.
+//! No file can make the reader panic or allocate without bound: a length counts only as far as there are bytes.
 
 use mcap::read::ChunkReader;
 use mcap::records::{MessageHeader, Record, op};
@@ -14,7 +14,7 @@ const LONGEST_RECORD_BYTES: usize = 32 << 20;
 /// Bytes requested from the file at a time.
 const READ_BYTES: usize = 64 << 10;
 
-/// Opcode that no record has: space that the file system had reserved for a file and never filled.
+/// Opcode 0, which no record has: space that the file system reserved for a file and never filled.
 const NEVER_WRITTEN: u8 = 0;
 
 /// Error of opening a file.
@@ -39,7 +39,7 @@ pub enum Damage {
     /// The file is not well-formed MCAP, or a checksum is wrong.
     #[error("{0}")]
     Container(McapError),
-    /// A program compressed the file.
+    /// The file is compressed; only uncompressed chunks are read.
     #[error("it is compressed with `{0}`; `mcap decompress` makes a copy that can be read")]
     Compressed(String),
     /// The records of a chunk do not fill it.
@@ -56,13 +56,13 @@ impl From<McapError> for Damage {
     }
 }
 
-/// How a file ends.
+/// Completeness of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// The writer finished the file: all messages are there.
+    /// The writer finished the file; all messages are present.
     Finished,
-    /// The file breaks off (a killed process, a full disk): its last messages are missing, up to the chunk that the writer
-    /// had not yet written.
+    /// The file is truncated (a killed process, a full disk): its last messages are missing, from the first chunk that the
+    /// writer had not yet written.
     CutOff,
 }
 
@@ -80,9 +80,9 @@ pub struct ChannelInfo<'a> {
 /// A message on a chosen channel.
 #[derive(Clone, Debug)]
 pub struct Message<T> {
-    /// What the channel was chosen as.
+    /// Value of `choose` for the channel.
     pub topic: T,
-    /// Number of the message, as its writer counted.
+    /// Sequence number given by the writer.
     pub sequence: u32,
     /// Time of the message, ns.
     pub time_ns: u64,
@@ -90,11 +90,11 @@ pub struct Message<T> {
     pub data: Vec<u8>,
 }
 
-/// Reads the messages of chosen channels.
+/// Reader of the messages of chosen channels.
 pub struct MessageReader<R, T> {
     source: R,
     reader: LinearReader,
-    /// Records read and not yet used.
+    /// Records read and not yet returned.
     records: std::vec::IntoIter<Record<'static>>,
     choose: fn(ChannelInfo<'_>) -> Option<T>,
     schemas: BTreeMap<u16, String>,
@@ -104,10 +104,10 @@ pub struct MessageReader<R, T> {
 }
 
 impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
-    /// Opens a file for the messages of all channels that `choose` has a topic for. Not real-time.
+    /// Opens a file for the messages of all channels for which `choose` returns a value. Not real-time.
     ///
     /// # Errors
-    /// [`OpenError`]: the file cannot be read, or does not begin as MCAP does.
+    /// [`OpenError`]: the file cannot be read, or does not begin with the magic bytes.
     pub fn open(mut source: R, choose: fn(ChannelInfo<'_>) -> Option<T>) -> Result<Self, OpenError> {
         if !begins_as_mcap(&mut source)? {
             return Err(OpenError::NotMcap);
@@ -136,16 +136,16 @@ impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
         &self.library
     }
 
-    /// Returns how the file ends; known from the start.
+    /// Returns the completeness of the file, known from the start.
     #[must_use]
     pub fn ending(&self) -> Ending {
         self.ending
     }
 
-    /// Returns the next message, or none at the end. After an error no call returns a message. Not real-time.
+    /// Returns the next message; `None` at the end, and after an error. Not real-time.
     ///
     /// # Errors
-    /// [`Damage`] at the place reached.
+    /// [`Damage`] at the current position.
     pub fn next_message(&mut self) -> Result<Option<Message<T>>, Damage> {
         loop {
             for record in self.records.by_ref() {
@@ -181,7 +181,7 @@ impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
         }
     }
 
-    /// Returns the records of the next chunk (or the next record outside of chunks), or none at the end of the data.
+    /// Returns the records of the next chunk, or the next record outside of chunks; `None` at the end of the data.
     fn read_records(&mut self) -> Result<Option<Vec<Record<'static>>>, Damage> {
         let may_be_cut_off = self.ending == Ending::CutOff;
         loop {
@@ -212,14 +212,14 @@ impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
     }
 }
 
-/// Returns true if the file begins as MCAP does, as far as it goes.
+/// Returns true if the file begins with the magic bytes, or with a part of them and nothing else.
 fn begins_as_mcap(source: &mut impl Read) -> io::Result<bool> {
     let mut head = Vec::with_capacity(MAGIC.len());
     source.take(MAGIC.len() as u64).read_to_end(&mut head)?;
     Ok(MAGIC.starts_with(&head))
 }
 
-/// Finds out how a file ends: a finished one with the magic bytes that it begins with.
+/// Determines the completeness of a file: a finished one ends with the magic bytes.
 fn find_ending(source: &mut (impl Read + Seek)) -> io::Result<Ending> {
     let length = source.seek(SeekFrom::End(0))?;
     let magic_length = MAGIC.len() as u64;
@@ -244,7 +244,7 @@ fn records_of_chunk(chunk: &[u8]) -> Result<Vec<Record<'static>>, Damage> {
     records.collect::<Result<_, McapError>>().map_err(Damage::from)
 }
 
-/// Returns true if the bytes of a chunk are records a chunk may hold, end to end. `mcap` 0.26 trusts lengths inside a chunk.
+/// Returns true if a chunk consists of permitted records, end to end. `mcap` 0.26 trusts lengths inside a chunk.
 fn is_filled_by_records(mut bytes: &[u8]) -> bool {
     while let Some(([opcode, length @ ..], rest)) = bytes.split_first_chunk::<9>() {
         let allowed = matches!(*opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE);

@@ -1,5 +1,5 @@
-//! The functions of HDAPI that are used, as its public interface declares them (version 3): names, numbers and types only.
-//! Errors lie on a stack that `hdGetError` takes from. Parameters are those of the current device of the process.
+//! Functions of HDAPI used by the plugin, as declared by its public interface (version 3): names, numbers and types only.
+//! `hdGetError` pops the last error from a stack. Parameters are those of the current device of the process.
 //!
 //! Pointers lead to as many numbers as the parameter has; each is a local of the function here that calls it, so that none
 //! outlives the call.
@@ -19,14 +19,14 @@ pub(crate) struct ErrorInfo {
     device: c_uint,
 }
 
-/// What the scheduler calls: 1 to be called again, 0 for the end.
+/// Callback of the scheduler: returns 1 to be called again, 0 to end.
 type Callback = unsafe extern "C" fn(*mut c_void) -> c_uint;
 
-/// Priority of a callback that is neither first nor last.
+/// Priority of a callback in the middle of the range.
 const PRIORITY: c_ushort = 0x7FFF;
 
 sdk_functions! {
-    /// Where the functions are.
+    /// Function pointers of the loaded library.
     pub(crate) struct Functions needs "OpenHaptics 3.0" {
         fn hdGetString(c_uint) -> *const c_char;
         fn hdInitDevice(*const c_char) -> c_uint;
@@ -50,15 +50,15 @@ sdk_functions! {
     }
 }
 
-/// Safe calls: each passes numbers, and pointers to locals of its own.
+/// Safe wrappers: each call passes numbers, and pointers to its own locals.
 impl Functions {
-    /// A text of the interface or of the current device.
+    /// Returns a text of the interface or of the current device.
     pub(crate) fn text(&self, parameter: c_uint) -> String {
         // SAFETY: any number is legal; the text is static, or null.
         text(unsafe { (self.hdGetString)(parameter) })
     }
 
-    /// Opens the device of this name, which becomes the current one; the default one without a name.
+    /// Opens the device with a name, or the default device, and makes it the current one.
     pub(crate) fn init(&self, name: Option<&CStr>) -> c_uint {
         // SAFETY: null, or a text that lives for the call.
         unsafe { (self.hdInitDevice)(name.map_or(std::ptr::null(), CStr::as_ptr)) }
@@ -84,7 +84,7 @@ impl Functions {
         unsafe { (self.hdEndFrame)(handle) }
     }
 
-    /// Numbers of a parameter that has `N` of them.
+    /// Reads the `N` values of a parameter of the current device.
     pub(crate) fn numbers<const N: usize>(&self, parameter: Numbers<N>) -> [f64; N] {
         let mut numbers = [0.0; N];
         // SAFETY: as many places as the parameter has numbers, by its type.
@@ -92,7 +92,7 @@ impl Functions {
         numbers
     }
 
-    /// A whole number.
+    /// Reads the first value of an integer parameter.
     pub(crate) fn whole(&self, parameter: c_uint) -> c_int {
         let mut places = [0; 6];
         // SAFETY: no parameter of whole numbers has more than six.
@@ -115,7 +115,7 @@ impl Functions {
         unsafe { (self.hdDisable)(capability) }
     }
 
-    /// Takes the newest error of this thread; 0 if there is none.
+    /// Pops the last error of this thread; 0 if there is none.
     pub(crate) fn take_error(&self) -> c_uint {
         // SAFETY: a function without preconditions.
         unsafe { (self.hdGetError)() }.code
@@ -147,7 +147,7 @@ impl Functions {
         Stopped(())
     }
 
-    /// Has a client called once a tick, until it is taken out.
+    /// Schedules a client, which is then called once per tick until it is unscheduled.
     pub(crate) fn schedule(&self, client: Box<Client>) -> Scheduled {
         let data = Box::into_raw(client);
         // SAFETY: `data` stays valid until `free`, before which the scheduler has ended.
@@ -155,14 +155,14 @@ impl Functions {
         Scheduled { handle, data }
     }
 
-    /// Takes a client out. A call of it may still be under way.
+    /// Unschedules a client. A call of the client may still be in progress.
     pub(crate) fn unschedule(&self, scheduled: &Scheduled) {
         // SAFETY: any handle is legal; one that is not in is an error of the SDK.
         unsafe { (self.hdUnschedule)(scheduled.handle) };
     }
 }
 
-/// A parameter that has `N` numbers.
+/// Number of a parameter with `N` values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Numbers<const N: usize>(c_uint);
 
@@ -179,25 +179,25 @@ pub(crate) const MAX_STIFFNESS: Numbers<1> = Numbers(0x2602);
 pub(crate) const MAX_FORCE: Numbers<1> = Numbers(0x2603);
 pub(crate) const MAX_TORQUE: Numbers<1> = Numbers(0x2622);
 
-/// The scheduler has ended: nobody calls a client any more.
+/// Proof that the scheduler has ended and calls no client any more.
 pub(crate) struct Stopped(());
 
-/// A client in the scheduler's list.
+/// Scheduled client.
 pub(crate) struct Scheduled {
     handle: c_ulong,
     data: *mut Client,
 }
 
 impl Scheduled {
-    /// Whether the SDK took it.
+    /// Returns whether the SDK accepted the client.
     pub(crate) fn is_in(&self) -> bool {
-        // What the interface calls an invalid handle, in 32 or 64 bits.
+        // The interface's invalid handle, in 32 or 64 bits.
         self.handle != 0xFFFF_FFFF && self.handle != c_ulong::MAX
     }
 }
 
 impl Scheduled {
-    /// Frees a client that was taken out before the scheduler ended.
+    /// Frees a client that was unscheduled before the scheduler ended.
     pub(crate) fn free(self, _stopped: &Stopped) {
         // SAFETY: the box of `schedule`, taken back once: nobody calls it any more.
         drop(unsafe { Box::from_raw(self.data) });
@@ -211,16 +211,16 @@ const _: fn() = || {
     is_send::<Client>();
 };
 
-/// The callback of every client.
+/// Runs a tick of a client; the callback of every client.
 unsafe extern "C" fn called(data: *mut c_void) -> c_uint {
     // SAFETY: the data of `schedule`: a client that lives until it is taken out, and that only the scheduler uses.
     let client = unsafe { &mut *data.cast::<Client>() };
-    // Nothing unwinds into the SDK.
+    // No panic may unwind into the SDK.
     let goes_on = catch_unwind(AssertUnwindSafe(|| client.step()));
     c_uint::from(goes_on.unwrap_or_else(|_| client.break_off()))
 }
 
-/// A text of the SDK.
+/// Copies a static text of the SDK; empty for a null pointer.
 fn text(place: *const c_char) -> String {
     if place.is_null() {
         return String::new();
@@ -229,7 +229,7 @@ fn text(place: *const c_char) -> String {
     unsafe { CStr::from_ptr(place) }.to_string_lossy().into_owned()
 }
 
-/// The name of a device, if it can be one.
+/// Converts a device name to a C string; `None` if it contains a null character.
 pub(crate) fn name_of(text: &str) -> Option<CString> {
     CString::new(text).ok()
 }

@@ -1,4 +1,4 @@
-//! A device of the SDK in the axes and units of the contract, and its errors with what to do.
+//! Device of the SDK in the axes and units of the contract, with its errors and their remedies.
 
 use crate::ffi::{
     ANGULAR_VELOCITY, FORCE, Functions, LAST_FORCE, LAST_TORQUE, MAX_FORCE, MAX_STIFFNESS, MAX_TORQUE,
@@ -8,34 +8,34 @@ use flotor_hal::{Conditions, DMat3, DQuat, DVec3, Fault, Pose, Refusal, Twist, W
 use flotor_vendor_sdk::{Library, LibraryProblem, Sample, Sdk, StandIn, without_signals};
 use std::ffi::{c_int, c_uint};
 
-/// The SDK, as far as its library has to be found.
+/// Library lookup of the SDK.
 const SDK: Sdk = Sdk {
     name: "OpenHaptics",
     files: &["libHD.so.3.4", "libHD.so.3.0", "libHD.so"],
     files_on_windows: &["hd.dll"],
     variables: &["OH_SDK_BASE", "3DTOUCH_BASE"],
 };
-/// Oldest version of the SDK.
+/// Oldest supported major version of the SDK.
 const OLDEST: u32 = 3;
-/// Texts: version of the interface, model, serial number.
+/// Text parameters: version of the interface, model, serial number.
 const VERSION: c_uint = 0x2500;
 const MODEL: c_uint = 0x2501;
 const SERIAL: c_uint = 0x2504;
-/// Whole numbers: buttons, sensed axes, driven axes.
+/// Integer parameters: buttons, sensed axes, driven axes.
 const BUTTONS: c_uint = 0x2000;
 const INPUT_DOF: c_uint = 0x2553;
 const OUTPUT_DOF: c_uint = 0x2554;
 const FORCE_OUTPUT: c_uint = 0x4000;
-/// No device.
+/// Invalid handle.
 const NO_DEVICE: c_uint = 0xFFFF_FFFF;
-/// States of calibration.
+/// Calibration states, and the parameter of the supported calibration styles.
 const NEEDS_UPDATE: c_uint = 0x5001;
 const NEEDS_MANUAL_INPUT: c_uint = 0x5002;
 const CALIBRATION_STYLE: c_uint = 0x2555;
 /// Millimetres in a metre, and mN·m in a N·m.
 const MILLI: f64 = 1.0e3;
 
-/// An error of the SDK.
+/// Failed call of the SDK.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Failed {
     code: c_uint,
@@ -43,7 +43,7 @@ pub(crate) struct Failed {
     what: &'static str,
 }
 
-/// What an error means while the loop runs.
+/// Maps an error code to the fault of the contract while the loop runs.
 fn fault(code: c_uint) -> Fault {
     match code {
         0x0200 => Fault::OverTemperature,
@@ -57,7 +57,7 @@ fn fault(code: c_uint) -> Fault {
 }
 
 impl Failed {
-    /// For people, before it runs.
+    /// Returns the refusal before a run, with the remedy.
     pub(crate) fn refusal(&self) -> Refusal {
         let remedy = match self.code {
             0x0300 => {
@@ -75,14 +75,14 @@ impl Failed {
     }
 }
 
-/// A device that is open.
+/// Open device.
 pub(crate) struct Hd {
     functions: Functions,
     handle: c_uint,
     facts: Facts,
 }
 
-/// What a device says about itself.
+/// Properties reported by a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Facts {
     /// Middle of the usable workspace and half its size, m, axes of the contract.
@@ -96,7 +96,7 @@ pub(crate) struct Facts {
 }
 
 impl Hd {
-    /// Opens the library and the device of this name. Moves nothing. Not real-time.
+    /// Opens the library, and the device with a name or the default one. Causes no motion. Not real-time.
     pub(crate) fn open(path: Option<&str>, stand_in: StandIn, name: Option<&str>) -> Result<Self, Refusal> {
         let library = Library::open(&SDK, path, stand_in).map_err(Refusal::resource)?;
         let functions = Functions::load(&library).map_err(Refusal::resource)?;
@@ -118,7 +118,7 @@ impl Hd {
                 .ok_or_else(|| Refusal::parameter("`name` has a null character; no device is called so"))
         });
         let told = told.transpose()?;
-        // What others left on the stack is none of ours.
+        // Discards errors of earlier calls.
         while functions.take_error() != 0 {}
         let handle = without_signals(|| functions.init(told.as_deref()));
         let code = functions.take_error();
@@ -153,7 +153,7 @@ impl Hd {
         })
     }
 
-    /// The error of this thread, if there is one.
+    /// Returns the last error of this thread as a failure, if there is one.
     pub(crate) fn check(&self, what: &'static str) -> Result<(), Failed> {
         match self.functions.take_error() {
             0 => Ok(()),
@@ -161,7 +161,7 @@ impl Hd {
         }
     }
 
-    /// The error of this thread, which there must be.
+    /// Returns the last error of this thread as a failure, also for code 0.
     pub(crate) fn failure(&self, what: &'static str) -> Failed {
         let code = self.functions.take_error();
         Failed { code, words: self.functions.words(code), what }
@@ -175,13 +175,13 @@ impl Hd {
         &self.facts
     }
 
-    /// What the maker calls it, and its serial number.
+    /// Returns the maker's name of the model and the serial number.
     pub(crate) fn name(&self) -> String {
         self.functions.make_current(self.handle);
         format!("{} {}", self.functions.text(MODEL), self.functions.text(SERIAL))
     }
 
-    /// Whether it knows where it is; it is given the chance to find out by itself. Not real-time.
+    /// Checks the calibration, after an attempt to update it automatically. Not real-time.
     pub(crate) fn calibrate(&self) -> Result<(), Refusal> {
         self.functions.make_current(self.handle);
         if self.functions.check_calibration() == NEEDS_UPDATE {
@@ -206,8 +206,8 @@ impl Hd {
         )))
     }
 
-    /// Lets force through, or not: of the device whose frame is open, on the thread of the scheduler. What goes wrong is on the
-    /// stack of errors, which the end of the frame looks at.
+    /// Enables or disables the force of the device whose frame is open; on the thread of the scheduler. Errors stay on the stack,
+    /// which the end of the frame checks.
     pub(crate) fn switch_here(&self, force: Force) {
         match force {
             Force::On => self.functions.enable(FORCE_OUTPUT),
@@ -215,7 +215,7 @@ impl Hd {
         }
     }
 
-    /// Begins a frame and measures in it; on the thread of the scheduler.
+    /// Begins a frame and reads a sample; on the thread of the scheduler.
     pub(crate) fn begin(&self) -> Result<Sample, Fault> {
         let functions = &self.functions;
         functions.begin_frame(self.handle);
@@ -264,7 +264,7 @@ impl Drop for Hd {
     }
 }
 
-/// Whether force is let through.
+/// Force output of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Force {
     On,
@@ -283,7 +283,7 @@ impl Facts {
     };
 }
 
-/// Theirs: x right, y up, z towards the user. Ours: x right, y away, z up.
+/// Transforms a vector from the SDK's axes (x right, y up, z towards the user) to the host's (x right, y away, z up).
 fn from_hd([x, y, z]: [f64; 3]) -> DVec3 {
     DVec3::new(x, -z, y)
 }
@@ -292,7 +292,7 @@ fn to_hd(vector: DVec3) -> [f64; 3] {
     [vector.x, vector.z, -vector.y]
 }
 
-/// The pose of a matrix of theirs by its columns, lengths in mm.
+/// Converts a transform of the SDK, by columns, lengths in mm, to a pose relative to the workspace's centre.
 fn pose(transform: &[f64; 16], centre_m: DVec3) -> Pose {
     let [a, b, c, _, d, e, f, _, g, h, i, _, x, y, z, _] = *transform;
     let theirs = DMat3::from_cols_array(&[a, b, c, d, e, f, g, h, i]);

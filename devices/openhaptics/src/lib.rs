@@ -1,15 +1,15 @@
-//! The Touch and Phantom family, over the OpenHaptics that the user has installed: nothing of it is part of Flotor.
+//! Device plugin for the Touch and Phantom family, over the OpenHaptics that the user has installed: no part of it belongs to Flotor.
 //!
-//! The SDK owns the pace: its scheduler calls the plugin once a millisecond, and the loop takes the sample, at once if the scene
-//! has `pacing = "device"`:
+//! The SDK sets the rate: its scheduler calls the plugin once a millisecond, and the loop takes the newest sample, without
+//! delay if the scene has `pacing = "device"`:
 //!
 //! ```text
 //! libHD.so -> ffi -> Hd -> callback of the scheduler -> Exchange -> loop
 //! ```
 //!
-//! - `ffi`: the functions that are used, as the SDK declares them.
-//! - `hd`: the same, safe, in the axes and units of the contract; errors with their words.
-//! - `scheduler`: the scheduler, which all devices of a process share, and the callback of each.
+//! - `ffi`: functions of the SDK, as the SDK declares them.
+//! - `hd`: safe calls in the axes and units of the contract; errors with text and remedy.
+//! - `scheduler`: the scheduler, shared by all devices of a process, and its callback for each device.
 //! - `plugin`: parameters and the contract.
 
 mod ffi;

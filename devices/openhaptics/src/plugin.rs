@@ -1,4 +1,4 @@
-//! The device as a plugin: parameters and the contract.
+//! Implementation of the device contract for the Touch and Phantom family, with their parameters.
 
 use crate::hd::{Facts, Hd};
 use crate::scheduler::Driver;
@@ -15,9 +15,9 @@ use std::time::Duration;
 const NO_YES: Choices = choices!["false", "true"];
 const PACES: Choices = choices!["real", "lockstep"];
 
-/// The scheduler's rate, Hz.
+/// Rate of the scheduler, Hz.
 const RATE_HZ: f64 = 1000.0;
-/// Steps of the encoders at the handle, m (450 dpi, the coarsest of the family).
+/// Resolution of the encoders at the handle, m (450 dpi, the coarsest of the family).
 const RESOLUTION_M: f64 = 5.5e-5;
 
 const SCHEMA: &[Parameter] = &[
@@ -54,17 +54,17 @@ const SCHEMA: &[Parameter] = &[
     ),
 ];
 
-/// A device of the family, opened: known, without force.
+/// Opened device of the family: identified, without force.
 pub struct TouchDevice {
     hd: Arc<Hd>,
     exchange: Arc<Exchange>,
-    /// Largest force, N, and torque, N·m.
+    /// Limits of force, N, and torque, N·m.
     most: [f64; 2],
     timeout: Duration,
     parameters: [f64; SCHEMA.len()],
 }
 
-/// The same, driven by the scheduler of the SDK.
+/// Active device, driven by the scheduler of the SDK.
 pub struct ScheduledDevice {
     opened: TouchDevice,
     driver: Driver,
@@ -116,17 +116,17 @@ impl Device for TouchDevice {
             sensed: if is_turned { Axes::ALL } else { Axes::TRANSLATION },
             actuated: if gives_torque { Axes::ALL } else { Axes::TRANSLATION },
             range_m: range_m.to_array(),
-            // The SDK says no range of the stylus: whatever a rotation can be.
+            // The SDK reports no range of the stylus: declare the largest rotation.
             range_rad: [if is_turned { PI } else { 0.0 }; 3],
             resolution_m: RESOLUTION_M,
             max_force_n: [force_n; 3],
             max_torque_nm: [torque_nm; 3],
-            // From nothing to the most in a tick of the scheduler; the SDK limits the slew further.
+            // Slew: from zero to the maximum in a tick of the scheduler; the SDK limits it further.
             max_force_slew_n_per_s: force_n * RATE_HZ,
             max_torque_slew_nm_per_s: if torque_nm > 0.0 { torque_nm * RATE_HZ } else { f64::INFINITY },
             max_stiffness_n_per_m: stiffness_n_per_m,
             rate_hz: [100.0, RATE_HZ],
-            // The wrench waits for the next call of the scheduler.
+            // A wrench waits for the next call of the scheduler.
             latency_s: 1.0 / RATE_HZ,
         }
     }
@@ -178,7 +178,7 @@ impl PacingDevice for ScheduledDevice {
 }
 
 impl ConnectionDevice for TouchDevice {
-    /// Those of 3D Systems: a serial port of the older ones, raw HID of the newer.
+    /// Devices of 3D Systems: a serial port for the older ones, raw HID for the newer.
     const USB: &'static [UsbKind] =
         &[UsbKind::new(0x2988, 0x0302, UsbAccess::Serial), UsbKind::of_vendor(0x2988, UsbAccess::Hid)];
 }

@@ -1,7 +1,7 @@
-//! The scheduler of the SDK, which all devices of a process share, and what it calls once a tick.
+//! Scheduler of the SDK, shared by all devices of a process, and its callback, which runs once per tick.
 //!
-//! Which device a call of the SDK is about is a state of the process, and a frame sets it. So force is switched in a frame, by
-//! the thread of the scheduler: no other device can come in between.
+//! The current device of the SDK is a state of the process, and a frame sets it. Force is therefore switched within a frame, on
+//! the thread of the scheduler: no other device can intervene.
 
 use crate::ffi::{Scheduled, Stopped};
 use crate::hd::{Failed, Force, Hd};
@@ -9,12 +9,12 @@ use flotor_hal::{Fault, Wrench};
 use flotor_vendor_sdk::{Exchange, Orders, without_signals};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Who is in the scheduler of this process, which runs as long as there is anybody.
+/// Clients in the scheduler of this process, which runs while there are any.
 static CLIENTS: Mutex<Clients> = Mutex::new(Clients { running: 0, retired: Vec::new() });
 
 struct Clients {
     running: usize,
-    /// Taken out while the scheduler ran on for others: freed when it ends.
+    /// Clients unscheduled while the scheduler ran on for others; freed when it ends.
     retired: Vec<Scheduled>,
 }
 
@@ -22,7 +22,7 @@ fn clients() -> MutexGuard<'static, Clients> {
     CLIENTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What the scheduler calls for a device.
+/// Callback data of one device.
 pub(crate) struct Client {
     hd: Arc<Hd>,
     exchange: Arc<Exchange>,
@@ -31,7 +31,7 @@ pub(crate) struct Client {
 }
 
 impl Client {
-    /// A tick: a frame with a sample and a wrench. Whether it is to be called again.
+    /// Runs a tick: a frame with a sample and a wrench. Returns whether to be called again.
     pub(crate) fn step(&mut self) -> bool {
         match self.frame() {
             Ok(()) if self.exchange.is_over() => self.give_up(),
@@ -56,9 +56,9 @@ impl Client {
         Ok(())
     }
 
-    /// No force, and no further call.
+    /// Disables the force; returns false to end the calls.
     pub(crate) fn give_up(&mut self) -> bool {
-        // What the SDK says of it changes nothing any more; a frame that is open is ended.
+        // Errors of the SDK no longer matter here; an open frame is ended.
         let _ = self.hd.finish(&Wrench::ZERO);
         let _ = self.hd.begin();
         self.hd.switch_here(Force::Off);
@@ -67,14 +67,14 @@ impl Client {
         false
     }
 
-    /// The same after a panic.
+    /// Reports a panic as a fault, and disables the force; returns false to end the calls.
     pub(crate) fn break_off(&mut self) -> bool {
         self.exchange.fail(Fault::Broken);
         self.give_up()
     }
 }
 
-/// A device that the scheduler drives, until it is dropped.
+/// Running registration of a device with the scheduler, until dropped.
 pub(crate) struct Driver {
     hd: Arc<Hd>,
     exchange: Arc<Exchange>,
@@ -82,7 +82,7 @@ pub(crate) struct Driver {
 }
 
 impl Driver {
-    /// Has the scheduler call the device, which is energised at zero in the first frame. Not real-time.
+    /// Schedules the device, which is energised at zero in the first frame. Not real-time.
     pub(crate) fn start(hd: &Arc<Hd>, exchange: &Arc<Exchange>) -> Result<Self, Failed> {
         let (hd, exchange) = (Arc::clone(hd), Arc::clone(exchange));
         let orders = exchange.begin();
@@ -91,7 +91,7 @@ impl Driver {
         let mut clients = clients();
         let scheduled = hd.functions().schedule(Box::new(client));
         if !scheduled.is_in() {
-            // What was never in is never called; it is freed with the others.
+            // A rejected client is never called; it is freed with the others.
             clients.retired.push(scheduled);
             return Err(hd.failure("scheduling"));
         }
@@ -106,7 +106,7 @@ impl Driver {
 }
 
 impl Drop for Driver {
-    /// Zero force, then nothing is called any more. Not real-time.
+    /// Sends zero force, then unschedules the device; ends the scheduler with its last client. Not real-time.
     fn drop(&mut self) {
         let Some(scheduled) = self.scheduled.take() else { return };
         let functions = self.hd.functions();
@@ -121,7 +121,7 @@ impl Drop for Driver {
             clients.retired.drain(..).for_each(|retired| retired.free(&stopped));
         }
         drop(clients);
-        // One that was called for the last time is out already: that it cannot be taken out again is no error.
+        // An error of unscheduling is expected: a client whose last call has returned is no longer scheduled.
         let _ = self.hd.check("the end");
         self.exchange.note_silence();
     }

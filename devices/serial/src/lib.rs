@@ -1,8 +1,8 @@
-//! A non-blocking serial port, shared by device plugins.
+//! Non-blocking serial port, shared by device plugins.
 //!
-//! - [`Port`]: a port that does not wait, whatever the system.
-//! - [`NotOpened`]: why one cannot be opened, and what to do.
-//! - [`PORT_HELP`], [`PORT_EXAMPLE`]: what a plugin's parameter `port` is.
+//! - [`Port`]: a port that never blocks, on any system.
+//! - [`NotOpened`]: error of opening a port, with its remedy.
+//! - [`PORT_HELP`], [`PORT_EXAMPLE`]: help and example of a plugin's parameter `port`.
 
 mod platform;
 
@@ -12,7 +12,7 @@ use std::io::{self, Read, Write};
 
 /// Help text of a plugin's parameter `port`.
 pub const PORT_HELP: &str = platform::PORT_HELP;
-/// A value of that parameter.
+/// Example of a parameter `port`.
 pub const PORT_EXAMPLE: &str = platform::PORT_EXAMPLE;
 
 /// A non-blocking serial port: a read without data and a write without room return [`io::ErrorKind::WouldBlock`] or
@@ -20,21 +20,21 @@ pub const PORT_EXAMPLE: &str = platform::PORT_EXAMPLE;
 #[derive(Debug)]
 pub struct Port(platform::System);
 
-/// Why a port cannot be opened. Displays as the cause and what to do.
+/// Error of opening a port. Displays as the cause and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NotOpened {
-    /// This user may not use it.
+    /// This user has no permission.
     Forbidden {
-        /// What to do.
+        /// Remedy, as a clause.
         remedy: &'static str,
     },
-    /// Another program has it.
+    /// Another program uses the port.
     InUse,
-    /// Something else is there.
+    /// The path is no serial port.
     NoPort,
-    /// Nothing is there, or the system says something else.
+    /// There is no file at the path, or another error of the system.
     Missing {
-        /// What the system says.
+        /// Error of the system, as text.
         cause: String,
     },
 }
@@ -56,30 +56,30 @@ impl Port {
     /// Opens the port at a path of the system (`/dev/ttyACM0`, `COM3`) at a speed in baud. Not real-time.
     ///
     /// # Errors
-    /// [`NotOpened`].
+    /// [`NotOpened`], with the cause and the remedy.
     pub fn open(path: &str, baud: u32) -> Result<Self, NotOpened> {
         let builder = serialport::new(path, baud).timeout(platform::PATIENCE);
         platform::System::open(&builder).map(Self).map_err(|error| platform::reason(path, error))
     }
 
-    /// The same port once more, for another thread. Not real-time.
+    /// Returns a second handle of the port, for another thread. Not real-time.
     ///
     /// # Errors
-    /// What the system says.
+    /// Errors of the system.
     pub fn second(&self) -> io::Result<Self> {
         Ok(Self(self.0.try_clone_native()?))
     }
 
-    /// Tells the other end that somebody is here, if the port has a line for it (DTR). Not real-time.
+    /// Sets the line DTR, if the port has one, to show the other end that a program is connected. Not real-time.
     pub fn announce(&mut self) {
-        // A port without modem lines (a pseudo terminal) says so, and works.
+        // A port without modem lines (a pseudo terminal) returns an error, and works.
         let _ = self.0.write_data_terminal_ready(true);
     }
 
-    /// Number of bytes received and not yet read. Real-time: bounded, no allocation; one call of the system.
+    /// Returns the number of bytes received and not yet read. Real-time: bounded, no allocation; one call of the system.
     ///
     /// # Errors
-    /// The port is gone.
+    /// If the port is gone.
     pub fn waiting(&self) -> io::Result<usize> {
         Ok(usize::try_from(self.0.bytes_to_read()?).unwrap_or(usize::MAX))
     }
@@ -87,12 +87,12 @@ impl Port {
     /// Discards the bytes received and not yet read. Real-time: bounded, no allocation; one call of the system.
     ///
     /// # Errors
-    /// The port is gone.
+    /// If the port is gone.
     pub fn forget_input(&self) -> io::Result<()> {
         Ok(self.0.clear(ClearBuffer::Input)?)
     }
 
-    /// The descriptor of the port, or the lower half of its handle, as the contract has it.
+    /// Returns the descriptor of the port, or the lower half of its handle, as the contract defines.
     #[must_use]
     pub fn descriptor(&self) -> i32 {
         platform::descriptor(&self.0)
@@ -115,7 +115,7 @@ impl Write for Port {
     }
 }
 
-/// Of a write whose time is over Windows says that it went well, with no byte: to `write_all` that is a port which is gone.
+/// Converts a write of zero bytes to `WouldBlock`: Windows returns it for a timeout, and `write_all` takes it for a closed port.
 fn taken(written: io::Result<usize>) -> io::Result<usize> {
     match written {
         Ok(0) => Err(io::ErrorKind::WouldBlock.into()),

@@ -1,4 +1,4 @@
-//! From the commanded wrench to the one the flotor feels: coils, amplifiers, field, heat.
+//! Conversion of the commanded wrench to the delivered one: coils, amplifiers, field, heat.
 //!
 //! The flotor is driven by six flat coils in the field of magnets on the frame (Lorentz levitation). Each
 //! pushes along one line, in proportion to its current:
@@ -7,16 +7,16 @@
 //! commanded wrench -> currents -> limit -> amplifiers -> wrench of the currents -> uneven field -> delivered
 //! ```
 //!
-//! - [`coils`]: where the coils sit and what a current does.
-//! - [`thermal`]: how hot they get, and when that is a fault.
-//! - [`field`]: how much the vertical force is off at a height.
+//! - [`coils`]: placement of the coils and their wrenches.
+//! - [`thermal`]: temperatures of the coils, and thermal faults.
+//! - [`field`]: error of the vertical force over the height.
 //!
-//! **Limit.** A coil carries 3.5 A at most. Where a wrench asks for more, *all six* currents are scaled alike:
-//! a spring at its limit then feels softer, but pulls in the right direction. Clipping each coil for itself
-//! would give a little more force and turn it, which couples the axes of a loop that was stable in each.
+//! **Limit.** A coil carries 3.5 A at most. Where a wrench needs more, *all six* currents are scaled alike: a spring at its
+//! limit is then softer, but pulls in the right direction. Clipping each coil separately would give a little more force in
+//! another direction, and couple the axes of a loop that was stable in each.
 //!
-//! **Amplifiers** follow their command with a first-order lag. The plant takes a constant wrench for a tick,
-//! so each coil is given its mean current over the tick: the momentum that goes into the flotor is exact.
+//! **Amplifiers** follow their command with a first-order lag. The plant takes a constant wrench for a tick, so each coil
+//! gets its mean current over the tick: the momentum of the flotor is exact.
 
 pub mod coils;
 pub mod field;
@@ -30,22 +30,22 @@ use field::FieldError;
 use flotor_hal::Fault;
 use thermal::{Thermal, ThermalParameters};
 
-/// What the actuation is built from.
+/// Parameters of the actuation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuationParameters {
-    /// Where the coils sit.
+    /// Placement of the coils.
     pub geometry: CoilGeometry,
     /// Bandwidth of the current amplifiers, Hz.
     pub amplifier_bandwidth_hz: f64,
     /// Unevenness of the field.
     pub field: FieldError,
-    /// Heat.
+    /// Thermal parameters of the coils.
     pub thermal: ThermalParameters,
 }
 
 impl ActuationParameters {
-    /// The geometry that meets the published force limits, the thesis's field. The bandwidth is an estimate:
-    /// switching amplifiers on coils of about a millihenry reach a few kHz.
+    /// Geometry that meets the published force limits, with the thesis's field. The bandwidth is an estimate: switching
+    /// amplifiers on coils of about a millihenry reach a few kHz.
     pub const MAGLEV: Self = Self {
         geometry: CoilGeometry::MAGLEV,
         amplifier_bandwidth_hz: 2000.0,
@@ -60,12 +60,12 @@ impl ActuationParameters {
     }
 }
 
-/// Whether every coil conducts.
+/// State of the wiring: whether every coil conducts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wiring {
-    /// All do.
+    /// All coils conduct.
     Intact,
-    /// This one (0 to 5) does not.
+    /// This coil (0 to 5) does not conduct.
     Open(usize),
 }
 
@@ -82,7 +82,7 @@ pub struct Actuation {
 }
 
 impl Actuation {
-    /// Cold coils without current. Real-time: bounded, no allocation.
+    /// Creates cold coils without current. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// If a number is not physical, or the coils cannot push in all six directions.
@@ -99,7 +99,7 @@ impl Actuation {
         })
     }
 
-    /// The mean wrench on the flotor over the next `dt_s` (s) while `commanded` (finite) is asked for, at a
+    /// Returns the mean wrench on the flotor over the next `dt_s` (s) for a constant `commanded` (finite) wrench, at a
     /// height of `z_m` above home.
     ///
     /// Real-time: bounded, no allocation.
@@ -112,7 +112,7 @@ impl Actuation {
         {
             *current = 0.0;
         }
-        // i' = (asked - i) / lag: what is closed of the gap at the end, and what is open of it on average.
+        // i' = (asked - i) / lag: closed fraction of the gap at the end, and mean open fraction.
         let (closed, open) = (self.lag.closed(dt_s), self.lag.mean_open(dt_s));
         let mut mean_a = [0.0; COILS];
         for ((current, asked), mean_current) in self.currents_a.iter_mut().zip(asked_a).zip(&mut mean_a) {
@@ -131,26 +131,25 @@ impl Actuation {
         delivered
     }
 
-    /// The coils' own fault, if they have one. Real-time: bounded, no allocation.
+    /// Returns the fault of the coils, if any. Real-time: bounded, no allocation.
     #[must_use]
     pub fn fault(&self) -> Option<Fault> {
         self.thermal.fault()
     }
 
-    /// Temperature and load of the coils. Real-time: bounded, no allocation.
+    /// Returns the temperatures and the load of the coils. Real-time: bounded, no allocation.
     #[must_use]
     pub fn thermal(&self) -> &Thermal {
         &self.thermal
     }
 
-    /// True if the last wrench was scaled down to the current limit. Real-time: bounded, no allocation.
+    /// Returns true if the last wrench was scaled down to the current limit. Real-time: bounded, no allocation.
     #[must_use]
     pub fn is_saturated(&self) -> bool {
         self.is_saturated
     }
 
-    /// Ticks so far in which the wrench was scaled down to the current limit. Real-time: bounded, no
-    /// allocation.
+    /// Returns the number of ticks with a wrench scaled down to the current limit. Real-time: bounded, no allocation.
     #[must_use]
     pub fn saturated_ticks(&self) -> u64 {
         self.saturated_ticks

@@ -1,46 +1,46 @@
-//! Faults on purpose: what breaks on a real machine, at a set time or at random.
+//! Injected faults: failures of a real machine, at a set time or at random.
 //!
-//! Code that drives a device is good if it survives these. One kind of fault is chosen per run; it strikes in
-//! *episodes*, one at a set time, or any number at random with a set rate, each of a set length. The random
-//! ones come from the run's seed: the same run has the same faults.
+//! Code that drives a device should survive these faults. One kind of fault is chosen per run; it occurs in *episodes*, one
+//! at a set time, or any number at random with a set rate, each of a set length. The random times come from the run's seed:
+//! equal runs have equal faults.
 
 use crate::noise::{Noise, Stream};
 use crate::validation::{Check, Domain, InvalidParameter, number};
 use flotor_hal::math;
 
-/// What breaks.
+/// Kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
     /// The cells lose the light spots.
     SensorLoss,
-    /// Samples arrive a tick late.
+    /// Samples arrive one tick late.
     LateSample,
-    /// The last sample comes again, called new.
+    /// The last sample arrives again, marked as new.
     DuplicateSample,
-    /// No sample comes; the old one stays and is called old.
+    /// No sample arrives; the old one is repeated, marked as old.
     DroppedSample,
-    /// One coordinate (0 to 5: x, y, z and the rotations) stays where it was.
+    /// One coordinate (0 to 5: x, y, z and the rotations) is stuck at its value.
     StuckAxis(usize),
     /// One coil (0 to 5) does not conduct.
     CoilOpen(usize),
-    /// The device says that a coil is too hot.
+    /// The device reports a coil that is too hot.
     OverTemperature,
-    /// Somebody pulls the cable: no sample, no force.
+    /// The cable is unplugged: no sample, no force.
     CablePull,
-    /// The device's clock stutters: samples are taken up to half a period early.
+    /// The device's clock has jitter: samples are taken up to half a period early.
     ClockJitter,
 }
 
-/// What breaks, and when.
+/// Kind and times of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultPlan {
-    /// What breaks.
+    /// Kind of the fault.
     pub kind: FaultKind,
     /// Start of the one planned episode, ns.
     pub start_ns: u64,
     /// Length of every episode, ns.
     pub duration_ns: u64,
-    /// Mean number of random episodes a second; the planned one is left out if it is not zero.
+    /// Mean number of random episodes per second; if not zero, there is no planned episode.
     pub rate_per_s: f64,
 }
 
@@ -50,30 +50,30 @@ impl FaultPlan {
     }
 }
 
-/// Says tick by tick what is broken.
+/// Schedule of the faults in a run.
 #[derive(Clone, Debug)]
 pub struct Faults {
     plan: Option<FaultPlan>,
     noise: Noise,
-    /// End of the random episode under way, ns.
+    /// End of the current random episode, ns.
     until_ns: u64,
 }
 
 impl Faults {
-    /// At the start of a run. Real-time: bounded, no allocation.
+    /// Starts the schedule of a run. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If the plan holds a number that is not physical.
+    /// If the plan contains a number that is not physical.
     pub fn new(plan: Option<FaultPlan>, seed: u64) -> Result<Self, InvalidParameter> {
         plan.map_or(Ok(()), |plan| plan.check())?;
         Ok(Self { plan, noise: Noise::new(seed, Stream::Faults), until_ns: 0 })
     }
 
-    /// What is broken now, `dt_s` (s) after the last time this was asked. Real-time: bounded, no allocation.
+    /// Returns the fault at `time_ns`, `dt_s` (s) after the last call. Real-time: bounded, no allocation.
     pub fn at(&mut self, time_ns: u64, dt_s: f64) -> Option<FaultKind> {
         let FaultPlan { kind, start_ns, duration_ns, rate_per_s } = self.plan?;
         let active = if rate_per_s > 0.0 {
-            // At least one episode in dt_s, if they come independently of each other.
+            // Probability of at least one episode in dt_s, for independent episodes.
             let chance = -math::exp_m1(-rate_per_s * dt_s);
             if self.noise.uniform() < chance {
                 self.until_ns = time_ns.saturating_add(duration_ns);
@@ -85,7 +85,7 @@ impl Faults {
         active.then_some(kind)
     }
 
-    /// How early a stuttering clock takes this sample, as a share (0 to 1/2) of the period. Real-time: bounded,
+    /// Returns a random early sampling time under clock jitter, as a fraction (0 to 1/2) of the period. Real-time: bounded,
     /// no allocation.
     pub fn jitter(&mut self) -> f64 {
         0.5 * self.noise.uniform()

@@ -1,28 +1,28 @@
-//! First-order lags: what is left of a difference after a while.
+//! First-order lags: exponential decay of a difference.
 
 use flotor_hal::math;
 
-/// Anything that closes a gap at a rate in proportion to it: an amplifier, a warming coil, a low-pass.
+/// First-order lag: an amplifier, a warming coil, a low-pass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lag {
     lag_s: f64,
-    /// The last stretch of time, s, and the share of a gap closed in it: ticks are mostly alike.
+    /// Last time step, s, with its closed fraction: ticks are mostly of equal length.
     dt_s: f64,
     closed: f64,
 }
 
 impl Lag {
-    /// Closes two thirds of a gap in `lag_s` (s, above zero). Real-time: bounded, no allocation.
+    /// Creates a lag with the time constant `lag_s` (s, above zero). Real-time: bounded, no allocation.
     pub(crate) fn new(lag_s: f64) -> Self {
         Self { lag_s, dt_s: 0.0, closed: 0.0 }
     }
 
-    /// A low-pass whose corner is at `bandwidth_hz` (Hz, above zero). Real-time: bounded, no allocation.
+    /// Creates a low-pass with the corner at `bandwidth_hz` (Hz, above zero). Real-time: bounded, no allocation.
     pub(crate) fn of_bandwidth(bandwidth_hz: f64) -> Self {
         Self::new(1.0 / (std::f64::consts::TAU * bandwidth_hz))
     }
 
-    /// Share of a gap that is closed after `dt_s` (s), `1 - e^(-dt / lag)`, without cancellation for short times.
+    /// Returns the closed fraction of a gap after `dt_s` (s), `1 - e^(-dt / lag)`, without cancellation for short times.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -33,7 +33,7 @@ impl Lag {
         self.closed
     }
 
-    /// Share of a gap that is open on average during `dt_s` (s). Real-time: bounded, no allocation.
+    /// Returns the mean open fraction of a gap during `dt_s` (s). Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn mean_open(&mut self, dt_s: f64) -> f64 {
         if dt_s > 0.0 { self.lag_s / dt_s * self.closed(dt_s) } else { 1.0 }

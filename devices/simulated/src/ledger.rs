@@ -1,29 +1,29 @@
-//! Energy balance of the flotor: where every joule came from and where it went.
+//! Energy balance of the flotor: sources and sinks of its mechanical energy.
 //!
-//! Over any stretch of time
+//! Over any interval
 //!
 //! ```text
 //! change of (kinetic + potential) = coils + feed-forward + hand - dissipated
 //! ```
 //!
-//! Each of the six terms is computed on its own: kinetic and potential energy from the state, the four works
-//! as integrals of force times velocity along the motion (see `plant::step`). None is the remainder of the
-//! others, so an imbalance is a real error of the integration, not of the book-keeping. The host compares it
-//! with the peak of the mechanical energy; a closed loop that gains energy out of nothing cannot hide here.
+//! Each of the six terms is computed independently: kinetic and potential energy from the state, the four works as
+//! integrals of force times velocity along the motion (see `plant::step`). None is the remainder of the others, so an
+//! imbalance is a real error of the integration, not of the accounting. The host compares it with the peak of the
+//! mechanical energy; this detects any closed loop that gains energy without a source.
 
 use std::ops::AddAssign;
 
-/// Mechanical energy of the flotor (the mass of a gripping hand not included).
+/// Mechanical energy of the flotor (without the mass of a gripping hand).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MechanicalEnergy {
-    /// Of translation and rotation, J.
+    /// Energy of translation and rotation, J.
     pub kinetic_j: f64,
-    /// Of gravity, J; zero at home (origin of the device frame, upright).
+    /// Energy of gravity, J; zero at home (origin of the device frame, upright).
     pub potential_j: f64,
 }
 
 impl MechanicalEnergy {
-    /// Kinetic plus potential energy, J. Real-time: bounded, no allocation.
+    /// Returns kinetic plus potential energy, J. Real-time: bounded, no allocation.
     #[must_use]
     #[inline]
     pub fn total_j(&self) -> f64 {
@@ -31,27 +31,27 @@ impl MechanicalEnergy {
     }
 }
 
-/// Work done on the flotor during some time.
+/// Work done on the flotor during an interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Work {
-    /// By the coils' wrench, J.
+    /// Work of the coils' wrench, J.
     pub coils_j: f64,
-    /// By the gravity compensation, J.
+    /// Work of the gravity compensation, J.
     pub feed_forward_j: f64,
-    /// By the hand on the handle, J: its spring, its damper and the inertia of its own mass.
+    /// Work of the hand on the handle, J: its spring, its damper and the inertia of its own mass.
     pub hand_j: f64,
-    /// Taken out by eddy-current drag, J; never negative but for rounding.
+    /// Energy dissipated by eddy-current drag, J; never negative but for rounding.
     pub dissipated_j: f64,
 }
 
 impl Work {
-    /// Work that changes the mechanical energy, J. Real-time: bounded, no allocation.
+    /// Returns the work that changes the mechanical energy, J. Real-time: bounded, no allocation.
     #[must_use]
     pub fn net_j(&self) -> f64 {
         self.coils_j + self.feed_forward_j + self.hand_j - self.dissipated_j
     }
 
-    /// True if every term is finite. Real-time: bounded, no allocation.
+    /// Returns true if every term is finite. Real-time: bounded, no allocation.
     #[must_use]
     #[inline]
     pub fn is_finite(&self) -> bool {
@@ -87,7 +87,7 @@ impl Ledger {
         Self { start, now: start, work: Work::default(), peak_j: start.total_j().abs() }
     }
 
-    /// Books the work of a stretch of time and the energy at its end. Real-time: bounded, no allocation.
+    /// Adds the work of an interval and sets the energy at its end. Real-time: bounded, no allocation.
     #[inline]
     pub fn book(&mut self, work: Work, now: MechanicalEnergy) {
         self.work += work;
@@ -95,31 +95,31 @@ impl Ledger {
         self.peak_j = self.peak_j.max(now.total_j().abs());
     }
 
-    /// Mechanical energy when the balance was opened. Real-time: bounded, no allocation.
+    /// Returns the mechanical energy at the start of the balance. Real-time: bounded, no allocation.
     #[must_use]
     pub fn start(&self) -> MechanicalEnergy {
         self.start
     }
 
-    /// Mechanical energy now. Real-time: bounded, no allocation.
+    /// Returns the present mechanical energy. Real-time: bounded, no allocation.
     #[must_use]
     pub fn energy(&self) -> MechanicalEnergy {
         self.now
     }
 
-    /// Works since the start. Real-time: bounded, no allocation.
+    /// Returns the work since the start. Real-time: bounded, no allocation.
     #[must_use]
     pub fn work(&self) -> Work {
         self.work
     }
 
-    /// Largest magnitude of the mechanical energy since the start, J. Real-time: bounded, no allocation.
+    /// Returns the largest magnitude of the mechanical energy since the start, J. Real-time: bounded, no allocation.
     #[must_use]
     pub fn peak_j(&self) -> f64 {
         self.peak_j
     }
 
-    /// Energy that appeared from nowhere (positive) or vanished (negative) since the start, J.
+    /// Returns the energy gained (positive) or lost (negative) without a source since the start, J.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
@@ -127,7 +127,7 @@ impl Ledger {
         (self.now.total_j() - self.start.total_j()) - self.work.net_j()
     }
 
-    /// Magnitude of [`Self::imbalance_j`] relative to [`Self::peak_j`]; 0 for a flotor that never had energy.
+    /// Returns the magnitude of [`Self::imbalance_j`] relative to [`Self::peak_j`]; 0 if the energy was always zero.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]

@@ -3,16 +3,15 @@
 //! The plugin steps a [`Simulation`](simulation::Simulation) of flotor and hand by the scheduled length of each
 //! tick: the wrench written in one tick acts, constant, until the next (zero-order hold), as coils do.
 //!
-//! Preset `plain` is that and no more. Preset `full` puts the machine between: the wrench goes through
-//! amplifiers, coils and an uneven field, the pose comes from light spots on noisy cells, late and in steps, and
-//! things break on request.
+//! Preset `plain` is only that. Preset `full` adds the machine: the wrench passes through amplifiers, coils and an uneven
+//! field, the pose comes from light spots on noisy cells, delayed and quantised, and faults are injected on request.
 //!
 //! - [`plant`]: the flotor, a rigid body with six degrees of freedom.
-//! - [`hand`]: what holds it, and what it means to do.
-//! - [`ledger`]: where every joule came from and went.
-//! - [`workspace`]: how far it moves and how hard it pushes.
-//! - [`simulation`]: all of them on one clock.
-//! - [`actuation`], [`sensing`], [`faults`]: what preset `full` adds; [`machine`] puts them around the simulation.
+//! - [`hand`]: impedance and intended motion of the hand.
+//! - [`ledger`]: energy balance.
+//! - [`workspace`]: range of motion and force limits.
+//! - [`simulation`]: flotor, hand and energy balance on one clock.
+//! - [`actuation`], [`sensing`], [`faults`]: the additions of preset `full`, connected by [`machine`].
 
 pub mod actuation;
 pub mod faults;

@@ -1,16 +1,16 @@
-//! Six linear equations: six coils against six components of a wrench.
+//! Systems of six linear equations, for six coils and the six components of a wrench.
 
-/// Six numbers.
+/// Vector of six numbers.
 pub(crate) type Vector6 = [f64; 6];
 
-/// Six rows of six.
+/// Matrix of six rows.
 pub(crate) type Matrix6 = [Vector6; 6];
 
-/// A pivot smaller than this share of the largest entry of its row means that the rows depend on each other:
-/// far above rounding (1e-16), far below the 0.06 of a well-built device.
+/// Smallest pivot, relative to the largest entry of the matrix; below that the rows are linearly dependent. Far above
+/// rounding (1e-16), far below the 0.06 of a well-built device.
 const LEAST_PIVOT: f64 = 1.0e-6;
 
-/// The inverse, or nothing if the rows depend on each other (or hold a NaN): Gauss and Jordan's elimination with
+/// Returns the inverse, or `None` if the rows are linearly dependent (or contain a NaN): Gauss-Jordan elimination with
 /// partial pivoting.
 ///
 /// Real-time: bounded, no allocation.
@@ -42,7 +42,7 @@ pub(crate) fn inverse(matrix: &Matrix6) -> Option<Matrix6> {
     Some(right)
 }
 
-/// `matrix x`. Real-time: bounded, no allocation.
+/// Returns `matrix x`. Real-time: bounded, no allocation.
 pub(crate) fn product(matrix: &Matrix6, vector: &Vector6) -> Vector6 {
     // A loop instead of `map`, whose closure is not always inlined: this runs twice a tick.
     let mut sums = [0.0; 6];

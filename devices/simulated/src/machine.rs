@@ -1,9 +1,8 @@
 //! Preset `full`: the machine between the controller and the simulated flotor.
 //!
-//! One cycle: the wrench of the last write goes through amplifiers, coils and field and moves the flotor for the
-//! time of the tick; the cells take a sample, and the one that has come through the latency is returned.
-//! Faults reach in where they would on the real thing. The flotor goes on moving whatever the controller is
-//! told.
+//! One cycle: the wrench of the last write passes through amplifiers, coils and field and moves the flotor for the time of
+//! the tick; the cells take a sample, and the sample whose latency has elapsed is returned. Faults act at their place in
+//! the real machine. The flotor continues to move, whatever is reported to the controller.
 
 use crate::actuation::coils::Coils;
 use crate::actuation::{Actuation, ActuationParameters, Wiring};
@@ -18,23 +17,23 @@ use flotor_hal::{
     Conditions, Cycle, DeviceState, Fault, Tick, Twist, orientation_from_rotation_vector, rotation_vector,
 };
 
-/// What a machine is built from.
+/// Parameters of a machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineParameters {
     /// Amplifiers, coils, field, heat.
     pub actuation: ActuationParameters,
     /// Light spots, cells, pose finder, velocity.
     pub sensing: SensingParameters,
-    /// What breaks, if anything.
+    /// Injected fault, if any.
     pub fault: Option<FaultPlan>,
 }
 
 impl MachineParameters {
-    /// The machine as far as it is published, with nothing broken.
+    /// The published machine, without a fault.
     pub const MAGLEV: Self =
         Self { actuation: ActuationParameters::MAGLEV, sensing: SensingParameters::MAGLEV, fault: None };
 
-    /// Largest force and torque along one axis alone, N and N·m. Real-time: bounded, no allocation.
+    /// Returns the largest force and torque along one axis alone, N and N·m. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// If the coils cannot push in all six directions.
@@ -49,15 +48,15 @@ pub struct Machine {
     actuation: Actuation,
     sensing: Sensing,
     faults: Faults,
-    /// Where the stuck coordinate stays.
+    /// Value of the stuck coordinate, m or rad.
     stuck_at: Option<f64>,
 }
 
 impl Machine {
-    /// A cold machine that sees the flotor in `start`. Real-time: bounded, no allocation.
+    /// Creates a cold machine with the flotor in the state `start`. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a number is not physical, the coils depend on each other, or the diodes stand in a line.
+    /// If a number is not physical, the coils are linearly dependent, or the diodes stand in a line.
     pub fn new(parameters: &MachineParameters, start: &State, seed: u64) -> Result<Self, InvalidParameter> {
         let pose = Pose { position_m: start.position_m, orientation: start.orientation };
         Ok(Self {
@@ -68,8 +67,8 @@ impl Machine {
         })
     }
 
-    /// Moves the flotor for the time of `tick` under the `commanded` wrench (finite) and takes a sample into
-    /// `state`. Real-time: bounded, no allocation.
+    /// Moves the flotor for the time of `tick` under the `commanded` wrench (finite) and stores a sample in `state`.
+    /// Real-time: bounded, no allocation.
     pub fn cycle(
         &mut self,
         simulation: &mut Simulation,
@@ -120,8 +119,8 @@ impl Machine {
         }
     }
 
-    /// Advances the simulation by the tick and samples `early_ns` before its end, or earlier if the clock has jitter; true
-    /// if the motion left every physical range.
+    /// Advances the simulation by the tick and samples `early_ns` before its end, or earlier if the clock has jitter.
+    /// Returns true if the motion exceeded the physical limits.
     fn move_and_sample(
         &mut self,
         simulation: &mut Simulation,
@@ -130,7 +129,7 @@ impl Machine {
         (fault, early_ns): (Option<FaultKind>, u64),
     ) -> bool {
         let jitter_ns = match fault {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a share of the tick
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a fraction of the tick
             Some(FaultKind::ClockJitter) => (self.faults.jitter() * tick.dt_ns as f64) as u64,
             _ => 0,
         };
@@ -142,7 +141,7 @@ impl Machine {
         before.stopped || after.stopped
     }
 
-    /// Sets one coordinate of a pose to what it was when it got stuck.
+    /// Sets one coordinate of a pose to its value when it got stuck.
     fn hold(&mut self, axis: usize, pose: &mut Pose) {
         let mut rotation_rad = rotation_vector(pose.orientation);
         let coordinate = match axis {
@@ -159,7 +158,7 @@ impl Machine {
         }
     }
 
-    /// Amplifiers and coils. Real-time: bounded, no allocation.
+    /// Returns amplifiers and coils. Real-time: bounded, no allocation.
     #[must_use]
     pub fn actuation(&self) -> &Actuation {
         &self.actuation

@@ -1,22 +1,21 @@
 //! Seeded randomness: the same seed gives the same noise on every machine.
 //!
-//! The generator is PCG (O'Neill 2014), named and fixed so that an update of a library cannot change a run.
-//! Every user of noise draws from a stream of its own: switching one source on or off leaves the others as
-//! they were.
+//! The generator is PCG (O'Neill 2014), named and fixed so that an update of a library cannot change a run. Every source of
+//! noise has its own stream: switching one on or off does not change the others.
 
 use flotor_hal::math;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
 
-/// Who draws.
+/// Stream of random numbers, one per source of noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stream {
     /// Noise of the position cells.
     Sensor = 1,
-    /// When faults strike.
+    /// Times of random faults.
     Faults = 2,
-    /// Tremor and noise of force of the hand.
+    /// Tremor and force noise of the hand.
     Hand = 3,
 }
 
@@ -27,21 +26,21 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// The stream of one user in a run of this seed. Real-time: bounded, no allocation.
+    /// Creates the stream of one source in a run with this seed. Real-time: bounded, no allocation.
     pub(crate) fn new(seed: u64, stream: Stream) -> Self {
-        // An odd constant (the golden ratio in 64 bits) keeps neighbouring seeds and streams apart.
+        // An odd constant (the golden ratio in 64 bits) separates neighbouring seeds and streams.
         let mixed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(stream as u64);
         Self { generator: Pcg64Mcg::seed_from_u64(mixed) }
     }
 
-    /// Evenly distributed over 0 (included) to 1 (excluded). Real-time: bounded, no allocation.
+    /// Returns a uniform number from 0 (included) to 1 (excluded). Real-time: bounded, no allocation.
     pub(crate) fn uniform(&mut self) -> f64 {
         /// 2^-53: the 53 highest bits fill the mantissa.
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.generator.next_u64() >> 11) as f64 * STEP
     }
 
-    /// Two independent numbers of normal distribution, mean 0 and deviation 1 (Box and Muller 1958).
+    /// Returns two independent normal numbers, mean 0 and deviation 1 (Box and Muller 1958).
     ///
     /// Real-time: bounded, no allocation.
     pub(crate) fn normal_pair(&mut self) -> [f64; 2] {

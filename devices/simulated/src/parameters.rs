@@ -1,4 +1,4 @@
-//! What the simulated flotor can be told, and how a set of values becomes a [`Setup`].
+//! Parameters of the simulated flotor, and their conversion to a [`Setup`].
 
 pub(crate) mod live;
 mod machine;
@@ -19,13 +19,13 @@ const MM: f64 = 1.0e-3;
 const UM: f64 = 1.0e-6;
 const PERCENT: f64 = 1.0e-2;
 
-/// Beginning of the documentation of a parameter that only preset `full` reads.
+/// Prefix of the documentation of parameters used only by preset `full`.
 const OF_FULL: &str = "Full:";
 
-/// Refuses a value that would change nothing: one of the machine that preset `plain` leaves out.
+/// Rejects a parameter without effect: one of the machine under preset `plain`.
 ///
 /// # Errors
-/// Names the first of them, and the preset that has it.
+/// If such a parameter is set; the error contains its name and the preset that uses it.
 pub(crate) fn refuse_idle(settings: &Settings<'_>) -> Result<(), Refusal> {
     if has_machine(settings) {
         return Ok(());
@@ -39,10 +39,10 @@ pub(crate) fn refuse_idle(settings: &Settings<'_>) -> Result<(), Refusal> {
     })
 }
 
-/// The setup a set of values means; tick length and seed are filled in at activation. Not real-time.
+/// Converts a set of values to a setup; tick length and seed are set at activation. Not real-time.
 ///
 /// # Errors
-/// If a file that is to drive the hand cannot be used.
+/// If a script or recording of the hand is unreadable or invalid.
 pub(crate) fn setup(settings: &Settings<'_>) -> Result<Setup, Refusal> {
     let flotor = flotor(settings);
     let trajectory = trajectory(settings)?;
@@ -85,8 +85,8 @@ fn flotor(settings: &Settings<'_>) -> FlotorParameters {
     flotor
 }
 
-/// The impedance of the grip that is set, else of the one the script names, else of a firm one; single numbers
-/// come before either.
+/// Returns the impedance of the configured grip, else of the script's grip, else of a firm one; single numbers override the
+/// grip.
 fn impedance(settings: &Settings<'_>, trajectory: &Trajectory) -> Impedance {
     let of_script = match trajectory {
         Trajectory::Scripted(script) => script.grip(),
@@ -118,7 +118,7 @@ fn trajectory(settings: &Settings<'_>) -> Result<Trajectory, Refusal> {
     }
 }
 
-/// What the parameter `hand` names.
+/// Returns the trajectory selected by the parameter `hand`.
 fn simple_trajectory(settings: &Settings<'_>) -> Trajectory {
     let value = |id| settings.number_or_default(id);
     let depth_m = value("hand_depth_mm") * MM;
@@ -137,7 +137,7 @@ fn simple_trajectory(settings: &Settings<'_>) -> Trajectory {
     }
 }
 
-/// Three explicitly set numbers, each falling back to a component of `base` (which is already in SI).
+/// Returns a vector of three parameters; an unset one falls back to a component of `base` (already in SI).
 fn three(settings: &Settings<'_>, ids: [&str; 3], base: DVec3, scale: f64) -> DVec3 {
     let [x, y, z] = ids.map(|id| settings.number(id).map(|value| value * scale));
     DVec3::new(x.unwrap_or(base.x), y.unwrap_or(base.y), z.unwrap_or(base.z))
@@ -148,7 +148,7 @@ fn nanoseconds(seconds: f64) -> u64 {
     (seconds * 1.0e9).round() as u64
 }
 
-/// The value in force of the parameter at `index` of the schema, as a person would set it.
+/// Returns the effective value of the parameter at `index` of the schema, in the units of the schema.
 pub(crate) fn in_force(setup: &Setup, settings: &[f64], index: usize) -> f64 {
     let Some(parameter) = SCHEMA.get(index) else { return f64::NAN };
     let FlotorParameters { mass_kg, inertia_kg_m2, centre_of_mass_m, gravity_m_per_s2, drag, .. } =

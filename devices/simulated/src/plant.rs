@@ -1,9 +1,9 @@
 //! The flotor as a rigid body with six degrees of freedom.
 //!
-//! The moving part of the device is a bowl with a handle that hangs in a magnetic field: one rigid body, no
-//! friction, no transmission. Four things act on it: the coils' wrench and eddy-current drag, both taken at
-//! the origin of the flotor frame (the centre of the bowl); gravity and its compensation, at the centre of
-//! mass; and the hand, at the origin, where the handle is. With `y` the position of the centre of mass,
+//! The moving part of the device is a bowl with a handle that hangs in a magnetic field: one rigid body, no friction, no
+//! transmission. Four loads act on it: the coils' wrench and eddy-current drag, both at the origin of the flotor frame (the
+//! centre of the bowl); gravity and its compensation, at the centre of mass; and the hand, at the origin, the place of the
+//! handle. With `y` the position of the centre of mass,
 //! `x = y - R c` that of the origin and `w` the angular velocity in the flotor frame:
 //!
 //! ```text
@@ -12,16 +12,14 @@
 //! q' = q w / 2
 //! ```
 //!
-//! **Time.** A coil wrench holds from one tick to the next, so during a step the translation is a linear
-//! oscillator under constant or linearly growing force, and `plant::translation` solves it exactly. The
-//! rotation is nonlinear; it is integrated by a Runge-Kutta method of order six. Where the centre of mass is
-//! off the origin the two pull on each other, and `plant::step` integrates that pull in the Runge-Kutta
-//! method while it carries the oscillator exactly (an integrating factor): sixth order in general, exact to
-//! rounding when nothing rotates or the centre of mass is at the origin.
+//! **Time.** A coil wrench is constant from one tick to the next, so during a step the translation is a linear oscillator
+//! under constant or linearly growing force, and `plant::translation` solves it exactly. The rotation is nonlinear and
+//! integrated by a Runge-Kutta method of order six. With the centre of mass off the origin the two are coupled, and
+//! `plant::step` integrates the coupling in the Runge-Kutta method and the oscillator exactly (an integrating factor):
+//! sixth order in general, exact to rounding when nothing rotates or the centre of mass is at the origin.
 //!
-//! **A hand with mass** moves its mass with the handle: the plant then integrates flotor and hand as one
-//! body, with the hand a point mass at the origin whose weight the person carries. What is reported is always
-//! the flotor.
+//! **A hand with mass** moves rigidly with the handle: the plant then integrates flotor and hand as one body, with the hand
+//! a point mass at the origin whose weight the person carries. The reported state is always that of the flotor.
 
 mod body;
 mod motion;
@@ -39,7 +37,7 @@ use flotor_hal::glam::{BVec3, DQuat, DVec3};
 use motion::{Contact, Motion};
 use scheme::Scheme;
 
-/// Longest time one piece of [`Plant::advance`] may cover, ns. Longer stretches come in pieces.
+/// Longest piece of one call of [`Plant::advance`], ns. Callers split longer intervals.
 pub const MAX_PIECE_NS: u64 = 1_000_000;
 
 /// Standard gravity, m/s² (ISO 80000-3).
@@ -49,7 +47,7 @@ pub const STANDARD_GRAVITY_M_PER_S2: f64 = 9.806_65;
 /// 5.69 N).
 pub const THESIS_MEASURED_WEIGHT_N: f64 = 6.9;
 
-/// Feed-forward in the thesis's program, N (Varadharajan 2007, section 3.2 and appendix A).
+/// Feed-forward of the thesis's program, N (Varadharajan 2007, section 3.2 and appendix A).
 pub const THESIS_FEED_FORWARD_N: f64 = 7.7;
 
 /// Force and torque of the coils on the flotor, at the origin of the flotor frame, device frame.
@@ -62,10 +60,10 @@ pub struct Wrench {
 }
 
 impl Wrench {
-    /// No force, no torque.
+    /// Zero force and torque.
     pub const ZERO: Self = Self { force_n: DVec3::ZERO, torque_nm: DVec3::ZERO };
 
-    /// True if every number is finite. Real-time: bounded, no allocation.
+    /// Returns true if every number is finite. Real-time: bounded, no allocation.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.force_n.is_finite() && self.torque_nm.is_finite()
@@ -77,20 +75,20 @@ impl Wrench {
 pub enum FeedForward {
     /// Exactly the weight: the flotor floats.
     Weight,
-    /// A set force, N; the rest of the weight is felt.
+    /// A set force, N; the difference to the weight acts on the flotor.
     Force(f64),
 }
 
 /// Eddy-current drag, acting at the origin of the flotor frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drag {
-    /// Resistance to translation, N s/m.
+    /// Drag coefficient of translation, N s/m.
     pub translational_ns_per_m: f64,
-    /// Resistance to rotation, N·m s/rad.
+    /// Drag coefficient of rotation, N·m s/rad.
     pub rotational_nms_per_rad: f64,
 }
 
-/// What the flotor is made of.
+/// Physical parameters of the flotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlotorParameters {
     /// Mass, kg.
@@ -101,9 +99,9 @@ pub struct FlotorParameters {
     pub centre_of_mass_m: DVec3,
     /// Gravity, m/s², pointing down.
     pub gravity_m_per_s2: f64,
-    /// Compensation of gravity.
+    /// Feed-forward that compensates gravity.
     pub feed_forward: FeedForward,
-    /// Drag.
+    /// Eddy-current drag.
     pub drag: Drag,
 }
 
@@ -130,7 +128,7 @@ impl FlotorParameters {
     pub const UTAH: Self =
         Self { mass_kg: 0.555, centre_of_mass_m: DVec3::new(0.614e-3, 1.225e-3, -31.669e-3), ..Self::THESIS };
 
-    /// Upward compensation force, N. Real-time: bounded, no allocation.
+    /// Returns the upward compensation force, N. Real-time: bounded, no allocation.
     #[must_use]
     pub fn feed_forward_n(&self) -> f64 {
         match self.feed_forward {
@@ -139,14 +137,14 @@ impl FlotorParameters {
         }
     }
 
-    /// Refuses numbers no flotor has. Real-time: bounded, no allocation.
+    /// Rejects unphysical numbers. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// Names the first parameter that is not finite, not positive, or impossible.
+    /// If a parameter is not finite, not positive, or impossible; the error contains its name.
     pub fn check(&self) -> Result<(), InvalidParameter> {
         number("mass_kg", self.mass_kg, Domain::Positive)?;
         vector("inertia_kg_m2", self.inertia_kg_m2, Domain::Positive)?;
-        // The moments of a flat body just meet the triangle inequality: leave rounding some room.
+        // The moments of a flat body just meet the triangle inequality: allow for rounding.
         let sum_kg_m2 = self.inertia_kg_m2.element_sum();
         if 2.0 * self.inertia_kg_m2.max_element() > sum_kg_m2 * (1.0 + 1.0e-12) {
             return Err(InvalidParameter::ImpossibleInertia { principal_kg_m2: self.inertia_kg_m2 });
@@ -181,10 +179,10 @@ impl State {
         angular_velocity_rad_per_s: DVec3::ZERO,
     };
 
-    /// Refuses states that are not finite or not a rotation. Real-time: bounded, no allocation.
+    /// Rejects non-finite states and orientations that are no rotation. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// Names the first offending part.
+    /// If a part is not finite or no rotation; the error contains its name.
     pub fn check(&self) -> Result<(), InvalidParameter> {
         Pose { position_m: self.position_m, orientation: self.orientation }.check()?;
         vector("velocity_m_per_s", self.velocity_m_per_s, Domain::Finite)?;
@@ -192,26 +190,26 @@ impl State {
     }
 }
 
-/// How a piece of motion went.
+/// Result of a piece of motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
-    /// As the equations say; the work done meanwhile.
+    /// Regular motion, with the work done.
     Moved(Work),
-    /// The motion left every physical range (a wrench of 1e30 N, say): the flotor was stopped where it last
-    /// was.
+    /// The motion exceeded the physical limits (for example with a wrench of 1e30 N): the flotor was stopped at its last
+    /// pose.
     Stopped,
 }
 
-/// The flotor, alone or in a hand, ready to move.
+/// The flotor, free or held by a hand, in motion.
 #[derive(Clone, Debug)]
 pub struct Plant {
     motion: Motion,
     free: Scheme,
-    /// One for each way the hand may hold it.
+    /// One entry per set of axes along which the hand may yield.
     held: Vec<Held>,
 }
 
-/// The flotor in a hand that yields along some axes.
+/// The flotor in a hand without stiffness along some axes.
 #[derive(Clone, Debug)]
 struct Held {
     yielding: BVec3,
@@ -219,8 +217,8 @@ struct Held {
 }
 
 impl Plant {
-    /// A flotor in `state`, for a hand of `impedance` that may grip it. `nominal_ns` is the piece that comes
-    /// most often: what it needs is computed once.
+    /// Creates a flotor in `state`, for a hand of `impedance` that may grip it. `nominal_ns` is the most frequent piece
+    /// length; its tables are computed once.
     ///
     /// Not real-time.
     ///
@@ -235,10 +233,10 @@ impl Plant {
         Self::yielding(flotor, impedance, &[BVec3::FALSE], state, nominal_ns)
     }
 
-    /// The same for a hand that at times yields along one of these sets of axes. Not real-time.
+    /// Creates a flotor for a hand that at times yields along a set of axes, else like [`Self::new`]. Not real-time.
     ///
     /// # Errors
-    /// Those of [`Self::new`].
+    /// Errors of [`Self::new`].
     pub fn yielding(
         flotor: &FlotorParameters,
         impedance: &Impedance,
@@ -259,33 +257,33 @@ impl Plant {
         })
     }
 
-    /// Pose and velocity now. Real-time: bounded, no allocation.
+    /// Returns the present pose and velocity. Real-time: bounded, no allocation.
     #[must_use]
     #[inline]
     pub fn state(&self) -> State {
         self.motion.state()
     }
 
-    /// Puts the flotor somewhere else; the caller has checked `state`. Real-time: bounded, no allocation.
+    /// Sets the state of the flotor; the caller has checked `state`. Real-time: bounded, no allocation.
     pub(crate) fn place(&mut self, state: &State) {
         self.motion = Motion::of(state);
     }
 
-    /// Mechanical energy of the flotor now. Real-time: bounded, no allocation.
+    /// Returns the present mechanical energy of the flotor. Real-time: bounded, no allocation.
     #[must_use]
     #[inline]
     pub fn energy(&self) -> MechanicalEnergy {
         self.free.body().energy(&self.motion)
     }
 
-    /// Moves on by `piece_ns` (at most [`MAX_PIECE_NS`]; more counts as that) under a constant finite `coils`
-    /// wrench, held by a hand whose intention starts as given and moves on at its velocity, or by none.
+    /// Advances by `piece_ns` (clamped to [`MAX_PIECE_NS`]) under a constant finite `coils` wrench, held by a hand whose
+    /// intention starts as given and moves at its velocity, or free.
     ///
-    /// Cutting a piece into smaller ones gives the same motion: to rounding in translation, to the error of
-    /// the Runge-Kutta method (order 6) in rotation.
+    /// Splitting a piece into smaller ones gives the same motion: to rounding in translation, to the error of the
+    /// Runge-Kutta method (order 6) in rotation.
     ///
-    /// Real-time: bounded, no allocation. A piece other than the nominal one and its predecessor costs a new
-    /// set of response functions.
+    /// Real-time: bounded, no allocation. A piece length other than the nominal and the previous one costs a new set of
+    /// response functions.
     #[inline]
     pub fn advance(&mut self, piece_ns: u64, coils: &Wrench, hand: Option<&Intention>) -> Outcome {
         if piece_ns == 0 {
@@ -311,7 +309,7 @@ impl Plant {
     }
 }
 
-/// Goes on with a motion that is sound, else stops. Real-time: bounded, no allocation.
+/// Applies a valid motion, else stops the flotor. Real-time: bounded, no allocation.
 #[inline]
 fn go_on(motion: &mut Motion, next: Option<(Motion, Work)>) -> Outcome {
     let Some((next, work)) = next else {
@@ -322,8 +320,8 @@ fn go_on(motion: &mut Motion, next: Option<(Motion, Work)>) -> Outcome {
     Outcome::Moved(work)
 }
 
-/// What one straight step is not enough for. Real-time: bounded, no allocation.
-#[inline(never)] // keeps the one step of most pieces small
+/// Advances a piece that one straight step cannot cover. Real-time: bounded, no allocation.
+#[inline(never)] // keeps the common single step small
 fn advance_by_steps(
     motion: &mut Motion,
     scheme: &mut Scheme,

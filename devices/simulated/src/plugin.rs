@@ -20,34 +20,34 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// The simulated flotor, opened: the numbers are checked, nothing moves.
+/// The opened simulated flotor: parameters are checked, nothing moves.
 pub struct SimulatedFlotor {
     setup: Setup,
-    /// What stands between controller and flotor; nothing with preset `plain`.
+    /// Machine between controller and flotor; `None` with preset `plain`.
     machine: Option<MachineParameters>,
-    /// Every parameter as set or by default, in the order of the schema.
+    /// Values of all parameters, set or default, in the order of the schema.
     values: Vec<f64>,
-    /// Correction of the vertical force; nothing until somebody has measured it.
+    /// Correction of the vertical force; no correction until measured.
     calibration: VerticalCalibration,
     stopped: Arc<AtomicBool>,
 }
 
-/// The simulated flotor, running.
+/// The running simulated flotor.
 pub struct RunningFlotor {
     simulation: Simulation,
     machine: Option<Box<Machine>>,
     opened: SimulatedFlotor,
-    /// When the device sets the pace.
+    /// Clock of the samples, for a loop paced by the device.
     samples: SampleClock,
-    /// Acts from the last write to the next.
+    /// Wrench of the last write, constant until the next one.
     held: Wrench,
-    /// It is less than was requested.
+    /// True if `held` was limited.
     is_limited: bool,
-    /// Height of the latest sample, m: where the vertical force is corrected for.
+    /// Height of the latest sample, m, for the correction of the vertical force.
     height_m: f64,
 }
 
-/// Cuts the coils from any thread.
+/// Stop handle that cuts the coils from any thread.
 pub struct CoilSwitch(Arc<AtomicBool>);
 
 impl SafeStop for CoilSwitch {
@@ -64,7 +64,7 @@ const TORQUE_SLEW_NM_PER_S: f64 = 6.3e3;
 const NOMINAL_PERIOD_S: f64 = 1.0e-3;
 /// Damping of the device's own boundary mode, N·s/m (client program of the University of Utah).
 const RENDERED_DAMPING_NS_PER_M: f64 = 15.0;
-/// Rates the device's controller accepts, Hz (public client of the device's interface).
+/// Slowest and fastest rate of the device's controller, Hz (public client of the device's interface).
 const RATE_HZ: [f64; 2] = [100.0, 10_000.0];
 
 impl Device for SimulatedFlotor {
@@ -85,7 +85,7 @@ impl Device for SimulatedFlotor {
             calibration: VerticalCalibration::NONE,
             stopped: Arc::new(AtomicBool::new(false)),
         };
-        // Everything that depends on the tick length is checked again at activation.
+        // Conditions that depend on the tick length are checked again at activation.
         opened.start(opened.setup.tick_ns, 0).map_err(Refusal::parameter)?;
         Ok(opened)
     }
@@ -176,7 +176,7 @@ impl CalibrationDevice for SimulatedFlotor {
 }
 
 impl SimulatedFlotor {
-    /// Flotor, hand and machine at time 0.
+    /// Creates flotor, hand and machine at time 0.
     fn start(&self, tick_ns: u64, seed: u64) -> Result<(Simulation, Option<Box<Machine>>), InvalidParameter> {
         let setup = Setup { tick_ns, seed, ..self.setup.clone() };
         let machine = |parameters| Machine::new(parameters, &setup.start, seed).map(Box::new);
@@ -216,7 +216,7 @@ impl ActiveDevice for RunningFlotor {
 
     fn write(&mut self, _tick: &Tick, wrench: &flotor_hal::Wrench) -> Cycle {
         let asked = Wrench { force_n: wrench.force(), torque_nm: wrench.torque() };
-        // The coils give what they can: the host has limited the wrench already, another caller may not have.
+        // The host has limited the wrench already; another caller may not have.
         self.held = match (&self.machine, asked.is_finite()) {
             (_, false) => Wrench::ZERO,
             (Some(_), true) => {
@@ -271,7 +271,7 @@ impl RunningFlotor {
 }
 
 impl IndependentStopDevice for SimulatedFlotor {
-    /// It is a part of the host's process, and gone with it.
+    /// Returns a stop without its own means: the device is part of the host's process and ends with it.
     fn independent_stop(&self) -> IndependentStop {
         IndependentStop::by_itself(StoppedState::Zero, 0)
     }

@@ -1,13 +1,13 @@
-//! Samples taken at even times of the machine's clock: the simulated flotor as a device that sets the pace.
+//! Sampling at a fixed rate by the machine's clock, for a loop paced by the simulated flotor.
 
 use flotor_hal::SampleWait;
 use std::time::{Duration, Instant};
 
-/// Takes a sample every period from the first wait on.
+/// Clock with a sample every period from the first wait on.
 pub(crate) struct SampleClock {
     period: Duration,
     started: Option<Instant>,
-    /// Samples that a wait has told of.
+    /// Samples reported by earlier waits.
     told: u64,
 }
 
@@ -16,7 +16,7 @@ impl SampleClock {
         Self { period: Duration::from_nanos(period_ns.max(1)), started: None, told: 0 }
     }
 
-    /// Sleeps until there is a sample nobody was told of, or for `timeout`.
+    /// Sleeps until an unreported sample is available, or until `timeout`.
     pub(crate) fn wait(&mut self, timeout: Duration) -> SampleWait {
         let since = self.started.get_or_insert_with(Instant::now).elapsed();
         let next = Duration::from_nanos(self.nanoseconds(self.told + 1));

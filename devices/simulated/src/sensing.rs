@@ -1,17 +1,16 @@
-//! From the true motion to the sample the controller sees: light spots, noise, steps, delay, velocity.
+//! Conversion of the true motion to the controller's sample: light spots, noise, steps, delay, velocity.
 //!
-//! Three light-emitting diodes on the flotor are imaged on three position cells of the frame. Two coordinates
-//! each make six numbers, from which the pose is found by iteration:
-//!
+//! Three light-emitting diodes on the flotor are imaged on three position cells of the frame. Two coordinates each make six
+//! numbers, from which the pose is found by iteration:
 //! ```text
 //! pose -> light spots -> bandwidth -> edge nonlinearity -> noise -> steps -> pose found -> delay -> velocity
 //! ```
 //!
-//! - [`optics`]: where the diodes are, where their spots fall, and the pose back from six numbers.
-//! - [`velocity`]: three estimates of velocity from a row of poses.
+//! - [`optics`]: layout of the diodes, light spots of a pose, pose from six spot coordinates.
+//! - [`velocity`]: three estimators of velocity from a sequence of poses.
 //!
-//! Nothing of the errors is known to the pose finder, as nothing of them is to the machine's. Positions of
-//! noise and steps are meant at the diode; the lens shrinks them for the cell.
+//! The pose finder corrects none of the errors, like that of the real machine. Sizes of noise and steps are given at the
+//! diode; the lens scales them to the cell.
 
 pub mod optics;
 pub mod velocity;
@@ -25,32 +24,32 @@ use flotor_hal::glam::DVec3;
 use optics::{Optics, OpticsGeometry, Spots};
 use velocity::{Estimator, EstimatorKind, Velocity};
 
-/// Samples that are kept: 32 ms at 10 kHz, the newest and one more for a late sample.
+/// Number of stored samples: 32 ms at 10 kHz, the newest and one more for a late sample.
 const KEPT_SAMPLES: usize = 322;
 
-/// What the sensing is built from.
+/// Parameters of the sensing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensingParameters {
-    /// Where diodes, lenses and cells are.
+    /// Layout of diodes, lenses and cells.
     pub geometry: OpticsGeometry,
     /// Noise of each coordinate, root mean square at the diode, m.
     pub noise_m: f64,
-    /// Step of the converters, at the diode, m; 0 for none.
+    /// Quantisation step of the converters, at the diode, m; 0 for none.
     pub step_m: f64,
-    /// Error of a cell at its edge, as a share of its half width: it grows with the cube of the distance.
+    /// Error of a cell at its edge, as a fraction of its half width; grows with the cube of the distance.
     pub edge_nonlinearity: f64,
     /// Bandwidth of cells and amplifiers, Hz; 0 for no limit.
     pub bandwidth_hz: f64,
     /// Time between a sample and its arrival, ns, at most 32 ms at 10 kHz.
     pub latency_ns: u64,
-    /// How velocity is estimated.
+    /// Velocity estimator.
     pub estimator: EstimatorKind,
 }
 
 impl SensingParameters {
-    /// The commercial device: steps of 2 µm (brochure); noise of 1 µm, edge error of 1 % and one tick of delay
-    /// are usual for lateral-effect cells and a bus, not published. Velocity as the University of Utah's
-    /// control program: a low-pass of 200 Hz.
+    /// The commercial device: steps of 2 µm (brochure); noise of 1 µm, edge error of 1 % and one tick of delay are usual
+    /// for lateral-effect cells and a bus, not published. Velocity as in the University of Utah's control program: a
+    /// low-pass of 200 Hz.
     pub const MAGLEV: Self = Self {
         geometry: OpticsGeometry::MAGLEV,
         noise_m: 1.0e-6,
@@ -70,12 +69,12 @@ impl SensingParameters {
     }
 }
 
-/// What arrives at the controller.
+/// Sample that arrives at the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// When it was taken, ns.
+    /// Sampling time, ns.
     pub taken_ns: u64,
-    /// The pose found, or nothing if a spot left its cell or the iteration found none.
+    /// Pose; `None` if a spot left its cell or the iteration failed.
     pub pose: Option<Pose>,
     /// Estimated velocity.
     pub velocity: Velocity,
@@ -88,21 +87,21 @@ pub struct Sensing {
     optics: Optics,
     noise: Noise,
     estimator: Estimator,
-    /// Where the last pose was found: the next one is near.
+    /// Last pose found, the start of the next iteration.
     found: Pose,
     bandwidth: Option<Lag>,
-    /// Spots after the bandwidth limit; none before the first sample.
+    /// Spots after the bandwidth limit; `None` before the first sample.
     slow_spots: Option<Spots>,
-    /// The last samples, a ring.
+    /// Ring of the last samples.
     samples: [Sample; KEPT_SAMPLES],
     newest: usize,
 }
 
 impl Sensing {
-    /// Before the first sample, at a pose to start looking from. Real-time: bounded, no allocation.
+    /// Creates the sensing before its first sample; the iteration starts at `start`. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a number is not physical or the diodes do not show the pose (they stand in a line).
+    /// If a number is not physical or the diodes do not determine the pose (they stand in a line).
     pub fn new(parameters: &SensingParameters, seed: u64, start: &Pose) -> Result<Self, InvalidParameter> {
         parameters.check()?;
         let empty = Sample { taken_ns: 0, pose: Some(*start), velocity: Velocity::ZERO };
@@ -136,8 +135,8 @@ impl Sensing {
         }
     }
 
-    /// Returns how many ticks of `dt_ns` a sample waits before it arrives, and how long before the end of its tick it is
-    /// taken (ns): together the latency. Real-time: bounded, no allocation.
+    /// Returns the delay of a sample in ticks of `dt_ns`, and the time of sampling before the end of its tick (ns):
+    /// together the latency. Real-time: bounded, no allocation.
     #[must_use]
     pub fn latency(&self, dt_ns: u64) -> (usize, u64) {
         let (whole, rest_ns) = match dt_ns {
@@ -147,7 +146,7 @@ impl Sensing {
         (usize::try_from(whole).unwrap_or(usize::MAX), rest_ns)
     }
 
-    /// Returns the sample `age` ticks before the newest, or the oldest that is kept. Real-time: bounded, no allocation.
+    /// Returns the sample `age` ticks before the newest, or the oldest stored. Real-time: bounded, no allocation.
     #[must_use]
     pub fn arrived(&self, age: usize) -> Sample {
         let length = self.samples.len();
@@ -160,14 +159,14 @@ impl Sensing {
         })
     }
 
-    /// Whether the noise changes every sample: it is at least a step of the converters. Real-time: bounded, no allocation.
+    /// Returns true for noise of at least a converter step, which changes every sample. Real-time: bounded, no allocation.
     #[must_use]
     pub fn is_noisy(&self) -> bool {
         let SensingParameters { noise_m, step_m, .. } = self.parameters;
         noise_m > 0.0 && noise_m >= step_m
     }
 
-    /// The six coordinates as the converters give them; nothing if a spot is beside its cell.
+    /// Returns the six coordinates after the converters; `None` if a spot is outside its cell.
     fn measured_spots(&mut self, truth: &Pose, dt_s: f64) -> Option<Spots> {
         let mut spots = self.optics.spots(truth)?;
         if let Some(bandwidth) = &mut self.bandwidth {
@@ -197,15 +196,15 @@ impl Sensing {
     }
 }
 
-/// The nearest whole number, for sizes below 2^51: adding and taking away a number so large that its own steps
-/// are ones rounds in two instructions, where the processor's rounding is not at hand in every build.
+/// Returns the nearest integer, for magnitudes below 2^51: adding and subtracting a number with a spacing of 1 rounds in
+/// two instructions, as the processor's rounding instruction is not available in every build.
 fn nearest_whole(number: f64) -> f64 {
     const STEPS_OF_ONE: f64 = 1.5 * (1_u64 << 52) as f64;
     (number + STEPS_OF_ONE) - STEPS_OF_ONE
 }
 
 impl Pose {
-    /// Small rotation from this orientation to `other`, rad, device frame.
+    /// Returns the small rotation from this orientation to `other`, rad, device frame.
     pub(crate) fn rotation_to(&self, other: &Self) -> DVec3 {
         flotor_hal::rotation_vector(other.orientation * self.orientation.conjugate())
     }

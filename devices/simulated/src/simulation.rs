@@ -1,10 +1,9 @@
-//! Flotor, hand and energy balance on one clock: what a device needs to stand in for the machine.
+//! Flotor, hand and energy balance on one clock.
 //!
-//! The clock counts integer nanoseconds, so a run can be cut at any of them and goes on bit for bit the same
-//! way. The hand's intention is a smooth curve sampled once a millisecond and drawn straight in between, on a
-//! grid that belongs to the clock and not to the servo: ticks of any length, regular or not, meet the same
-//! hand. Each tick is cut at the grid and at the moment the hand releases the handle; within a piece the plant is exact
-//! (see `plant`).
+//! The clock counts integer nanoseconds, so a run can be interrupted at any of them and continues bit-identically. The
+//! hand's intention is a smooth curve sampled once a millisecond and interpolated linearly, on a grid of the clock instead
+//! of the servo: the hand is the same for ticks of any length, regular or not. Each tick is split at the grid and at the
+//! moment the hand releases the handle; within a piece the plant is exact (see `plant`).
 
 use crate::hand::guidance::NotGuiding;
 use crate::hand::{Aim, Follower, Guidance, Hand, Intention, Pose, Trajectory, Wavering};
@@ -14,30 +13,30 @@ use crate::validation::InvalidParameter;
 use crate::workspace::SensorRange;
 use flotor_hal::glam::DVec3;
 
-/// Longest time one call of [`Simulation::advance`] simulates, ns: ten ticks of the slowest servo (100 Hz).
-/// It bounds what a tick may cost after a delay of the host.
+/// Longest time of one call of [`Simulation::advance`], ns: ten ticks of the slowest servo (100 Hz). Bounds the cost of a
+/// tick after a delay of the host.
 pub const MAX_ADVANCE_NS: u64 = 100_000_000;
 
-/// Distance of the samples of the hand's intention, ns.
+/// Sampling interval of the hand's intention, ns.
 const GRID_NS: u64 = MAX_PIECE_NS;
 
-/// What a simulation is built from.
+/// Parameters of a simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
-    /// The flotor.
+    /// Physical parameters of the flotor.
     pub flotor: FlotorParameters,
-    /// The hand.
+    /// Impedance, intended motion and unsteadiness of the hand.
     pub hand: Hand,
-    /// Where the flotor starts.
+    /// Initial state of the flotor.
     pub start: State,
-    /// Time between two ticks if all goes well, ns. Any other works too, and costs a little more.
+    /// Nominal tick length, ns. Other lengths work too, at a slightly higher cost.
     pub tick_ns: u64,
-    /// Seed of what the hand does without meaning to.
+    /// Seed of the hand's tremor and force noise.
     pub seed: u64,
 }
 
 impl Setup {
-    /// The demo: the thesis's flotor at home in an exploring hand, at 1 kHz.
+    /// Setup of the demo: the thesis's flotor at home in an exploring hand, at 1 kHz.
     pub const DEMO: Self = Self {
         flotor: FlotorParameters::THESIS,
         hand: Hand::EXPLORING,
@@ -47,20 +46,19 @@ impl Setup {
     };
 }
 
-/// What went wrong during a tick. Nothing here stops the simulation.
+/// Incidents of a tick. None stops the simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Incidents {
-    /// The wrench held a NaN or an infinity; the coils gave nothing instead.
+    /// The wrench contained a NaN or an infinity; the coils delivered zero instead.
     pub wrench_rejected: bool,
-    /// The motion left every physical range; the flotor was stopped where it was and a new energy balance
-    /// began.
+    /// The motion exceeded the physical limits; the flotor was stopped at its pose and a new energy balance began.
     pub stopped: bool,
-    /// The tick was longer than [`MAX_ADVANCE_NS`]; only that much was simulated.
+    /// The tick was longer than [`MAX_ADVANCE_NS`]; only that time was simulated.
     pub cut_short: bool,
 }
 
 impl Incidents {
-    /// True if nothing went wrong. Real-time: bounded, no allocation.
+    /// Returns true if no incident occurred. Real-time: bounded, no allocation.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
@@ -80,10 +78,10 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// A simulation at time 0. Not real-time.
+    /// Creates a simulation at time 0. Not real-time.
     ///
     /// # Errors
-    /// If a parameter is not physical; the error names it.
+    /// If a parameter is not physical; the error contains its name.
     pub fn new(setup: &Setup) -> Result<Self, InvalidParameter> {
         let plant = plant(setup, &setup.start)?;
         let wavering = Wavering::new(setup.hand.unsteadiness, setup.seed);
@@ -98,7 +96,7 @@ impl Simulation {
         })
     }
 
-    /// Back to the start: time 0, first state, new energy balance. Real-time: bounded, no allocation.
+    /// Resets to the start: time 0, first state, new energy balance. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.plant.place(&self.setup.start);
         self.ledger = Ledger::open(self.plant.energy());
@@ -107,12 +105,12 @@ impl Simulation {
         self.stroke = Stroke::at(0, &self.setup.hand.trajectory, &self.wavering);
     }
 
-    /// Replaces the hand from now on; its trajectory keeps counting from the start of the run.
+    /// Replaces the hand from now on; the times of its trajectory count from the start of the run.
     ///
     /// Not real-time.
     ///
     /// # Errors
-    /// If a parameter is not physical; the hand then stays as it was.
+    /// If a parameter is not physical; the old hand then continues.
     pub fn set_hand(&mut self, hand: Hand) -> Result<(), InvalidParameter> {
         let setup = Setup { hand, ..self.setup.clone() };
         self.plant = plant(&setup, &self.plant.state())?;
@@ -123,7 +121,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Lets the client `guide` take the hand (see [`guidance`](crate::hand::guidance)), or keep it; 0 releases the hand.
+    /// Takes or holds the hand for the client `guide` (see [`guidance`](crate::hand::guidance)); 0 releases the hand.
     /// Real-time: bounded, no allocation.
     ///
     /// # Errors
@@ -141,23 +139,23 @@ impl Simulation {
         self.guidance.aim_at(axis, target_m, self.time_ns)
     }
 
-    /// Number of the client that guides the hand; 0 for none. Real-time: bounded, no allocation.
+    /// Returns the number of the guiding client; 0 for none. Real-time: bounded, no allocation.
     #[must_use]
     pub fn guided_by(&self) -> f64 {
         self.guidance.guide()
     }
 
-    /// Moves on by `dt_ns` under a coil wrench that is constant over that time (zero-order hold).
+    /// Advances by `dt_ns` under a coil wrench that is constant over that time (zero-order hold).
     ///
-    /// Splitting a tick changes nothing but rounding in translation and the Runge-Kutta error in rotation.
-    /// Total: a wrench that is not finite counts as none. Real-time: bounded, no allocation.
+    /// Splitting a tick changes nothing but rounding in translation and the Runge-Kutta error in rotation. A non-finite
+    /// wrench counts as zero. Real-time: bounded, no allocation.
     pub fn advance(&mut self, dt_ns: u64, coils: Wrench) -> Incidents {
         let wrench_rejected = !coils.is_finite();
         let coils = if wrench_rejected { &Wrench::ZERO } else { &coils };
         Incidents { wrench_rejected, ..self.advance_under(dt_ns, coils) }
     }
 
-    /// [`Self::advance`] with a finite wrench that stays where it is: a copy would have to be in memory before
+    /// Advances like [`Self::advance`], under a finite wrench passed by reference: a copy would have to be in memory before
     /// the motion starts.
     #[inline]
     pub(crate) fn advance_under(&mut self, dt_ns: u64, coils: &Wrench) -> Incidents {
@@ -178,46 +176,45 @@ impl Simulation {
         incidents
     }
 
-    /// Time since the start, ns. Real-time: bounded, no allocation.
+    /// Returns the time since the start, ns. Real-time: bounded, no allocation.
     #[must_use]
     pub fn time_ns(&self) -> u64 {
         self.time_ns
     }
 
-    /// Pose and velocity of the flotor now. Real-time: bounded, no allocation.
+    /// Returns the present pose and velocity of the flotor. Real-time: bounded, no allocation.
     #[must_use]
     pub fn state(&self) -> State {
         self.plant.state()
     }
 
-    /// Whether the sensors see the flotor now. Real-time: bounded, no allocation.
+    /// Returns the present visibility of the flotor to the sensors. Real-time: bounded, no allocation.
     #[must_use]
     pub fn sensor_range(&self) -> SensorRange {
         let state = self.plant.state();
         SensorRange::of(state.position_m, state.orientation)
     }
 
-    /// What the trajectory of the hand aims at now; nothing while it is off the handle. Real-time: bounded, no allocation.
+    /// Returns the trajectory's present aim; `None` while the hand is off the handle. Real-time: bounded, no allocation.
     #[must_use]
     pub fn aim(&self) -> Option<Aim> {
         self.setup.hand.trajectory.aim(self.time_ns)
     }
 
-    /// Energy balance since the start. Real-time: bounded, no allocation.
+    /// Returns the energy balance since the start. Real-time: bounded, no allocation.
     #[must_use]
     pub fn ledger(&self) -> &Ledger {
         &self.ledger
     }
 
-    /// What the simulation was built from, with the hand of the latest [`Self::set_hand`]. Real-time:
-    /// bounded, no allocation.
+    /// Returns the setup, with the hand of the latest [`Self::set_hand`]. Real-time: bounded, no allocation.
     #[must_use]
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
 
-    /// Length of the piece that starts now, ns, and the intention of the hand meanwhile; nothing while it is off the
-    /// handle. It lasts to the tick's end, the next grid point, or the moment the hand releases the handle.
+    /// Returns the length of the next piece, ns, and the intention of the hand during the piece; `None` while the hand is
+    /// off the handle. A piece ends with the tick, at the next grid point, or when the hand releases the handle.
     #[inline]
     fn next_piece(&mut self, tick_end_ns: u64) -> (u64, Option<Intention>) {
         let trajectory = &self.setup.hand.trajectory;
@@ -240,28 +237,28 @@ impl Simulation {
     }
 }
 
-/// Flotor and hand of a setup, the flotor in `state`.
+/// Creates the plant of a setup, with the flotor in `state`.
 fn plant(setup: &Setup, state: &State) -> Result<Plant, InvalidParameter> {
     let Setup { flotor, hand, tick_ns, .. } = setup;
     hand.check()?;
     Plant::yielding(flotor, &hand.impedance, &hand.trajectory.yieldings(), state, *tick_ns)
 }
 
-/// What the hand aims at between two grid points of the clock.
+/// Aims of the hand at two adjacent grid points of the clock.
 #[derive(Clone, Copy, Debug)]
 struct Stroke {
     start_ns: u64,
     end_ns: u64,
     start: Option<Aim>,
     end: Option<Aim>,
-    /// Whether a guide has a share in it: a release that the trajectory plans is then not made.
+    /// True while a guide moves the hand: a planned release of the trajectory is then skipped.
     is_guided: bool,
-    /// Under a guide: what the trajectory would aim at at the end.
+    /// Aim of the trajectory at the end, without the guide.
     scripted: Option<Aim>,
 }
 
 impl Stroke {
-    /// The stroke under way at a time.
+    /// Returns the stroke that contains a time.
     fn at(time_ns: u64, trajectory: &Trajectory, wavering: &Wavering) -> Self {
         let start_ns = time_ns - time_ns % GRID_NS;
         let end_ns = start_ns.saturating_add(GRID_NS);
@@ -269,8 +266,8 @@ impl Stroke {
         Self { start_ns, end_ns, start: aim(start_ns), end: aim(end_ns), is_guided: false, scripted: None }
     }
 
-    /// On to the next stroke, which starts where this one ends: their common grid point is evaluated once.
-    #[inline(never)] // what calls it would keep all its numbers in memory over the sine
+    /// Advances to the next stroke, which starts at the end of this one: their common grid point is evaluated once.
+    #[inline(never)] // inlined, the sine would force the caller's numbers into memory
     fn go_on(&mut self, trajectory: &Trajectory, wavering: &Wavering) {
         (self.start_ns, self.start) = (self.end_ns, self.end);
         self.end_ns = self.end_ns.saturating_add(GRID_NS);
@@ -278,16 +275,16 @@ impl Stroke {
         self.is_guided = false;
     }
 
-    /// Lets the guide move the end of this stroke, at whose start the handle is in `state`.
+    /// Moves the end of this stroke by the guide; the handle is in `state` at its start.
     #[cold] // hands mostly follow their trajectory
     fn be_guided(&mut self, guidance: &mut Guidance, state: &State) {
         let (scripted, dt_s) = (self.end, seconds(GRID_NS));
         let (end, velocity_m_per_s) = guidance.advance(self.end_ns, dt_s, scripted, &Follower::of(state));
         (self.end, self.is_guided) = (end, !guidance.is_free());
         if guidance.is_free() {
-            self.start = self.scripted; // the trajectory goes on as if there had been no guide
+            self.start = self.scripted; // the trajectory continues as without a guide
         } else if let (Some(start), Some(end), Some(scripted)) = (&mut self.start, end, scripted) {
-            // Where a force is meant, the intended position goes with the handle and the damper of the hand does not.
+            // For an intended force the intended position follows the handle; the damper of the hand does not.
             let from_m = end.pose.position_m - velocity_m_per_s * dt_s;
             start.pose.position_m = DVec3::select(scripted.yielding, from_m, start.pose.position_m);
         }
@@ -295,7 +292,7 @@ impl Stroke {
     }
 
     /// Returns the intended motion of the hand at the end of the stroke, where a guide begins. Without a grip, the motion of the handle.
-    #[cold] // a client takes the hand seldom
+    #[cold] // clients take the hand rarely
     fn follower(&self, state: &State) -> Follower {
         self.drawn(self.end_ns).map_or_else(
             || Follower::of(state),
@@ -306,16 +303,16 @@ impl Stroke {
         )
     }
 
-    /// What an unsteady hand aims at at a time.
+    /// Returns the aim of an unsteady hand at a time.
     #[inline]
     fn aim(time_ns: u64, trajectory: &Trajectory, wavering: &Wavering) -> Option<Aim> {
         let aim = trajectory.aim(time_ns)?;
         Some(wavered(&aim, wavering, seconds(time_ns)))
     }
 
-    /// The aim at a time during the stroke, drawn straight to its end: position on the chord with
-    /// its slope as velocity; orientation and force, which the plant takes as constant, halfway. Where the hand
-    /// releases the handle before the end it stays.
+    /// Interpolates the aim linearly at a time during the stroke: position on the chord with its slope as velocity;
+    /// orientation and force, constant for the plant, at the midpoint. Constant if the hand releases the handle before the
+    /// end.
     #[inline(always)]
     fn drawn(&self, time_ns: u64) -> Option<Intention> {
         let start = self.start?;
@@ -336,7 +333,7 @@ impl Stroke {
     }
 }
 
-/// An aim as an unsteady hand has it.
+/// Returns an aim with tremor and force noise.
 #[inline]
 fn wavered(aim: &Aim, wavering: &Wavering, time_s: f64) -> Aim {
     let pose = Pose { position_m: aim.pose.position_m + wavering.offset_m(time_s), ..aim.pose };

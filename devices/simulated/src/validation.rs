@@ -1,12 +1,12 @@
-//! Checks of physical parameters, before anything moves.
+//! Validation of physical parameters before the simulation starts.
 //!
-//! A mass that is negative or a stiffness that is NaN is refused by name when the device is opened, so that
-//! the equations of motion never meet one.
+//! A negative mass or a stiffness of NaN is rejected by name when the device is opened, so that the equations of motion
+//! never contain one.
 
 use flotor_hal::glam::DVec3;
 use std::fmt;
 
-/// Why a parameter was refused.
+/// Reason for the rejection of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InvalidParameter {
     /// NaN or infinite.
@@ -14,21 +14,21 @@ pub enum InvalidParameter {
         /// Name of the parameter, unit included.
         name: &'static str,
     },
-    /// Zero or negative where only a positive number makes sense.
+    /// Zero or negative where only positive numbers are valid.
     NotPositive {
         /// Name of the parameter, unit included.
         name: &'static str,
         /// The value given.
         value: f64,
     },
-    /// Negative where zero is the least.
+    /// Negative where zero is the minimum.
     Negative {
         /// Name of the parameter, unit included.
         name: &'static str,
         /// The value given.
         value: f64,
     },
-    /// One principal moment of inertia exceeds the sum of the other two: no body has that.
+    /// A principal moment of inertia above the sum of the other two, impossible for any body.
     ImpossibleInertia {
         /// The principal moments given, kg m^2.
         principal_kg_m2: DVec3,
@@ -37,18 +37,18 @@ pub enum InvalidParameter {
     NotARotation {
         /// Name of the parameter.
         name: &'static str,
-        /// Its length.
+        /// Length of the quaternion.
         length: f64,
     },
     /// Six coils that cannot push in all six directions.
     DependentCoils,
-    /// Three diodes that do not show all six coordinates of a pose.
+    /// Three diodes that do not determine all six coordinates of a pose.
     DiodesInALine,
-    /// Flotor and hand would move faster than the integrator resolves.
+    /// Rates of flotor and hand above the resolution of the integrator.
     TooStiff {
-        /// Steps per millisecond the mechanism would need.
+        /// Required steps per millisecond.
         steps_per_ms: f64,
-        /// The most that are taken.
+        /// Largest number of steps per millisecond.
         limit: f64,
     },
 }
@@ -96,10 +96,10 @@ impl fmt::Display for InvalidParameter {
 
 impl std::error::Error for InvalidParameter {}
 
-/// Verdict on one parameter.
+/// Result of a check.
 pub(crate) type Check = Result<(), InvalidParameter>;
 
-/// What numbers a parameter may take.
+/// Valid range of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Domain {
     /// Any finite number.
@@ -113,7 +113,7 @@ pub(crate) enum Domain {
 /// Checks one number against its domain. Real-time: bounded, no allocation.
 ///
 /// # Errors
-/// Names the parameter and what is wrong with it.
+/// If the value is outside its domain; the error contains the name.
 pub(crate) fn number(name: &'static str, value: f64, domain: Domain) -> Check {
     match domain {
         _ if !value.is_finite() => Err(InvalidParameter::NotFinite { name }),
@@ -126,7 +126,7 @@ pub(crate) fn number(name: &'static str, value: f64, domain: Domain) -> Check {
 /// Checks every component of a vector against one domain. Real-time: bounded, no allocation.
 ///
 /// # Errors
-/// Names the parameter and what is wrong with it.
+/// If a component is outside its domain; the error contains the name.
 pub(crate) fn vector(name: &'static str, value: DVec3, domain: Domain) -> Check {
     value.to_array().into_iter().try_for_each(|component| number(name, component, domain))
 }

@@ -1,42 +1,41 @@
-//! What the magnetic-levitation haptic device can reach and exert: published numbers, as constants.
+//! Range of motion and force limits of the magnetic-levitation haptic device: published numbers, as constants.
 //!
 //! Source throughout: Varadharajan 2007 (CMU-RI-TR-07-21), section 2, unless a constant says otherwise.
 
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::math;
 
-/// Translation the sensors see, in all directions about the origin, m (thesis section 2: ±12 mm).
+/// Range of translation of the sensors, in all directions about the origin, m (thesis section 2: ±12 mm).
 pub const TRANSLATION_RANGE_M: f64 = 12.0e-3;
 
-/// Rotation the sensors see, in all directions, rad (thesis section 2: ±7 degrees).
+/// Range of rotation of the sensors, in all directions, rad (thesis section 2: ±7 degrees).
 pub const ROTATION_RANGE_RAD: f64 = 7.0 * std::f64::consts::PI / 180.0;
 
-/// Largest force of each axis, N. The thesis (section 2) gives 55 to 140 N "depending on the axis" and does
-/// not say which; the vertical is taken as the strong one, as in any six-coil bowl that meets both numbers.
+/// Largest force of each axis, N. The thesis (section 2) gives 55 to 140 N "depending on the axis", without the axes; the
+/// vertical is assumed to be the strong one, as in any six-coil bowl that meets both numbers.
 pub const FORCE_LIMIT_N: DVec3 = DVec3::new(55.0, 55.0, 140.0);
 
-/// Largest torque of each axis, N·m. The thesis (section 2) gives 6.3 to 12.2 N·m; yaw is taken as the strong
-/// one.
+/// Largest torque of each axis, N·m. The thesis (section 2) gives 6.3 to 12.2 N·m; yaw is assumed to be the strong axis.
 pub const TORQUE_LIMIT_NM: DVec3 = DVec3::new(6.3, 6.3, 12.2);
 
-/// Largest stiffness a contact is rendered with in translation, N/m (thesis section 2: about 25 N/mm).
+/// Largest stiffness of a rendered contact in translation, N/m (thesis section 2: about 25 N/mm).
 pub const STIFFNESS_LIMIT_N_PER_M: f64 = 25.0e3;
 
-/// Largest stiffness a contact is rendered with in rotation, N·m/rad (thesis section 2).
+/// Largest stiffness of a rendered contact in rotation, N·m/rad (thesis section 2).
 pub const ROTATIONAL_STIFFNESS_LIMIT_NM_PER_RAD: f64 = 50.0;
 
-/// Whether the sensors see the flotor.
+/// Visibility of the flotor to the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorRange {
     /// All three light spots are on their cells.
     Inside,
-    /// The flotor left the range: its pose is not to be trusted.
+    /// The flotor left the range: its pose is invalid.
     Outside,
 }
 
 impl SensorRange {
-    /// Judges a pose: `position_m` of the flotor frame's origin and `orientation` (unit, flotor to device
-    /// frame), both in the device frame. A pose that is not finite is outside.
+    /// Classifies a pose: `position_m` of the flotor frame's origin and `orientation` (unit, flotor to device frame), both
+    /// in the device frame. A non-finite pose is outside.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]

@@ -1,15 +1,15 @@
-//! 3Dconnexion's SpaceMouse and its relatives: six axes in, no force out.
+//! Device plugin for 3Dconnexion's SpaceMouse and its relatives: six axes in, no force out.
 //!
-//! The puck springs back to where it was; how far it is pushed says how fast the pose moves. A tick takes all reports
-//! that have come, remembers the newest deflection and moves the pose on:
+//! The puck springs back to its rest position; its deflection sets the speed of the pose. A tick reads all pending reports,
+//! stores the newest deflection and moves the pose:
 //!
 //! ```text
 //! report bytes -> Report -> Deflection -> speed -> pose, inside its range
 //! ```
 //!
-//! - [`report`]: the bytes of the puck, and nothing else.
+//! - [`report`]: parser of the puck's reports.
 //! - [`motion`]: from deflection to pose.
-//! - [`source`]: where reports come from: hidapi, or a list in a test.
+//! - [`source`]: source of reports: hidapi, or a list in a test.
 //! - `plugin`: parameters and the contract.
 
 pub mod motion;

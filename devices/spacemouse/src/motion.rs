@@ -1,28 +1,28 @@
-//! From how far the puck is pushed to where the handle is.
+//! Motion of the handle from the deflection of the puck.
 //!
 //! Deflection is speed: at full deflection the pose moves at its greatest speed, in between in proportion, and not at
-//! all inside the dead zone, which hides the noise of a puck that is let go. Position and rotation stay inside a ball
-//! each; at its surface motion goes on along it.
+//! all inside the dead zone, which hides the noise of a released puck. Position and rotation stay inside a ball
+//! each; at its surface motion continues along it.
 
 use crate::report::{FULL_DEFLECTION, Report};
 use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 
-/// How deflection moves the pose.
+/// Gains and limits from deflection to motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Speed at full deflection, m/s.
     pub speed_m_per_s: f64,
     /// Angular speed at full deflection, rad/s.
     pub spin_rad_per_s: f64,
-    /// Share of the full deflection that counts as none.
+    /// Dead zone, as a fraction of the full deflection.
     pub dead_zone: f64,
-    /// Farthest from home, m.
+    /// Limit on the distance from home, m.
     pub range_m: f64,
-    /// Farthest from home, rad.
+    /// Limit on the rotation from home, rad.
     pub range_rad: f64,
 }
 
-/// How far the puck is pushed, as shares of full deflection in the host's frame (x right, y away from the user, z up).
+/// Deflection of the puck, as fractions of full deflection in the host's frame (x right, y away from the user, z up).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deflection {
     translation: DVec3,
@@ -30,7 +30,7 @@ pub struct Deflection {
 }
 
 impl Deflection {
-    /// Takes what a report says. Real-time: bounded, no allocation.
+    /// Updates the deflection from a report. Real-time: bounded, no allocation.
     pub fn update(&mut self, report: &Report) {
         match report {
             Report::Translation(axes) => self.translation = share(*axes),
@@ -43,23 +43,23 @@ impl Deflection {
     }
 }
 
-/// The puck's axes (y towards the user, z down) are the host's turned half round x; rotations turn likewise.
+/// Converts axes of the puck (y towards the user, z down) to fractions in the host's frame, half a turn about x; rotations likewise.
 fn share([x, y, z]: [i16; 3]) -> DVec3 {
     let full = f64::from(FULL_DEFLECTION);
     let share = DVec3::new(f64::from(x), -f64::from(y), -f64::from(z)) / full;
     share.clamp(DVec3::splat(-1.0), DVec3::splat(1.0))
 }
 
-/// What the puck asks for in a tick.
+/// Motion requested in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotionRequest {
-    /// Move as it is pushed.
+    /// Move with the deflection.
     Follow(Deflection),
     /// Go home, at full speed.
     Home,
 }
 
-/// Where the handle is.
+/// Pose of the handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     position_m: DVec3,
@@ -73,7 +73,7 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// Moves on for a time; the velocity is that of the motion made, limits included. Real-time: bounded, no allocation.
+    /// Advances the pose by a time step; returns the velocity of the actual motion, limits included. Real-time: bounded, no allocation.
     pub fn advance(&mut self, request: &MotionRequest, gains: &Gains, dt_s: f64) -> Twist {
         if dt_s <= 0.0 {
             return Twist::ZERO;
@@ -99,7 +99,7 @@ impl Motion {
         Twist::new((self.position_m - before.position_m) / dt_s, turned_rad / dt_s)
     }
 
-    /// Where the handle is. Real-time: bounded, no allocation.
+    /// Returns the pose of the handle. Real-time: bounded, no allocation.
     #[must_use]
     pub fn pose(&self) -> Pose {
         Pose::new(self.position_m, self.orientation)
@@ -107,7 +107,7 @@ impl Motion {
 }
 
 impl Gains {
-    /// Each axis from 0 at the edge of the dead zone to 1 at full deflection.
+    /// Scales each axis from 0 at the edge of the dead zone to 1 at full deflection.
     fn past_dead_zone(&self, share: DVec3) -> DVec3 {
         let beyond = (share.abs() - self.dead_zone).max(DVec3::ZERO) / (1.0 - self.dead_zone);
         beyond * share.signum()

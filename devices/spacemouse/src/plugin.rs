@@ -1,4 +1,4 @@
-//! The puck as a plugin: pose in, no force out.
+//! Implementation of the device contract for the puck: pose in, no force out.
 
 use crate::motion::{Deflection, Gains, Motion, MotionRequest};
 use crate::platform::PATH_HELP;
@@ -9,9 +9,9 @@ use flotor_hal::{
     NothingToStop, OutOfRange, Parameter, Refusal, Settings, Tick, Wrench, export_device,
 };
 
-/// Reports taken in a tick: a puck sends one or two every 8 ms or slower. What is beyond comes in the next tick.
+/// Limit on reports read in a tick: a puck sends one or two every 8 ms or slower. Further reports wait for the next tick.
 const REPORTS_PER_TICK: usize = 8;
-/// A longer time between two ticks is not caught up, s: the pose stands still instead.
+/// Longest time step of the motion, s: after a longer pause the pose does not catch up.
 const LONGEST_TIME_S: f64 = 0.1;
 
 const SPEED: usize = 0;
@@ -37,7 +37,7 @@ const SCHEMA: &[Parameter] = &[
     Parameter::text("path", PATH_HELP),
 ];
 
-/// What of the parameters is in force.
+/// Current parameter values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Values([f64; SCHEMA.len()]);
 
@@ -61,7 +61,7 @@ impl Values {
         }
     }
 
-    /// The bit of the button that brings the pose home.
+    /// Returns the bit mask of the button that brings the pose home; 0 for none.
     fn home_bit(&self) -> u32 {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: 0 to 32
         let button = self.0[HOME_BUTTON] as u32;
@@ -69,13 +69,13 @@ impl Values {
     }
 }
 
-/// A puck, opened: its reports are ours. The source is a parameter so that tests bring their own.
+/// Opened puck. The source of reports is a type parameter so that tests can supply their own.
 pub struct SpaceMouse<S = HidPuck> {
     source: S,
     values: Values,
 }
 
-/// A puck whose reports move the pose.
+/// Active puck whose reports move the pose.
 pub struct OpenPuck<S = HidPuck> {
     opened: SpaceMouse<S>,
     deflection: Deflection,
@@ -84,7 +84,7 @@ pub struct OpenPuck<S = HidPuck> {
 }
 
 impl<S: Reports> SpaceMouse<S> {
-    /// The pose follows from now on, from home.
+    /// Starts the motion of the pose from home.
     fn follow(self) -> OpenPuck<S> {
         OpenPuck { opened: self, deflection: Deflection::default(), motion: Motion::default(), buttons: 0 }
     }
@@ -107,7 +107,7 @@ impl Device for SpaceMouse {
             sensed: Axes::ALL,
             range_m: [range_m; 3],
             range_rad: [range_rad; 3],
-            // A report every 8 ms and slower.
+            // A report every 8 ms or slower.
             latency_s: 8.0e-3,
             ..Capabilities::UNDRIVEN
         }

@@ -1,4 +1,4 @@
-//! HID reports of a puck, as bytes. No input or output here.
+//! Parser of the puck's HID reports. No I/O here.
 //!
 //! | First byte | Then | Meaning |
 //! |---|---|---|
@@ -10,33 +10,33 @@
 //! Numbers are little-endian. The descriptor of the SpaceNavigator (256f:c635 is its emulation in this crate's tests) gives
 //! ±350 as the logical range. The axes are those of the HID usage tables (page 1, usages 30 to 35 hex): x to the
 //! right, y towards the user, z down, rotations about them by the right-hand rule. Other reports (battery, keys by
-//! code) are left alone.
+//! code) are ignored.
 
-/// Deflection along and about an axis at which a puck is at its stop.
+/// Reading along or about an axis at the mechanical stop.
 pub const FULL_DEFLECTION: i16 = 350;
 
-/// One report.
+/// Parsed report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Report {
-    /// Translation.
+    /// Translation x, y, z alone.
     Translation([i16; 3]),
-    /// Rotation.
+    /// Rotation x, y, z alone.
     Rotation([i16; 3]),
-    /// Both at once.
+    /// Translation and rotation in one report.
     Motion {
-        /// Translation.
+        /// Translation x, y, z.
         translation: [i16; 3],
-        /// Rotation.
+        /// Rotation x, y, z.
         rotation: [i16; 3],
     },
-    /// Buttons, one bit each; those beyond 32 are left out.
+    /// Buttons, one bit each; those beyond 32 are dropped.
     Buttons(u32),
-    /// Something else, or too short.
+    /// Report of another kind, or too short.
     Other,
 }
 
 impl Report {
-    /// Reads a report with its number in front. Real-time: bounded, no allocation.
+    /// Parses a report that begins with its number. Real-time: bounded, no allocation.
     #[must_use]
     pub fn parse(bytes: &[u8]) -> Self {
         match bytes {

@@ -1,49 +1,49 @@
-//! Where reports come from.
+//! Sources of reports.
 
 use crate::platform::{ACCESS_REMEDY, PATH_EXAMPLE, is_refused};
 use flotor_hal::Refusal;
 use hidapi::{HidApi, HidDevice, HidError};
 
-/// Vendor numbers: 3Dconnexion, and Logitech, which sold the older ones.
+/// USB vendors: 3Dconnexion, and Logitech, which sold the older pucks.
 const VENDORS: [u16; 2] = [0x256f, 0x046d];
-/// Product numbers of Logitech that are 3Dconnexion's: from the SpaceMouse Plus (c603) to the SpaceMouse Pro (c62b).
+/// Logitech products that are 3Dconnexion's pucks: from the SpaceMouse Plus (c603) to the SpaceMouse Pro (c62b).
 const PRODUCTS_OF_LOGITECH: std::ops::RangeInclusive<u16> = 0xc603..=0xc62b;
-/// What a six-axis puck is in the HID usage tables: a multi-axis controller of the generic desktop page.
+/// HID usage of a six-axis puck: a multi-axis controller of the generic desktop page.
 const PAGE: u16 = 0x01;
 const MULTI_AXIS_CONTROLLER: u16 = 0x08;
 
-/// Longest report that is looked at.
+/// Buffer size of a report, bytes.
 pub const REPORT_BYTES: usize = 64;
 
 /// The puck is gone: unplugged, or switched off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gone;
 
-/// Something that gives reports.
+/// Source of reports.
 pub trait Reports: Send + 'static {
-    /// The next report that has come, and its length; 0 for none. Real-time: bounded, no allocation; one call of the
+    /// Reads the next pending report and returns its length; 0 without one. Real-time: bounded, no allocation; one call of the
     /// system.
     ///
     /// # Errors
-    /// [`Gone`].
+    /// If the puck is gone.
     fn next(&mut self, report: &mut [u8; REPORT_BYTES]) -> Result<usize, Gone>;
 }
 
-/// A puck at a HID device of the system.
+/// Puck opened as a HID device of the system.
 pub struct HidPuck(HidDevice);
 
 impl HidPuck {
     /// Opens the puck at a device path, or the first puck found. Not real-time.
     ///
     /// # Errors
-    /// A [`Refusal`] that says what is there and what to do.
+    /// A [`Refusal`] with the cause and the remedy.
     pub fn open(path: Option<&str>) -> Result<Self, Refusal> {
         let api = HidApi::new().map_err(Refusal::resource)?;
         let puck = |info: &&hidapi::DeviceInfo| {
             let (vendor, product) = (info.vendor_id(), info.product_id());
             let ours =
                 vendor == VENDORS[0] || vendor == VENDORS[1] && PRODUCTS_OF_LOGITECH.contains(&product);
-            // The usage tells a puck from the keyboard that some of them are as well.
+            // Some pucks are a keyboard as well: the usage distinguishes them.
             ours && (info.usage_page(), info.usage()) == (PAGE, MULTI_AXIS_CONTROLLER)
         };
         let path = match path {
@@ -70,7 +70,7 @@ fn refused(path: &str, error: &HidError) -> Refusal {
 
 impl Reports for HidPuck {
     fn next(&mut self, report: &mut [u8; REPORT_BYTES]) -> Result<usize, Gone> {
-        // Every error of reading is a puck that is gone: hidapi has only words for it.
+        // Any read error means a disconnected puck: hidapi returns no error code.
         self.0.read_timeout(report, 0).map_err(|_| Gone)
     }
 }

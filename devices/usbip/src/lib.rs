@@ -1,11 +1,11 @@
-//! USB/IP between a device in software and the kernel of this machine, for emulators of devices.
+//! USB/IP connection between an emulated device and the kernel of this machine.
 //!
 //! ```text
 //! program -> libusb, hidraw or tty -> kernel -> vhci_hcd ~ USB/IP on a socket ~ emulator
 //! ```
 //!
-//! - [`wire`]: the messages.
-//! - [`vhci`]: where a device is plugged in; needs the module `vhci_hcd` and the right to plug something in.
+//! - [`wire`]: encoding of the messages.
+//! - [`vhci`]: attachment of a device; needs the module `vhci_hcd` and the permission to attach.
 //!
 //! Not real-time.
 #![cfg(target_os = "linux")]

@@ -1,4 +1,4 @@
-//! The socket of the virtual cable: the kernel's `vhci_hcd`, told through sysfs.
+//! Attachment of devices to the kernel's `vhci_hcd`, through sysfs.
 
 use std::io::{self, ErrorKind};
 use std::os::fd::AsRawFd;
@@ -6,7 +6,7 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 
 const FOLDER: &str = "/sys/devices/platform/vhci_hcd.0";
-/// Speed of a device, as the kernel numbers it.
+/// USB speed of a device, as the kernel numbers it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speed {
     /// 12 Mbit/s: packets every millisecond.
@@ -17,19 +17,19 @@ pub enum Speed {
 
 /// State of a port without a device (`VDEV_ST_NULL`).
 const FREE: &str = "004";
-/// Bus number of the device's far end; any will do.
+/// Bus number of the device's far end; an arbitrary value.
 const FAR_BUS: u32 = 1 << 16;
 
-/// True if a device can be plugged in here.
+/// Returns true if the module `vhci_hcd` is loaded.
 #[must_use]
 pub fn is_available() -> bool {
     Path::new(FOLDER).join("attach").exists()
 }
 
-/// Plugs what speaks USB/IP at the other end of the stream into a free port, as a device of this speed.
+/// Attaches the USB/IP device at the other end of the stream to a free port, at this speed.
 ///
 /// # Errors
-/// What the system says: usually that the module `vhci_hcd` is not loaded, or that this user may not.
+/// Errors of the system: usually the module `vhci_hcd` is not loaded, or the user has no permission.
 pub fn attach(stream: &UnixStream, speed: Speed) -> io::Result<()> {
     let explained = |error: io::Error| {
         let hint = match error.kind() {
@@ -42,11 +42,11 @@ pub fn attach(stream: &UnixStream, speed: Speed) -> io::Result<()> {
     let status = std::fs::read_to_string(format!("{FOLDER}/status")).map_err(explained)?;
     let port = free_port(&status).ok_or_else(|| explained(ErrorKind::ResourceBusy.into()))?;
     let line = format!("{port} {} {} {}", stream.as_raw_fd(), FAR_BUS + port + 1, speed as u32);
-    // The kernel takes a reference of its own; ours ends here.
+    // The kernel takes a reference of its own; the caller may close the stream.
     std::fs::write(format!("{FOLDER}/attach"), line).map_err(explained)
 }
 
-/// The first free port up to high speed in the controller's table: `hub port sta spd dev sockfd local_busid`.
+/// Returns the first free port up to high speed in the controller's table: `hub port sta spd dev sockfd local_busid`.
 fn free_port(status: &str) -> Option<u32> {
     status.lines().find_map(|line| {
         let mut words = line.split_whitespace();

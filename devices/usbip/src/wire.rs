@@ -1,5 +1,5 @@
-//! The messages of USB/IP between a virtual host controller and a device (Linux kernel documentation,
-//! `usb/usbip_protocol`): headers of 48 bytes, big endian, some with data behind.
+//! USB/IP messages between a virtual host controller and a device (Linux kernel documentation,
+//! `usb/usbip_protocol`): headers of 48 bytes, big endian, some followed by data.
 
 use std::io::{self, Read, Write};
 
@@ -8,19 +8,19 @@ const SUBMIT: u32 = 1;
 const UNLINK: u32 = 2;
 const SUBMITTED: u32 = 3;
 const UNLINKED: u32 = 4;
-/// Longest data taken with one message: the largest transfer the kernel's drivers here make is 4 KiB.
+/// Limit on the data of one message, bytes: the largest transfer of the kernel's drivers here is 4 KiB.
 const LONGEST_DATA: usize = 1 << 20;
 
-/// Status of a transfer that the device refuses, and of one that was taken back (Linux `EPIPE`, `ECONNRESET`).
+/// Status of a stalled and of an unlinked transfer (Linux `EPIPE`, `ECONNRESET`).
 const STALLED: i32 = -32;
 const TAKEN_BACK: i32 = -104;
 
-/// What the host controller requests.
+/// Request of the host controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Message {
-    /// A transfer.
+    /// Start a transfer.
     Submit(Transfer),
-    /// Take a transfer back.
+    /// Cancel a transfer.
     Unlink {
         /// Number of this message.
         number: u32,
@@ -29,29 +29,29 @@ pub enum Message {
     },
 }
 
-/// A transfer that waits for its end.
+/// Pending transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Transfer {
-    /// Its number.
+    /// Number of the transfer.
     pub number: u32,
     /// Address of the endpoint, with the direction in bit 7.
     pub endpoint: u8,
-    /// Bytes asked for, or given.
+    /// Length requested from the device, or sent to it, bytes.
     pub length: usize,
-    /// Of a control transfer: its setup packet.
+    /// Setup packet of a control transfer.
     pub setup: [u8; 8],
-    /// What the host sent.
+    /// Data of the host; empty for transfers towards the host.
     pub data: Vec<u8>,
 }
 
-/// Bit 7 of an endpoint's address: towards the host.
+/// Direction bit of an endpoint's address: towards the host.
 pub const INPUT: u8 = 0x80;
 
 impl Message {
-    /// Reads one message.
+    /// Reads one message from a stream.
     ///
     /// # Errors
-    /// The stream's, and `InvalidData` for what is no message.
+    /// Errors of the stream; `InvalidData` for an unknown message or too much data.
     pub fn read(stream: &mut impl Read) -> io::Result<Self> {
         let mut header = [0; HEADER_BYTES];
         stream.read_exact(&mut header)?;
@@ -78,33 +78,33 @@ impl Message {
     }
 }
 
-/// Ends a transfer: with data towards the host, or all bytes of the host taken.
+/// Completes a transfer: with data towards the host, or with all bytes of the host accepted.
 ///
 /// # Errors
-/// The stream's.
+/// Errors of the stream.
 pub fn complete(stream: &mut impl Write, transfer: &Transfer, data: &[u8]) -> io::Result<()> {
     let is_input = transfer.endpoint & INPUT != 0;
     let actual = if is_input { data.len() } else { transfer.length };
     end(stream, SUBMITTED, transfer.number, 0, u32::try_from(actual).unwrap_or(0), data)
 }
 
-/// Ends a transfer the device refuses.
+/// Completes a transfer as stalled: the device refuses it.
 ///
 /// # Errors
-/// The stream's.
+/// Errors of the stream.
 pub fn stall(stream: &mut impl Write, transfer: &Transfer) -> io::Result<()> {
     end(stream, SUBMITTED, transfer.number, STALLED, 0, &[])
 }
 
-/// Says that a transfer was taken back, or that it had ended already.
+/// Replies to an unlink request: the transfer was cancelled, or had completed before.
 ///
 /// # Errors
-/// The stream's.
+/// Errors of the stream.
 pub fn unlinked(stream: &mut impl Write, number: u32, in_time: bool) -> io::Result<()> {
     end(stream, UNLINKED, number, if in_time { TAKEN_BACK } else { 0 }, 0, &[])
 }
 
-/// One write for header and data: the kernel's reader wakes up once.
+/// Writes header and data with one call, so that the kernel's reader wakes up once.
 fn end(
     stream: &mut impl Write,
     kind: u32,

@@ -1,7 +1,7 @@
-//! Between the thread of an SDK and the loop: the newest sample one way, the newest wrench the other.
+//! Data exchange between the thread of an SDK and the loop: newest sample one way, newest wrench the other.
 //!
-//! Force goes with either side. A wrench that the loop does not renew within [`VALID`] counts as none; after
-//! [`Exchange::stop`] there is none but zero; a sample that does not come is stale, then a fault.
+//! If either side fails, the force is removed: a wrench that the loop does not renew within [`VALID`] counts as zero; after
+//! [`Exchange::stop`] only zero is sent; a missing sample is stale, then a fault.
 
 use crate::latest::Latest;
 use flotor_hal::{Conditions, DeviceState, Fault, Pose, Twist, Wrench};
@@ -9,44 +9,44 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How long a wrench is valid without another one: longer than a loop is late, shorter than a hand is carried far.
+/// Validity of a wrench without renewal: longer than the delays of a loop, too short for the hand to be carried far.
 pub const VALID: Duration = Duration::from_millis(20);
-/// How long either side waits for the other in lockstep.
+/// Timeout of the wait for the other side in lockstep.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Longest sleep of the thread of the SDK in lockstep.
 const SLICE: Duration = Duration::from_millis(1);
-/// How long a stop waits until zero was sent.
+/// Timeout of a stop while zero is not sent yet.
 const STOP_WITHIN: Duration = Duration::from_millis(20);
-/// Pause between two looks while a stop waits.
+/// Poll interval of a stop.
 const LOOK: Duration = Duration::from_micros(100);
 /// Words of a sample: pose 7, twist 6, delivered wrench 6, buttons, conditions.
 const SAMPLE_WORDS: usize = 21;
 
-/// Who waits for whom.
+/// Synchronisation of loop and SDK.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// Nobody: each takes the newest of the other.
+    /// No waits: each side takes the newest data of the other.
     Real,
-    /// Each waits for the other, for a second at most: for hosts on a virtual clock over a simulated device.
+    /// Each side waits for the other, for a second at most: for hosts on a virtual clock with a simulated device.
     Lockstep,
 }
 
-/// What the thread of an SDK measures in a cycle, in the device frame of the contract.
+/// Measurement of one cycle, in the device frame of the contract.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Pose of the handle, m and unit quaternion.
     pub pose: Pose,
-    /// Its velocity, m/s and rad/s.
+    /// Velocity of the handle, m/s and rad/s.
     pub twist: Twist,
-    /// What the device says it gave, N and N·m.
+    /// Wrench delivered according to the device, N and N·m.
     pub delivered: Wrench,
     /// Buttons, one bit each.
     pub buttons: u32,
-    /// What else is to be known.
+    /// Conditions of the device, such as saturation.
     pub conditions: Conditions,
 }
 
-/// The place where both meet.
+/// Lock-free exchange of samples and wrenches, with stop and fault.
 #[derive(Debug)]
 pub struct Exchange {
     pace: Pace,
@@ -55,17 +55,17 @@ pub struct Exchange {
     /// Code of a [`Fault`]; 0: none.
     fault: AtomicU32,
     is_stopped: AtomicBool,
-    /// Whether nothing but zero is on its way to the device.
+    /// True if no force is pending: only zero was sent, or nothing.
     is_quiet: AtomicBool,
-    /// Whether the thread of the SDK is to end.
+    /// Requests the end of the SDK's thread.
     is_over: AtomicBool,
-    /// Samples there were when it began.
+    /// Number of samples at the last `begin`.
     begun_at: AtomicU64,
     gate: Mutex<()>,
     changed: Condvar,
 }
 
-/// What the thread of an SDK knows of the loop's wrenches.
+/// Newest wrench of the loop, as seen by the thread of an SDK.
 #[derive(Debug)]
 pub struct Orders {
     seen: u64,
@@ -74,7 +74,7 @@ pub struct Orders {
 }
 
 impl Exchange {
-    /// Without sample, wrench and fault.
+    /// Creates an exchange without sample, wrench and fault.
     #[must_use]
     pub fn new(pace: Pace) -> Self {
         Self {
@@ -93,7 +93,7 @@ impl Exchange {
 
     // ------------------------------------------------------------ the thread of the SDK
 
-    /// A new sample. On the thread of the SDK.
+    /// Publishes a new sample. On the thread of the SDK.
     pub fn publish(&self, sample: &Sample) {
         let mut words = [0; SAMPLE_WORDS];
         let Sample { pose, twist, delivered, buttons, conditions } = sample;
@@ -110,13 +110,13 @@ impl Exchange {
         self.tell();
     }
 
-    /// The device cannot go on. The first reason is kept. On the thread of the SDK.
+    /// Reports a fault that ends the operation; the first fault stays. On the thread of the SDK.
     pub fn fail(&self, fault: Fault) {
         let _ = self.fault.compare_exchange(0, fault as u32, Ordering::AcqRel, Ordering::Acquire);
         self.tell();
     }
 
-    /// What to send now. In lockstep, waits for the loop. On the thread of the SDK.
+    /// Returns the wrench to send. In lockstep, waits for the loop. On the thread of the SDK.
     pub fn next_wrench(&self, orders: &mut Orders) -> Wrench {
         if self.pace == Pace::Lockstep {
             self.wait_for_command(orders.seen);
@@ -129,7 +129,7 @@ impl Exchange {
             (orders.seen, orders.renewed) = (count, Instant::now());
         }
         let is_expired = self.pace == Pace::Real && orders.renewed.elapsed() > VALID;
-        // Whoever stops sees that force is on its way, or this sees the stop: never neither.
+        // Either the stopping thread sees pending force, or this thread sees the stop: one of both is certain.
         self.is_quiet.store(false, Ordering::SeqCst);
         if is_expired || self.is_over() || self.is_stopped.load(Ordering::SeqCst) {
             return Wrench::ZERO;
@@ -140,32 +140,31 @@ impl Exchange {
     fn wait_for_command(&self, seen: u64) {
         let since = Instant::now();
         let is_due = || self.command.count() > seen || self.is_over() || self.is_stopped();
-        // In slices: a stop may not take the lock to wake anybody.
+        // In slices, because a stop takes no lock and thus wakes no waiting thread.
         while !is_due() && since.elapsed() < PATIENCE {
             self.wait(SLICE, is_due);
         }
     }
 
-    /// What was sent. On the thread of the SDK.
+    /// Records a sent wrench. On the thread of the SDK.
     pub fn note_sent(&self, wrench: &Wrench) {
         self.is_quiet.store(*wrench == Wrench::ZERO, Ordering::SeqCst);
     }
 
-    /// The thread of the SDK sends nothing any more, and force is off.
+    /// Records that the thread of the SDK sends no more wrenches, with the force disabled.
     pub fn note_silence(&self) {
         self.is_quiet.store(true, Ordering::SeqCst);
     }
 
-    /// Whether the thread of the SDK is to end.
+    /// Returns whether the thread of the SDK must end.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.is_over.load(Ordering::Acquire)
     }
 
-    // ------------------------------------------------------------ the loop and everybody else
+    // ------------------------------------------------------------ the loop and other threads
 
-    /// Begins anew: no wrench, no fault, not stopped; samples count on. What it returns goes to the thread of the SDK. Not
-    /// real-time.
+    /// Resets wrench, fault and stop; the sample count continues. The result is for the thread of the SDK. Not real-time.
     #[must_use]
     pub fn begin(&self) -> Orders {
         self.command.put(&[0; 6]);
@@ -176,13 +175,13 @@ impl Exchange {
         Orders { seen: self.command.count(), renewed: Instant::now(), wrench: Wrench::ZERO }
     }
 
-    /// Asks the thread of the SDK to end.
+    /// Requests the end of the SDK's thread.
     pub fn end(&self) {
         self.is_over.store(true, Ordering::Release);
         self.tell();
     }
 
-    /// No force from now on, from any thread: returns when zero was sent, after 20 ms at the latest. No lock, no allocation.
+    /// Stops the force, from any thread; returns once zero is sent, after 20 ms at the latest. No lock, no allocation.
     pub fn stop(&self) {
         self.is_stopped.store(true, Ordering::SeqCst);
         let since = Instant::now();
@@ -191,28 +190,28 @@ impl Exchange {
         }
     }
 
-    /// Whether it is stopped.
+    /// Returns whether the force is stopped.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.is_stopped.load(Ordering::SeqCst)
     }
 
-    /// Number of samples before it began.
+    /// Returns the number of samples at the last `begin`.
     pub(crate) fn begun_at(&self) -> u64 {
         self.begun_at.load(Ordering::Acquire)
     }
 
-    /// Number of samples so far.
+    /// Returns the number of samples so far.
     pub(crate) fn samples(&self) -> u64 {
         self.sample.count()
     }
 
-    /// What is wrong.
+    /// Returns the first fault since the last `begin`.
     pub(crate) fn fault(&self) -> Option<Fault> {
         Fault::from_code(self.fault.load(Ordering::Acquire))
     }
 
-    /// The newest sample, and how many there were.
+    /// Returns the newest sample and the number of samples so far.
     pub(crate) fn newest(&self) -> Option<(u64, DeviceState)> {
         let (count, words) = self.sample.get()?;
         let numbers = words.map(f64::from_bits);
@@ -229,7 +228,7 @@ impl Exchange {
         (count > 0).then_some((count, state))
     }
 
-    /// The wrench of the loop.
+    /// Sets the wrench of the loop.
     pub(crate) fn command(&self, wrench: &Wrench) {
         let ([x, y, z], [rx, ry, rz]) = (wrench.force_n, wrench.torque_nm);
         self.command.put(&[x, y, z, rx, ry, rz].map(f64::to_bits));
@@ -238,12 +237,12 @@ impl Exchange {
         }
     }
 
-    /// Waits for a sample after so many, for so long; in lockstep for a second.
+    /// Waits until there are more than `seen` samples, or a fault, or until the timeout.
     pub(crate) fn wait_for_sample(&self, seen: u64, patience: Duration) {
         self.wait(patience, || self.samples() > seen || self.fault().is_some());
     }
 
-    /// Whether nothing waits but the SDK itself: its thread must not spin then.
+    /// Returns true if nothing but the SDK paces its thread, which then must not spin.
     #[must_use]
     pub fn runs_free(&self) -> bool {
         self.pace == Pace::Real || self.is_stopped()
@@ -254,7 +253,7 @@ impl Exchange {
     }
 
     fn tell(&self) {
-        // Whoever waits holds the lock while it looks, so that nothing changes unseen between its look and its sleep.
+        // The waiting thread checks its condition under the lock, so that no change falls between check and sleep.
         drop(self.gate.lock().unwrap_or_else(PoisonError::into_inner));
         self.changed.notify_all();
     }

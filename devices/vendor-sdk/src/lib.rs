@@ -1,17 +1,16 @@
-//! What device plugins over a vendor's SDK share.
+//! Shared parts of device plugins over a vendor's SDK.
 //!
-//! Such a plugin brings nothing of the vendor: it opens the library that the user has installed. Devices are then driven by a
-//! thread that follows the SDK (its own scheduler, or one that its blocking calls pace), and not by the loop:
+//! Such a plugin contains nothing of the vendor: it opens the library that the user has installed. A thread that follows the SDK
+//! (the SDK's own scheduler, or a thread paced by blocking calls) drives the device, not the loop:
 //!
 //! ```text
 //!  user's library -> Library -> functions of the plugin -> thread -> Exchange -> LoopEnd -> loop
 //! ```
 //!
-//! - [`Library`]: finds the file, checks processor and kind, opens it, looks up functions; [`LibraryProblem`] says which of
-//!   these failed and what to do.
-//! - [`Exchange`]: the newest sample one way, the newest wrench the other, and how force goes if either side fails.
-//! - [`LoopEnd`]: the loop's side of it, as the contract wants it.
-//! - [`without_signals`]: threads of a library must not take signals of the host.
+//! - [`Library`]: finds, checks and opens the file, looks up functions; [`LibraryProblem`] names the failed step and remedy.
+//! - [`Exchange`]: newest sample one way, newest wrench the other, and removal of the force if either side fails.
+//! - [`LoopEnd`]: the loop's side of an exchange, for the contract.
+//! - [`without_signals`]: keeps signals of the host away from the threads of a library.
 
 mod exchange;
 mod latest;

@@ -1,4 +1,4 @@
-//! The user's own library, opened at run time and never closed: SDKs leave threads and handlers behind.
+//! The user's own library, opened at run time and never closed, because SDKs leave threads and handlers behind.
 #![allow(unsafe_code)] // libloading; listed in tests/tests/system/architecture.rs
 
 use crate::platform::{self, Loaded};
@@ -7,19 +7,19 @@ use crate::search::{Sdk, looked_at};
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
-/// What Flotor's own drop-in libraries export.
+/// Symbol exported by Flotor's own drop-in libraries.
 const MARKER: &[u8] = b"flotor_dropin\0";
 
-/// What to do with one of Flotor's own drop-in libraries.
+/// Policy for Flotor's own drop-in libraries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StandIn {
-    /// Nothing is simulated unless somebody says so.
+    /// Refuse them: no simulated device without consent.
     Refuse,
-    /// It stands in for a device.
+    /// Accept them as simulated devices.
     Accept,
 }
 
-/// A library of an SDK.
+/// Open library of an SDK.
 #[derive(Debug)]
 pub struct Library {
     loaded: ManuallyDrop<Loaded>,
@@ -27,11 +27,11 @@ pub struct Library {
 }
 
 impl Library {
-    /// Opens the library: the file `told`, else the first that fits where the SDK and the system have libraries. Not
+    /// Opens the library: the file `told`, else the first fitting file in the folders of SDK and system. Not
     /// real-time; runs the constructors of the library.
     ///
     /// # Errors
-    /// [`LibraryProblem`].
+    /// [`LibraryProblem`] with the cause and the remedy.
     pub fn open(sdk: &Sdk, told: Option<&str>, stand_in: StandIn) -> Result<Self, LibraryProblem> {
         let places = match told {
             Some(path) => vec![PathBuf::from(path)],
@@ -41,7 +41,7 @@ impl Library {
         for place in &places {
             match looked_at(place) {
                 Some(Ok(())) => return Self::load(place, stand_in),
-                // One for other processors, perhaps: the right one may lie elsewhere.
+                // Possibly for another processor: a later folder may have the right file.
                 Some(Err(why)) => problem = problem.or(Some(why)),
                 None => {}
             }
@@ -69,13 +69,13 @@ impl Library {
         }
     }
 
-    /// The file.
+    /// Returns the path of the opened file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// A function of the library; its name ends in `\0`. Not real-time.
+    /// Looks up a function of the library, `None` if missing; the name must end in `\0`. Not real-time.
     ///
     /// # Safety
     /// `F` is a function pointer of the type that the SDK documents for this name.
@@ -86,9 +86,9 @@ impl Library {
     }
 }
 
-/// Declares functions of an SDK: a struct with a pointer for each, and `load`, which looks all of them up. Those after
-/// `optional` may be missing. To be used in a module of FFI, whose declarations are those that the SDK documents: whoever calls
-/// one guarantees its arguments.
+/// Declares functions of an SDK: a struct with a pointer for each, and `load`, which looks all of them up. Functions marked
+/// `optional` may be missing. For use in an FFI module with the declarations that the SDK documents: the caller of
+/// a function guarantees its arguments.
 #[macro_export]
 macro_rules! sdk_functions {
     (
@@ -106,7 +106,7 @@ macro_rules! sdk_functions {
         }
 
         impl $table {
-            /// Looks all of them up. Not real-time.
+            /// Looks up all functions. Not real-time.
             $visibility fn load(library: &$crate::Library) -> Result<Self, $crate::LibraryProblem> {
                 let missing = |function| $crate::LibraryProblem::MissingFunction {
                     path: library.path().to_path_buf(),

@@ -1,11 +1,11 @@
-//! The loop's side of an exchange, as the contract wants it.
+//! Loop's side of an exchange, as required by the contract.
 
 use crate::exchange::Exchange;
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, SafeStop, SampleWait, Tick, Wrench};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Takes the force away, from any thread.
+/// Stop of the force, usable from any thread.
 #[derive(Clone, Debug)]
 pub struct StopSwitch(pub Arc<Exchange>);
 
@@ -15,29 +15,29 @@ impl SafeStop for StopSwitch {
     }
 }
 
-/// What `read`, `write` and `wait_for_sample` of a device do that a thread of an SDK drives.
+/// Implementation of `read`, `write` and `wait_for_sample` for a device that a thread of an SDK drives.
 #[derive(Debug)]
 pub struct LoopEnd {
     exchange: Arc<Exchange>,
-    /// Largest force, N, and torque, N·m, in any direction.
+    /// Limits of force, N, and torque, N·m, in any direction.
     most: [f64; 2],
     timeout: Duration,
     seen: u64,
-    /// Samples that a wait has told of.
+    /// Number of samples reported by waits.
     awaited: u64,
     fresh: Instant,
     state: DeviceState,
 }
 
 impl LoopEnd {
-    /// Of an exchange that has begun; a sample is a fault when it does not come within `timeout`. Not real-time.
+    /// Creates the loop's side of an exchange that has begun; no sample within `timeout` is a fault. Not real-time.
     #[must_use]
     pub fn new(exchange: Arc<Exchange>, most: [f64; 2], timeout: Duration) -> Self {
         let seen = exchange.begun_at();
         Self { exchange, most, timeout, seen, awaited: seen, fresh: Instant::now(), state: DeviceState::HOME }
     }
 
-    /// The newest sample. Real-time: bounded, no allocation; in lockstep it waits.
+    /// Reads the newest sample. Real-time: bounded, no allocation; in lockstep it waits.
     pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         if let Some(patience) = self.exchange.lockstep_patience() {
             self.exchange.wait_for_sample(self.seen, patience);
@@ -57,7 +57,7 @@ impl LoopEnd {
         cycle
     }
 
-    /// The wrench from now on, within the limits of the device. Real-time: bounded, no allocation.
+    /// Limits a wrench to the device's range and sets it. Real-time: bounded, no allocation.
     pub fn write(&mut self, wrench: &Wrench) -> Cycle {
         let [force_n, torque_nm] = [wrench.force(), wrench.torque()];
         let within = |vector: DVec3, most: f64| {
@@ -69,14 +69,14 @@ impl LoopEnd {
         self.exchange.fault().map_or(Cycle::Fresh, Cycle::Fault)
     }
 
-    /// Waits for a sample that no earlier wait has told of. Real-time but for the waiting: no allocation.
+    /// Waits for a sample after those of earlier waits. Real-time except for the wait: no allocation.
     pub fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
         self.exchange.wait_for_sample(self.awaited, Duration::from_nanos(timeout_ns));
         let samples = self.exchange.samples();
         let new = samples.saturating_sub(self.awaited);
         self.awaited = samples;
         match (new, self.exchange.fault()) {
-            // What is wrong is told by the next read.
+            // The next read returns the fault.
             (0, Some(_)) => SampleWait::Arrived { samples: 1 },
             (0, None) => SampleWait::TimedOut,
             (samples, _) => SampleWait::Arrived { samples },

@@ -1,69 +1,69 @@
-//! Why the library of an SDK cannot be used: what, where, and what to do.
+//! Errors of loading the library of an SDK, with file, cause and remedy.
 
 use crate::platform::{LIBRARY_ENDING, missing_remedy};
 use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Why the library of an SDK cannot be used.
+/// Error of loading the library of an SDK.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LibraryProblem {
-    /// None of the places has it.
+    /// No folder contains the library.
     NotFound {
-        /// What people call the SDK.
+        /// Name of the SDK.
         sdk: &'static str,
-        /// Where it was looked for, in order.
+        /// Searched files, in order.
         searched: Vec<PathBuf>,
     },
-    /// It cannot be read.
+    /// The file cannot be read.
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         reason: String,
     },
-    /// It is no shared library.
+    /// The file is no shared library.
     NotALibrary {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// It is for other processors.
+    /// The library is for another processor.
     Architecture {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What it is for.
+        /// Bits and processor of the library.
         found: String,
-        /// What this program needs.
+        /// Bits and processor of this program.
         needed: String,
     },
-    /// The system's loader refuses it, usually because something it needs is missing.
+    /// The system's loader refuses the library, usually because of a missing dependency.
     Refused {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the loader says.
+        /// Error of the loader.
         reason: String,
     },
-    /// It is a drop-in library of Flotor, which would load Flotor once more.
+    /// The file is a drop-in library of Flotor, which would load Flotor once more.
     StandIn {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// It lacks a function.
+    /// The library lacks a function.
     MissingFunction {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Name of the function.
         function: &'static str,
-        /// What people call the SDK, with the oldest version that has all functions.
+        /// Name of the SDK, with the oldest version that has all functions.
         needed: String,
     },
-    /// It is older than the plugin needs.
+    /// The SDK is older than the plugin needs.
     TooOld {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its version.
+        /// Version of the SDK.
         found: String,
-        /// The oldest that will do.
+        /// Oldest supported version.
         needed: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Where a library may be, and which processors it is for: told by its first bytes, before anything of it runs.
+//! Search for the library of an SDK, and check of its processor by its first bytes, before any of its code runs.
 
 use crate::platform;
 use crate::problem::LibraryProblem;
@@ -6,30 +6,30 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-/// An SDK, as far as its library has to be found.
+/// Library lookup data of an SDK.
 #[derive(Clone, Copy, Debug)]
 pub struct Sdk {
-    /// What people call it.
+    /// Name of the SDK, for errors.
     pub name: &'static str,
-    /// Names of the library's file, the preferred one first.
+    /// File names of the library, the preferred one first.
     pub files: &'static [&'static str],
-    /// The same on Windows.
+    /// File names of the library on Windows, the preferred one first.
     pub files_on_windows: &'static [&'static str],
     /// Environment variables that name the folder of the SDK.
     pub variables: &'static [&'static str],
 }
 
 impl Sdk {
-    /// Returns the files that may be the library, in order, with absolute paths: a relative folder is one of the folder in which the
+    /// Returns the candidate files, in order, with absolute paths: a relative folder is relative to the folder in which the
     /// program was started, as for the loader of the system. Not real-time.
     pub(crate) fn places(&self, said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
         let folders = platform::folders(self, said).into_iter();
-        let folders = folders.filter_map(|folder| std::path::absolute(folder).ok()); // an empty one is none
+        let folders = folders.filter_map(|folder| std::path::absolute(folder).ok()); // `absolute` drops empty ones
         folders.flat_map(|folder| platform::files(self).iter().map(move |file| folder.join(file))).collect()
     }
 }
 
-/// Whether a file is a library for this program; `None` if it is not there. Not real-time.
+/// Checks that a file is a library for this program; `None` if there is no file. Not real-time.
 pub(crate) fn looked_at(path: &Path) -> Option<Result<(), LibraryProblem>> {
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(platform::HEAD as u64).read_to_end(&mut head));

@@ -1,8 +1,8 @@
-//! The device on this machine's own USB: the kernel enumerates it, and libusb, and with it every program that drives a
-//! Falcon, finds it as it finds the real one.
+//! Emulated device on the USB of this machine: the kernel enumerates it as a real Falcon, and libusb, and with it every program
+//! that drives a Falcon, finds it.
 //!
-//! A transfer towards the host waits until a packet is due. Needs Linux with the module `vhci_hcd`, and the right to plug
-//! something in.
+//! A transfer towards the host waits until a packet is due. Needs Linux with the module `vhci_hcd`, and the permission to attach
+//! a device.
 
 use crate::in_process::InProcess;
 use crate::machine::STATUS;
@@ -21,18 +21,18 @@ use std::time::Duration;
 /// Addresses of the endpoints.
 const OUT: u8 = 0x02;
 const IN: u8 = 0x81;
-/// How often is looked whether a packet is due: a quarter of the shortest latency.
+/// Poll interval for due packets: a quarter of the shortest latency timer.
 const LOOK: Duration = Duration::from_micros(250);
 
 /// Types of descriptors (USB 2.0, chapter 9).
 const DEVICE: u8 = 1;
 const CONFIGURATION: u8 = 2;
 const STRING: u8 = 3;
-/// Requests with a direction and a kind: those of the vendor, to and from the device.
+/// Request types of the vendor, to and from the device.
 const VENDOR_OUT: u8 = 0x40;
 const VENDOR_IN: u8 = 0xc0;
 
-/// A device that is plugged in; dropping it pulls the cable.
+/// Attached device; dropping it detaches the device.
 pub struct Gadget {
     socket: UnixStream,
     shared: Arc<Shared>,
@@ -47,15 +47,15 @@ struct Shared {
 
 struct Bus {
     socket: UnixStream,
-    /// Transfers towards the host that wait, oldest first.
+    /// Pending transfers towards the host, oldest first.
     fetches: VecDeque<Transfer>,
 }
 
 impl Gadget {
-    /// Plugs the device into this machine.
+    /// Attaches the device to this machine.
     ///
     /// # Errors
-    /// What the system says: usually that the module `vhci_hcd` is not loaded, or that this user may not.
+    /// Errors of the system: usually the module `vhci_hcd` is not loaded, or the user has no permission.
     pub fn plug_in(device: InProcess) -> io::Result<Self> {
         let (ours, kernels) = UnixStream::pair()?;
         let bus = Bus { socket: ours.try_clone()?, fetches: VecDeque::new() };
@@ -77,7 +77,7 @@ impl Gadget {
         Ok(gadget)
     }
 
-    /// False once the other end of the cable is gone.
+    /// Returns false once the connection to the kernel has ended.
     #[must_use]
     pub fn is_plugged_in(&self) -> bool {
         !self.shared.is_over.load(Ordering::Acquire)
@@ -99,13 +99,13 @@ impl Shared {
         self.bus.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Ends transfers as packets become due.
+    /// Completes transfers as packets become due.
     fn pace(&self) {
         while !self.is_over.load(Ordering::Acquire) {
             std::thread::sleep(LOOK);
             let mut bus = self.lock();
             if self.device.machine().is_gone() {
-                // As for the kernel after a reset of the hub: it is unplugged.
+                // A reset of the hub unplugs the device for the kernel.
                 let _ = bus.socket.shutdown(Shutdown::Both);
                 return;
             }
@@ -118,7 +118,7 @@ impl Shared {
     fn deliver(&self, bus: &mut Bus) -> io::Result<()> {
         while let Some(transfer) = bus.fetches.front() {
             let Some(mut data) = self.device.machine().packet(self.device.now()) else { break };
-            // A transfer ends with a packet that is not full, or with its last byte.
+            // A short packet or the last byte completes a transfer.
             while data.len().is_multiple_of(PACKET_BYTES) && data.len() + PACKET_BYTES <= transfer.length {
                 let next = self.device.machine().packet(self.device.now());
                 data.extend(next.unwrap_or_else(|| STATUS.to_vec()));
@@ -159,7 +159,7 @@ impl Shared {
         }
     }
 
-    /// What comes of a control transfer; nothing is a stall.
+    /// Answers a control transfer; `None` stalls the endpoint.
     fn control(&self, transfer: &Transfer) -> Option<Vec<u8>> {
         let [kind, request, value_low, value_high, ..] = transfer.setup;
         let value = u16::from_le_bytes([value_low, value_high]);
@@ -172,7 +172,7 @@ impl Shared {
                 STRING => string_descriptor(value_low),
                 _ => None,
             },
-            // Get and set configuration, get and set interface, get status, clear feature: there is one of each, and no
+            // Get and set configuration, get and set interface, get status, clear feature: the device has one of each, and no
             // endpoint is ever halted.
             (0x80, 8) => Some(vec![1]),
             (0x81, 10) => Some(vec![0]),
@@ -183,7 +183,7 @@ impl Shared {
     }
 }
 
-/// An FT232BM, whose vendor and product are a Falcon's.
+/// Returns the descriptor of an FT232BM with the vendor and product of a Falcon.
 fn device_descriptor() -> Vec<u8> {
     let (usb_1_1, class, packet, release, strings, configurations) =
         ([0x10, 0x01], [0, 0, 0], 8, [0x00, 0x04], [1, 2, 3], 1);
@@ -213,7 +213,7 @@ fn configuration_descriptor() -> Vec<u8> {
     bytes
 }
 
-/// A string; 0 says which languages there are.
+/// Returns a string descriptor; number 0 lists the languages.
 fn string_descriptor(number: u8) -> Option<Vec<u8>> {
     let text = match number {
         0 => return Some(vec![4, STRING, 0x09, 0x04]), // American English

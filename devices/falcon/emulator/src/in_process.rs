@@ -1,14 +1,14 @@
-//! The device in the process of its host: the plugin's trait of a chip.
+//! Emulated device in the process of its host: implements the plugin's [`Chip`] trait.
 
 use crate::machine::Machine;
 use flotor_falcon::chip::{Chip, ChipLost, Request};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How long a read sleeps between two looks.
+/// Poll interval of a read.
 const NAP: Duration = Duration::from_micros(100);
 
-/// A device that several hold: the plugin as a chip, and a test that looks at it.
+/// Shared handle of an emulated device: the plugin uses it as a chip, and a test inspects it. Clones share the device.
 #[derive(Clone, Debug)]
 pub struct InProcess {
     machine: Arc<Mutex<Machine>>,
@@ -16,18 +16,18 @@ pub struct InProcess {
 }
 
 impl InProcess {
-    /// Plugs it in.
+    /// Wraps a device and starts its clock.
     #[must_use]
     pub fn new(machine: Machine) -> Self {
         Self { machine: Arc::new(Mutex::new(machine)), started: Instant::now() }
     }
 
-    /// The device.
+    /// Locks the device.
     pub fn machine(&self) -> MutexGuard<'_, Machine> {
         self.machine.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Its time.
+    /// Returns the time since the device was created.
     #[must_use]
     pub fn now(&self) -> Duration {
         self.started.elapsed()

@@ -1,4 +1,4 @@
-//! A Novint Falcon without hardware: the FTDI chip, the boot loader and a firmware, on three ways to a host.
+//! Novint Falcon without hardware: the FTDI chip, the boot loader and a firmware, with three connections to a host.
 //!
 //! ```text
 //!                       +- InProcess: the plugin's trait of a chip, for tests
@@ -6,11 +6,11 @@
 //!                       +- gadget: this machine's own USB, for every program that drives a Falcon
 //! ```
 //!
-//! - [`machine`]: what the device does; pure, with a clock that is passed in.
-//! - [`rig`]: a device in the rig of the vertical calibration, whose motors deliver less or more than they are told.
-//! - [`in_process`], [`server`], [`gadget`]: the three ways.
+//! - [`machine`]: behaviour of the device; pure, with a clock that is passed in.
+//! - [`rig`]: a device in the rig of the vertical calibration, whose motors deliver more or less than the command.
+//! - [`in_process`], [`server`], [`gadget`]: the three connections.
 //!
-//! It has no firmware of the maker's: any bytes are loaded and run the one that is written here. Not real-time.
+//! Contains no firmware of the maker: any bytes load, and the firmware of [`machine`] runs. Not real-time.
 
 #[cfg(target_os = "linux")]
 pub mod gadget;

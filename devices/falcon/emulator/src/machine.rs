@@ -1,4 +1,4 @@
-//! The device behind its USB endpoints: what it answers to requests and bytes, and when a packet is due.
+//! State machine of the device behind its USB endpoints: replies to requests and bytes, and due packets.
 
 use flotor_emulation::rig::Stand;
 use flotor_falcon::boot::{AGREED, LOAD_DIVISOR, PROMPT, PROMPT_ANSWER, PROMPT_DIVISOR, RUN_DIVISOR};
@@ -9,92 +9,91 @@ use flotor_hal::{DVec3, VerticalCalibration};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// States of modem and line at the head of each packet: nothing connected to the modem's lines; the line has sent all
-/// it had.
+/// Modem and line status at the head of each packet: no modem lines connected; transmitter empty.
 pub const STATUS: [u8; 2] = [0x01, 0x60];
 /// Latency timer after a reset, ms.
 const LATENCY_MS: u16 = 16;
-/// Commands with the homing bit until the hand has pushed the handle in and pulled it out.
+/// Number of commands with the homing bit until the hand has homed the handle (pushed in and pulled out).
 const HOMING_COMMANDS: u32 = 50;
-/// Motor word for a torque of an arm, 1/(N·m), as the plugin has it by default.
+/// Motor word per torque of an arm, 1/(N·m): the plugin's default.
 const WORDS_PER_NM: f64 = 10_000.0;
 
-/// What a device does that was just plugged in.
+/// Power history of a device that was just plugged in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Power {
-    /// Its power was off: the boot loader waits, no arm has met its end.
+    /// Power was off: the boot loader waits, the arms are not homed.
     Off,
-    /// Its firmware runs since an earlier program, and its arms count.
+    /// Firmware runs since an earlier program; the arms are homed.
     On,
 }
 
-/// Something that goes wrong on purpose.
+/// Injected fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The loader never answers.
+    /// The loader never replies to the prompt.
     NoPrompt,
-    /// The loader says this byte instead of agreeing.
+    /// The loader replies with this byte instead of the agreement.
     NotAgreed(u8),
-    /// This byte of the firmware comes back with its lowest bit changed.
+    /// The echo of this byte of the firmware has its lowest bit changed.
     WrongEcho(usize),
-    /// This byte of the firmware does not come back.
+    /// This byte of the firmware has no echo.
     NoEcho(usize),
-    /// The firmware does not run.
+    /// The firmware does not start.
     NoReport,
-    /// From this command on: a packet without its status.
+    /// From this command on: a packet without its status bytes.
     ShortPacket(u64),
-    /// From this command on: a report too many.
+    /// From this command on: one surplus report per command.
     StaleReport(u64),
-    /// From this command on: packets with their status alone.
+    /// From this command on: packets with their status bytes alone.
     IdlePackets(u64),
     /// From this command on: bytes that are no reports.
     Noise(u64),
-    /// From this command on: the arms count from nowhere.
+    /// From this command on: the arms are not homed and count zero.
     Unhomed(u64),
-    /// From this command on: counts that no arms can have.
+    /// From this command on: encoder counts outside the linkage's geometry.
     NoPosture(u64),
-    /// At this command: the hub is reset.
+    /// From this command on: the device is gone, as after a reset of the hub.
     HubReset(u64),
 }
 
-/// Who has the line.
+/// Program in control of the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// The loader waits for its prompt.
+    /// Loader, waiting for its prompt.
     Loader,
-    /// The loader was asked, and waits for the byte to agree on.
+    /// Loader, prompted, waiting for the agreement byte.
     Prompted,
-    /// The loader takes a firmware: so many bytes so far.
+    /// Loader, receiving a firmware: number of bytes so far.
     Loading(usize),
-    /// The firmware.
+    /// Firmware.
     Running,
 }
 
-/// Where hand or stand have the handle, in the maker's frame.
+/// Motion of the handle by a hand or a stand, in the maker's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
-    /// A hand moves it to and fro.
+    /// Sinusoidal motion by a hand.
     ToAndFro {
-        /// The middle, m.
+        /// Middle of the motion, m.
         centre_m: DVec3,
-        /// From there to the ends, m.
+        /// Amplitude from the middle to the ends, m.
         amplitude_m: DVec3,
-        /// How often, Hz.
+        /// Frequency, Hz.
         frequency_hz: f64,
     },
-    /// The stand of a calibration rig holds it, above and below the centre of the range. Its clock advances by a
-    /// millisecond with each command, so that a delayed host misses no stop.
+    /// Handle held by the stand of a calibration rig, above and below the centre of the range. Time advances by a millisecond with each
+    /// command, so that a delayed host misses no stop.
     OnStand(Stand),
 }
 
 impl Motion {
-    /// A handle that is held at a place, m.
+    /// Returns the motion of a handle held at a position, m.
     #[must_use]
     pub fn held(place_m: DVec3) -> Self {
         Self::ToAndFro { centre_m: place_m, amplitude_m: DVec3::ZERO, frequency_hz: 0.0 }
     }
 
-    /// Where the handle is at a time, and after so many commands, m.
+    /// Returns the position of the handle at a time and after a number of commands, m.
     fn place_m(&self, at: Duration, commands: u64) -> DVec3 {
         match self {
             Self::ToAndFro { centre_m, amplitude_m, frequency_hz } => {
@@ -107,26 +106,26 @@ impl Motion {
     }
 }
 
-/// A device.
+/// Emulated device.
 #[derive(Clone, Debug)]
 pub struct Machine {
     motion: Motion,
-    /// Share of a vertical force that arrives, by the height above the centre of the range.
+    /// Delivered over commanded vertical force, by the height above the centre of the range.
     share: VerticalCalibration,
-    /// Buttons that the hand presses.
+    /// Pressed buttons, one bit each.
     buttons: u32,
     fault: Option<Fault>,
     stage: Stage,
     divisor: u16,
     latency_ms: u16,
-    /// When the last packet went.
+    /// Time of the last packet.
     last_packet: Duration,
     to_host: VecDeque<u8>,
     heard: VecDeque<u8>,
     frames: Frames,
     homed: u8,
     homing_commands: u32,
-    /// What the arms would count where the firmware began: until they have met their ends, they count from there.
+    /// Encoder counts at the start of the firmware: the zero of the counts until homing.
     began: Option<[i16; 3]>,
     commands: u64,
     command: Command,
@@ -134,7 +133,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// A device that was just plugged in, and whose handle moves so.
+    /// Creates a device that was just plugged in, with a motion of its handle.
     #[must_use]
     pub fn new(power: Power, motion: Motion) -> Self {
         let (stage, homed) = match power {
@@ -162,40 +161,40 @@ impl Machine {
         }
     }
 
-    /// Something will go wrong.
+    /// Injects a fault, or clears it with `None`.
     pub fn breaks(&mut self, fault: Option<Fault>) {
         self.fault = fault;
     }
 
-    /// The hand goes on in another way, and presses these buttons.
+    /// Replaces the motion of the handle and the pressed buttons.
     pub fn moves(&mut self, motion: Motion, buttons: u32) {
         (self.motion, self.buttons) = (motion, buttons);
     }
 
-    /// Of a vertical force arrives this share from now on, by the height above the centre of the range.
+    /// Sets the ratio of delivered to commanded vertical force, by the height above the centre of the range.
     pub fn delivers(&mut self, share: VerticalCalibration) {
         self.share = share;
     }
 
-    /// The newest command.
+    /// Returns the newest command.
     #[must_use]
     pub fn command(&self) -> Command {
         self.command
     }
 
-    /// How many commands there were.
+    /// Returns the number of commands so far.
     #[must_use]
     pub fn commands(&self) -> u64 {
         self.commands
     }
 
-    /// True once it is no longer on the bus.
+    /// Returns true once the device has left the bus.
     #[must_use]
     pub fn is_gone(&self) -> bool {
         self.is_gone
     }
 
-    /// Force of the motors on the hand, N, in the maker's frame; `None` where the linkage has no posture.
+    /// Returns the force of the motors on the hand, N, in the maker's frame; `None` where the linkage has no posture.
     #[must_use]
     pub fn force_n(&self, at: Duration) -> Option<DVec3> {
         let place_m = self.motion.place_m(at, self.commands);
@@ -205,7 +204,7 @@ impl Machine {
         Some(force_n.with_y(force_n.y * self.share.share(place_m.y - CENTRE_M.y)))
     }
 
-    /// A request of the host to the chip; what it answers, or nothing to what is no request of its.
+    /// Carries out a request of the host to the chip and returns the reply; `None` for an unknown request.
     pub fn request(&mut self, number: u8, value: u16) -> Option<Vec<u8>> {
         match number {
             _ if number == Request::Reset as u8 => {
@@ -218,12 +217,12 @@ impl Machine {
                         self.latency_ms = LATENCY_MS;
                     }
                 }
-                // What is stale is not in the chip but behind it.
+                // Stale bytes of the fault injection are behind the chip, not in it.
                 Some(Vec::new())
             }
             _ if number == Request::BaudRate as u8 => {
                 self.divisor = value;
-                // The firmware begins at its own rate.
+                // The switch to its baud rate starts the firmware.
                 if let (Stage::Loading(1..), RUN_DIVISOR) = (self.stage, value)
                     && self.fault != Some(Fault::NoReport)
                 {
@@ -236,26 +235,26 @@ impl Machine {
                 self.latency_ms = value.clamp(1, 255);
                 Some(Vec::new())
             }
-            // Modem lines, flow control, format; characters of events and errors, and the mode of the pins, mean nothing here.
+            // No effect here: modem lines, flow control, format, event and error characters, pin mode.
             1 | 2 | 4 | 6 | 7 | 0x0b => Some(Vec::new()),
             _ => None,
         }
     }
 
-    /// A question of the host to the chip; nothing to what is no question of its.
+    /// Returns the reply to a read request of the host; `None` for an unknown request.
     #[must_use]
     pub fn question(&self, number: u8) -> Option<Vec<u8>> {
         match number {
             5 => Some(STATUS.to_vec()),
             0x0a => Some(self.latency_ms.to_le_bytes().get(..1)?.to_vec()),
             0x0c => Some(vec![0]),
-            // A chip without a memory of its own.
+            // Chip without an EEPROM.
             0x90 => Some(vec![0xff, 0xff]),
             _ => None,
         }
     }
 
-    /// Bytes of the host for the line.
+    /// Receives bytes of the host on the serial line.
     pub fn output(&mut self, bytes: &[u8], at: Duration) {
         for byte in bytes {
             match (self.stage, self.divisor) {
@@ -268,7 +267,7 @@ impl Machine {
                 }
                 (Stage::Loader | Stage::Prompted, PROMPT_DIVISOR) => self.prompted(*byte),
                 (Stage::Loading(_), PROMPT_DIVISOR) => {
-                    // The handshake begins anew.
+                    // The handshake restarts.
                     self.stage = Stage::Loader;
                     self.prompted(*byte);
                 }
@@ -287,7 +286,7 @@ impl Machine {
                         _ => self.to_host.push_back(*byte),
                     }
                 }
-                // At a rate that is not its own a line carries nothing.
+                // Bytes at a wrong baud rate are lost.
                 _ => {}
             }
         }
@@ -305,7 +304,7 @@ impl Machine {
         }
     }
 
-    /// A command: its report.
+    /// Carries out a command and queues a report.
     fn obey(&mut self, command: Command, at: Duration) {
         self.command = command;
         self.commands += 1;
@@ -345,8 +344,8 @@ impl Machine {
         }
     }
 
-    /// The packet that is due for a host that waits for one: what the line has said, or, when the latency timer has run
-    /// out, the chip's own states alone.
+    /// Returns the due packet for a waiting host: bytes of the serial line, or the status bytes alone when the latency timer has
+    /// expired; `None` if no packet is due.
     pub fn packet(&mut self, at: Duration) -> Option<Vec<u8>> {
         let latency = Duration::from_millis(u64::from(self.latency_ms));
         let is_due = at.saturating_sub(self.last_packet) >= latency;
@@ -364,7 +363,7 @@ impl Machine {
     }
 }
 
-/// Where a device has the handle that counts so, m; `None` for counts that no arms can have.
+/// Returns the position of the handle for encoder counts, m; `None` for counts outside the linkage's geometry.
 #[must_use]
 pub fn place_of(encoders: [i16; 3]) -> Option<DVec3> {
     Some(posture(angles_rad(encoders), CENTRE_M)?.position_m())

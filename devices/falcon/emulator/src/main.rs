@@ -1,4 +1,4 @@
-//! A Novint Falcon without hardware: `flotor emulate falcon` starts it.
+//! Program `flotor emulate falcon`: a Novint Falcon without hardware.
 
 use clap::{Parser, ValueEnum};
 use flotor_emulation::clients::{Clients, Tenure};
@@ -21,7 +21,7 @@ use std::process::ExitCode;
     sudo modprobe vhci_hcd && sudo flotor emulate falcon --transport usb --power off\n  \
     flotor emulate falcon --calibration-rig /tmp/flotor-force")]
 struct Arguments {
-    /// What the host connects by
+    /// Connection to the host
     #[arg(long, value_enum, default_value = "tcp")]
     transport: TransportOption,
     /// Tcp: where to listen (port 0: any free one)
@@ -29,13 +29,13 @@ struct Arguments {
     listen: String,
     #[command(flatten)]
     reach: ReachArguments,
-    /// Whether its firmware runs already
+    /// Power state: whether the firmware runs already
     #[arg(long, value_enum, default_value = "on")]
     power: PowerOption,
-    /// From the middle of the motion to its ends, in mm
+    /// Amplitude, from the middle of the motion to its ends, in mm
     #[arg(long, default_value_t = 15.0, value_name = "MM", value_parser = amplitude_mm)]
     amplitude_mm: f64,
-    /// How often the handle goes up and down, in Hz
+    /// Frequency of the motion, in Hz
     #[arg(long, default_value_t = 0.5, value_name = "HZ", value_parser = frequency_hz)]
     frequency_hz: f64,
     #[command(flatten)]
@@ -46,7 +46,7 @@ struct Arguments {
 }
 
 impl Arguments {
-    /// What the hand does.
+    /// Returns the motion of the hand: a sine along the vertical.
     fn motion(&self) -> Motion {
         // Up is y in the maker's frame.
         Motion::ToAndFro {
@@ -68,9 +68,9 @@ enum TransportOption {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum PowerOption {
-    /// It was off: the boot loader waits for a firmware, any bytes
+    /// Power was off: the boot loader waits for a firmware, any bytes
     Off,
-    /// The firmware runs, and the arms count
+    /// The firmware runs, and the arms are homed
     On,
 }
 
@@ -112,7 +112,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             let mut clients = Clients::of(port)?;
             loop {
                 let stream = clients.wait_for_one()?;
-                // A host that goes is no failure.
+                // A host that disconnects is no failure.
                 let _ = server::serve(stream, &device, Tenure::begin(&mut clients));
                 if arguments.once {
                     return Ok(());

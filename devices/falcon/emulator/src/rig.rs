@@ -1,5 +1,5 @@
-//! A device in the rig of the vertical calibration: the stand holds its handle, its motors deliver more or less than they
-//! are told, and a force sensor feels the difference to the weight.
+//! Emulated device in the rig of the vertical calibration: the stand holds its handle, its motors deliver more or less than the
+//! command, and a force sensor measures the difference to the weight.
 
 use crate::in_process::InProcess;
 use crate::machine::{Machine, Motion, Power};
@@ -10,25 +10,25 @@ use std::path::{Path, PathBuf};
 
 /// Delivered over commanded force: `1.04 - 0.004 z - 0.0006 z²`, z in mm; an arbitrary curve of this rig.
 const SHARE_PER_M: [f64; 3] = [1.04, -4.0, -600.0];
-/// Where that holds, m: what the stand goes through. Beyond, the share is that at the end.
+/// Domain of the curve, m: the travel of the stand. Beyond, the ratio is constant.
 const RANGE_M: [f64; 2] = [-7.0e-3, 7.0e-3];
-/// Weight of handle, plate and screws on the arms, N, likewise made up.
+/// Weight of handle, plate and screws on the arms, N; arbitrary as well.
 pub const WEIGHT_N: f64 = 1.5;
 
-/// Difference of the largest and the smallest share over the range, percent: `1.04 + 0.004²/(4 0.0006)` at -3.33 mm, less
+/// Difference of the largest and the smallest ratio over the range, percent: `1.04 + 0.004²/(4 0.0006)` at -3.33 mm, less
 /// 0.9826 at 7 mm.
 pub const ERROR_PERCENT: f64 = 6.406_666_7;
 
-/// A device in the rig, with a force sensor of this name; and the name of its terminal.
+/// Creates a device in the rig and starts its force sensor under a link; returns the device and the path of the sensor's terminal.
 ///
 /// # Errors
-/// What the system says of a pseudo terminal.
+/// Errors of the pseudo terminal.
 pub fn device_on(stand: Stand, link: &Path, power: Power) -> Result<(InProcess, PathBuf), Box<dyn Error>> {
     let mut machine = Machine::new(power, Motion::OnStand(stand));
     machine.delivers(VerticalCalibration::new(RANGE_M, &SHARE_PER_M)?);
     let device = InProcess::new(machine);
     let felt = device.clone();
-    // Arms without a posture exert nothing that is known.
+    // No force without a posture of the arms.
     let force_n = move || felt.machine().force_n(felt.now()).map_or(0.0, |force_n| force_n.y) - WEIGHT_N;
     let name = serve(link, force_n)?;
     Ok((device, name))

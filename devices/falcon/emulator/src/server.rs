@@ -1,4 +1,4 @@
-//! The device for a plugin in another process, over TCP (`flotor_falcon::remote`).
+//! TCP server of the emulated device, for a plugin in another process (`flotor_falcon::remote`).
 
 use crate::in_process::InProcess;
 use flotor_emulation::clients::Tenure;
@@ -8,16 +8,16 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
-/// How long is waited for the host before a look whether a packet is due, ns. `poll` waits so short a time; the timeout of a
-/// socket is rounded to the system's ticks of some milliseconds.
+/// Poll interval for due packets while the host is silent, ns. `poll` is precise enough; a socket's timeout is rounded to the
+/// system's ticks of some milliseconds.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000 };
-/// Time in which a host takes a packet.
+/// Timeout of the write of a packet to the host.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// Serves a host until it is gone, or the device is, or its tenure is over.
+/// Serves a host until the host or the device is gone, or the tenure is over.
 ///
 /// # Errors
-/// The system's error of the connection.
+/// Errors of the connection.
 pub fn serve(mut stream: TcpStream, device: &InProcess, mut tenure: Tenure<'_>) -> io::Result<()> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
@@ -54,7 +54,7 @@ pub fn serve(mut stream: TcpStream, device: &InProcess, mut tenure: Tenure<'_>) 
     }
 }
 
-/// Carries out the first message of some bytes; its length, if it is whole.
+/// Carries out the first message in a buffer; returns its length, `None` while it is incomplete.
 fn obey(heard: &[u8], device: &InProcess) -> io::Result<Option<usize>> {
     let now = device.now();
     match heard {

@@ -1,17 +1,17 @@
-//! Linux: udev says who may use a device.
+//! Linux: permissions of a USB device by udev.
 
 use std::net::TcpStream;
 use std::os::fd::AsRawFd;
 
-/// What helps where no other advice does.
+/// Remedy for all other errors.
 pub(crate) const OTHER_REMEDY: &str = "connect it without a hub, and try again";
 
-/// Whether programs can reach a USB bus: a container has none unless it is given one.
+/// Returns whether programs can reach a USB bus: a container has none by default.
 pub(crate) fn has_bus() -> bool {
     std::path::Path::new("/dev/bus/usb").is_dir()
 }
 
-/// How a user is allowed to use the device.
+/// Returns the remedy for a missing permission: a line for udev.
 pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     format!(
         "put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control --reload` and plug it in again: \
@@ -20,7 +20,7 @@ pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     )
 }
 
-/// The descriptor of a connection.
+/// Returns the descriptor of a connection.
 pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
     stream.as_raw_fd()
 }

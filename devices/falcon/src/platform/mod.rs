@@ -1,4 +1,4 @@
-//! What differs between systems: what the user of a device on USB has to do, and the number of a connection.
+//! Parts that differ between systems: remedies for USB errors, and the descriptor of a connection.
 
 #[cfg(not(windows))]
 mod linux;

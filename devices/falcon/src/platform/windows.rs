@@ -1,25 +1,25 @@
-//! Windows: a driver says who may use a device; libusb needs WinUSB.
+//! Windows: access to a USB device by its driver; libusb needs WinUSB.
 
 use std::net::TcpStream;
 use std::os::windows::io::AsRawSocket;
 
-/// What helps where no other advice does.
+/// Remedy for all other errors.
 pub(crate) const OTHER_REMEDY: &str =
     "give it the driver WinUSB with the program Zadig, connect it without a hub, and try again";
 
-/// Whether programs can reach a USB bus.
+/// Returns whether programs can reach a USB bus.
 pub(crate) fn has_bus() -> bool {
     true
 }
 
-/// How a user is allowed to use the device.
+/// Returns the remedy for a missing permission: another driver.
 pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     format!(
         "close the program that uses {vendor:04x}:{product:04x}, or give it the driver WinUSB with the program Zadig"
     )
 }
 
-/// The number of a connection's handle, of which the system uses 32 bits.
+/// Returns the handle of a connection, of which the system uses 32 bits.
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // as the contract says
 pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
     stream.as_raw_socket() as i32

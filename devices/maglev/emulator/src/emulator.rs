@@ -1,8 +1,7 @@
-//! The controller without hardware: its firmware, a plant, and a link to the host.
+//! Emulator of the controller: its firmware, a plant, and a link to the host.
 //!
-//! The plant is whatever gives samples and takes wrenches; the program `flotor-maglev-emulator` loads the simulated
-//! flotor for it through the plugin contract. Authors of other plugins can use this module as it is: a link, a
-//! plant, and [`Emulator::serve`].
+//! The program `flotor-maglev-emulator` loads the simulated flotor as the plant through the plugin contract. Authors of
+//! other plugins can use this module directly: a link, a plant, and [`Emulator::serve`].
 
 use crate::controller::{Controller, ControllerConfig, LimitConfig, Reply, Sample};
 use flotor_hal::{Capabilities, Wrench};
@@ -12,54 +11,53 @@ use flotor_maglev::transport::{Incoming, LinkLost, Transport};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// What moves: takes the wrench of a cycle and gives the sample at its end.
+/// Simulated mechanics: gets the wrench of a cycle and returns the sample at its end.
 pub trait Plant {
-    /// Moves on by `dt_us` under a constant wrench; 0 only looks.
+    /// Advances by `dt_us` under a constant wrench; 0 only returns the current sample.
     fn advance(&mut self, dt_us: u64, wrench: &Wrench) -> Sample;
 
-    /// Back to the start.
+    /// Resets the plant to its initial state.
     fn restart(&mut self);
 }
 
-/// Who says when a cycle runs.
+/// Clock of the cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// The machine's clock: a cycle each period, whatever the host does, as on hardware.
+    /// The machine's clock: a cycle each period, independent of the host, as on hardware.
     RealTime,
-    /// The host's commands: a cycle for each, so that a host on a virtual clock gets the same run every time, bit for
-    /// bit.
+    /// The host's commands: a cycle for each, so that a host on a virtual clock gets bit-identical runs.
     Lockstep,
 }
 
-/// Something worth a line.
+/// Event for the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// The controller is in another mode.
+    /// The controller has changed its mode.
     Mode {
-        /// Which.
+        /// The new mode.
         mode: Mode,
-        /// What is wrong or limited.
+        /// Faults and active limits.
         condition: Condition,
-        /// How long the host had been silent, µs.
+        /// Silence of the host before the change, µs.
         silence_us: u64,
         /// The controller's clock, µs.
         at_us: u64,
     },
-    /// Nobody is at the other end any more.
+    /// The link to the host is lost.
     Closed {
-        /// What was not acted on while somebody was.
+        /// Requests rejected while the host was connected.
         rejections: Rejections,
     },
 }
 
-/// Time of one cycle in real time, µs.
+/// Period of a cycle in real time, µs.
 const CYCLE_US: u64 = 1000;
-/// Packets looked at in one cycle: a burst is from a delayed host, and its old commands are not obeyed anyway.
+/// Limit of packets read in one cycle: a burst is from a delayed host, with commands that have expired.
 const PACKETS_PER_CYCLE: usize = 16;
-/// How long a lockstep cycle sleeps while there is no command.
+/// Poll interval of a lockstep cycle while no command arrives.
 const LOCKSTEP_NAP: Duration = Duration::from_micros(20);
 
-/// A controller in operation.
+/// An emulated controller with its plant.
 pub struct Emulator<P> {
     controller: Controller,
     plant: P,
@@ -69,7 +67,7 @@ pub struct Emulator<P> {
 }
 
 impl<P: Plant> Emulator<P> {
-    /// A controller with its coils off, over a plant.
+    /// Creates a controller with its coils off, over a plant.
     pub fn new(config: ControllerConfig, pace: Pace, plant: P) -> Self {
         let mut emulator =
             Self { controller: Controller::new(config), plant, pace, now_us: 0, mode: Mode::Disarmed };
@@ -77,13 +75,13 @@ impl<P: Plant> Emulator<P> {
         emulator
     }
 
-    /// The controller.
+    /// Returns the controller.
     #[must_use]
     pub fn controller(&self) -> &Controller {
         &self.controller
     }
 
-    /// Serves one host until it is gone, or until `stop`; then the coils are off.
+    /// Serves one host until the link is lost, or until `stop`; then switches the coils off.
     pub fn serve(&mut self, link: &mut dyn Transport, stop: &AtomicBool, log: &mut dyn FnMut(Event)) {
         let before = *self.controller.intake().rejections();
         match self.pace {
@@ -110,13 +108,13 @@ impl<P: Plant> Emulator<P> {
             self.tell_mode(log);
             deadline += Duration::from_micros(CYCLE_US);
             match deadline.checked_duration_since(Instant::now()) {
-                // Answers go out when the question comes in, as a controller's interrupt does it.
+                // Replies are sent on arrival of the request, as a controller's interrupt does.
                 Some(_) => {
                     if self.receive_until(link, deadline).is_err() {
                         return;
                     }
                 }
-                // Delayed: what was missed is made up in simulated time, so that the watchdog sees the silence.
+                // Delayed: missed cycles run in simulated time, so that the watchdog sees the silence.
                 None => {
                     let missed_us = u64::try_from(deadline.elapsed().as_micros()).unwrap_or(u64::MAX);
                     for _ in 0..(missed_us / CYCLE_US).min(1000) {
@@ -179,7 +177,7 @@ impl<P: Plant> Emulator<P> {
             };
             let Some(reply) = self.controller.receive(&packet, self.now_us) else { continue };
             match (reply, self.controller.mode()) {
-                // Arming starts the plant anew: the same run, the same bits.
+                // Arming restarts the plant, so that every run is bit-identical.
                 (Reply::Status(_), Mode::Armed) => {
                     self.plant.restart();
                     self.run(0);
@@ -204,7 +202,7 @@ impl<P: Plant> Emulator<P> {
         link.send(&answer.encode())
     }
 
-    /// A cycle: the wrench for the time of the cycle, and the sample at its end.
+    /// Runs one cycle: applies the wrench for `dt_us` and samples at the end.
     fn run(&mut self, dt_us: u64) {
         let wrench = if dt_us == 0 { Wrench::ZERO } else { self.controller.drive(self.now_us, dt_us) };
         let sample = self.plant.advance(dt_us, &wrench);
@@ -223,12 +221,12 @@ impl<P: Plant> Emulator<P> {
     }
 }
 
-/// A controller for a device with these capabilities.
+/// Returns the configuration of a controller for a device with these capabilities.
 #[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // f32 is what the wire has, latencies are small
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the wire format is f32, latencies are small
 pub fn controller_config(capabilities: &Capabilities, pace: Pace, serial: &str) -> ControllerConfig {
     let narrow = |values: [f64; 3]| values.map(|value| value as f32);
-    // The weakest of what the plant says and what is published.
+    // The smaller of the plant's limits and the published ones.
     let limits = LimitConfig {
         max_force_n: LimitConfig::MAGLEV.max_force_n.min(capabilities.max_force_n.into()),
         max_torque_nm: LimitConfig::MAGLEV.max_torque_nm.min(capabilities.max_torque_nm.into()),
@@ -260,7 +258,7 @@ pub fn controller_config(capabilities: &Capabilities, pace: Pace, serial: &str) 
         hold_us: 50_000,
         landing_us: 500_000,
         hold_damping: [15.0, 0.15],
-        // The accuracy of light spots smeared over a millisecond; no figure is published.
+        // Limit from the smearing of light spots over a millisecond of exposure; no figure is published.
         max_speed_m_per_s: 2.0,
     }
 }

@@ -1,11 +1,11 @@
-//! The controller at the other end of the maglev device's link, without hardware.
+//! Emulator of the maglev device's controller.
 //!
-//! - [`controller`]: the firmware as a state machine; the authority over the coils.
+//! - [`controller`]: the firmware as a state machine, with the final limits on the coils.
 //! - [`Emulator`]: that controller over a [`Plant`], serving a host on any transport of the plugin.
-//! - [`ml_api`]: the controller of the Maglev 200 as its own clients see it.
+//! - [`ml_api`]: the controller of the Maglev 200 as seen by its clients.
 //! - `gadget`: that controller as a USB device of this machine's own kernel (Linux).
 //!
-//! Of the plugin it uses the protocol and the transports.
+//! The crate uses the plugin's protocol and transports.
 
 pub mod controller;
 mod emulator;

@@ -1,20 +1,20 @@
-//! Walls at the edge of what the sensors see, and limits of rotation: those of the thesis, made stable and passive.
+//! Walls at the edge of the sensors' range and limits of rotation: the thesis's, made stable and passive.
 //!
 //! The thesis keeps the flotor in range by a sphere of springs and dampers and limits its tilt to 2.86° (0.05 rad;
-//! Varadharajan 2007, section 3.2 and appendix A). Here, too, with three differences:
-//! - Damping acts once. The program of the thesis damps rotation always, and again beyond the limit.
-//! - Damping in a wall resists going out only: it does not pull a handle that comes back by itself.
-//! - Every stiffness is at most [half of what is stable](SampledLoop::largest_stiffness) for its damping, period and
-//!   latency, and the stiffness in force is reported.
+//! Varadharajan 2007, section 3.2 and appendix A). This module differs in three points:
+//! - Damping acts once. The program of the thesis damps rotation always, and a second time beyond the limit.
+//! - Damping in a wall resists outward motion only: a wall does not hold back a handle that returns by itself.
+//! - Every stiffness is at most [half of the stability limit](SampledLoop::largest_stiffness) for its damping, period and
+//!   latency, and the resulting stiffness is reported.
 //!
 //! Real-time: bounded, no allocation.
 
 use flotor_hal::{DVec3, Damper, DeviceState, SampledLoop, Wrench, rotation_vector};
 
-/// A spring and a damper that begin at a limit.
+/// A spring and a damper that act beyond a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall {
-    /// Where it begins, m or rad.
+    /// Position or angle at which the wall begins, m or rad.
     pub limit: f64,
     /// Stiffness, N/m or N·m/rad.
     pub stiffness: f64,
@@ -23,21 +23,20 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// Returns this wall with a stiffness that is stable in a loop. Its damper acts outwards only; `everywhere` of its
-    /// damping (N·s/m or N·m·s/rad) acts in both directions.
+    /// Returns this wall with a stiffness that is stable in a loop. The wall's damper acts outwards only; the part
+    /// `everywhere` of its damping (N·s/m or N·m·s/rad) acts in both directions.
     #[must_use]
     pub fn stabilised(self, sampled: &SampledLoop, everywhere: f64) -> Self {
         let most = sampled.largest_stiffness(everywhere, Damper::OneWay(self.damping - everywhere));
         Self { stiffness: self.stiffness.min(most), ..self }
     }
 
-    /// How deep `push` (N or N·m) drives an inertia (kg or kg·m²) into it that arrives at `speed`, sampled every
-    /// `period_s` and answered after `delay_s` more.
+    /// Bounds the penetration into the wall of an inertia (kg or kg·m²) under `push` (N or N·m) that arrives at `speed`,
+    /// sampled every `period_s` and answered after a further `delay_s`.
     ///
-    /// At rest the spring carries the push. On the way there push and speed have done work that the spring takes up,
-    /// `F x + m v² / 2 = K x² / 2` with no damping at all; and what moves at its fastest is seen a period and a delay
-    /// late. The damper of a [stabilised](Self::stabilised) wall takes more than sampling adds (Gil et al. 2009), so
-    /// this is a bound.
+    /// At rest the spring balances the push. Until then push and speed have done work that the spring stores, `F x + m v² /
+    /// 2 = K x² / 2` without any damping; and motion at its fastest is seen a period and a delay late. The damper of a
+    /// [stabilised](Self::stabilised) wall dissipates more than sampling generates (Gil et al. 2009), so this is a bound.
     #[must_use]
     pub fn penetration(
         &self,
@@ -53,61 +52,61 @@ impl Wall {
         Penetration { at_rest, at_most: at_rest + swing + fastest * (period_s + delay_s) }
     }
 
-    /// What it answers `depth` beyond its limit, going out at `speed`; nothing inside.
+    /// Returns the force at `depth` beyond the limit, moving outwards at `speed`; 0 inside the limit.
     fn push(&self, depth: f64, speed: f64) -> f64 {
         if depth > 0.0 { self.stiffness * depth + self.damping * speed.max(0.0) } else { 0.0 }
     }
 
-    /// The same on one axis, to both sides.
+    /// Returns the force of two opposite walls on one axis.
     fn push_axis(&self, position: f64, speed: f64) -> f64 {
         let side = position.signum();
         -side * self.push(position.abs() - self.limit, speed * side)
     }
 }
 
-/// How deep something gets into a wall, m or rad.
+/// Penetration into a wall, m or rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Penetration {
-    /// Where it comes to rest.
+    /// Depth at rest.
     pub at_rest: f64,
-    /// The deepest point on the way there.
+    /// Upper bound of the depth on the way to rest.
     pub at_most: f64,
 }
 
-/// All walls.
+/// All walls of the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walls {
-    /// A sphere about the origin.
+    /// Sphere about the origin.
     pub sphere: Wall,
-    /// Planes on each axis; a limit beyond the sphere does nothing.
+    /// Pairs of planes on each axis; a limit beyond the sphere has no effect.
     pub planes: [Wall; 3],
     /// Limits of rotation about x and y.
     pub tilt: Wall,
     /// Limit of rotation about z.
     pub yaw: Wall,
-    /// Spring of yaw about home, N·m/rad: the thesis's stand-in for the torque its spring has none for.
+    /// Spring of yaw about home, N·m/rad: the thesis's substitute for the yaw torque that its spring lacks.
     pub yaw_spring_nm_per_rad: f64,
-    /// Damping of rotation everywhere, N·m·s/rad; takes the place of the walls' own where that is larger.
+    /// Damping of rotation everywhere, N·m·s/rad; replaces a smaller damping of a wall.
     pub rotation_damping_nms_per_rad: f64,
 }
 
 /// Stiffness and damping of the makers' boundary mode: N/m, N·s/m, N·m/rad, N·m·s/rad (client program of the
 /// University of Utah).
 const MAKER: [f64; 4] = [15_000.0, 15.0, 50.0, 0.15];
-/// Least proportional constant of the thesis's angle limit, N·m/rad, and its multiple of gamma in N.
+/// Least proportional gain of the thesis's angle limit, N·m/rad, and gain per gamma in N.
 const THESIS_LEAST_NM_PER_RAD: f64 = 30.0;
 const THESIS_PER_GAMMA: f64 = 2.5;
 /// Angle limit of the thesis, rad: 2.86 degrees.
 pub const THESIS_ANGLE_LIMIT_RAD: f64 = 0.05;
 
-/// Stiffness of the thesis's angle limit for a spring of `gamma_n`, N·m/rad.
+/// Returns the stiffness of the thesis's angle limit for a spring of `gamma_n`, N·m/rad.
 #[must_use]
 pub fn thesis_nm_per_rad(gamma_n: f64) -> f64 {
     (THESIS_PER_GAMMA * gamma_n).max(THESIS_LEAST_NM_PER_RAD)
 }
 
 impl Walls {
-    /// The makers' boundary mode, at a radius in m.
+    /// Returns the walls of the makers' boundary mode, with a sphere of this radius in m.
     #[must_use]
     pub fn maker(radius_m: f64) -> Self {
         let [stiffness, damping, rotational, rotational_damping] = MAKER;
@@ -123,9 +122,8 @@ impl Walls {
         }
     }
 
-    /// The thesis's walls for a spring of `gamma_n`: the sphere ends where its coils touch (or at `radius_m`, if that
-    /// is nearer), the angular constant grows with gamma. What the thesis does not print (translational gains,
-    /// damping) is the makers'.
+    /// Returns the thesis's walls for a spring of `gamma_n`, with a sphere of `radius_m`: the angular stiffness grows with
+    /// gamma. Values missing in the thesis (translational gains, damping) are the makers'.
     #[must_use]
     pub fn thesis(radius_m: f64, gamma_n: f64) -> Self {
         let maker = Self::maker(radius_m);
@@ -144,7 +142,7 @@ impl Walls {
         let everywhere = self.rotation_damping_nms_per_rad;
         self.sphere = self.sphere.stabilised(sampled, 0.0);
         self.planes = self.planes.map(|plane| plane.stabilised(sampled, 0.0));
-        // One damper at a time: the larger, so that the wall is as damped as it was stabilised for.
+        // One damper at a time: the larger, so that the damping of the wall matches its stability limit.
         for turn in [&mut self.tilt, &mut self.yaw] {
             turn.damping = turn.damping.max(everywhere);
             *turn = turn.stabilised(sampled, everywhere);
@@ -154,7 +152,7 @@ impl Walls {
         self
     }
 
-    /// Force and torque of all walls on the hand.
+    /// Returns force and torque of all walls on the hand.
     #[must_use]
     pub fn wrench(&self, state: &DeviceState) -> Wrench {
         let (position, velocity) = (state.pose.position(), state.twist.linear());
@@ -172,7 +170,7 @@ impl Walls {
         );
         let (turn, spin) = (rotation_vector(state.pose.orientation()), state.twist.angular());
         let axis = |wall: &Wall, angle: f64, speed: f64| {
-            // Everywhere the one damper; beyond the limit the spring, and what the wall's damper has more.
+            // The common damper acts everywhere; beyond the limit act the spring and the excess of the wall's damping.
             let everywhere = self.rotation_damping_nms_per_rad;
             let more = Wall { damping: wall.damping - everywhere, ..*wall };
             -everywhere * speed + more.push_axis(angle, speed)

@@ -2,7 +2,7 @@
 
 use flotor_hal::{DQuat, DVec3, math};
 
-/// The orientation of three angles, rad.
+/// Returns the orientation of three angles, rad.
 #[must_use]
 pub fn orientation(angles_rad: DVec3) -> DQuat {
     let about = |axis: DVec3, angle: f64| {
@@ -12,7 +12,7 @@ pub fn orientation(angles_rad: DVec3) -> DQuat {
     about(DVec3::Z, angles_rad.z) * about(DVec3::Y, angles_rad.y) * about(DVec3::X, angles_rad.x)
 }
 
-/// The three angles of an orientation, rad; the one about y is within a quarter turn.
+/// Returns the three angles of an orientation, rad; the angle about y is within a quarter turn.
 #[must_use]
 pub fn angles(orientation: DQuat) -> DVec3 {
     let DQuat { x, y, z, w } = orientation;

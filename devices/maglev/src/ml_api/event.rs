@@ -1,9 +1,9 @@
-//! Events: what a controller says unasked, on the callback connection, and what a client answers.
+//! Events: unsolicited messages of a controller on the callback connection, and their acknowledgements by a client.
 
 use super::frame::{Fields, Frame};
 use super::values::{Buttons, FaultBits, Six, WirePose};
 
-/// Number of the event that ends a callback connection, and of the function that asks for it.
+/// Number of the event that ends a callback connection, and of the function that requests the end.
 const END: i32 = 71;
 
 /// Events a client can register for.
@@ -17,29 +17,29 @@ pub enum EventKind {
     Overtemp = 76,
     /// The fault bits changed.
     Fault = 77,
-    /// A servo interval.
+    /// A servo interval began.
     Tick = 78,
 }
 
-/// What happened.
+/// An event with its payload.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A button changed.
     Button(Buttons),
-    /// A boundary was crossed: for each axis -1 below its range, 1 above, 0 inside; 1 at last outside the sphere.
+    /// A boundary was crossed: for each axis -1 below its range, 1 above, 0 inside; last element: 1 outside the sphere.
     Boundary([i32; 7]),
-    /// A coil is too hot: all temperatures, °C.
+    /// A coil is too hot: temperatures of all coils, °C.
     Overtemp(Six),
     /// The fault bits changed.
     Fault(FaultBits),
-    /// A servo interval, and the pose it began with.
+    /// A servo interval began: the pose at its start.
     Tick(WirePose),
-    /// No more events: the connection ends.
+    /// Last event: the connection ends.
     End,
 }
 
 impl Event {
-    /// Which kind it is; nothing for the end.
+    /// Returns the kind of the event; `None` for [`Event::End`].
     #[must_use]
     pub const fn kind(&self) -> Option<EventKind> {
         Some(match self {
@@ -52,7 +52,7 @@ impl Event {
         })
     }
 
-    /// As bytes.
+    /// Encodes the event as a frame.
     #[must_use]
     pub fn encode(&self) -> Frame {
         let mut frame = Frame::new(self.kind().map_or(END, |kind| kind as i32));
@@ -72,7 +72,7 @@ impl Event {
         frame
     }
 
-    /// Reads a frame. Total: any bytes give an event or nothing.
+    /// Decodes a frame; `None` for any bytes that are no event. Never panics.
     #[must_use]
     pub fn decode(frame: &[u8]) -> Option<Self> {
         let (id, mut fields) = Fields::of(frame)?;
@@ -99,21 +99,21 @@ impl Event {
     }
 }
 
-/// What a client's handler returned; the order of events is the only thing that says to which.
+/// Return value of a client's event handler. Acknowledgements carry no event number: they match events by order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Acknowledgement(pub i32);
 
 impl Acknowledgement {
-    /// Of an event without a handler, and of the end.
+    /// Acknowledgement of an event without a handler, and of [`Event::End`].
     pub const UNHANDLED: Self = Self(-1);
 
-    /// As bytes.
+    /// Encodes the acknowledgement as a frame.
     #[must_use]
     pub fn encode(self) -> Frame {
         Frame::new(self.0)
     }
 
-    /// Reads a frame; nothing if it is malformed.
+    /// Decodes a frame; `None` if malformed.
     #[must_use]
     pub fn decode(frame: &[u8]) -> Option<Self> {
         Fields::of(frame).map(|(value, _)| Self(value))

@@ -1,10 +1,10 @@
 //! One frame: its length, its code (function, status or event), and fields of four bytes.
 
-/// Shortest frame: length and code.
+/// Length of the shortest frame: length and code.
 pub const SHORTEST_BYTES: usize = 8;
-/// Longest frame a controller accepts, and longest event a client does.
+/// Length of the longest frame that a controller accepts, and of the longest event that a client accepts.
 pub const LONGEST_BYTES: usize = 512;
-/// Longest frame this code sends: a request for all gains of a set.
+/// Length of the longest frame sent by this code: a request with all gains of a set.
 const LONGEST_SENT_BYTES: usize = 108;
 
 /// A frame to send.
@@ -15,7 +15,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A frame of this code, without fields.
+    /// Creates a frame with this code and no fields.
     #[must_use]
     pub fn new(code: i32) -> Self {
         let mut frame = Self { bytes: [0; LONGEST_SENT_BYTES], length: 4 };
@@ -23,13 +23,13 @@ impl Frame {
         frame
     }
 
-    /// The bytes to send.
+    /// Returns the encoded frame.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.length).unwrap_or_default()
     }
 
-    /// Adds raw bytes; what does not fit is left out (no message of this protocol is so long).
+    /// Appends raw bytes; drops them if they do not fit (no message of this protocol is so long).
     pub(super) fn put(&mut self, bytes: &[u8]) -> &mut Self {
         if let Some(room) = self.bytes.get_mut(self.length..self.length + bytes.len()) {
             room.copy_from_slice(bytes);
@@ -58,14 +58,14 @@ impl Frame {
     }
 }
 
-/// Fields of a frame that came in, one after another.
+/// Sequential reader for the fields of a received frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fields<'a> {
     bytes: &'a [u8],
 }
 
 impl<'a> Fields<'a> {
-    /// Code and fields of a whole frame; nothing if its length is not what it says or it has no code.
+    /// Splits a whole frame into code and fields; `None` if its length field is wrong or the code is missing.
     pub(super) fn of(frame: &'a [u8]) -> Option<(i32, Self)> {
         let (length, rest) = frame.split_first_chunk()?;
         let (code, bytes) = rest.split_first_chunk()?;
@@ -73,7 +73,7 @@ impl<'a> Fields<'a> {
         (told == frame.len()).then_some((i32::from_le_bytes(*code), Self { bytes }))
     }
 
-    /// The next four bytes.
+    /// Reads the next four bytes as an integer.
     pub(super) fn int(&mut self) -> Option<i32> {
         self.array().map(i32::from_le_bytes)
     }
@@ -96,7 +96,7 @@ impl<'a> Fields<'a> {
         Some(*first)
     }
 
-    /// What is left.
+    /// Returns the unread bytes.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.bytes
     }

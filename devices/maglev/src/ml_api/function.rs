@@ -1,4 +1,4 @@
-//! The functions, by their numbers on the wire.
+//! Functions of the controller, with their numbers on the wire.
 
 use super::event::EventKind;
 
@@ -11,10 +11,10 @@ macro_rules! functions {
         }
 
         impl Function {
-            /// All of them.
+            /// All functions, by number.
             pub const ALL: &'static [Self] = &[$(Self::$name),+];
 
-            /// Returns the name that the ML API gives it.
+            /// Returns the name of the function in the ML API.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => stringify!($name),)+
@@ -27,160 +27,160 @@ macro_rules! functions {
 functions! {
     /// Keeps an axis inside a range.
     ConstrainAxis = 1,
-    /// Gravity becomes the feed-forward of the normal gains.
+    /// Sets the feed-forward of the normal gains to the stored gravity.
     DefyGravity = 2,
-    /// The client goes.
+    /// Ends the session of the client.
     Disconnect = 3,
-    /// Finds the wrench that holds the flotor; takes seconds.
+    /// Measures the wrench that holds the flotor; takes seconds.
     FindGravity = 4,
-    /// Where the flotor is.
+    /// Returns the pose of the flotor.
     GetActualPosition = 5,
-    /// How each axis is controlled.
+    /// Returns the control mode of each axis.
     GetAxisModes = 6,
-    /// Radius of the boundary sphere.
+    /// Returns the radius of the boundary sphere.
     GetBoundaryRadius = 7,
-    /// The buttons.
+    /// Returns the state of the buttons.
     GetButtonStatus = 8,
-    /// The light spots.
+    /// Returns the light spots on the position sensors.
     GetCellPosition = 9,
-    /// Largest current of each coil.
+    /// Returns the current limit of each coil.
     GetCurrentLimits = 10,
-    /// Current of each coil.
+    /// Returns the current of each coil.
     GetCurrents = 11,
-    /// Where the flotor should be.
+    /// Returns the desired pose of the flotor.
     GetDesiredPosition = 12,
-    /// What is wrong.
+    /// Returns the fault bits.
     GetFault = 14,
-    /// Force of one axis.
+    /// Returns the force of one axis.
     GetForceAxis = 15,
-    /// The wrench in force.
+    /// Returns the commanded wrench.
     GetForces = 16,
-    /// The user's frame.
+    /// Returns the user's frame.
     GetFrame = 17,
-    /// Gains of all axes.
+    /// Returns the gains of all axes.
     GetGainVecAxes = 18,
-    /// Gains of one axis.
+    /// Returns the gains of one axis.
     GetGainVecAxis = 19,
-    /// Gains of the grasp.
+    /// Returns the gains of the grasp.
     GetGainVecGrasp = 20,
-    /// One gain.
+    /// Returns one gain.
     GetGainVecSingle = 21,
-    /// Current of the grasp.
+    /// Returns the current of the grasp.
     GetGraspCurrent = 22,
-    /// Largest current of the grasp.
+    /// Returns the current limit of the grasp.
     GetGraspCurrentLimit = 23,
-    /// The stored gravity.
+    /// Returns the stored gravity.
     GetGravity = 24,
-    /// Reach of the cells.
+    /// Returns the range of the position sensors.
     GetLatCellLimit = 25,
-    /// Where the cells sit.
+    /// Returns the placement of the position sensors.
     GetLatCellOffset = 26,
-    /// Voltages of the cells.
+    /// Returns the voltages of the position sensors.
     GetRawCellData = 27,
-    /// Servo rate.
+    /// Returns the servo rate.
     GetServoFrequency = 28,
-    /// Largest speeds.
+    /// Returns the speed limits.
     GetSpeedLimits = 29,
-    /// Temperature of each coil.
+    /// Returns the temperature of each coil.
     GetTemp = 30,
-    /// How the flotor moves.
+    /// Returns the velocity of the flotor.
     GetVelocity = 31,
-    /// The controller's version.
+    /// Returns the controller's version.
     GetVersion = 32,
     /// Sets the flotor down; takes seconds.
     Land = 33,
-    /// Holds an axis where it is.
+    /// Locks an axis at its position.
     LockAxis = 34,
-    /// From now on, changes of the buttons.
+    /// Registers for changes of the buttons.
     RegisterButton = 36,
-    /// From now on, changes of the fault bits.
+    /// Registers for changes of the fault bits.
     RegisterFault = 37,
-    /// From now on, crossings of boundaries.
+    /// Registers for crossings of boundaries.
     RegisterBoundary = 38,
-    /// From now on, coils that are too hot.
+    /// Registers for coils that are too hot.
     RegisterOvertemp = 39,
-    /// From now on, each servo interval.
+    /// Registers for servo intervals.
     RegisterTick = 40,
-    /// Clears the faults whose cause is gone.
+    /// Clears the faults without a present cause.
     ResetFault = 41,
-    /// Default gains of a set; takes seconds.
+    /// Restores the default gains of a set; takes seconds.
     ResetGainVecAxes = 42,
-    /// Voltage of the spare output.
+    /// Sets the voltage of the spare output.
     SetAuxDac = 43,
-    /// Radius of the boundary sphere.
+    /// Sets the radius of the boundary sphere.
     SetBoundaryRadius = 44,
-    /// Largest current of each coil.
+    /// Sets the current limit of each coil.
     SetCurrentLimits = 45,
-    /// Current of each coil.
+    /// Sets the current of each coil.
     SetCurrents = 46,
-    /// Where the flotor should be.
+    /// Sets the desired pose of the flotor.
     SetDesiredPosition = 47,
-    /// Force of one axis.
+    /// Sets the force of one axis.
     SetForceAxis = 48,
-    /// The wrench.
+    /// Sets the wrench.
     SetForces = 49,
-    /// The user's frame.
+    /// Sets the user's frame.
     SetFrame = 50,
-    /// Gains of all axes.
+    /// Sets the gains of all axes.
     SetGainVecAxes = 51,
-    /// Gains of one axis.
+    /// Sets the gains of one axis.
     SetGainVecAxis = 52,
-    /// Gains of the grasp.
+    /// Sets the gains of the grasp.
     SetGainVecGrasp = 53,
-    /// One gain.
+    /// Sets one gain.
     SetGainVecSingle = 54,
-    /// Current of the grasp.
+    /// Sets the current of the grasp.
     SetGraspCurrent = 55,
-    /// Largest current of the grasp.
+    /// Sets the current limit of the grasp.
     SetGraspCurrentLimit = 56,
     /// Stores gravity.
     SetGravity = 57,
-    /// Where the cells sit.
+    /// Sets the placement of the position sensors.
     SetLatCellOffset = 58,
-    /// Servo rate.
+    /// Sets the servo rate.
     SetServoFrequency = 59,
-    /// Largest speeds.
+    /// Sets the speed limits.
     SetSpeedLimits = 60,
-    /// How the desired position moves.
+    /// Sets the velocity of the desired pose.
     SetVelocity = 61,
-    /// Starts the controller anew.
+    /// Restarts the controller.
     Shutdown = 62,
     /// Lifts the flotor home; takes seconds.
     Takeoff = 63,
     /// Frees an axis.
     UnlockAxis = 64,
-    /// No button events any more.
+    /// Unregisters from button events.
     UnregisterButton = 65,
-    /// No fault events any more.
+    /// Unregisters from fault events.
     UnregisterFault = 66,
-    /// No boundary events any more.
+    /// Unregisters from boundary events.
     UnregisterBoundary = 67,
-    /// No temperature events any more.
+    /// Unregisters from temperature events.
     UnregisterOvertemp = 68,
-    /// No ticks any more.
+    /// Unregisters from ticks.
     UnregisterTick = 69,
     /// Ends the callback connection.
     StopCallbacks = 71,
-    /// A token for this connection, which carries events from now on.
+    /// Returns a token for this connection, which carries events from then on.
     RequestToken = 72,
-    /// The callback connection with this token belongs to this client.
+    /// Assigns the callback connection with this token to the client.
     MapToken = 73,
 }
 
 impl Function {
-    /// Its number on the wire.
+    /// Returns the number of the function on the wire.
     #[must_use]
     pub const fn id(self) -> i32 {
         self as i32
     }
 
-    /// The function of a number, if there is one.
+    /// Returns the function with a number; `None` if there is none.
     #[must_use]
     pub fn of(id: i32) -> Option<Self> {
         Self::ALL.iter().copied().find(|function| *function as i32 == id)
     }
 
-    /// The events it begins.
+    /// Returns the events that the function registers for; `None` for other functions.
     #[must_use]
     pub const fn registers(self) -> Option<EventKind> {
         Some(match self {
@@ -193,7 +193,7 @@ impl Function {
         })
     }
 
-    /// The events it ends.
+    /// Returns the events that the function unregisters from; `None` for other functions.
     #[must_use]
     pub const fn unregisters(self) -> Option<EventKind> {
         Some(match self {
@@ -206,7 +206,7 @@ impl Function {
         })
     }
 
-    /// True if it moves the flotor or changes how the controller does; what only looks, and landing, is free to all clients.
+    /// Returns true if only the commanding client may call the function. Reading and landing are free to all clients.
     #[must_use]
     pub const fn commands(self) -> bool {
         matches!(

@@ -1,27 +1,27 @@
-//! Frames out of a stream of bytes: whole ones, whatever pieces they come in.
+//! Assembly of whole frames from a byte stream, for any segmentation of the stream.
 
 use super::frame::{LONGEST_BYTES, SHORTEST_BYTES};
 use std::io::{ErrorKind, Read};
 
-/// What a look at a stream found.
+/// Result of one read of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Taken {
-    /// A whole frame of this many bytes, to be had from [`Intake::frame`] until the next look.
+    /// A whole frame of this many bytes; [`Intake::frame`] returns the frame until the next read.
     Frame(usize),
-    /// Nothing more has arrived.
+    /// No whole frame yet.
     Nothing,
-    /// A length that no frame has: where the next one begins is not known.
+    /// An invalid length: the start of the next frame is unknown.
     Malformed,
-    /// The other side is gone.
+    /// The connection is lost.
     Lost,
 }
 
-/// Bytes that arrived and were not used yet.
+/// Buffer of received, unused bytes.
 #[derive(Clone, Debug)]
 pub struct Intake {
     bytes: [u8; LONGEST_BYTES],
     filled: usize,
-    /// Bytes of the frame that was told last: gone with the next look.
+    /// Bytes of the frame returned last; discarded by the next read.
     told: usize,
 }
 
@@ -32,13 +32,13 @@ impl Default for Intake {
 }
 
 impl Intake {
-    /// The frame that was told of last.
+    /// Returns the frame found by the last [`Intake::take`].
     #[must_use]
     pub fn frame(&self) -> &[u8] {
         self.bytes.get(..self.told).unwrap_or_default()
     }
 
-    /// The next frame of a stream; one call of the system at most if the stream does not block.
+    /// Reads the next frame of a stream; one system call at most if the stream does not block.
     pub fn take(&mut self, stream: &mut impl Read) -> Taken {
         self.bytes.copy_within(self.told..self.filled, 0);
         self.filled -= self.told;
@@ -65,13 +65,13 @@ impl Intake {
         }
     }
 
-    /// True if some bytes of a frame have arrived and others have not.
+    /// Returns true if a frame has arrived in part.
     #[must_use]
     pub fn is_in_the_middle(&self) -> bool {
         self.filled > self.told
     }
 
-    /// Length of the frame that begins here; an error if no frame has it.
+    /// Returns the length of the frame at the start of the buffer; an error if the length is invalid.
     fn length(&self) -> Option<Result<usize, ()>> {
         let head = self.bytes.get(..self.filled)?.first_chunk()?;
         let length = usize::try_from(i32::from_le_bytes(*head)).unwrap_or(0);

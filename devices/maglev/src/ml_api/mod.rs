@@ -1,4 +1,4 @@
-//! The ML API 1.5b: what the controller of the Maglev 200 speaks on TCP port 5678. One codec for both ends.
+//! The ML API 1.5b: protocol of the controller of the Maglev 200, on TCP port 5678. One codec for both ends.
 //!
 //! ```text
 //! request   length i32, function i32, arguments        client to controller, control connection
@@ -11,9 +11,9 @@
 //! on a connection at a time. Metres, radians, seconds, newtons, amperes, degrees Celsius; axes x, y, z and the rotations
 //! about them, the device frame.
 //!
-//! - [`frame`]: bytes of one frame, written and read; [`intake`] cuts them out of a stream.
-//! - [`values`]: what fields mean; [`angles`]: three angles as an orientation.
-//! - [`request`], [`reply`], [`event`]: what is said, and as which bytes.
+//! - [`frame`]: encoding and decoding of one frame; [`intake`]: frames from a stream.
+//! - [`values`]: types of the fields; [`angles`]: three angles as an orientation.
+//! - [`request`], [`reply`], [`event`]: the messages and their encoding.
 //!
 //! Real-time throughout: bounded, no allocation.
 
@@ -36,5 +36,5 @@ pub use values::{
     Axis, AxisMode, Buttons, Cell, CellOffset, FaultBits, Gain, GainSet, Pid, Six, Status, Version, WirePose,
 };
 
-/// The port every controller and every client uses.
+/// TCP port of every controller.
 pub const PORT: u16 = 5678;

@@ -1,5 +1,5 @@
-//! Replies: a status, and always the full results. A client decodes results whatever the status says, so that a reply that
-//! is cut short would give it numbers of an earlier one.
+//! Replies: a status and always the full results. A client decodes results even with an error status: after a truncated
+//! reply the numbers of an earlier one would remain.
 
 use super::frame::{Fields, Frame};
 use super::function::Function;
@@ -8,47 +8,47 @@ use super::values::{AxisMode, Buttons, Cell, CellOffset, FaultBits, Pid, Six, St
 /// Results of a function. Units of [`super`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Results {
-    /// None.
+    /// No results.
     None,
     /// One number.
     Number(f32),
     /// Six numbers.
     Six(Six),
-    /// A pose.
+    /// A pose of the flotor or a frame.
     Pose(WirePose),
-    /// How each axis is controlled.
+    /// Control mode of each axis.
     Modes([AxisMode; 6]),
-    /// Buttons.
+    /// State of the buttons.
     Buttons(Buttons),
-    /// Light spots.
+    /// Light spots on the position sensors.
     Cells([Cell; 3]),
-    /// What is wrong.
+    /// Fault bits.
     Fault(FaultBits),
     /// Gains of all axes.
     Gains([Pid; 6]),
-    /// Gains of an axis.
+    /// Gains of one axis.
     Pid(Pid),
-    /// Where the cells sit.
+    /// Placement of the position sensors.
     CellOffsets([CellOffset; 3]),
-    /// Voltages, four a cell.
+    /// Voltages, four per position sensor.
     Voltages([f32; 12]),
-    /// The version.
+    /// Version of the controller.
     Version(Version),
-    /// The name of a callback connection.
+    /// Token of a callback connection.
     Token(i32),
 }
 
-/// What a controller answers.
+/// Reply of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reply {
-    /// Whether it was done.
+    /// Status of the call.
     pub status: Status,
-    /// Results, of the function's kind.
+    /// Results, in the variant of the function.
     pub results: Results,
 }
 
 impl Results {
-    /// The results of a function with all numbers zero: what goes with an error.
+    /// Returns the results of a function with all numbers zero, for replies with an error.
     #[must_use]
     pub fn zero(function: Function) -> Self {
         match function {
@@ -91,7 +91,7 @@ impl Results {
             Self::Six(values) => return frame.floats(values),
             Self::Pose(pose) => return frame.int(pose.out_of_range.into()).floats(&pose.at),
             Self::Modes(modes) => {
-                // The first two once more: the vendor's decoder reads two further numbers over them.
+                // The first two are sent a second time: the vendor's decoder reads two further numbers.
                 for mode in modes.iter().chain(modes.iter().take(2)) {
                     frame.int(*mode as i32);
                 }
@@ -169,25 +169,25 @@ impl Results {
 }
 
 impl Reply {
-    /// Done, with these results.
+    /// Creates a reply with status OK and these results.
     #[must_use]
     pub const fn ok(results: Results) -> Self {
         Self { status: Status::OK, results }
     }
 
-    /// Done, or why not; a function without results.
+    /// Creates a reply of a function without results.
     #[must_use]
     pub const fn status(status: Status) -> Self {
         Self { status, results: Results::None }
     }
 
-    /// Not done: full results of zeros. What has no function has no results.
+    /// Creates a reply with an error and results of zeros; no results without a function.
     #[must_use]
     pub fn failed(function: Option<Function>, status: Status) -> Self {
         Self { status, results: function.map_or(Results::None, Results::zero) }
     }
 
-    /// As bytes.
+    /// Encodes the reply as a frame.
     #[must_use]
     pub fn encode(&self) -> Frame {
         let mut frame = Frame::new(self.status.0);
@@ -195,8 +195,8 @@ impl Reply {
         frame
     }
 
-    /// Reads the frame that answers a function. Total: any bytes give a reply or nothing; one that is shorter than the
-    /// function's results is none.
+    /// Decodes the reply to a function; `None` for any other bytes and for a frame shorter than the function's results.
+    /// Never panics.
     #[must_use]
     pub fn decode(function: Function, frame: &[u8]) -> Option<Self> {
         let (status, mut fields) = Fields::of(frame)?;

@@ -5,27 +5,27 @@ use super::frame::{Fields, Frame};
 use super::function::Function;
 use super::values::{Axis, CellOffset, Gain, GainSet, Pid, Six, Status, WirePose};
 
-/// What a client asks. Units of [`super`].
+/// Request of a client. Units of [`super`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
     /// A function without arguments.
     Plain(Function),
     /// Keeps an axis between two values, m or rad.
     ConstrainAxis {
-        /// Which.
+        /// Axis to constrain.
         axis: Axis,
         /// Smallest and largest value.
         range: [f32; 2],
     },
-    /// A function of one axis: its force, locking, unlocking.
+    /// A function of one axis: read its force, lock or unlock the axis.
     OfAxis(Function, Axis),
-    /// A function of one gain set: reading or resetting it.
+    /// A function of one gain set: read or reset the set.
     OfSet(Function, GainSet),
-    /// Gains of an axis.
+    /// Reads the gains of an axis.
     GetGainVecAxis(GainSet, Axis),
-    /// One gain.
+    /// Reads one gain.
     GetGainVecSingle(GainSet, Axis, Gain),
-    /// Begins or ends events; the client's process id.
+    /// Registers for events or unregisters; with the client's process id.
     Register(Function, i32),
     /// A function of one number: radius m, voltage V, current A, frequency Hz.
     Number(Function, f32),
@@ -33,33 +33,33 @@ pub enum Request {
     Six(Function, Six),
     /// A function of a pose: desired position, frame.
     Pose(Function, WirePose),
-    /// Force of one axis, N or N·m.
+    /// Sets the force of one axis, N or N·m.
     SetForceAxis(Axis, f32),
-    /// Gains of all axes.
+    /// Sets the gains of all axes.
     SetGainVecAxes(GainSet, [Pid; 6]),
-    /// Gains of an axis.
+    /// Sets the gains of an axis.
     SetGainVecAxis(GainSet, Axis, Pid),
-    /// Gains of the grasp.
+    /// Sets the gains of the grasp.
     SetGainVecGrasp(Pid),
-    /// One gain.
+    /// Sets one gain.
     SetGainVecSingle(GainSet, Axis, Gain, f32),
-    /// Where the cells sit.
+    /// Sets the placement of the position sensors.
     SetLatCellOffset([CellOffset; 3]),
-    /// The callback connection of this token is the client's.
+    /// Assigns the callback connection with this token to the client.
     MapToken(i32),
 }
 
-/// A request that cannot be obeyed, and what is to be answered.
+/// An invalid request, with the status for the reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unreadable {
-    /// The function, if there is one of that number.
+    /// The requested function; `None` if the number is unknown.
     pub function: Option<Function>,
-    /// Why not.
+    /// Status for the reply.
     pub status: Status,
 }
 
 impl Request {
-    /// The function.
+    /// Returns the function of the request.
     #[must_use]
     pub const fn function(&self) -> Function {
         match *self {
@@ -83,7 +83,7 @@ impl Request {
         }
     }
 
-    /// Registers for events.
+    /// Creates the request that registers for events.
     #[must_use]
     pub const fn register(kind: EventKind, process: i32) -> Self {
         let function = match kind {
@@ -96,7 +96,7 @@ impl Request {
         Self::Register(function, process)
     }
 
-    /// As bytes.
+    /// Encodes the request as a frame.
     #[must_use]
     pub fn encode(&self) -> Frame {
         let mut frame = Frame::new(self.function().id());
@@ -137,10 +137,10 @@ impl Request {
         frame
     }
 
-    /// Reads a frame. Total: any bytes give a request or what is to be answered; bytes behind the arguments are ignored.
+    /// Decodes a frame; bytes after the arguments are ignored. Never panics.
     ///
     /// # Errors
-    /// [`Unreadable`].
+    /// [`Unreadable`] for an unknown function, missing arguments or an invalid axis, gain or gain set.
     pub fn decode(frame: &[u8]) -> Result<Self, Unreadable> {
         let unknown = Unreadable { function: None, status: Status::UNKNOWN };
         let (id, fields) = Fields::of(frame).ok_or(unknown)?;
@@ -149,7 +149,7 @@ impl Request {
     }
 }
 
-/// Arguments of a function that are being read.
+/// Reader for the arguments of a function.
 struct Arguments<'a> {
     fields: Fields<'a>,
     function: Function,
@@ -180,7 +180,7 @@ impl Arguments<'_> {
             | Function::SetSpeedLimits
             | Function::SetVelocity => Request::Six(function, self.six()?),
             Function::SetDesiredPosition | Function::SetFrame => {
-                // The flag is whatever the caller's memory held.
+                // The flag is ignored: clients send uninitialised memory.
                 self.int()?;
                 Request::Pose(function, WirePose { out_of_range: false, at: self.six()? })
             }

@@ -1,11 +1,11 @@
-//! What the fields mean.
+//! Types of the fields.
 
 use std::fmt;
 
-/// A number for each axis: x, y, z, then the rotations about them.
+/// A number for each axis: x, y, z, then the rotations about x, y, z.
 pub type Six = [f32; 6];
 
-/// One of six axes.
+/// Axis of translation or rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// Along x.
@@ -23,30 +23,30 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// All of them, in the order of the wire.
+    /// All axes, in the order of the wire.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
 
-    /// The axis of a code; the seventh, the grasp of other devices, is none.
+    /// Returns the axis of a code; `None` for the seventh, the grasp of other devices.
     pub(super) fn of(code: i32) -> Option<Self> {
         Self::ALL.into_iter().find(|axis| *axis as i32 == code)
     }
 }
 
-/// Which gains act on an axis.
+/// Gain set, by the state of the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GainSet {
-    /// An axis that is free.
+    /// Gains of a free axis.
     Normal = 0,
-    /// One that is locked where it was.
+    /// Gains of a locked axis.
     Locked = 1,
-    /// One beyond its constraint.
+    /// Gains of an axis beyond its constraint.
     Constrained = 2,
-    /// Any, beyond the boundary sphere.
+    /// Gains of all axes beyond the boundary sphere.
     Boundary = 3,
 }
 
 impl GainSet {
-    /// All of them.
+    /// All gain sets, in the order of the wire.
     pub const ALL: [Self; 4] = [Self::Normal, Self::Locked, Self::Constrained, Self::Boundary];
 
     pub(super) fn of(code: i32) -> Option<Self> {
@@ -54,7 +54,7 @@ impl GainSet {
     }
 }
 
-/// One of the four gains of an axis.
+/// Gain of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gain {
     /// Proportional.
@@ -68,7 +68,7 @@ pub enum Gain {
 }
 
 impl Gain {
-    /// All of them.
+    /// All gains, in the order of the wire.
     pub const ALL: [Self; 4] = [Self::P, Self::I, Self::D, Self::Ff];
 
     pub(super) fn of(code: i32) -> Option<Self> {
@@ -76,7 +76,7 @@ impl Gain {
     }
 }
 
-/// Gains of an axis: N/m, N/(m s), N s/m, N; about it N·m/rad, N·m/(rad s), N·m s/rad, N·m.
+/// Gains of an axis: N/m, N/(m s), N s/m, N; of a rotation N·m/rad, N·m/(rad s), N·m s/rad, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pid {
     /// Proportional.
@@ -90,10 +90,10 @@ pub struct Pid {
 }
 
 impl Pid {
-    /// No force at all.
+    /// Gains without any force.
     pub const ZERO: Self = Self { p: 0.0, i: 0.0, d: 0.0, ff: 0.0 };
 
-    /// One of them.
+    /// Returns a reference to one of the gains.
     pub fn gain_mut(&mut self, gain: Gain) -> &mut f32 {
         match gain {
             Gain::P => &mut self.p,
@@ -104,26 +104,26 @@ impl Pid {
     }
 }
 
-/// A pose on the wire: m and rad.
+/// Pose on the wire: m and rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WirePose {
-    /// The sensors do not see the flotor.
+    /// True if the flotor is outside the sensors' range.
     pub out_of_range: bool,
-    /// Position and the angles of [`super::angles`].
+    /// Position, then the angles defined in [`super::angles`].
     pub at: Six,
 }
 
-/// How an axis is controlled.
+/// Control mode of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AxisMode {
     /// Free.
     #[default]
     Normal = 0,
-    /// Held where it was.
+    /// Locked at its position.
     Locked = 1,
-    /// Kept inside a range.
+    /// Constrained to a range.
     Constrained = 2,
-    /// At the boundary sphere.
+    /// Beyond the boundary sphere.
     Boundary = 3,
 }
 
@@ -135,34 +135,34 @@ impl AxisMode {
     }
 }
 
-/// Buttons of the handle.
+/// State of the handle's buttons.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Buttons {
-    /// The left one is pressed.
+    /// True while the left button is pressed.
     pub left: bool,
-    /// The right one is pressed.
+    /// True while the right button is pressed.
     pub right: bool,
 }
 
-/// A light spot on its cell, m.
+/// Position of a light spot on a position sensor, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cell {
-    /// Along the cell.
+    /// Coordinate along the sensor.
     pub x: f32,
-    /// Across it.
+    /// Coordinate across the sensor.
     pub y: f32,
-    /// The spot is on the cell.
+    /// True if the spot is on the sensor.
     pub is_valid: bool,
 }
 
-/// Where a cell sits: m, m, rad.
+/// Placement of a position sensor: m, m, rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CellOffset {
     /// Along x.
     pub x: f32,
     /// Along y.
     pub y: f32,
-    /// Turn.
+    /// Rotation, rad.
     pub t: f32,
 }
 
@@ -174,10 +174,10 @@ pub struct Version {
 }
 
 impl Version {
-    /// A client copies it unchecked: with its end it is 16 bytes.
+    /// Longest text: clients copy the text unchecked into 16 bytes, with its final zero.
     const LONGEST: usize = 15;
 
-    /// A text; what is too long is cut, what is no printable ASCII ends it.
+    /// Creates a version from ASCII text; cuts text that is too long, and ends at the first unprintable byte.
     #[must_use]
     pub fn new(text: &[u8]) -> Self {
         let mut version = Self::default();
@@ -191,58 +191,58 @@ impl Version {
         version
     }
 
-    /// As text.
+    /// Returns the version as text.
     #[must_use]
     pub fn text(&self) -> &str {
         std::str::from_utf8(self.text.get(..self.length).unwrap_or_default()).unwrap_or_default()
     }
 }
 
-/// What a controller says to a request: 0, or why not.
+/// Status of a reply: 0, or an error code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status(pub i32);
 
 impl Status {
-    /// Done.
+    /// Success.
     pub const OK: Self = Self(0);
-    /// A function it does not know.
+    /// Unknown function.
     pub const UNKNOWN: Self = Self(-1);
-    /// A gain out of range.
+    /// Gain out of range.
     pub const GAIN_RANGE: Self = Self(1);
     /// No such gain or gain set.
     pub const GAIN_TYPE: Self = Self(3);
     /// No such axis.
     pub const AXIS: Self = Self(4);
-    /// A position out of range.
+    /// Position out of range.
     pub const POSITION: Self = Self(5);
-    /// A force out of range.
+    /// Force out of range.
     pub const FORCE: Self = Self(6);
-    /// A current that was clipped.
+    /// Current clipped to its limit.
     pub const CURRENT: Self = Self(7);
-    /// A frequency out of range.
+    /// Frequency out of range.
     pub const FREQUENCY: Self = Self(8);
-    /// A speed out of range.
+    /// Speed out of range.
     pub const SPEED: Self = Self(10);
-    /// A request without its arguments.
+    /// Arguments missing.
     pub const COMMUNICATION: Self = Self(0x10);
-    /// Another client commands.
+    /// Another client commands; this client may only read.
     pub const RECEIVE_ONLY: Self = Self(0x30);
-    /// No connection has that token.
+    /// No connection has this token.
     pub const NO_MATCH: Self = Self(0x62);
-    /// It has landed.
+    /// The flotor has landed.
     pub const LANDED: Self = Self(0x100);
-    /// It has taken off.
+    /// The flotor has taken off.
     pub const TAKEN_OFF: Self = Self(0x200);
-    /// It does not control the coils.
+    /// The controller does not control the coils.
     pub const OFF_LINE: Self = Self(0x300);
     /// A coil is too hot.
     pub const OVERHEATED: Self = Self(0x400);
-    /// It took too long.
+    /// The procedure timed out.
     pub const TIMER: Self = Self(0x800);
-    /// Another procedure took its place.
+    /// Another procedure replaced this one.
     pub const REPLACED: Self = Self(0x801);
 
-    /// True for [`Status::OK`].
+    /// Returns true for [`Status::OK`].
     #[must_use]
     pub const fn is_ok(self) -> bool {
         self.0 == 0
@@ -277,14 +277,14 @@ impl fmt::Display for Status {
     }
 }
 
-/// What is wrong, a bit each; a fault switches the coils off.
+/// Fault bits; a fault switches the coils off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultBits(pub u32);
 
 impl FaultBits {
-    /// Nothing.
+    /// No fault.
     pub const NONE: Self = Self(0);
-    /// The sensors do not see the flotor.
+    /// The flotor is outside the sensors' range.
     pub const SENSOR_RANGE: Self = Self(1);
     /// A coil is too hot.
     pub const OVER_TEMPERATURE: Self = Self(2);
@@ -293,25 +293,25 @@ impl FaultBits {
     /// The flotor moves too fast.
     pub const OVER_SPEED: Self = Self(8);
 
-    /// Both.
+    /// Returns the union of two sets of faults.
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// What of it is not in the other.
+    /// Returns the faults that are not in `other`.
     #[must_use]
     pub const fn without(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
-    /// True if all of `other` is among them.
+    /// Returns true if all faults of `other` are set.
     #[must_use]
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// True if nothing is wrong.
+    /// Returns true if no fault is set.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         self.0 == 0

@@ -1,4 +1,4 @@
-//! Connections: one call outstanding, one write a frame, a deadline for everything.
+//! Connections: one outstanding call, one write per frame, a timeout for every read.
 
 use crate::ml_api::{
     Acknowledgement, Event, Frame, Function, Intake, Reply, Request, Results, Status, Taken,
@@ -9,16 +9,16 @@ use std::io::Write;
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Why a call has no results.
+/// Cause of a call without results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoResults {
-    /// There is no other side any more.
+    /// The connection is lost.
     Lost,
-    /// Nothing came in time.
+    /// No reply within the timeout.
     Silent,
-    /// What came is no reply to that call.
+    /// The received frame is no reply to the call.
     Malformed,
-    /// The controller says why not.
+    /// The controller rejected the call with this status.
     Refused(Status),
 }
 
@@ -33,7 +33,7 @@ impl std::fmt::Display for NoResults {
     }
 }
 
-/// A connection that can be waited for.
+/// A connection with timed reads of whole frames.
 pub(crate) struct Line {
     stream: TcpStream,
     intake: Intake,
@@ -42,7 +42,7 @@ pub(crate) struct Line {
 impl Line {
     pub(crate) fn open(address: &str) -> Result<Self, OpenError> {
         let stream = tcp::open(address)?;
-        // Reset when dropped: a controller whose client is gone is to know it at once.
+        // Reset when dropped, so that the controller detects the end of its client at once.
         reset_when_dropped(&stream);
         Ok(Self { stream, intake: Intake::default() })
     }
@@ -51,14 +51,14 @@ impl Line {
         &self.stream
     }
 
-    /// Sends a frame. Real-time: bounded, no allocation; one call of the system.
+    /// Sends a frame. Real-time: bounded, no allocation; one system call.
     fn send(&mut self, frame: &Frame) -> Result<(), NoResults> {
         let sent = self.stream.write(frame.bytes());
-        // A frame of a hundred bytes on a connection with nothing outstanding has room, or nobody reads.
+        // A frame of a hundred bytes fits into an empty send buffer, or the other end has stopped reading.
         if sent.is_ok_and(|length| length == frame.bytes().len()) { Ok(()) } else { Err(NoResults::Lost) }
     }
 
-    /// The next whole frame's bytes; nothing if it does not come in time.
+    /// Reads the next whole frame into the buffer; false on timeout.
     fn take(&mut self, patience: Duration) -> Result<bool, NoResults> {
         let until = Instant::now() + patience;
         loop {
@@ -77,7 +77,7 @@ impl Line {
     }
 }
 
-/// The control connection.
+/// Control connection: one call at a time.
 pub(crate) struct Control {
     line: Line,
     outstanding: Option<(Function, Instant)>,
@@ -89,17 +89,17 @@ impl Control {
         Self { line, outstanding: None, is_lost: false }
     }
 
-    /// True once a reply is overdue or the other side is gone: nothing is asked on it any more.
+    /// Returns true after a timeout or an error; no further call is sent.
     pub(crate) fn is_lost(&self) -> bool {
         self.is_lost
     }
 
-    /// When the call was made that is not answered yet.
+    /// Returns the start of the outstanding call, if any.
     pub(crate) fn outstanding_since(&self) -> Option<Instant> {
         self.outstanding.map(|(_, since)| since)
     }
 
-    /// Makes a call without waiting. Real-time: bounded, no allocation.
+    /// Sends a call without waiting. Real-time: bounded, no allocation.
     pub(crate) fn begin(&mut self, request: &Request) -> Result<(), NoResults> {
         if self.is_lost || self.outstanding.is_some() {
             return Err(NoResults::Lost);
@@ -109,7 +109,7 @@ impl Control {
         self.keep(sent)
     }
 
-    /// The reply to the call that was made; nothing if it does not come within the budget. Real-time: bounded, no allocation.
+    /// Receives the reply to the outstanding call; `None` if it misses the budget. Real-time: bounded, no allocation.
     pub(crate) fn finish(&mut self, budget: Duration) -> Result<Option<Reply>, NoResults> {
         let Some((function, _)) = self.outstanding else { return Ok(None) };
         let taken = self.line.take(budget);
@@ -126,9 +126,9 @@ impl Control {
         result
     }
 
-    /// A call and its results. Not real-time.
+    /// Makes a call and returns its results. Not real-time.
     pub(crate) fn call(&mut self, request: &Request, patience: Duration) -> Result<Results, NoResults> {
-        // One that a tick left behind.
+        // A call left outstanding by a tick.
         if self.outstanding.is_some() && self.finish(patience)?.is_none() {
             return self.keep(Err(NoResults::Silent));
         }
@@ -141,13 +141,13 @@ impl Control {
     }
 }
 
-/// The connection that carries events.
+/// Callback connection, for events.
 pub(crate) struct Events {
     line: Line,
 }
 
 impl Events {
-    /// A new connection, with the token the controller gave it. Not real-time.
+    /// Opens a callback connection; returns it with the token from the controller. Not real-time.
     pub(crate) fn open(address: &str, patience: Duration) -> Result<(Self, i32), NoResults> {
         let line = Line::open(address).map_err(|_| NoResults::Lost)?;
         let mut asking = Control::new(line);
@@ -157,8 +157,8 @@ impl Events {
         }
     }
 
-    /// The next event; nothing if there is none within the budget. Real-time: bounded, no allocation. What is no event is
-    /// acknowledged as such, and the next one looked at.
+    /// Reads the next event; `None` without one within the budget, and for an unknown event, which is acknowledged as
+    /// unhandled. Real-time: bounded, no allocation.
     pub(crate) fn next(&mut self, budget: Duration) -> Result<Option<Event>, NoResults> {
         if !self.line.take(budget)? {
             return Ok(None);
@@ -170,7 +170,7 @@ impl Events {
         Ok(event)
     }
 
-    /// Answers an event. Real-time: bounded, no allocation.
+    /// Acknowledges an event. Real-time: bounded, no allocation.
     pub(crate) fn acknowledge(&mut self, value: Acknowledgement) -> Result<(), NoResults> {
         self.line.send(&value.encode())
     }

@@ -1,11 +1,11 @@
-//! The client of the ML API: two connections and a session, and a third connection for nothing but the stop.
+//! Client of the ML API: two connections for a session, and a third one reserved for the stop.
 //!
-//! - [`connection`]: a call and its reply, events and their acknowledgements, each with a deadline.
-//! - [`session`]: from the first call to levitation, and back.
-//! - [`stop`]: a Land frame that is ready before anything is energised.
+//! - [`connection`]: calls and replies, events and acknowledgements, each with a timeout.
+//! - [`session`]: take-off, commands and landing.
+//! - [`stop`]: a Land frame, encoded before the coils are energised.
 //!
-//! A connection on which a reply is overdue is lost: replies have no number, so that the next one could be the one that is
-//! missing. Lost connections are reset when they are dropped.
+//! A connection with an overdue reply is lost: replies have no number, so the next one could be the overdue one. Lost
+//! connections are reset when dropped.
 
 pub(crate) mod connection;
 pub(crate) mod session;

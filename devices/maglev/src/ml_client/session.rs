@@ -1,4 +1,4 @@
-//! From the first call to levitation, and back. Not real-time, but for the calls of a tick.
+//! Session with a controller: take-off, commands and landing. Not real-time, except for the calls of a tick.
 
 use super::connection::{Control, Events, Line, NoResults};
 use crate::ml_api::{
@@ -8,23 +8,23 @@ use crate::ml_api::{
 use crate::transport::OpenError;
 use std::time::{Duration, Instant};
 
-/// How long a call may take, and one that moves the flotor.
+/// Timeout of a call, and of a call that moves the flotor.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(1);
 const PROCEDURE_PATIENCE: Duration = Duration::from_secs(30);
-/// How often faults are reset before it is given up, and the pause between two times.
+/// Limit of attempts to reset the faults, and the pause between two attempts.
 const RESETS: u32 = 10;
 const RESET_PAUSE: Duration = Duration::from_millis(500);
-/// Steps in which gains fade.
+/// Number of steps of the fading gains.
 const FADE_STEPS: u32 = 20;
-/// What registers for the same events again: any number will do.
+/// Process id in registrations; the controller only compares it.
 const PROCESS: i32 = 1;
 /// Events of a session; ticks last, because they begin at once.
 const KINDS: [EventKind; 5] =
     [EventKind::Fault, EventKind::Overtemp, EventKind::Boundary, EventKind::Button, EventKind::Tick];
-/// Gains that must not act beside a force command. The boundary's stay: it is the controller's own wall.
+/// Gain sets that must not act beside a force command. The boundary's gains stay: they are the controller's own wall.
 const FORCED: [GainSet; 3] = [GainSet::Normal, GainSet::Locked, GainSet::Constrained];
 
-/// What a controller says about itself.
+/// Identity and limits of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Facts {
     pub(crate) version: crate::ml_api::Version,
@@ -32,7 +32,7 @@ pub(crate) struct Facts {
     pub(crate) speed_limits: Six,
 }
 
-/// What a session is to be like.
+/// Settings of a session.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Plan {
     pub(crate) rate_hz: f32,
@@ -41,16 +41,16 @@ pub(crate) struct Plan {
     pub(crate) fade: Duration,
 }
 
-/// What was reached.
+/// Result of a take-off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TakenOff {
-    /// The first tick.
+    /// Pose of the first tick.
     pub(crate) pose: WirePose,
-    /// What carries the flotor, N and N·m.
+    /// Wrench that balances the weight of the flotor, N and N·m.
     pub(crate) gravity: Six,
 }
 
-/// Why taking off failed: at what, and why.
+/// Cause of a failed take-off, with the function that failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Failed {
     At(Function, NoResults),
@@ -76,15 +76,15 @@ pub(crate) struct Session {
     control: Control,
     events: Option<Events>,
     address: String,
-    /// Gains before they were faded.
+    /// Gains before the fade.
     kept: [[Pid; 6]; 3],
-    /// Ticks that came and are not acknowledged.
+    /// Ticks received and not yet acknowledged.
     owed: u32,
     dropped: u64,
 }
 
 impl Session {
-    /// Connects and asks who is there.
+    /// Opens the control connection.
     pub(crate) fn open(address: &str) -> Result<Self, OpenError> {
         Ok(Self {
             control: Control::new(Line::open(address)?),
@@ -100,7 +100,7 @@ impl Session {
         self.control.is_lost()
     }
 
-    /// Ticks that were older than the one that was used.
+    /// Returns the number of ticks superseded by a newer tick before use.
     pub(crate) fn dropped_ticks(&self) -> u64 {
         self.dropped
     }
@@ -120,7 +120,7 @@ impl Session {
         }
     }
 
-    /// What the controller says about itself.
+    /// Requests identity and limits of the controller.
     pub(crate) fn facts(&mut self) -> Result<Facts, Failed> {
         let version = match self.call(&Request::Plain(Function::GetVersion))? {
             Results::Version(version) => version,
@@ -131,7 +131,7 @@ impl Session {
         Ok(Facts { version, current_limits_a, speed_limits })
     }
 
-    /// Faults cleared, lifted, weighed, gains faded to forces, ticks coming: what is left is commanding.
+    /// Clears faults, lifts and weighs the flotor, fades the gains to a force command, and registers for events.
     pub(crate) fn take_off(&mut self, plan: &Plan) -> Result<TakenOff, Failed> {
         self.clear_faults()?;
         self.call(&Request::Number(Function::SetServoFrequency, plan.rate_hz))?;
@@ -157,8 +157,8 @@ impl Session {
         Err(Failed::NoTick)
     }
 
-    /// Somebody left the flotor in the air, perhaps without gains and with a force in their place: first the default gains,
-    /// which rise slowly, then a target in the force's place.
+    /// Takes over a flotor that another client left levitating, perhaps with a force in place of gains: restores the
+    /// default gains, which rise slowly, then sets the actual pose as the target.
     fn take_over(&mut self) -> Result<(), Failed> {
         let reset = Request::OfSet(Function::ResetGainVecAxes, GainSet::Normal);
         self.call_within(&reset, PROCEDURE_PATIENCE)?;
@@ -174,7 +174,7 @@ impl Session {
             if attempt > 0 {
                 std::thread::sleep(RESET_PAUSE);
             }
-            // That it is refused is told better by what is left.
+            // A rejection is ignored: the remaining fault bits explain more.
             match self.call(&Request::Plain(Function::ResetFault)) {
                 Ok(_) => {}
                 Err(refused @ Failed::At(_, NoResults::Refused(Status::RECEIVE_ONLY))) => {
@@ -194,7 +194,7 @@ impl Session {
         Err(Failed::Faulted(left))
     }
 
-    /// Finds what carries the flotor, and lets the controller carry it until forces do.
+    /// Measures the weight of the flotor, and compensates it by the controller until force commands replace the gains.
     fn carry(&mut self, plan: &Plan) -> Result<Six, Failed> {
         if !plan.finds_gravity {
             return Ok([0.0; 6]);
@@ -218,8 +218,8 @@ impl Session {
         self.call(&Request::register(kind, PROCESS)).map(|_| ())
     }
 
-    /// Fades the gains until nothing but the carrying feed-forward is left, and puts a force command in its place. In the
-    /// end all three sets are zero: whether a force command replaces the gains or comes on top of them, it is the same force.
+    /// Fades the gains down to the feed-forward of the weight and replaces them by a force command. All three sets end at
+    /// zero: the force is then the same whether a command replaces the gains or adds to them.
     fn fade_to_forces(&mut self, fade: Duration, gravity: Six) -> Result<(), Failed> {
         for (place, set) in FORCED.into_iter().enumerate() {
             self.kept[place] = match self.call(&Request::OfSet(Function::GetGainVecAxes, set))? {
@@ -245,7 +245,7 @@ impl Session {
         Ok(())
     }
 
-    /// Ticks end, the gains of before hold the flotor where it is, and it lands. Whatever goes wrong: the next call tries.
+    /// Unregisters from events, restores the gains to hold the pose `at`, and lands. Continues after an error.
     pub(crate) fn land(&mut self, at: Option<WirePose>) {
         for kind in KINDS.into_iter().rev() {
             let function = match kind {
@@ -264,14 +264,14 @@ impl Session {
             let _ = self.call(&Request::Pose(Function::SetDesiredPosition, pose));
         }
         let _ = self.call_within(&Request::Plain(Function::Land), PROCEDURE_PATIENCE);
-        // Ticks that were on their way.
+        // Ticks still in transit.
         while let Ok(Some(_)) = self.next_event(Duration::ZERO) {}
         let _ = self.acknowledge_ticks();
     }
 
     // ------------------------------------------------------------ in a tick
 
-    /// The next event; all but ticks are acknowledged. Real-time: bounded, no allocation.
+    /// Reads the next event; acknowledges all but ticks. Real-time: bounded, no allocation.
     pub(crate) fn next_event(&mut self, budget: Duration) -> Result<Option<Event>, NoResults> {
         let Some(events) = &mut self.events else { return Err(NoResults::Lost) };
         let event = match events.next(budget) {
@@ -292,7 +292,7 @@ impl Session {
         Ok(event)
     }
 
-    /// Lets the controller go on: the ticks that came are dealt with. Real-time: bounded, no allocation.
+    /// Acknowledges the received ticks, so that the controller continues. Real-time: bounded, no allocation.
     pub(crate) fn acknowledge_ticks(&mut self) -> Result<(), NoResults> {
         let Some(events) = &mut self.events else { return Err(NoResults::Lost) };
         while self.owed > 0 {
@@ -302,8 +302,8 @@ impl Session {
         Ok(())
     }
 
-    /// Commands a wrench; true if the controller has confirmed it within the budget. One that is not confirmed yet is
-    /// waited for first, and the new one is left out if it is still missing. Real-time: bounded, no allocation.
+    /// Commands a wrench; returns true if the controller confirms within the budget. Waits for the confirmation of an
+    /// earlier command first, and drops the new command if that is missing. Real-time: bounded, no allocation.
     pub(crate) fn command(&mut self, wrench: Six, budget: Duration) -> Result<bool, NoResults> {
         if self.control.outstanding_since().is_some() && !self.is_confirmed(budget)? {
             return Ok(false);
@@ -312,7 +312,7 @@ impl Session {
         self.is_confirmed(budget)
     }
 
-    /// Since when a command has not been confirmed.
+    /// Returns the start of the unconfirmed command, if any.
     pub(crate) fn unconfirmed_since(&self) -> Option<Instant> {
         self.control.outstanding_since()
     }
@@ -327,7 +327,7 @@ impl Session {
 }
 
 impl Drop for Session {
-    /// Leaves in the two steps of the protocol; a connection that is lost is reset.
+    /// Ends the session in the two steps of the protocol; a lost connection is reset.
     fn drop(&mut self) {
         if self.control.is_lost() {
             return;

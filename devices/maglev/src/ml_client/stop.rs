@@ -1,5 +1,4 @@
-//! The stop: one Land frame, on a connection that nothing else uses. No force in the air is no safe state: the flotor
-//! would fall.
+//! Stop by a Land frame, on a connection of its own. Zero force is no safe state while levitating: the flotor would fall.
 
 use super::connection::Line;
 use crate::ml_api::{Frame, Function, Request};
@@ -10,13 +9,13 @@ use std::io::{Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Longest time a controller takes to land, ns.
+/// Longest duration of a landing, ns.
 const LANDING_NS: u64 = 30_000_000_000;
 
-/// What the loop and whoever stops it share.
+/// State shared by the loop and the stopping threads.
 pub(crate) struct Stop {
     is_stopped: AtomicBool,
-    /// Held by whoever stops or reopens: neither waits for the other.
+    /// Locked while stopping or reopening; a stop does not wait for the lock.
     line: Mutex<Line>,
     frame: Frame,
 }
@@ -28,12 +27,12 @@ impl Stop {
         Ok(Self { is_stopped: AtomicBool::new(false), line: Mutex::new(Line::open(address)?), frame })
     }
 
-    /// True once somebody has stopped the device. Real-time: bounded, no allocation.
+    /// Returns true after a stop. Real-time: bounded, no allocation.
     pub(crate) fn is_stopped(&self) -> bool {
         self.is_stopped.load(Ordering::Acquire)
     }
 
-    /// Begins anew; replies to earlier stops are not needed. Not real-time.
+    /// Clears the stop and discards replies to earlier stops. Not real-time.
     pub(crate) fn rearm(&self) {
         if let Ok(line) = self.line.lock() {
             let mut replies = [0; 64];
@@ -42,7 +41,7 @@ impl Stop {
         self.is_stopped.store(false, Ordering::Release);
     }
 
-    /// Connects again, to a controller that was gone. Not real-time.
+    /// Reconnects to the controller. Not real-time.
     pub(crate) fn reopen(&self, address: &str) -> Result<(), OpenError> {
         let anew = Line::open(address)?;
         if let Ok(mut line) = self.line.lock() {
@@ -51,7 +50,7 @@ impl Stop {
         Ok(())
     }
 
-    /// Sends the frame, once, without waiting for anything.
+    /// Sends the Land frame once, without waiting for a reply.
     fn stop(&self) {
         if self.is_stopped.swap(true, Ordering::AcqRel) {
             return;
@@ -61,7 +60,7 @@ impl Stop {
         }
     }
 
-    /// How the device is stopped without its host.
+    /// Describes the stop of the device without its host.
     pub(crate) fn independent(&self) -> IndependentStop {
         let descriptor = self.line.lock().map_or(-1, |line| platform::descriptor(line.stream()));
         IndependentStop::by_message(descriptor, self.frame.bytes(), StoppedState::Landed, LANDING_NS)

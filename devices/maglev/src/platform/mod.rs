@@ -1,7 +1,7 @@
-//! What differs between systems for a controller. Each system has one module with the same items:
+//! Platform-specific code. Each system has one module with the same items:
 //! - `reset_when_dropped`, `wait_for`, `descriptor`: connections;
-//! - `access_remedy`, `driver_remedy`: how a user is allowed to use a device on USB, and gives it a driver;
-//! - `hid_is_offered`: whether a loop can send by HID.
+//! - `access_remedy`, `driver_remedy`: instructions for access to a USB device and for its driver;
+//! - `hid_is_offered`: availability of HID in a loop.
 
 #[cfg(not(windows))]
 mod unix;

@@ -1,31 +1,31 @@
-//! Unix: sockets and terminals are descriptors that can be waited for.
+//! Unix: sockets and terminals are descriptors with `poll`.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::net::TcpStream;
 use std::os::fd::AsRawFd;
 use std::time::Duration;
 
-/// The other side is to know at once when a connection is dropped. Not real-time.
+/// Makes the system reset the connection when dropped, so that the other end detects it at once. Not real-time.
 pub(crate) fn reset_when_dropped(stream: &TcpStream) {
     let _ = rustix::net::sockopt::set_socket_linger(stream, Some(Duration::ZERO));
 }
 
-/// Waits until something has come, or for a time. Real-time: bounded by the time, no allocation.
+/// Waits for data until the timeout. Real-time: bounded by the timeout, no allocation.
 pub(crate) fn wait_for(stream: &TcpStream, most: Duration) {
     let most = Timespec {
         tv_sec: i64::try_from(most.as_secs()).unwrap_or(i64::MAX),
         tv_nsec: i64::from(most.subsec_nanos()),
     };
-    // Whatever it says, the next look tells.
+    // Errors show in the next read.
     let _ = poll(&mut [PollFd::new(stream, PollFlags::IN)], Some(&most));
 }
 
-/// The descriptor of a connection.
+/// Returns the descriptor of a connection.
 pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
     stream.as_raw_fd()
 }
 
-/// The udev rule that gives the logged-in user access to the device; `subsystem` is `usb` or `hidraw`.
+/// Returns the udev rule that gives the logged-in user access to the device; `subsystem` is `usb` or `hidraw`.
 #[cfg(any(feature = "usb", feature = "hid"))]
 pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> String {
     // A hidraw node has its ids on a parent.
@@ -37,16 +37,16 @@ pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> Strin
     )
 }
 
-/// How to install a driver that gives programs access to a USB device: not needed, the kernel has one.
+/// Returns no instructions: the kernel has a driver for USB devices.
 #[cfg(feature = "usb")]
 pub(crate) fn driver_remedy(_: u16, _: u16) -> Option<String> {
     None
 }
 
-/// Whether HID can be used in a loop: the kernel takes a report at once.
+/// Checks the availability of HID in a loop: always, as the kernel takes a report at once.
 ///
 /// # Errors
-/// None.
+/// None on this system.
 #[cfg(feature = "hid")]
 #[allow(clippy::unnecessary_wraps)] // as on other systems
 pub(crate) fn hid_is_offered() -> Result<(), &'static str> {

@@ -1,21 +1,21 @@
-//! Windows: sockets are waited for in steps of milliseconds, which are longer than a tick.
+//! Windows: socket waits have a resolution of milliseconds, longer than a tick.
 
 use rustix::net::sockopt::set_socket_linger;
 use std::net::TcpStream;
 use std::os::windows::io::AsRawSocket;
 use std::time::{Duration, Instant};
 
-/// What is left of a wait is not slept, because a sleep may take so much longer.
+/// Last part of a wait, polled without sleep because a sleep may overrun by as much.
 const AWAKE: Duration = Duration::from_millis(2);
-/// Between two looks before that.
+/// Poll interval before the last part.
 const NAP: Duration = Duration::from_millis(1);
 
-/// The other side is to know at once when a connection is dropped. Not real-time.
+/// Makes the system reset the connection when dropped, so that the other end detects it at once. Not real-time.
 pub(crate) fn reset_when_dropped(stream: &TcpStream) {
     let _ = set_socket_linger(stream, Some(Duration::ZERO));
 }
 
-/// Waits until something has come, or for a time: asks again and again. Real-time: bounded by the time, no allocation.
+/// Waits for data until the timeout, by polling. Real-time: bounded by the timeout, no allocation.
 pub(crate) fn wait_for(stream: &TcpStream, most: Duration) {
     let until = Instant::now() + most;
     let is_silent = || {
@@ -32,28 +32,28 @@ pub(crate) fn wait_for(stream: &TcpStream, most: Duration) {
     }
 }
 
-/// The number of a connection's handle, of which the system uses 32 bits.
+/// Returns the handle of a connection, of which the system uses 32 bits.
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // as the contract says
 pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
     stream.as_raw_socket() as i32
 }
 
-/// What a device on USB needs to be used.
+/// Returns instructions for access to a USB device.
 #[cfg(any(feature = "usb", feature = "hid"))]
 pub(crate) fn access_remedy(_: &str, vendor: u16, product: u16) -> String {
     format!("close the program that uses {vendor:04x}:{product:04x}")
 }
 
-/// How to install a driver that gives programs access to a USB device.
+/// Returns instructions for installing a driver with access for programs.
 #[cfg(feature = "usb")]
 pub(crate) fn driver_remedy(vendor: u16, product: u16) -> Option<String> {
     Some(format!("give {vendor:04x}:{product:04x} the driver WinUSB, with the program Zadig"))
 }
 
-/// Whether HID can be used in a loop.
+/// Checks the availability of HID in a loop.
 ///
 /// # Errors
-/// Why not.
+/// Always, with the reason.
 #[cfg(feature = "hid")]
 pub(crate) fn hid_is_offered() -> Result<(), &'static str> {
     Err(

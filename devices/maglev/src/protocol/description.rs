@@ -1,22 +1,22 @@
-//! What a controller says about itself: axes, ranges, limits, in three pages.
+//! Description of a controller: axes, ranges, limits, in three pages.
 
 use super::frame::{Reader, Rejection, Writer};
 
-/// Bytes of a serial number; shorter ones end in zeros.
+/// Length of a serial number; shorter ones end in zeros.
 pub const SERIAL_BYTES: usize = 16;
 
-/// Everything a controller says about itself. SI, device frame.
+/// Description of a controller. SI units, device frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Description {
     /// Sensed axes, one bit each: x, y, z, then rotation about x, y, z.
     pub sensed: u8,
-    /// Actuated axes, likewise.
+    /// Actuated axes, one bit each: x, y, z, then rotation about x, y, z.
     pub actuated: u8,
-    /// Smallest position step that is resolved, m.
+    /// Position resolution, m.
     pub resolution_m: f32,
     /// Slowest and fastest command rate, Hz.
     pub rate_hz: [f32; 2],
-    /// From taking a sample to the force that answers it, beyond one period, µs.
+    /// Latency from a sample to the resulting force, beyond one period, µs.
     pub latency_us: u32,
     /// Serial number, ASCII, zeros at the end.
     pub serial: [u8; SERIAL_BYTES],
@@ -24,7 +24,7 @@ pub struct Description {
     pub range_m: [f32; 3],
     /// Largest rotation about each axis, rad.
     pub range_rad: [f32; 3],
-    /// Largest stiffness that is rendered stably, N/m.
+    /// Largest stiffness rendered stably, N/m.
     pub max_stiffness_n_per_m: f32,
     /// Fastest change of force, N/s.
     pub force_slew_n_per_s: f32,
@@ -34,7 +34,7 @@ pub struct Description {
     pub max_force_n: [f32; 3],
     /// Largest torque about each axis, N·m.
     pub max_torque_nm: [f32; 3],
-    /// Longest watchdog a host may ask for, µs.
+    /// Longest watchdog time that a host may request, µs.
     pub longest_watchdog_us: u32,
 }
 
@@ -62,10 +62,10 @@ pub enum Page {
         range_m: [f32; 3],
         /// See [`Description::range_rad`].
         range_rad: [f32; 3],
-        /// Stiffness, slew of force, slew of torque.
+        /// Largest stiffness, slew rate of force, slew rate of torque.
         rates: [f32; 3],
     },
-    /// Force and torque.
+    /// Largest force and torque, longest watchdog time.
     Limits {
         /// See [`Description::max_force_n`].
         max_force_n: [f32; 3],
@@ -76,11 +76,11 @@ pub enum Page {
     },
 }
 
-/// Number of pages.
+/// Number of pages of a description.
 pub const PAGES: u16 = 3;
 
 impl Description {
-    /// One page of it.
+    /// Returns a page of the description.
     ///
     /// # Errors
     /// [`Rejection::Kind`] if there is no such page.
@@ -108,7 +108,7 @@ impl Description {
         })
     }
 
-    /// The description three pages make; nothing unless they are the three, in order.
+    /// Assembles a description; `None` unless the pages are the three in order.
     #[must_use]
     pub fn from_pages(pages: [Page; 3]) -> Option<Self> {
         let [
@@ -138,14 +138,14 @@ impl Description {
         })
     }
 
-    /// The serial number as text; what is not printable ASCII is left out. Not real-time.
+    /// Returns the serial number as text; drops bytes that are not printable ASCII. Not real-time.
     #[must_use]
     pub fn serial_text(&self) -> String {
         self.serial.iter().filter(|byte| byte.is_ascii_graphic()).map(|byte| char::from(*byte)).collect()
     }
 }
 
-/// A serial number of at most 16 bytes; longer ones are cut.
+/// Converts a serial number to at most 16 bytes; longer ones are cut.
 #[must_use]
 pub fn serial_bytes(serial: &str) -> [u8; SERIAL_BYTES] {
     let mut bytes = [0; SERIAL_BYTES];
@@ -154,7 +154,7 @@ pub fn serial_bytes(serial: &str) -> [u8; SERIAL_BYTES] {
 }
 
 impl Page {
-    /// Its number.
+    /// Returns the number of the page.
     #[must_use]
     pub const fn number(&self) -> u16 {
         match self {

@@ -1,4 +1,4 @@
-//! Frames: what is said, and as which 64 bytes. Little endian, SI, `f32`.
+//! Frames: requests, answers, and their encoding in 64 bytes. Little endian, SI units, `f32`.
 //!
 //! ```text
 //!  0 magic u16   2 version u8   3 kind u8   4 sequence u32   8 acknowledged u32   12 time_us u32
@@ -7,79 +7,79 @@
 
 use super::description::Page;
 
-/// Bytes of every frame: one packet of the smallest interrupt endpoint at high speed.
+/// Length of a frame: one packet of the smallest interrupt endpoint at high speed.
 pub const FRAME_BYTES: usize = 64;
-/// Version of the protocol this code speaks.
+/// Version of the protocol.
 pub const VERSION: u8 = 1;
 
 /// First two bytes of a frame from the host, "ML".
 const REQUEST_MAGIC: u16 = u16::from_le_bytes(*b"ML");
 /// First two bytes of a frame from the controller, "MS".
 const ANSWER_MAGIC: u16 = u16::from_le_bytes(*b"MS");
-/// What the checksum covers.
+/// Number of bytes covered by the checksum.
 const CHECKED_BYTES: usize = 60;
-/// Where the payload starts.
+/// Offset of the payload.
 const PAYLOAD: usize = 20;
 
-/// What the host asks of the controller.
+/// Request of the host.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// Describe yourself: this page.
+    /// Request for a page of the description.
     Describe {
         /// Number of the page.
         page: u16,
     },
-    /// Listen to this session from now on. Coils stay off.
+    /// Start of a session. The coils stay off.
     Arm {
         /// Time between two commands, µs.
         period_us: u32,
-        /// Longest silence before the controller acts by itself, µs.
+        /// Watchdog time: longest silence before the controller holds, µs.
         watchdog_us: u32,
     },
-    /// Levitate: obey commands from now on.
+    /// Start of levitation; commands are accepted from then on.
     TakeOff,
-    /// This wrench on the hand: force in N, torque in N·m.
+    /// Wrench on the hand: force in N, torque in N·m.
     Command {
-        /// Force and torque.
+        /// Force along x, y, z, then torque about x, y, z.
         wrench: [f32; 6],
-        /// How long it holds at most, µs; after that the controller holds by itself.
+        /// Validity, µs; after that the controller holds by itself.
         valid_us: u16,
     },
-    /// Set the flotor down and disarm.
+    /// Landing, then disarming.
     Land,
-    /// Coils off, now. Clears a fault.
+    /// Coils off at once; clears a fault.
     Disarm,
 }
 
 /// A request with its envelope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequestFrame {
-    /// Counts up by one with every frame of a session.
+    /// Sequence number, incremented with every frame of a session.
     pub sequence: u32,
-    /// Sequence of the newest answer the host has seen.
+    /// Sequence number of the newest answer received by the host.
     pub acknowledged: u32,
     /// The host's clock, µs, wrapping.
     pub time_us: u32,
-    /// Chosen by the host when it arms; frames of another session are not acted on.
+    /// Session number chosen by the host when arming; frames of another session are rejected.
     pub session: u32,
-    /// What is asked.
+    /// The request itself.
     pub request: Request,
 }
 
-/// What the controller is doing.
+/// Mode of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Coils off.
     Disarmed = 0,
-    /// Listening to a session; coils off.
+    /// Armed for a session; coils off.
     Armed = 1,
-    /// Obeying commands.
+    /// Executing the commands of the host.
     Levitating = 2,
-    /// Holding by itself: the host was silent.
+    /// Holding by itself after a silence of the host.
     Holding = 3,
     /// Setting the flotor down.
     Landing = 4,
-    /// Coils off, and nothing but a disarm is obeyed.
+    /// Coils off; only a disarm is accepted.
     Fault = 5,
 }
 
@@ -97,12 +97,12 @@ impl Mode {
     }
 }
 
-/// Why the controller is faulted, and what it limits; one bit each.
+/// Faults and active limits of the controller, one bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Condition(u16);
 
 impl Condition {
-    /// Nothing to report.
+    /// No fault and no active limit.
     pub const NONE: Self = Self(0);
     /// The host was silent for longer than the watchdog.
     pub const WATCHDOG: Self = Self(1);
@@ -110,7 +110,7 @@ impl Condition {
     pub const LINK_LOST: Self = Self(1 << 1);
     /// The flotor left the sensors' range.
     pub const SENSOR_RANGE: Self = Self(1 << 2);
-    /// Too much current for too long.
+    /// A coil carried too much current for too long.
     pub const OVERLOAD: Self = Self(1 << 3);
     /// A coil is too hot.
     pub const OVER_TEMPERATURE: Self = Self(1 << 4);
@@ -118,35 +118,35 @@ impl Condition {
     pub const OVER_SPEED: Self = Self(1 << 5);
     /// The flotor was leaving the sensors' range; the controller lands.
     pub const EDGE: Self = Self(1 << 6);
-    /// The command was larger, or changed faster, than the coils may; it was limited. No fault.
+    /// The command exceeded the largest wrench or slew rate and was limited. No fault.
     pub const LIMITED: Self = Self(1 << 8);
-    /// The controller's own boundary pushes back. No fault.
+    /// The controller's own boundary is active. No fault.
     pub const BOUNDARY: Self = Self(1 << 9);
-    /// The command outlived its validity; the controller holds until the next. No fault.
+    /// The command has expired; the controller holds until the next. No fault.
     pub const EXPIRED: Self = Self(1 << 10);
 
     const FAULTS: u16 = 0x00ff;
     const KNOWN: u16 = 0x077f;
 
-    /// Both.
+    /// Returns the union of two conditions.
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// True if all of `other` is reported.
+    /// Returns true if all bits of `other` are set.
     #[must_use]
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// The faults among them.
+    /// Returns the faults without the active limits.
     #[must_use]
     pub const fn faults(self) -> Self {
         Self(self.0 & Self::FAULTS)
     }
 
-    /// True if there is nothing.
+    /// Returns true if no fault and no active limit is set.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         self.0 == 0
@@ -173,12 +173,12 @@ impl std::fmt::Display for Condition {
     }
 }
 
-/// The newest sample and what the controller is doing.
+/// The newest sample and the mode of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Status {
-    /// What the controller is doing.
+    /// Mode of the controller.
     pub mode: Mode,
-    /// What is wrong or limited.
+    /// Faults and active limits.
     pub condition: Condition,
     /// Position of the handle, m.
     pub position_m: [f32; 3],
@@ -191,44 +191,44 @@ pub struct Status {
 }
 
 impl Status {
-    /// A step of velocity: the range of ±3.2 m/s is beyond any hand.
+    /// Resolution of a velocity, m/s: the range of ±3.2 m/s is beyond any hand.
     pub const VELOCITY_STEP_M_PER_S: f64 = 1.0e-4;
-    /// A step of angular velocity: ±32 rad/s.
+    /// Resolution of an angular velocity, rad/s: the range is ±32 rad/s.
     pub const SPIN_STEP_RAD_PER_S: f64 = 1.0e-3;
 }
 
-/// What the controller answers.
+/// Answer of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
-    /// To everything but `Describe`.
+    /// Status, the answer to all requests but `Describe`.
     Status(Status),
-    /// A page of the description.
+    /// Page of the description.
     Description(Page),
 }
 
 /// An answer with its envelope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnswerFrame {
-    /// Counts up by one with every answer.
+    /// Sequence number, incremented with every answer.
     pub sequence: u32,
-    /// Sequence of the newest request that was accepted.
+    /// Sequence number of the newest accepted request.
     pub acknowledged: u32,
     /// The controller's clock when the sample was taken, µs, wrapping.
     pub time_us: u32,
-    /// The session it listens to; 0: none.
+    /// Current session of the controller; 0: none.
     pub session: u32,
-    /// What is said.
+    /// The answer itself.
     pub answer: Answer,
 }
 
-/// Why bytes are no frame, or a frame is not acted on.
+/// Reason for the rejection of bytes or of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rejection {
     /// Too short, too long, or not decodable as a packet.
     Length,
-    /// The checksum is wrong: damaged on the way.
+    /// The checksum is wrong: the frame was damaged in transit.
     Checksum,
-    /// Not the first bytes of a frame in this direction.
+    /// Wrong first bytes for a frame in this direction.
     Magic,
     /// Another version of the protocol.
     Version,
@@ -236,16 +236,16 @@ pub enum Rejection {
     Kind,
     /// A number is NaN or infinite.
     NotFinite,
-    /// The same sequence number as the frame before.
+    /// Sequence number of the previous frame.
     Duplicate,
-    /// A sequence number that is over.
+    /// Sequence number older than the previous one.
     Old,
-    /// Another session: a host that has been replaced.
+    /// Another session, for example of a host that has been replaced.
     Session,
 }
 
 impl RequestFrame {
-    /// The frame as bytes.
+    /// Encodes the frame.
     #[must_use]
     pub fn encode(&self) -> [u8; FRAME_BYTES] {
         let mut bytes =
@@ -273,7 +273,7 @@ impl RequestFrame {
         bytes.finish()
     }
 
-    /// Reads bytes. Total: any bytes give a frame or a reason.
+    /// Decodes a frame; rejects any other bytes. Never panics.
     ///
     /// # Errors
     /// [`Rejection`], the first reason found.
@@ -294,7 +294,7 @@ impl RequestFrame {
 }
 
 impl AnswerFrame {
-    /// The frame as bytes.
+    /// Encodes the frame.
     #[must_use]
     pub fn encode(&self) -> [u8; FRAME_BYTES] {
         let mut bytes =
@@ -313,7 +313,7 @@ impl AnswerFrame {
         bytes.finish()
     }
 
-    /// Reads bytes. Total: any bytes give a frame or a reason.
+    /// Decodes a frame; rejects any other bytes. Never panics.
     ///
     /// # Errors
     /// [`Rejection`], the first reason found.
@@ -342,7 +342,7 @@ impl AnswerFrame {
     }
 }
 
-/// Fills a frame field by field.
+/// Encoder of a frame, field by field.
 pub(super) struct Writer {
     bytes: [u8; FRAME_BYTES],
 }
@@ -395,7 +395,7 @@ impl Writer {
     }
 }
 
-/// A frame whose length, checksum, magic and version were checked.
+/// A frame with valid length, checksum, magic and version.
 pub(super) struct Reader<'b> {
     bytes: &'b [u8; FRAME_BYTES],
 }
@@ -403,7 +403,7 @@ pub(super) struct Reader<'b> {
 impl<'b> Reader<'b> {
     fn new(bytes: &'b [u8], magic: u16) -> Result<Self, Rejection> {
         let reader = Self { bytes: bytes.try_into().map_err(|_| Rejection::Length)? };
-        // The checksum first: what is damaged says nothing.
+        // The checksum first: a damaged frame has no other valid field.
         if reader.double(CHECKED_BYTES) != checksum(reader.bytes) {
             return Err(Rejection::Checksum);
         }
@@ -445,13 +445,13 @@ impl<'b> Reader<'b> {
         std::array::from_fn(|index| i16::from_le_bytes(self.array(at + 2 * index)))
     }
 
-    /// Sequence, acknowledged, time, session.
+    /// Returns sequence number, acknowledged number, time and session.
     fn envelope(&self) -> [u32; 4] {
         [4, 8, 12, 56].map(|at| self.double(at))
     }
 }
 
-/// CRC-32 as in Ethernet and zlib (ISO 3309) of what it covers.
+/// Returns the CRC-32 (as in Ethernet and zlib, ISO 3309) of the covered bytes.
 fn checksum(bytes: &[u8; FRAME_BYTES]) -> u32 {
     crc32fast::hash(bytes.get(..CHECKED_BYTES).unwrap_or(bytes))
 }

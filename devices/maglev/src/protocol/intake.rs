@@ -1,27 +1,27 @@
-//! Which frames may be acted on: each at most once, in order, of the right session. The rest is counted.
+//! Replay protection: accepts each frame at most once, in order, of the right session; counts the rest.
 
 use super::frame::Rejection;
 
-/// How many frames were not acted on, by reason.
+/// Numbers of rejected frames, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rejections {
-    /// [`Rejection::Length`]
+    /// Frames rejected as [`Rejection::Length`].
     pub length: u32,
-    /// [`Rejection::Checksum`]
+    /// Frames rejected as [`Rejection::Checksum`].
     pub checksum: u32,
-    /// [`Rejection::Magic`]
+    /// Frames rejected as [`Rejection::Magic`].
     pub magic: u32,
-    /// [`Rejection::Version`]
+    /// Frames rejected as [`Rejection::Version`].
     pub version: u32,
-    /// [`Rejection::Kind`]
+    /// Frames rejected as [`Rejection::Kind`].
     pub kind: u32,
-    /// [`Rejection::NotFinite`]
+    /// Frames rejected as [`Rejection::NotFinite`].
     pub not_finite: u32,
-    /// [`Rejection::Duplicate`]
+    /// Frames rejected as [`Rejection::Duplicate`].
     pub duplicate: u32,
-    /// [`Rejection::Old`]
+    /// Frames rejected as [`Rejection::Old`].
     pub old: u32,
-    /// [`Rejection::Session`]
+    /// Frames rejected as [`Rejection::Session`].
     pub session: u32,
 }
 
@@ -37,7 +37,7 @@ impl std::fmt::Display for Rejections {
 }
 
 impl Rejections {
-    /// Counts one.
+    /// Increments the counter of a reason.
     pub fn count(&mut self, rejection: Rejection) {
         let counter = match rejection {
             Rejection::Length => &mut self.length,
@@ -53,7 +53,7 @@ impl Rejections {
         *counter = counter.saturating_add(1);
     }
 
-    /// What came since an earlier count.
+    /// Returns the differences to an earlier count.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {
@@ -69,7 +69,7 @@ impl Rejections {
         }
     }
 
-    /// All of them.
+    /// Returns the sum over all reasons.
     #[must_use]
     pub fn total(&self) -> u32 {
         let Self { length, checksum, magic, version, kind, not_finite, duplicate, old, session } = *self;
@@ -79,7 +79,7 @@ impl Rejections {
     }
 }
 
-/// Accepts sequence numbers that only go up, wrapping, and counts everything else.
+/// Replay protection: accepts strictly increasing sequence numbers, wrapping, and counts all others.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Intake {
     last: Option<u32>,
@@ -87,16 +87,16 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// Forgets the last sequence number: a new session begins. The counts stay.
+    /// Clears the last sequence number for a new session. The counts stay.
     pub fn restart(&mut self) {
         self.last = None;
     }
 
-    /// True if a frame of this sequence number is newer than all before; counts it otherwise.
+    /// Returns true for a sequence number newer than all before; counts a rejection otherwise.
     pub fn accept(&mut self, sequence: u32) -> bool {
         let rejection = match self.last {
             Some(last) if sequence == last => Rejection::Duplicate,
-            // Serial number arithmetic (RFC 1982): the half of the circle before the last is over.
+            // Serial number arithmetic (RFC 1982): the half of the circle before the last number is old.
             Some(last) if sequence.wrapping_sub(last) >= 1 << 31 => Rejection::Old,
             _ => {
                 self.last = Some(sequence);
@@ -107,18 +107,18 @@ impl Intake {
         false
     }
 
-    /// Counts a frame that is not acted on.
+    /// Counts a rejected frame.
     pub fn reject(&mut self, rejection: Rejection) {
         self.rejections.count(rejection);
     }
 
-    /// The newest sequence number, if there was one.
+    /// Returns the newest sequence number; `None` before the first.
     #[must_use]
     pub fn last(&self) -> Option<u32> {
         self.last
     }
 
-    /// What was not acted on so far.
+    /// Returns the numbers of rejected frames.
     #[must_use]
     pub fn rejections(&self) -> &Rejections {
         &self.rejections

@@ -1,8 +1,8 @@
 //! The wire protocol between host and controller: one frame of 64 bytes, one codec, every transport.
 //!
-//! - [`frame`]: what is said, and as which bytes.
-//! - [`description`]: what a controller says about itself when asked.
-//! - [`intake`]: which frames may be acted on; everything else is counted by its reason.
+//! - [`frame`]: requests and answers, and their encoding.
+//! - [`description`]: description of a controller, on request.
+//! - [`intake`]: replay protection; rejected frames are counted by reason.
 //! - [`stream`]: frames on links without packets (serial, TCP), by COBS.
 //!
 //! The byte table and the rules are in the book, `docs/src/devices/maglev-protocol.md`.

@@ -1,22 +1,22 @@
-//! Frames on links without packets: COBS-coded (Cheshire and Baker 1999), each ended by a zero byte.
+//! Frames on links without packets: COBS-coded (Cheshire and Baker 1999), each terminated by a zero byte.
 //!
-//! A reader that comes in late, or loses bytes, is in step again at the next zero.
+//! After lost bytes a reader resynchronises at the next zero.
 
 use super::frame::FRAME_BYTES;
 
-/// Bytes of a coded frame, its zero included.
+/// Largest length of a coded frame, its zero included.
 pub const CODED_BYTES: usize = corncobs::max_encoded_len(FRAME_BYTES);
 
-/// What one byte completed.
+/// Packet completed by a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
     /// A packet of the right length.
     Packet([u8; FRAME_BYTES]),
-    /// Something that is no packet.
+    /// Bytes that form no packet.
     Malformed,
 }
 
-/// A frame as it goes over the link: its bytes, and how many of them.
+/// Encodes a frame for the link; returns the buffer and the number of used bytes.
 #[must_use]
 pub fn coded(frame: &[u8; FRAME_BYTES]) -> ([u8; CODED_BYTES], usize) {
     let mut bytes = [0; CODED_BYTES];
@@ -24,7 +24,7 @@ pub fn coded(frame: &[u8; FRAME_BYTES]) -> ([u8; CODED_BYTES], usize) {
     (bytes, length)
 }
 
-/// Puts bytes together to packets.
+/// Decoder of packets from a byte stream.
 #[derive(Clone, Debug)]
 pub struct StreamDecoder {
     bytes: [u8; CODED_BYTES],
@@ -39,7 +39,7 @@ impl Default for StreamDecoder {
 }
 
 impl StreamDecoder {
-    /// Takes one byte.
+    /// Decodes one byte; returns a packet completed by it.
     pub fn push(&mut self, byte: u8) -> Option<Received> {
         match self.bytes.get_mut(self.length) {
             Some(slot) => {
@@ -51,7 +51,7 @@ impl StreamDecoder {
         (byte == 0).then(|| self.finish()).flatten()
     }
 
-    /// The packet before a zero; nothing between two zeros.
+    /// Returns the packet before a zero; `None` between two zeros.
     fn finish(&mut self) -> Option<Received> {
         let Self { mut bytes, length, overflown } = std::mem::take(self);
         if length <= 1 && !overflown {

@@ -1,21 +1,21 @@
-//! Devices on a USB bus by their ids, and what a user has to do once to be allowed to use one.
+//! Addresses of USB devices, and instructions for access.
 
 use super::OpenError;
 use crate::platform::access_remedy;
 
-/// A device by vendor, product and, if there are several, serial number.
+/// Address of a USB device: vendor, product and, if there are several devices, serial number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsbAddress {
-    /// Vendor id.
+    /// Vendor id, `idVendor` of the device descriptor.
     pub vendor: u16,
-    /// Product id.
+    /// Product id, `idProduct` of the device descriptor.
     pub product: u16,
-    /// Serial number; any if absent.
+    /// Serial number; `None`: any.
     pub serial: Option<String>,
 }
 
 impl UsbAddress {
-    /// Reads `vendor:product` or `vendor:product:serial`, ids in hex.
+    /// Parses `vendor:product` or `vendor:product:serial`, ids in hex.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let mut parts = text.splitn(3, ':');
@@ -24,7 +24,7 @@ impl UsbAddress {
         Some(Self { vendor, product, serial: parts.next().map(str::to_owned) })
     }
 
-    /// What is said to an address that is none.
+    /// Builds the error of an invalid address.
     pub(super) fn misread(address: &str) -> OpenError {
         OpenError::Address {
             address: address.to_owned(),
@@ -33,7 +33,7 @@ impl UsbAddress {
     }
 }
 
-/// What a user has to do to be allowed to use it; `subsystem` is `usb` or `hidraw`.
+/// Returns instructions for access to the device; `subsystem` is `usb` or `hidraw`.
 pub(super) fn remedy(subsystem: &str, wanted: &UsbAddress) -> String {
     access_remedy(subsystem, wanted.vendor, wanted.product)
 }

@@ -1,5 +1,5 @@
-//! HID: packets as reports of 64 bytes without a number, through the kernel's hidraw. Not on Windows, where a
-//! write waits until the device has taken it.
+//! HID: packets as reports of 64 bytes without a report number, through the kernel's hidraw. Not on Windows, where a write
+//! blocks until the device has received it.
 
 use super::address::{UsbAddress, remedy};
 use super::{Incoming, LinkLost, OpenError, Transport};
@@ -8,7 +8,7 @@ use crate::protocol::FRAME_BYTES;
 use hidapi::{HidApi, HidDevice, HidError};
 use std::time::Duration;
 
-/// Longest report that is looked at: one more than a frame, so that a longer one shows.
+/// Size of the receive buffer: one byte more than a frame, to detect longer reports.
 const BUFFER_BYTES: usize = FRAME_BYTES + 1;
 
 /// An open HID device.
@@ -16,10 +16,10 @@ pub struct HidLink {
     device: HidDevice,
 }
 
-/// Opens a device. Not real-time.
+/// Opens a HID device. Not real-time.
 ///
 /// # Errors
-/// [`OpenError`].
+/// [`OpenError`] if the address is invalid, or no device can be opened there.
 pub fn open(address: &str) -> Result<HidLink, OpenError> {
     hid_is_offered().map_err(|why| OpenError::NotOffered { why })?;
     let wanted = UsbAddress::parse(address).ok_or_else(|| UsbAddress::misread(address))?;
@@ -37,7 +37,7 @@ pub fn open(address: &str) -> Result<HidLink, OpenError> {
 impl Transport for HidLink {
     fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost> {
         let mut report = [0; FRAME_BYTES + 1];
-        // The first byte is the HID report number: 0, there is only one.
+        // First byte: HID report number 0, as there is only one report.
         if let Some(room) = report.get_mut(1..) {
             room.copy_from_slice(frame);
         }
@@ -50,9 +50,9 @@ impl Transport for HidLink {
 
     fn wait(&mut self, patience: Duration) -> Result<Incoming, LinkLost> {
         let mut buffer = [0; BUFFER_BYTES];
-        // Rounded up: waiting for less than a millisecond is not waiting at all.
+        // Rounded up: a timeout below a millisecond would be no wait at all.
         let patience_ms = i32::try_from(patience.as_nanos().div_ceil(1_000_000)).unwrap_or(i32::MAX);
-        // Every error of reading is a device that is gone: hidapi has only words for it.
+        // Every read error counts as a lost device: hidapi returns only a text.
         let length = self.device.read_timeout(&mut buffer, patience_ms).map_err(|_| LinkLost)?;
         let packet = buffer.get(..length).and_then(|bytes| bytes.try_into().ok());
         Ok(match (length, packet) {

@@ -1,4 +1,4 @@
-//! Links that carry frames, behind one trait: nothing above knows which library moves the bytes.
+//! Links for frames, behind one trait that hides the library in use.
 //!
 //! | | feature | carries |
 //! |---|---|---|
@@ -7,8 +7,8 @@
 //! | `usb` | `usb` | packets on a pair of interrupt or bulk endpoints |
 //! | `hid` | `hid` | packets as reports |
 //!
-//! In a tick a link never waits: what has not arrived is not there. At most one command is on its way; a link that is busy
-//! drops the new one, because a queue of commands is a queue of old forces.
+//! In a tick a link never waits for data. At most one command is in transit; a busy link drops the new one, because a queue
+//! of commands is a queue of old forces.
 
 #[cfg(any(feature = "usb", feature = "hid"))]
 pub mod address;
@@ -24,43 +24,43 @@ pub mod usb;
 use crate::protocol::FRAME_BYTES;
 use std::time::{Duration, Instant};
 
-/// How long a link that cannot wait by itself sleeps between two looks.
+/// Poll interval of a link without a blocking wait.
 const NAP: Duration = Duration::from_micros(250);
 
-/// What a look at a link found.
+/// Result of one read of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Incoming {
     /// A packet of the right length.
     Packet([u8; FRAME_BYTES]),
-    /// Something of another length, or not decodable.
+    /// Data of another length, or not decodable.
     Malformed,
-    /// Nothing has arrived.
+    /// No data available.
     Nothing,
 }
 
-/// The other side is gone: closed, unplugged, or killed.
+/// Error: the other end is gone (closed, unplugged, or killed).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LinkLost;
 
-/// A link that carries packets of one frame.
+/// Link for packets of one frame.
 pub trait Transport: Send {
-    /// Sends a frame, or drops it if the link is still busy with the one before. Real-time: bounded, no
-    /// allocation; one call of the system.
+    /// Sends a frame, or drops the frame if the link is still busy with the previous one. Real-time: bounded, no
+    /// allocation; one system call.
     ///
     /// # Errors
-    /// [`LinkLost`] if there is no other side.
+    /// [`LinkLost`] if the other end is gone.
     fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost>;
 
-    /// Takes what has arrived, one packet a call. Real-time: bounded, no allocation; one call of the system.
+    /// Receives one packet, if available. Real-time: bounded, no allocation; one system call.
     ///
     /// # Errors
-    /// [`LinkLost`] if there is no other side.
+    /// [`LinkLost`] if the other end is gone.
     fn receive(&mut self) -> Result<Incoming, LinkLost>;
 
-    /// Likewise, waiting for it for at most `patience`. Not real-time.
+    /// Receives one packet, waiting at most `patience`. Not real-time.
     ///
     /// # Errors
-    /// [`LinkLost`] if there is no other side.
+    /// [`LinkLost`] if the other end is gone.
     fn wait(&mut self, patience: Duration) -> Result<Incoming, LinkLost> {
         let until = Instant::now() + patience;
         loop {
@@ -74,56 +74,56 @@ pub trait Transport: Send {
     }
 }
 
-/// Why a link cannot be opened: what, and what to do.
+/// Cause of a failure to open a link, with a remedy.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum OpenError {
-    /// Nothing is there under that address.
+    /// No device or host at the address.
     Missing {
-        /// What was looked for.
+        /// The address given.
         address: String,
-        /// What the system said.
+        /// Error text of the system.
         cause: String,
     },
-    /// Somebody else uses it.
+    /// Another program uses the device.
     Busy {
-        /// What was looked for.
+        /// The address given.
         address: String,
     },
-    /// This user may not use it.
+    /// The user has no permission for the device.
     Forbidden {
-        /// What was looked for.
+        /// The address given.
         address: String,
-        /// What to do.
+        /// Instructions for access.
         remedy: String,
     },
-    /// The address means nothing to this transport.
+    /// The address has the wrong format for the transport.
     Address {
-        /// The address.
+        /// The address given.
         address: String,
-        /// What it should look like.
+        /// The expected format.
         expected: &'static str,
     },
-    /// No host has that name.
+    /// The host name is unknown.
     UnknownHost {
-        /// The name.
+        /// The host name given.
         host: String,
     },
-    /// This system cannot carry it.
+    /// The transport is not available on this system.
     NotOffered {
-        /// Why not, and what to do.
+        /// Reason and alternative.
         why: &'static str,
     },
-    /// The system has no driver for it that lets programs use it.
+    /// The device has no driver with access for programs.
     NoDriver {
-        /// What was looked for.
+        /// The address given.
         address: String,
-        /// What to do.
+        /// Instructions for installing a driver.
         remedy: String,
     },
     /// The plugin was built without this transport.
     NotBuilt {
-        /// The feature it needs.
+        /// Cargo feature of the transport.
         feature: &'static str,
     },
 }
@@ -160,23 +160,23 @@ impl std::fmt::Display for OpenError {
 
 impl std::error::Error for OpenError {}
 
-/// How a controller is reached.
+/// Kind of a transport, with its address format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// TCP, `host:port`.
+    /// TCP at `host:port`.
     Tcp,
-    /// A serial port, by its path.
+    /// A serial port or pseudo terminal, by its path.
     Serial,
-    /// USB, `vendor:product` in hex, with `:serial` behind it if there are several.
+    /// USB device, `vendor:product` in hex, optionally with `:serial`.
     Usb,
-    /// HID, likewise.
+    /// HID device, `vendor:product` in hex, optionally with `:serial`.
     Hid,
 }
 
-/// Opens a link. Not real-time.
+/// Opens a link of this kind to an address. Not real-time.
 ///
 /// # Errors
-/// [`OpenError`].
+/// [`OpenError`] if the address is invalid or unreachable, or the transport is not available.
 pub fn open(kind: Kind, address: &str) -> Result<Box<dyn Transport>, OpenError> {
     match kind {
         Kind::Tcp => Ok(Box::new(tcp::connect(address)?)),

@@ -4,13 +4,13 @@ use super::OpenError;
 use super::stream::StreamLink;
 use flotor_serial::{NotOpened, Port};
 
-/// 64 bytes a millisecond each way need 660 kbit/s with start and stop bits; USB CDC ports ignore the number.
+/// Baud rate: 64 bytes a millisecond each way need 660 kbit/s with start and stop bits; USB CDC ports ignore the rate.
 const BAUD: u32 = 2_000_000;
 
 /// Opens a serial port by its path. Not real-time.
 ///
 /// # Errors
-/// [`OpenError`].
+/// [`OpenError`] if the port is missing, in use, or not permitted.
 pub fn open(path: &str) -> Result<StreamLink<Port>, OpenError> {
     let mut port = Port::open(path, BAUD).map_err(|reason| refused(path, reason))?;
     port.announce();

@@ -1,28 +1,28 @@
-//! Coded frames on anything that reads and writes bytes without waiting.
+//! Coded frames on any non-blocking byte stream.
 
 use super::{Incoming, LinkLost, Transport};
 use crate::protocol::FRAME_BYTES;
 use crate::protocol::stream::{CODED_BYTES, Received, StreamDecoder, coded};
 use std::io::{ErrorKind, Read, Write};
 
-/// Bytes taken from the system at once: a few frames.
+/// Size of the read buffer, bytes: a few frames.
 const CHUNK_BYTES: usize = 256;
 
-/// A link of bytes. The stream must not wait: what is not there is `WouldBlock` or `TimedOut`.
+/// Link over a non-blocking byte stream: a read or write without progress must return `WouldBlock` or `TimedOut`.
 #[derive(Debug)]
 pub struct StreamLink<S> {
     stream: S,
     decoder: StreamDecoder,
     chunk: [u8; CHUNK_BYTES],
-    /// What of the chunk is not looked at yet.
+    /// Range of the chunk not yet decoded.
     fresh: std::ops::Range<usize>,
-    /// The frame that is not wholly written yet, and what is left of it.
+    /// Frame in transmission, with the range not yet written.
     pending: [u8; CODED_BYTES],
     left: std::ops::Range<usize>,
 }
 
 impl<S: Read + Write + Send> StreamLink<S> {
-    /// A link over a stream that does not wait.
+    /// Creates a link over a non-blocking stream.
     pub fn new(stream: S) -> Self {
         Self {
             stream,
@@ -34,12 +34,12 @@ impl<S: Read + Write + Send> StreamLink<S> {
         }
     }
 
-    /// True if somebody is at the other end.
+    /// Returns true if the other end is open.
     pub fn is_open(&mut self) -> bool {
         !self.fresh.is_empty() || self.fill().is_ok()
     }
 
-    /// Takes bytes from the system; true if there were any. Only when all of the last ones are looked at.
+    /// Reads bytes into the empty chunk; returns true if there were any.
     fn fill(&mut self) -> Result<bool, LinkLost> {
         loop {
             match self.stream.read(&mut self.chunk) {
@@ -57,7 +57,7 @@ impl<S: Read + Write + Send> StreamLink<S> {
         }
     }
 
-    /// Writes what is left of the pending frame; true if all of it went.
+    /// Writes the rest of the pending frame; returns true if the frame is complete.
     fn flush(&mut self) -> Result<bool, LinkLost> {
         while let Some(bytes) = self.pending.get(self.left.clone()).filter(|bytes| !bytes.is_empty()) {
             match self.stream.write(bytes) {
@@ -76,7 +76,7 @@ impl<S: Read + Write + Send> StreamLink<S> {
 
 impl<S: Read + Write + Send> Transport for StreamLink<S> {
     fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost> {
-        // Half a frame must be finished, or the other side loses the next one too.
+        // A partial frame must be completed first, or the other end loses the next one too.
         if self.flush()? {
             let length;
             (self.pending, length) = coded(frame);

@@ -1,4 +1,4 @@
-//! TCP: controllers that are reached over a network, and emulators in another process.
+//! TCP: controllers on a network, and emulators in another process.
 
 use super::OpenError;
 use super::stream::StreamLink;
@@ -6,23 +6,23 @@ use std::io::ErrorKind;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// Where a controller of Flotor's own protocol listens; 5678 is the ML API's.
+/// TCP port of a controller with Flotor's own protocol; 5678 is that of the ML API.
 pub const PORT: u16 = 5679;
-/// How long a connection may take to come about.
+/// Timeout of a connection attempt.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Connects to `host:port`. Not real-time.
+/// Opens a link to `host:port`. Not real-time.
 ///
 /// # Errors
-/// [`OpenError`].
+/// [`OpenError`] if the address is invalid or the connection fails.
 pub fn connect(address: &str) -> Result<StreamLink<TcpStream>, OpenError> {
     open(address).map(StreamLink::new)
 }
 
-/// A connection to `host:port` that neither waits nor collects small frames to large ones. Not real-time.
+/// Opens a non-blocking connection to `host:port` without Nagle's algorithm. Not real-time.
 ///
 /// # Errors
-/// [`OpenError`].
+/// [`OpenError`] if the address is invalid or the connection fails.
 pub fn open(address: &str) -> Result<TcpStream, OpenError> {
     let wrong =
         || OpenError::Address { address: address.to_owned(), expected: "host:port, like 127.0.0.1:5679" };
@@ -41,10 +41,10 @@ pub fn open(address: &str) -> Result<TcpStream, OpenError> {
     })
 }
 
-/// A connection that neither waits nor collects small frames to large ones.
+/// Makes a connection non-blocking and disables Nagle's algorithm.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the system when setting the options.
 pub fn prepared(stream: TcpStream) -> std::io::Result<TcpStream> {
     stream.set_nodelay(true)?;
     stream.set_nonblocking(true)?;

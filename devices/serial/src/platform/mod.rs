@@ -1,9 +1,9 @@
-//! What differs between systems for a serial port. Each system has one module with the same items:
-//! - `System`, `PATIENCE`: a port, and how long it is waited for;
-//! - `reason`: what an error of opening means;
-//! - `read`: what has come;
-//! - `descriptor`: the number of a port;
-//! - `PORT_HELP`, `PORT_EXAMPLE`, `PORT_LIST`: what people are told of a port's path.
+//! Parts of a serial port that differ between systems. Each system has one module with the same items:
+//! - `System`, `PATIENCE`: a port, and its timeout;
+//! - `reason`: cause of an error of opening;
+//! - `read`: non-blocking read;
+//! - `descriptor`: descriptor of a port;
+//! - `PORT_HELP`, `PORT_EXAMPLE`, `PORT_LIST`: user texts about a port's path.
 
 #[cfg(not(windows))]
 mod unix;

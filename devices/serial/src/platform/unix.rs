@@ -9,17 +9,17 @@ use std::time::Duration;
 
 pub(crate) type System = TTYPort;
 
-/// What a parameter `port` is.
+/// Help text of a parameter `port`.
 pub(crate) const PORT_HELP: &str = "Path of its serial port, as /dev/ttyACM0 or one below /dev/serial/by-id";
-/// What it may be.
+/// Example of a parameter `port`.
 pub(crate) const PORT_EXAMPLE: &str = "/dev/ttyACM0";
-/// How a user finds it.
+/// Advice for listing the ports.
 pub(crate) const PORT_LIST: &str = "`ls /dev/serial/by-id` lists the ports";
 
-/// How long a read or a write waits: not at all.
+/// Timeout of reads and writes: none.
 pub(crate) const PATIENCE: Duration = Duration::ZERO;
 
-/// Why a port cannot be opened.
+/// Maps an error of opening to its cause.
 pub(crate) fn reason(path: &str, error: Error) -> NotOpened {
     let is_there = || Path::new(path).exists();
     match error.kind() {
@@ -33,12 +33,12 @@ pub(crate) fn reason(path: &str, error: Error) -> NotOpened {
     }
 }
 
-/// Takes what has come.
+/// Reads the received bytes.
 pub(crate) fn read(port: &mut TTYPort, bytes: &mut [u8]) -> io::Result<usize> {
     port.read(bytes)
 }
 
-/// The descriptor of a port.
+/// Returns the descriptor of a port.
 pub(crate) fn descriptor(port: &TTYPort) -> i32 {
     port.as_raw_fd()
 }

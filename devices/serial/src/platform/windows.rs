@@ -8,36 +8,35 @@ use std::time::Duration;
 
 pub(crate) type System = COMPort;
 
-/// What a parameter `port` is.
+/// Help text of a parameter `port`.
 pub(crate) const PORT_HELP: &str = "Name of its serial port, as COM3";
-/// What it may be.
+/// Example of a parameter `port`.
 pub(crate) const PORT_EXAMPLE: &str = "COM3";
-/// How a user finds it.
+/// Advice for listing the ports.
 pub(crate) const PORT_LIST: &str = "the Device Manager lists the ports";
 
-/// How long a write waits at most: no time is for ever, and the shortest is a millisecond.
+/// Timeout of writes: zero would mean no timeout, and the shortest is a millisecond.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(1);
 
-/// `ERROR_ACCESS_DENIED`: of a port, that another program has it.
+/// `ERROR_ACCESS_DENIED`: for a port, another program has it open.
 const ACCESS_DENIED: i32 = 5;
 
-/// Why a port cannot be opened.
+/// Maps an error of opening to its cause.
 pub(crate) fn reason(_: &str, error: Error) -> NotOpened {
     match error.kind() {
-        // serialport has one kind for a port that is not there and one that is not given: the system's words tell them apart, in
-        // whatever language it has.
+        // serialport has one kind for a missing port and a port in use: the system's text distinguishes them, in any language.
         ErrorKind::NoDevice if error.description == words(ACCESS_DENIED) => NotOpened::InUse,
         _ => NotOpened::Missing { cause: error.description },
     }
 }
 
-/// What the system says of an error.
+/// Returns the system's text of an error code.
 fn words(code: i32) -> String {
     let said = io::Error::from_raw_os_error(code).to_string();
     said.strip_suffix(&format!(" (os error {code})")).unwrap_or(&said).trim().to_owned()
 }
 
-/// Takes what has come: more than there is would be waited for.
+/// Reads the received bytes; a request for more would wait for them.
 pub(crate) fn read(port: &mut COMPort, bytes: &mut [u8]) -> io::Result<usize> {
     let room = bytes.len().min(usize::try_from(port.bytes_to_read()?).unwrap_or(0));
     match bytes.get_mut(..room) {
@@ -46,7 +45,7 @@ pub(crate) fn read(port: &mut COMPort, bytes: &mut [u8]) -> io::Result<usize> {
     }
 }
 
-/// The number of a port's handle, of which the system uses 32 bits.
+/// Returns the handle of a port, of which the system uses 32 bits.
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // as the contract says
 pub(crate) fn descriptor(port: &COMPort) -> i32 {
     port.as_raw_handle() as usize as i32

@@ -1,10 +1,10 @@
-//! The six coils: where they sit, which wrench a set of currents makes, which currents a wrench needs.
+//! The six coils: placement, wrench of a set of currents, currents for a wrench.
 //!
 //! The published descriptions give force limits per axis but no coil positions. This geometry is synthetic
 //! and meets those limits (55 to 140 N, 6.3 to 12.2 N·m): on a hemisphere of 115 mm radius, ring A holds three
 //! coils 65 degrees from the bottom pole that push along the meridian, ring B three at 45 degrees that push
 //! along the parallel, each ring every 120 degrees. A current of 3.5 A pushes with 51.5 N. The coils move by a
-//! tenth of the radius at most, so their directions are taken as at home.
+//! tenth of the radius at most, so their directions at home are used throughout.
 
 use crate::linear::{Matrix6, Vector6, inverse, product};
 use crate::plant::Wrench;
@@ -19,10 +19,10 @@ pub const COILS: usize = 6;
 /// Currents of all coils, A; ring A first.
 pub type Currents = [f64; COILS];
 
-/// Most a coil carries, A (public interface of the device: current limits of ±3.5 A).
+/// Current limit of a coil, A (public interface of the device: ±3.5 A).
 pub const CURRENT_LIMIT_A: f64 = 3.5;
 
-/// Where the coils sit.
+/// Placement of the coils.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoilGeometry {
     /// Radius of the hemisphere, m.
@@ -36,7 +36,7 @@ pub struct CoilGeometry {
 }
 
 impl CoilGeometry {
-    /// The geometry of the module's description.
+    /// Geometry of the module's description.
     pub const MAGLEV: Self = Self {
         radius_m: 0.115,
         meridian_ring_rad: 65.0 * PI / 180.0,
@@ -44,7 +44,7 @@ impl CoilGeometry {
         coil_force_n: 51.5,
     };
 
-    /// Position from the origin of the flotor frame (m) and direction of the force of each coil.
+    /// Returns position from the origin of the flotor frame (m) and force direction of each coil.
     fn places(&self) -> [(DVec3, DVec3); COILS] {
         let place = |index: usize| {
             let azimuth = (index % 3) as f64 * (2.0 * PI / 3.0);
@@ -64,7 +64,7 @@ impl CoilGeometry {
     }
 }
 
-/// The coils as two matrices between currents and wrenches about the origin of the flotor frame.
+/// Coil model: two matrices between currents and wrenches about the origin of the flotor frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Coils {
     /// N and N·m per A: a column per coil.
@@ -74,7 +74,7 @@ pub struct Coils {
 }
 
 impl Coils {
-    /// Prepares both matrices. Real-time: bounded, no allocation.
+    /// Computes both matrices. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// If a number is not physical, or the six coils cannot push in all six directions.
@@ -85,7 +85,7 @@ impl Coils {
         number("coil_ring_b_deg", geometry.parallel_ring_rad, Domain::Finite)?;
         let force_n_per_a = geometry.coil_force_n / CURRENT_LIMIT_A;
         let mut wrench_of = [[0.0; COILS]; 6];
-        // Torques over the radius are forces: rows of one size, so that dependence is told from smallness.
+        // Torques over the radius are forces: rows of equal magnitude, so that only dependence causes a small pivot.
         let mut scaled = wrench_of;
         for (coil, (position, direction)) in geometry.places().into_iter().enumerate() {
             let force = direction * force_n_per_a;
@@ -103,8 +103,8 @@ impl Coils {
         Ok(Self { wrench_of, currents_of })
     }
 
-    /// The currents for a wrench, scaled down together to [`CURRENT_LIMIT_A`], and the share of the wrench that
-    /// leaves (1 within the limit). Real-time: bounded, no allocation.
+    /// Returns the currents for a wrench, scaled down together to [`CURRENT_LIMIT_A`], and the fraction of the wrench
+    /// delivered (1 within the limit). Real-time: bounded, no allocation.
     #[must_use]
     pub fn currents(&self, wrench: &Wrench) -> (Currents, f64) {
         let asked_a = product(&self.currents_of, &six(wrench));
@@ -117,14 +117,14 @@ impl Coils {
         }
     }
 
-    /// The wrench a set of currents (A) makes in an even field. Real-time: bounded, no allocation.
+    /// Returns the wrench of a set of currents (A) in an even field. Real-time: bounded, no allocation.
     #[must_use]
     pub fn wrench(&self, currents_a: &Currents) -> Wrench {
         let [fx, fy, fz, tx, ty, tz] = product(&self.wrench_of, currents_a);
         Wrench { force_n: DVec3::new(fx, fy, fz), torque_nm: DVec3::new(tx, ty, tz) }
     }
 
-    /// Largest force and torque along one axis alone, N and N·m. Real-time: bounded, no allocation.
+    /// Returns the largest force and torque along one axis alone, N and N·m. Real-time: bounded, no allocation.
     #[must_use]
     pub fn pure_axis_limits(&self) -> Wrench {
         let limit = |axis: usize| {

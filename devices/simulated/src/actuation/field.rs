@@ -1,4 +1,4 @@
-//! The uneven field: how much of the commanded vertical force arrives at a height.
+//! The uneven field: fraction of the commanded vertical force delivered at a height.
 //!
 //! The thesis weighed the vertical force over the height of the handle and fitted the excess by a polynomial,
 //! `p(z) = -0.00451 z^2 - 0.02583 z + 0.1915` with z in mm (Varadharajan 2007, section 3.4 and appendix A). Its
@@ -10,13 +10,13 @@ use crate::validation::{Check, Domain, number};
 /// The thesis's polynomial: coefficients of z^2, z and 1, z in mm.
 const POLYNOMIAL: [f64; 3] = [-0.004_51, -0.025_83, 0.1915];
 
-/// Half the stretch over which the variation is measured, mm.
+/// Half the range over which the variation is measured, mm.
 const HALF_STRETCH_MM: f64 = 7.0;
 
-/// Heights beyond this count as this, mm: the polynomial was fitted to a little more than half of it.
+/// Clamp of the height, mm: the polynomial was fitted to a little more than half of this range.
 const RANGE_MM: f64 = 12.0;
 
-/// Delivered over commanded vertical force is one plus this.
+/// Relative error of the vertical force: delivered over commanded force is one plus the error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldError {
     /// Difference between the largest and the smallest ratio over z = -7 mm to 7 mm (0.1087 is 10.87 %).
@@ -24,11 +24,10 @@ pub struct FieldError {
 }
 
 impl FieldError {
-    /// As the thesis found it.
+    /// Error measured in the thesis.
     pub const THESIS: Self = Self { peak_to_peak: 0.1087 };
 
-    /// Delivered over commanded vertical force at a height of `z_m` above home. Real-time: bounded, no
-    /// allocation.
+    /// Returns delivered over commanded vertical force at a height of `z_m` above home. Real-time: bounded, no allocation.
     #[must_use]
     pub fn delivered_share(&self, z_m: f64) -> f64 {
         let z_mm = (z_m * 1.0e3).clamp(-RANGE_MM, RANGE_MM);
@@ -40,7 +39,7 @@ impl FieldError {
     }
 }
 
-/// Peak to peak of the polynomial over the stretch: from its vertex down to the farther end.
+/// Variation of the polynomial over the range, peak to peak: from its vertex down to the farther end.
 const VARIATION: f64 = {
     let vertex_mm = -POLYNOMIAL[1] / (2.0 * POLYNOMIAL[0]);
     polynomial(vertex_mm) - polynomial(HALF_STRETCH_MM)

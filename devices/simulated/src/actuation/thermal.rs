@@ -1,38 +1,38 @@
-//! Heat of the coils: an I²t model with the two faults the device reports.
+//! Heating of the coils: an I²t model with the two faults reported by the device.
 //!
-//! Both follow the square of the current with a first-order lag:
+//! The load of the last minute and the temperature follow the square of the current with a first-order lag:
 //!
 //! ```text
 //! minute:       L' = (i^2 - L) / 60 s        over-current when the square root of L exceeds 2 A
 //! temperature:  T' = (T_ambient + r i^2 - T) / tau      over-temperature above 250 degrees
 //! ```
 //!
-//! The limits (about 2 A over a minute, 250 °C) are those of the public interface of the device. Heating `r`
-//! and `tau` were never published: here 2 A for ever end at 180 °C, in minutes. So the current fault comes
-//! first on a cool device; the temperature fault needs a hot room, or coils that cool badly.
+//! The limits (about 2 A over a minute, 250 °C) are those of the public interface of the device. Heating `r` and `tau` were
+//! never published: here a constant 2 A ends at 180 °C, after minutes. So the current fault comes first on a cool device;
+//! the temperature fault needs a hot room, or badly cooled coils.
 
 use super::coils::{COILS, Currents};
 use crate::lag::Lag;
 use crate::validation::{Check, Domain, number};
 use flotor_hal::Fault;
 
-/// Mean current over a minute that is too much, A.
+/// Limit of the mean current over a minute, A.
 pub const MEAN_CURRENT_LIMIT_A: f64 = 2.0;
 
-/// The minute, s.
+/// Time constant of the mean current, s.
 const CURRENT_LAG_S: f64 = 60.0;
 
-/// Hottest coil allowed, °C.
+/// Largest allowed temperature of a coil, °C.
 pub const TEMPERATURE_LIMIT_C: f64 = 250.0;
 
-/// What decides how hot a coil gets.
+/// Thermal parameters of a coil.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThermalParameters {
     /// Temperature around the device, °C.
     pub ambient_c: f64,
     /// Final rise of temperature per square of current, K/A².
     pub rise_k_per_a2: f64,
-    /// Time to two thirds of it, s.
+    /// Time constant of the rise, s.
     pub lag_s: f64,
 }
 
@@ -47,7 +47,7 @@ impl ThermalParameters {
     }
 }
 
-/// Heat of all coils.
+/// Thermal state of all coils.
 #[derive(Clone, Copy, Debug)]
 pub struct Thermal {
     parameters: ThermalParameters,
@@ -58,7 +58,7 @@ pub struct Thermal {
 }
 
 impl Thermal {
-    /// Coils as warm as the room. Real-time: bounded, no allocation.
+    /// Creates coils at ambient temperature. Real-time: bounded, no allocation.
     #[must_use]
     pub fn new(parameters: ThermalParameters) -> Self {
         Self {
@@ -70,7 +70,7 @@ impl Thermal {
         }
     }
 
-    /// Carries `currents_a` (A) for `dt_s` (s). Real-time: bounded, no allocation.
+    /// Heats the coils with `currents_a` (A) for `dt_s` (s). Real-time: bounded, no allocation.
     pub fn heat(&mut self, currents_a: &Currents, dt_s: f64) {
         let ThermalParameters { ambient_c, rise_k_per_a2, .. } = self.parameters;
         let (load_share, heat_share) = (self.minute.closed(dt_s), self.warming.closed(dt_s));
@@ -83,26 +83,26 @@ impl Thermal {
         }
     }
 
-    /// Root mean square current of the coil that carried most, over the last minute, A. Real-time: bounded, no
+    /// Returns the root mean square current over the last minute of the most loaded coil, A. Real-time: bounded, no
     /// allocation.
     #[must_use]
     pub fn mean_current_a(&self) -> f64 {
         self.load_a2.iter().copied().fold(0.0, f64::max).sqrt()
     }
 
-    /// Temperature of each coil, °C. Real-time: bounded, no allocation.
+    /// Returns the temperature of each coil, °C. Real-time: bounded, no allocation.
     #[must_use]
     pub fn temperatures_c(&self) -> Currents {
         self.temperature_c
     }
 
-    /// Temperature of the hottest coil, °C. Real-time: bounded, no allocation.
+    /// Returns the temperature of the hottest coil, °C. Real-time: bounded, no allocation.
     #[must_use]
     pub fn hottest_c(&self) -> f64 {
         self.temperature_c.iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// What is too much, if anything is. Real-time: bounded, no allocation.
+    /// Returns the thermal fault, if any. Real-time: bounded, no allocation.
     #[must_use]
     pub fn fault(&self) -> Option<Fault> {
         if self.hottest_c() > TEMPERATURE_LIMIT_C {

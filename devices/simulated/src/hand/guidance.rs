@@ -1,12 +1,12 @@
 //! Guidance of the hand from outside: a client of the run (a pointer in a window) moves the intended position of the handle.
 //!
 //! A guide takes the hand over from its trajectory, sets a target, and releases the hand. The intended position follows the
-//! target as a critically damped oscillator of limited speed would, so that a jump of the target is no jump of the force. After
-//! the release it returns to the trajectory within [`RELEASE_NS`]; where the trajectory does not hold the handle, or means a
-//! force, it approaches the handle itself, and the grip fades.
+//! target like a critically damped oscillator of limited speed, so that a jump of the target causes no jump of the force.
+//! After the release it returns to the trajectory within [`RELEASE_NS`]; where the trajectory does not hold the handle, or
+//! intends a force, it approaches the handle itself, and the grip fades.
 //!
-//! A guide that is silent for [`SILENCE_NS`] has released the hand: a client may end at any time. While one guides, no other
-//! can. Every time here is the clock of the simulation, so equal calls give equal bits.
+//! A guide that is silent for [`SILENCE_NS`] has released the hand: a client may end at any time. While one client guides,
+//! no other can. All times are those of the simulation's clock, so equal calls give bit-identical results.
 
 use super::{Aim, Pose, minimum_jerk};
 use crate::plant::State;
@@ -36,18 +36,18 @@ pub struct NotGuiding {
 pub(crate) struct Follower {
     /// Intended pose; the orientation is constant.
     pub(crate) pose: Pose,
-    /// Its rate, m/s.
+    /// Velocity of the intended position, m/s.
     pub(crate) velocity_m_per_s: DVec3,
 }
 
 /// Source of the hand's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
-    /// The trajectory.
+    /// The trajectory alone.
     Free,
-    /// A guide.
+    /// A guide alone.
     Guided(Follower),
-    /// The trajectory, with a share of the last guide that fades from the time of the release on, ns.
+    /// The trajectory, blended with the last guided motion; the blend fades from this time on, ns.
     Releasing(Follower, u64),
 }
 
@@ -57,7 +57,7 @@ pub(crate) struct Guidance {
     phase: Phase,
     /// Number of the client that guides.
     guide: f64,
-    /// Whether the client that named itself last is the guide: coordinates are from that client.
+    /// True if the client that identified itself last is the guide: coordinates are from that client.
     is_guide_speaking: bool,
     target_m: DVec3,
     /// Time of the latest value from the guide, ns.
@@ -65,22 +65,22 @@ pub(crate) struct Guidance {
 }
 
 impl Guidance {
-    /// A hand that no client guides.
+    /// Guidance of a hand without a guide.
     pub(crate) const NONE: Self =
         Self { phase: Phase::Free, guide: 0.0, is_guide_speaking: false, target_m: DVec3::ZERO, heard_ns: 0 };
 
-    /// True while the trajectory alone moves the hand. Real-time: bounded, no allocation.
+    /// Returns true while the trajectory alone moves the hand. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn is_free(&self) -> bool {
         matches!(self.phase, Phase::Free)
     }
 
-    /// Number of the client that guides; 0 for none. Real-time: bounded, no allocation.
+    /// Returns the number of the guiding client; 0 for none. Real-time: bounded, no allocation.
     pub(crate) fn guide(&self) -> f64 {
         if matches!(self.phase, Phase::Guided(_)) { self.guide } else { 0.0 }
     }
 
-    /// Takes the hand for the client `guide`, or keeps it; 0 releases it. A hand that is taken begins its motion as `start` says.
+    /// Takes or holds the hand for the client `guide`; 0 releases the hand. A taken hand begins with the motion `start`.
     ///
     /// Real-time: bounded, no allocation.
     ///
@@ -105,7 +105,7 @@ impl Guidance {
     /// Moves the target along an axis, m. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// [`NotGuiding`] if the client that named itself last does not guide.
+    /// [`NotGuiding`] if the client that identified itself last does not guide.
     pub(crate) fn aim_at(&mut self, axis: usize, target_m: f64, now_ns: u64) -> Result<(), NotGuiding> {
         self.hear(now_ns)?;
         self.target_m[axis.min(2)] = target_m;
@@ -127,8 +127,8 @@ impl Guidance {
         self.is_guide_speaking = false;
     }
 
-    /// Moves on by `dt_s` (s) to the time `now_ns`: what the hand then aims at, where the trajectory would aim at `scripted` and
-    /// the handle is at `handle` before, with the guide's share of the velocity, m/s.
+    /// Advances by `dt_s` (s) to the time `now_ns`. Returns the aim of the hand and the guide's part of its velocity, m/s,
+    /// for the trajectory's aim `scripted` and the handle at `handle` before.
     ///
     /// Real-time: bounded, no allocation.
     pub(crate) fn advance(
@@ -163,19 +163,19 @@ impl Guidance {
 }
 
 impl Follower {
-    /// A motion through a pose. Real-time: bounded, no allocation.
+    /// Creates a motion through a pose. Real-time: bounded, no allocation.
     pub(crate) fn moving(pose: Pose, velocity_m_per_s: DVec3) -> Self {
         Self { pose, velocity_m_per_s }
     }
 
-    /// The motion of the handle. Real-time: bounded, no allocation.
+    /// Returns the motion of the handle. Real-time: bounded, no allocation.
     pub(crate) fn of(state: &State) -> Self {
         let pose = Pose { position_m: state.position_m, orientation: state.orientation };
         Self::moving(pose, state.velocity_m_per_s)
     }
 
-    /// Moves towards the target for `dt_s` (s, at most 1 ms): a critically damped oscillator, integrated by the semi-implicit Euler
-    /// method, which is stable up to 40 ms. What was faster than the limit at first only slows down.
+    /// Moves towards the target for `dt_s` (s, at most 1 ms): a critically damped oscillator, integrated by the
+    /// semi-implicit Euler method, which is stable up to 40 ms. An initial speed above the limit only decreases.
     fn approach(&mut self, target_m: DVec3, dt_s: f64) {
         let way_m = target_m - self.pose.position_m;
         let pull = way_m * (FOLLOWING_PER_S * FOLLOWING_PER_S);
@@ -186,9 +186,9 @@ impl Follower {
     }
 }
 
-/// The aim between a guided pose (`share` 0) and a trajectory (1), `dt_s` (s) after the handle was at `handle`. Where the trajectory
-/// does not hold the handle, or means a force along an axis, the handle itself stands for the intended position: the spring of
-/// the hand is then at rest.
+/// Blends a guided pose (`share` 0) and a trajectory (1), `dt_s` (s) after the handle was at `handle`. Where the trajectory
+/// does not hold the handle, or intends a force along an axis, the handle itself replaces the intended position: the spring
+/// of the hand is then at rest.
 fn between(guided: &Pose, share: f64, scripted: Option<Aim>, handle: &Follower, dt_s: f64) -> Aim {
     let Follower { pose: handle, velocity_m_per_s } = *handle;
     let open = || Aim::at(Pose { position_m: handle.position_m + velocity_m_per_s * dt_s, ..handle });
@@ -201,7 +201,7 @@ fn between(guided: &Pose, share: f64, scripted: Option<Aim>, handle: &Follower, 
     Aim { force_n: scripted.force_n * share, ..Aim::at(pose) }
 }
 
-/// The vector, shortened to a length if it is longer.
+/// Returns the vector, shortened to at most this length.
 fn limited(vector: DVec3, length: f64) -> DVec3 {
     let square = vector.length_squared();
     if square > length * length { vector * (length / square.sqrt()) } else { vector }

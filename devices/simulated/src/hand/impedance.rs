@@ -3,7 +3,7 @@
 use crate::validation::{Check, Domain, number, vector};
 use flotor_hal::glam::{BVec3, DVec3};
 
-/// How a hand holds, by name.
+/// Named grip of a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grip {
     /// [`Impedance::FIRM`].
@@ -13,7 +13,7 @@ pub enum Grip {
 }
 
 impl Grip {
-    /// The published values behind the name. Real-time: bounded, no allocation.
+    /// Returns the published impedance of the grip. Real-time: bounded, no allocation.
     #[must_use]
     pub const fn impedance(self) -> Impedance {
         match self {
@@ -23,24 +23,24 @@ impl Grip {
     }
 }
 
-/// Spring, damper and mass the hand adds at the handle.
+/// Spring, damper and mass of the hand at the handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impedance {
     /// Translational stiffness along x, y, z of the device frame, N/m.
     pub stiffness_n_per_m: DVec3,
     /// Translational damping along x, y, z of the device frame, N s/m.
     pub damping_ns_per_m: DVec3,
-    /// Rotational stiffness, the same about every axis, N·m/rad.
+    /// Rotational stiffness about every axis, N·m/rad.
     pub rotational_stiffness_nm_per_rad: f64,
-    /// Rotational damping, the same about every axis, N·m s/rad.
+    /// Rotational damping about every axis, N·m s/rad.
     pub rotational_damping_nms_per_rad: f64,
     /// Mass that moves with the handle while it is held, kg; 0 for a hand without inertia.
     pub mass_kg: f64,
 }
 
 impl Impedance {
-    /// A relaxed arm that keeps its posture: 0.554 kg, 6.45 N s/m, 135 N/m (typical trial of van Beek,
-    /// Bergmann Tiest, Mugge and Kappers 2015, Sci. Rep. 5:18004).
+    /// A relaxed arm in a constant posture: 0.554 kg, 6.45 N s/m, 135 N/m (typical trial of van Beek, Bergmann Tiest, Mugge
+    /// and Kappers 2015, Sci. Rep. 5:18004).
     ///
     /// Rotation is an estimate: a passive wrist has 1 to 2 N·m/rad (Formica et al. 2012, J. Neurophysiol.
     /// 108:1158); the damping gives the flotor, 4e-3 kg m² about the handle, a damping ratio of about 0.4.
@@ -52,9 +52,8 @@ impl Impedance {
         mass_kg: 0.554,
     };
 
-    /// A firm grip: 0.5 kg, 70 N s/m, 2000 N/m, the operator usually quoted from Hashtrudi-Zaad and
-    /// Salcudean's studies of teleoperation. Stiff enough to compress a spring of 1 N/mm with an intention
-    /// only half as deep again.
+    /// A firm grip: 0.5 kg, 70 N s/m, 2000 N/m, the operator usually quoted from Hashtrudi-Zaad and Salcudean's studies of
+    /// teleoperation. Stiff enough to compress a spring of 1 N/mm with an intended depth of only 1.5 times the compression.
     ///
     /// Rotation is an estimate: a tensed wrist, twice the passive one (see [`Self::RELAXED`]), damping ratio
     /// about 0.45.
@@ -66,7 +65,7 @@ impl Impedance {
         mass_kg: 0.5,
     };
 
-    /// The same hand where it means a force instead of a place: no stiffness along the axes of `yielding`.
+    /// Returns this impedance for an intended force: no stiffness along the axes of `yielding`.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
@@ -74,16 +73,16 @@ impl Impedance {
         Self { stiffness_n_per_m: DVec3::select(yielding, DVec3::ZERO, self.stiffness_n_per_m), ..self }
     }
 
-    /// The same hand without inertia. Real-time: bounded, no allocation.
+    /// Returns this impedance without inertia. Real-time: bounded, no allocation.
     #[must_use]
     pub const fn massless(self) -> Self {
         Self { mass_kg: 0.0, ..self }
     }
 
-    /// Refuses negative and non-finite numbers. Real-time: bounded, no allocation.
+    /// Rejects negative and non-finite numbers. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// Names the first offending number.
+    /// If a number is negative or not finite; the error contains its name.
     pub(super) fn check(&self) -> Check {
         let least_zero = Domain::NotNegative;
         vector("hand stiffness_n_per_m", self.stiffness_n_per_m, least_zero)?;

@@ -1,14 +1,14 @@
-//! A trajectory that was recorded once, meant again: what a real hand did drives the simulated one.
+//! Recorded trajectories: the motion of a real hand as the intended motion of the simulated one.
 //!
-//! Two kinds of file are read. A recording of a run (`.mcap`) holds the pose of the handle at every tick. Any other
+//! Two kinds of file are supported. A recording of a run (`.mcap`) contains the pose of the handle at every tick. Any other
 //! file is a table of comma-separated values with a header:
 //!
 //! ```text
 //! time_s,x_m,y_m,z_m                      or      time_s,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad
 //! ```
 //!
-//! in the device frame, rotation as a rotation vector. Times grow from row to row and count from the first; in
-//! between, the hand aims along straight lines. Before the first and after the last row it stays.
+//! in the device frame, rotation as a rotation vector. Times increase from row to row and count from the first; in between,
+//! the intended pose is interpolated linearly. Before the first and after the last row it is constant.
 
 mod mcap_file;
 mod table;
@@ -22,27 +22,27 @@ use std::sync::Arc;
 
 /// Largest number of samples: hours of a run.
 const MAX_SAMPLES: usize = 1 << 24;
-/// Farthest position a handle can have had, m: ten times the range of the device.
+/// Largest plausible coordinate of a handle, m: ten times the range of the device.
 const FARTHEST_M: f64 = 0.12;
 
 /// A recorded trajectory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording(Arc<[Sample]>);
 
-/// Where the handle was.
+/// Recorded pose of the handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Sample {
-    /// Since the first sample.
+    /// Time since the first sample, ns.
     time_ns: u64,
     pose: Pose,
 }
 
-/// What is wrong with a recorded trajectory. Prints file, place, and what would be right.
+/// Error in a recorded trajectory. Prints file, place, and the expected content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingError {
     /// The file.
     pub file: String,
-    /// Place in it (a line, a message) and problem.
+    /// Place in the file (a line, a message) and problem.
     pub problem: String,
 }
 
@@ -58,7 +58,7 @@ impl Recording {
     /// Reads a file. Not real-time.
     ///
     /// # Errors
-    /// [`RecordingError`] if it cannot be read or is no trajectory.
+    /// [`RecordingError`] if the file is unreadable or contains no trajectory.
     pub fn load(path: &Path) -> Result<Self, RecordingError> {
         let wrong = |problem: String| RecordingError { file: path.display().to_string(), problem };
         let unreadable = |error| wrong(format!("cannot be read: {error}"));
@@ -75,7 +75,7 @@ impl Recording {
         samples.and_then(Self::new).map_err(wrong)
     }
 
-    /// Samples in order of time, of which there is at least one.
+    /// Creates a recording from samples in order of time; an error without any sample.
     fn new(samples: Vec<Sample>) -> Result<Self, String> {
         if samples.is_empty() {
             return Err("holds no pose".to_owned());
@@ -83,13 +83,13 @@ impl Recording {
         Ok(Self(samples.into()))
     }
 
-    /// When the last sample was taken, ns since the first. Real-time: bounded, no allocation.
+    /// Returns the time of the last sample, ns since the first. Real-time: bounded, no allocation.
     #[must_use]
     pub fn end_ns(&self) -> u64 {
         self.0.last().map_or(0, |sample| sample.time_ns)
     }
 
-    /// The aim at a time since the start of the run. Real-time: bounded, no allocation.
+    /// Returns the aim at a time since the start of the run. Real-time: bounded, no allocation.
     pub(super) fn aim(&self, time_ns: u64) -> Aim {
         let passed = self.0.partition_point(|sample| sample.time_ns <= time_ns);
         let (before, after) = (self.0.get(passed.saturating_sub(1)), self.0.get(passed));
@@ -102,10 +102,10 @@ impl Recording {
 }
 
 impl Sample {
-    /// A sample `time_s` (s) after the first whose pose is one a handle can have.
+    /// Creates a sample `time_s` (s) after the first; an error for an implausible time or pose.
     fn new(time_s: f64, position_m: DVec3, orientation: DQuat) -> Result<Self, String> {
         let pose = Pose { position_m, orientation };
-        // Written so that NaN is refused.
+        // Written so that NaN is rejected.
         if !(0.0..=1.0e6).contains(&time_s) {
             return Err(format!("time {time_s} s is outside 0 to 1000000 s after the first"));
         }
@@ -117,7 +117,7 @@ impl Sample {
         inside.then_some(Self { time_ns: (time_s * 1.0e9).round() as u64, pose }).ok_or_else(far)
     }
 
-    /// Appends a sample if it is later than the last.
+    /// Appends the sample; an error unless it is later than the last.
     fn append_to(self, samples: &mut Vec<Self>) -> Result<(), String> {
         match samples.last() {
             Some(last) if self.time_ns <= last.time_ns => {
@@ -131,7 +131,7 @@ impl Sample {
         }
     }
 
-    /// The pose on the way to a later sample.
+    /// Interpolates between this sample and a later one.
     fn toward(&self, later: &Self, time_ns: u64) -> Pose {
         let whole_ns = (later.time_ns - self.time_ns) as f64;
         let share = (time_ns.saturating_sub(self.time_ns) as f64 / whole_ns).min(1.0);

@@ -1,4 +1,4 @@
-//! Scripts: what a hand does, movement by movement, as a TOML file.
+//! Scripts: the intended movements of a hand in sequence, as a TOML file.
 //!
 //! ```toml
 //! title = "Press, feel, let go"
@@ -21,11 +21,11 @@
 //! release = {}
 //! ```
 //!
-//! A script starts at home. `move` goes to a place along a minimum-jerk curve (rotations as a rotation vector in the
-//! device frame) and `hold` stays there. `oscillate` swings about it along a sine that fades in and out in a
-//! period, as people explore softness. `push` means a force instead of a place: pulses (raised cosines) along which
-//! the hand has no stiffness; start it where the hand is not pulling. `release` opens the hand for good, so it comes
-//! last. After the last step the hand stays where it is.
+//! A script starts at home. `move` goes to a place along a minimum-jerk curve (rotations as a rotation vector in the device
+//! frame) and `hold` stays there. `oscillate` swings about the place along a sine that fades in and out in a period, as
+//! people explore softness. `push` sets a force instead of a place: pulses (raised cosines) along which the hand has no
+//! stiffness; start it where the hand is not pulling. `release` opens the hand for good, so it must be the last step. After
+//! the last step the hand holds its place.
 
 mod reader;
 
@@ -49,7 +49,7 @@ const BUILT_IN: [(&str, &str); Script::NAMES.len()] = [
     (Script::NAMES[6], include_str!("../../scripts/push.toml")),
 ];
 
-/// A sequence of movements, read and checked.
+/// A validated sequence of movements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Script {
     grip: Option<Grip>,
@@ -57,7 +57,7 @@ pub struct Script {
     release_ns: Option<u64>,
 }
 
-/// One movement, with where and when it starts.
+/// A movement with its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Leg {
     start_ns: u64,
@@ -66,20 +66,20 @@ struct Leg {
     movement: Movement,
 }
 
-/// What happens during a leg.
+/// Kind of a movement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Movement {
-    /// Nothing.
+    /// Rest at the start.
     Hold,
-    /// To a place, along a minimum-jerk curve.
+    /// Motion to a place, along a minimum-jerk curve.
     Move { to: Place },
-    /// About a place and back to it.
+    /// Oscillation about the start.
     Oscillate { amplitude: Place, frequency_hz: f64 },
     /// Pulses of force.
     Push { force_n: DVec3, frequency_hz: f64 },
 }
 
-/// A position and an orientation, or a change of both, device frame.
+/// Position and orientation, or a change of both, device frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Place {
     position_m: DVec3,
@@ -91,10 +91,10 @@ impl Script {
     /// Names of the built-in scripts.
     pub const NAMES: [&'static str; 7] = ["press", "hold", "release", "shear", "tilt", "tap", "push"];
 
-    /// A built-in script or one from a file. Not real-time.
+    /// Loads a built-in script or a file. Not real-time.
     ///
     /// # Errors
-    /// [`ScriptError`] with file, line, key, and what would be right.
+    /// [`ScriptError`] with file, line, key, and the expected content.
     pub fn load(name_or_path: &str) -> Result<Self, ScriptError> {
         match BUILT_IN.iter().find(|(name, _)| *name == name_or_path) {
             Some((name, text)) => reader::read(name, text),
@@ -102,32 +102,32 @@ impl Script {
         }
     }
 
-    /// Reads a script from its text; `file` is what complaints call it. Not real-time.
+    /// Parses a script; `file` is its name in errors. Not real-time.
     ///
     /// # Errors
-    /// [`ScriptError`] with file, line, key, and what would be right.
+    /// [`ScriptError`] with file, line, key, and the expected content.
     pub fn parse(file: &str, text: &str) -> Result<Self, ScriptError> {
         reader::read(file, text)
     }
 
-    /// How the script wants the handle to be held, if it says. Real-time: bounded, no allocation.
+    /// Returns the grip set by the script; `None` if unset. Real-time: bounded, no allocation.
     #[must_use]
     pub fn grip(&self) -> Option<Grip> {
         self.grip
     }
 
-    /// When the last movement ends, ns. Real-time: bounded, no allocation.
+    /// Returns the end of the last movement, ns. Real-time: bounded, no allocation.
     #[must_use]
     pub fn end_ns(&self) -> u64 {
         self.legs.last().map_or(0, |leg| leg.start_ns + leg.duration_ns)
     }
 
-    /// When the hand releases the handle, if it does, ns. Real-time: bounded, no allocation.
+    /// Returns the time of the planned release, ns; `None` without one. Real-time: bounded, no allocation.
     pub(super) fn release_ns(&self) -> Option<u64> {
         self.release_ns
     }
 
-    /// The aim at a time since the start of the run. Real-time: bounded, no allocation.
+    /// Returns the aim at a time since the start of the run; `None` after the release. Real-time: bounded, no allocation.
     pub(super) fn aim(&self, time_ns: u64) -> Option<Aim> {
         if self.release_ns.is_some_and(|release_ns| time_ns >= release_ns) {
             return None;
@@ -138,7 +138,7 @@ impl Script {
         Some(leg.map_or(Aim::at(Pose::HOME), |leg| leg.aim(time_ns)))
     }
 
-    /// Every set of axes along which some leg yields, and none. Not real-time.
+    /// Returns every set of axes along which a leg yields, and the empty set. Not real-time.
     pub(super) fn yieldings(&self) -> Vec<BVec3> {
         let mut found = vec![BVec3::FALSE];
         for yielding in self.legs.iter().map(Leg::yielding) {

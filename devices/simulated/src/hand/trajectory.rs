@@ -1,7 +1,7 @@
-//! The intended motion of the hand as a function of time, and when it holds the handle at all.
+//! The intended motion of the hand over time, with the times of the grip.
 //!
-//! Voluntary movements start and stop smoothly; [`minimum_jerk`] (Flash and Hogan 1985, J. Neurosci. 5:1688)
-//! is the usual curve, and every motion here is built from it and from sines.
+//! Voluntary movements start and stop smoothly; [`minimum_jerk`] (Flash and Hogan 1985, J. Neurosci. 5:1688) is the usual
+//! curve, and every motion here is composed of minimum-jerk curves and sines.
 
 use super::{Recording, Script};
 use crate::validation::{Check, Domain, InvalidParameter, number, vector};
@@ -9,7 +9,7 @@ use flotor_hal::glam::{BVec3, DQuat, DVec3};
 use flotor_hal::math;
 use std::f64::consts::TAU;
 
-/// A position and an orientation in the device frame.
+/// Position and orientation in the device frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Position of the flotor frame's origin, m.
@@ -22,17 +22,17 @@ impl Pose {
     /// Origin of the device frame, upright.
     pub const HOME: Self = Self { position_m: DVec3::ZERO, orientation: DQuat::IDENTITY };
 
-    /// Largest deviation of a unit quaternion's length that rounding of user input explains.
+    /// Rounding tolerance of a unit quaternion's length in user input.
     const LENGTH_TOLERANCE: f64 = 1.0e-6;
 
-    /// Refuses non-finite numbers and quaternions that are no rotation. Real-time: bounded, no allocation.
+    /// Rejects non-finite numbers and quaternions that are no rotation. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// Names the first offending number.
+    /// If a number is not finite, or the quaternion has not unit length.
     pub(crate) fn check(&self) -> Check {
         vector("position_m", self.position_m, Domain::Finite)?;
         let length = self.orientation.length();
-        // Written so that NaN is refused too.
+        // Written so that NaN is rejected too.
         if (length - 1.0).abs() <= Self::LENGTH_TOLERANCE {
             Ok(())
         } else {
@@ -41,19 +41,19 @@ impl Pose {
     }
 }
 
-/// What the person means at one instant, device frame.
+/// Intention of the hand at one instant, device frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aim {
-    /// Where the handle is meant to be.
+    /// Intended pose of the handle.
     pub pose: Pose,
-    /// Force that is meant beside that, N.
+    /// Intended force in addition, N.
     pub force_n: DVec3,
-    /// Axes along which a force is meant and no place: the hand has no stiffness there.
+    /// Axes with an intended force instead of a position: the hand has no stiffness there.
     pub yielding: BVec3,
 }
 
 impl Aim {
-    /// A place and no force. Real-time: bounded, no allocation.
+    /// Creates an aim at a pose, without force. Real-time: bounded, no allocation.
     #[must_use]
     #[inline]
     pub const fn at(pose: Pose) -> Self {
@@ -66,25 +66,25 @@ impl Aim {
     }
 }
 
-/// What the hand does to the plant during a piece of time, device frame: the aim drawn straight on.
+/// Intention of the hand during a piece of time, device frame: the aim interpolated linearly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intention {
     /// Intended position of the handle at the start, m.
     pub position_m: DVec3,
-    /// Its constant rate, m/s.
+    /// Constant velocity of the intended position, m/s.
     pub velocity_m_per_s: DVec3,
-    /// Intended orientation of the handle, the same all the time.
+    /// Constant intended orientation of the handle.
     pub orientation: DQuat,
-    /// Rate at which it is meant to turn, which the damping of the hand goes by, rad/s.
+    /// Intended angular velocity, used by the damping of the hand, rad/s.
     pub angular_velocity_rad_per_s: DVec3,
-    /// Force that is meant beside that, constant, N.
+    /// Constant intended force in addition, N.
     pub force_n: DVec3,
     /// Axes along which the hand has no stiffness.
     pub yielding: BVec3,
 }
 
 impl Intention {
-    /// To keep the handle at a pose. Real-time: bounded, no allocation.
+    /// Creates the intention to hold the handle at a pose. Real-time: bounded, no allocation.
     #[must_use]
     pub const fn resting(pose: Pose) -> Self {
         Self {
@@ -103,9 +103,9 @@ impl Intention {
 pub enum Trajectory {
     /// The hand is off the handle.
     Open,
-    /// The hand keeps the handle at a pose.
+    /// The hand holds the handle at a pose.
     Hold(Pose),
-    /// From home straight down along a minimum-jerk curve, then held there.
+    /// Straight down from home along a minimum-jerk curve, then hold.
     Press {
         /// Depth below home, m; negative pulls up.
         depth_m: f64,
@@ -114,15 +114,15 @@ pub enum Trajectory {
         /// Duration of the movement, s.
         rise_s: f64,
     },
-    /// The handle is kept at a pose, then let go.
+    /// Hold at a pose, then release.
     Release {
         /// Pose before the release.
         from: Pose,
-        /// When the hand opens, ns.
+        /// Time of the release, ns.
         at_ns: u64,
     },
-    /// Up and down along a sine, first downwards, faded in by a minimum-jerk envelope, as the subjects of the
-    /// thesis explored their springs.
+    /// Vertical sine, first downwards, faded in by a minimum-jerk envelope, as the subjects of the thesis explored their
+    /// springs.
     Oscillate {
         /// Middle of the movement, z in m; negative is below home.
         centre_m: f64,
@@ -135,19 +135,18 @@ pub enum Trajectory {
     },
     /// A sequence of movements from a file, or built in.
     Scripted(Script),
-    /// What a handle did once, meant again.
+    /// The recorded motion of a handle.
     Recorded(Recording),
 }
 
 impl Trajectory {
-    /// The demo's exploration. With [`Impedance::FIRM`](super::Impedance::FIRM) against spring 1 of the
-    /// thesis (1.13 N/mm at the handle) two thirds of it reach the handle: 4 mm about a middle 2.5 mm below
-    /// home, 1.5 times a second. Rate: most people explore softness at 1 to 2 Hz in 3 or more cycles
-    /// (Macfadyen 1998).
+    /// Exploration of the demo. With [`Impedance::FIRM`](super::Impedance::FIRM) against spring 1 of the thesis (1.13 N/mm
+    /// at the handle) two thirds of the amplitude reach the handle: 4 mm about a middle 2.5 mm below home, 1.5 times a
+    /// second. Rate: most people explore softness at 1 to 2 Hz in 3 or more cycles (Macfadyen 1998).
     pub const EXPLORE: Self =
         Self::Oscillate { centre_m: -4.0e-3, amplitude_m: 6.0e-3, frequency_hz: 1.5, onset_s: 1.0 };
 
-    /// The aim at a time since the start of the run, or nothing while the hand is off the handle.
+    /// Returns the aim at a time since the start of the run; `None` while the hand is off the handle.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
@@ -170,7 +169,7 @@ impl Trajectory {
         }
     }
 
-    /// Every set of axes along which the hand yields at some time. Not real-time.
+    /// Returns every set of axes along which the hand yields at some time. Not real-time.
     pub(crate) fn yieldings(&self) -> Vec<BVec3> {
         match self {
             Self::Scripted(script) => script.yieldings(),
@@ -178,7 +177,7 @@ impl Trajectory {
         }
     }
 
-    /// When the hand releases the handle, if that is planned, ns. Real-time: bounded, no allocation.
+    /// Returns the time of the planned release, ns; `None` without one. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn release_ns(&self) -> Option<u64> {
         match self {
@@ -188,13 +187,13 @@ impl Trajectory {
         }
     }
 
-    /// Refuses numbers that describe no motion. Real-time: bounded, no allocation.
+    /// Rejects numbers that describe no motion. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// Names the first offending number.
+    /// If a number is not finite or out of its range; the error contains its name.
     pub(super) fn check(&self) -> Check {
         match self {
-            // Scripts and recordings were checked where they were read.
+            // Scripts and recordings were checked on reading.
             Self::Open | Self::Scripted(_) | Self::Recorded(_) => Ok(()),
             Self::Hold(pose) | Self::Release { from: pose, .. } => pose.check(),
             Self::Press { depth_m, start_s, rise_s } => {
@@ -212,7 +211,7 @@ impl Trajectory {
     }
 }
 
-/// Share (0 to 1) of a minimum-jerk movement done `elapsed_s` after its start.
+/// Returns the completed fraction (0 to 1) of a minimum-jerk movement `elapsed_s` after its start.
 ///
 /// `10 u^3 - 15 u^4 + 6 u^5` with `u = elapsed / duration` (Flash and Hogan 1985); 0 before and 1 after.
 /// Real-time: bounded, no allocation.

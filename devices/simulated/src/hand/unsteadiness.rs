@@ -1,16 +1,15 @@
-//! What a hand does without meaning to: it trembles, and its forces scatter in proportion to their size.
+//! Unintended motion of the hand: tremor, and force noise in proportion to the force.
 //!
-//! **Tremor** moves the intended place. Physiological tremor of the hand has its peak at 8 to 10 Hz, whatever the
-//! force (Sutton and Sykes 1967, J. Physiol. 191:699), and several frequencies at a time up to 12 Hz (Veluvolu and
-//! Ang 2011, Sensors 11:3020). Instruments held in a braced hand move by 15 to 250 µm rms (Becker and others,
-//! PMC3032442, figure 4).
+//! **Tremor** moves the intended position. Physiological tremor of the hand has its peak at 8 to 10 Hz, independent of the
+//! force (Sutton and Sykes 1967, J. Physiol. 191:699), and several frequencies at a time up to 12 Hz (Veluvolu and Ang
+//! 2011, Sensors 11:3020). Instruments held in a braced hand move by 15 to 250 µm rms (Becker and others, PMC3032442,
+//! figure 4).
 //!
-//! **Noise of force** multiplies the intended force: its size grows in proportion to the force, over the whole band
-//! of 0.25 to 12.5 Hz in which it was measured, and most at low frequencies (Sutton and Sykes 1967). A share of 3
-//! to 5 % is usual.
+//! **Force noise** multiplies the intended force: its amplitude grows in proportion to the force, over the whole measured
+//! band of 0.25 to 12.5 Hz, and is largest at low frequencies (Sutton and Sykes 1967). A fraction of 3 to 5 % is usual.
 //!
-//! Both are sums of sines with random phases (Shinozuka and Deodatis 1991, Appl. Mech. Rev. 44:191): functions of
-//! time and seed alone, so that ticks of any length meet the same hand.
+//! Both are sums of sines with random phases (Shinozuka and Deodatis 1991, Appl. Mech. Rev. 44:191): functions of time and
+//! seed alone, so that the hand is the same for ticks of any length.
 
 use crate::noise::{Noise, Stream};
 use crate::validation::{Check, Domain, number};
@@ -21,23 +20,23 @@ use std::f64::consts::{SQRT_2, TAU};
 /// Band of tremor, Hz (see the module).
 const TREMOR_BAND_HZ: [f64; 2] = [8.0, 12.0];
 
-/// Band of the noise of force, Hz (see the module).
+/// Band of the force noise, Hz (see the module).
 const FORCE_BAND_HZ: [f64; 2] = [0.25, 12.5];
 
-/// Sines in a sum: enough for a distribution close to normal.
+/// Number of sines in a sum: enough for a distribution close to normal.
 const SINES: usize = 8;
 
-/// How unsteady a hand is.
+/// Unsteadiness of a hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unsteadiness {
-    /// Tremor of the intended place along each axis, root mean square, m.
+    /// Tremor of the intended position along each axis, root mean square, m.
     pub tremor_m: f64,
-    /// Noise of an intended force, root mean square, as a share of it.
+    /// Noise of an intended force, root mean square, as a fraction of the force.
     pub force_share: f64,
 }
 
 impl Unsteadiness {
-    /// A hand of stone.
+    /// A perfectly steady hand.
     pub const NONE: Self = Self { tremor_m: 0.0, force_share: 0.0 };
 
     pub(super) fn check(&self) -> Check {
@@ -46,7 +45,7 @@ impl Unsteadiness {
     }
 }
 
-/// The unsteadiness of one run.
+/// Random tremor and force noise of one run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wavering {
     size: Unsteadiness,
@@ -55,14 +54,14 @@ pub(crate) struct Wavering {
 }
 
 impl Wavering {
-    /// That of a run with this seed. Real-time: bounded, no allocation.
+    /// Draws the noise of a run with this seed. Real-time: bounded, no allocation.
     pub(crate) fn new(size: Unsteadiness, seed: u64) -> Self {
         let mut noise = Noise::new(seed, Stream::Hand);
         let tremor = [(); 3].map(|()| Waves::new(TREMOR_BAND_HZ, &mut noise));
         Self { size, tremor, force: Waves::new(FORCE_BAND_HZ, &mut noise) }
     }
 
-    /// How far the intended place is off at a time since the start of the run, m. Real-time: bounded, no
+    /// Returns the tremor of the intended position at a time since the start of the run, m. Real-time: bounded, no
     /// allocation.
     #[inline]
     pub(crate) fn offset_m(&self, time_s: f64) -> DVec3 {
@@ -72,7 +71,7 @@ impl Wavering {
         DVec3::from_array(self.tremor.map(|waves| waves.at(time_s))) * self.size.tremor_m
     }
 
-    /// An intended force (N) as it comes out. Real-time: bounded, no allocation.
+    /// Returns an intended force (N) with noise. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn force_n(&self, intended_n: DVec3, time_s: f64) -> DVec3 {
         if self.size.force_share == 0.0 || intended_n == DVec3::ZERO {
@@ -82,7 +81,7 @@ impl Wavering {
     }
 }
 
-/// Sines of equal size whose frequencies are spread evenly, on a logarithmic scale, over a band.
+/// Sines of equal amplitude with frequencies spread evenly, on a logarithmic scale, over a band.
 #[derive(Clone, Copy, Debug)]
 struct Waves([Sine; SINES]);
 
@@ -96,7 +95,7 @@ impl Waves {
     fn new([lowest_hz, highest_hz]: [f64; 2], noise: &mut Noise) -> Self {
         let mut share = 0.0;
         Self([(); SINES].map(|()| {
-            // A random place in each of the parts, so that the sum does not repeat itself.
+            // A random frequency in each part of the band, so that the sum is not periodic.
             let frequency_hz =
                 lowest_hz * math::pow(highest_hz / lowest_hz, (share + noise.uniform()) / SINES as f64);
             share += 1.0;
@@ -104,7 +103,7 @@ impl Waves {
         }))
     }
 
-    /// Mean square 1 over a long time.
+    /// Returns the sum at a time; its mean square is 1 over a long time.
     fn at(&self, time_s: f64) -> f64 {
         let sum: f64 = self.0.iter().map(|sine| math::sin(sine.rate_per_s * time_s + sine.phase)).sum();
         sum * (SQRT_2 / (SINES as f64).sqrt())

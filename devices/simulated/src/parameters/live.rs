@@ -9,10 +9,10 @@ use flotor_hal::OutOfRange;
 const TARGET: [usize; 3] =
     [index_of("hand_target_x_mm"), index_of("hand_target_y_mm"), index_of("hand_target_z_mm")];
 
-/// Index of the number of the client that guides.
+/// Index of the parameter with the number of the guiding client.
 const GUIDE: usize = index_of("hand_guide");
 
-/// Returns the index of a parameter; fails to compile without one.
+/// Returns the index of a parameter; compilation fails for an unknown one.
 const fn index_of(id: &str) -> usize {
     let mut index = 0;
     while !is_same(SCHEMA[index].id().as_bytes(), id.as_bytes()) {
@@ -32,7 +32,7 @@ const fn is_same(one: &[u8], other: &[u8]) -> bool {
 /// Changes the live parameter at `index` of the schema. Real-time: bounded, no allocation.
 ///
 /// # Errors
-/// [`OutOfRange`] with the number of the client that guides, if the value is from another one; also for a parameter that is not live.
+/// [`OutOfRange`]: with the number of the guiding client if the value is from another; for a parameter that is not live.
 pub(crate) fn change(simulation: &mut Simulation, index: usize, value: f64) -> Result<(), OutOfRange> {
     let refused = |NotGuiding { guide }| OutOfRange { min: guide, max: guide, value };
     if index == GUIDE {
@@ -44,13 +44,13 @@ pub(crate) fn change(simulation: &mut Simulation, index: usize, value: f64) -> R
     }
 }
 
-/// Applies the values with which a device was opened: a guide that is named there begins with the first tick. Real-time: bounded, no
+/// Applies the values with which a device was opened: a guide among them begins with the first tick. Real-time: bounded, no
 /// allocation.
 pub(crate) fn begin(simulation: &mut Simulation, values: &[f64]) {
     let guide = values.get(GUIDE).copied().unwrap_or_default();
     if guide != 0.0 && simulation.guide(guide).is_ok() {
         for (axis, index) in TARGET.into_iter().enumerate() {
-            // The guide was just named.
+            // Cannot fail: the guide has just been set.
             let _ = simulation.guide_to(axis, values.get(index).copied().unwrap_or_default() * MM);
         }
     }

@@ -1,4 +1,4 @@
-//! Preset `full`: from values to coils, cells and faults.
+//! Preset `full`: conversion of parameters to coils, cells and faults.
 
 use super::{MM, PERCENT, UM};
 use crate::actuation::ActuationParameters;
@@ -12,7 +12,7 @@ use crate::sensing::optics::OpticsGeometry;
 use crate::sensing::velocity::EstimatorKind;
 use flotor_hal::{Settings, math};
 
-/// What stands between controller and flotor; nothing with preset `plain`.
+/// Returns the parameters of the machine; `None` with preset `plain`.
 pub(crate) fn machine(settings: &Settings<'_>) -> Option<MachineParameters> {
     has_machine(settings).then(|| MachineParameters {
         actuation: actuation(settings),
@@ -66,7 +66,7 @@ fn estimator(settings: &Settings<'_>) -> EstimatorKind {
     match settings.choice_or_default("velocity") {
         1 => EstimatorKind::Difference,
         2 => EstimatorKind::Kalman {
-            // Steps are noise, too: evenly distributed over their width.
+            // Quantisation is noise, too: uniform over the width of a step.
             noise_m: math::hypot(
                 value("sensor_noise_um") * UM,
                 value("sensor_resolution_um") * UM / 12.0_f64.sqrt(),
@@ -100,7 +100,7 @@ fn fault(settings: &Settings<'_>) -> Option<FaultPlan> {
     })
 }
 
-/// Tick of the latency of the sensors, ns: of the device's own controller.
+/// Tick length in which the sensor latency is given, ns: that of the device's own controller.
 const TICK_OF_THE_SENSORS_NS: u64 = 1_000_000;
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the schema keeps it between 0 and 32

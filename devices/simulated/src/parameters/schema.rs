@@ -1,28 +1,28 @@
-//! The schema: every parameter with unit, range, default and a sentence.
+//! Parameter schema: every parameter with unit, range, default and a sentence.
 
 use crate::hand::Script;
 use crate::plant::FlotorParameters;
 use flotor_hal::{Choices, Parameter, choices};
 
-/// How much of the machine is simulated.
+/// Scope of the simulation.
 const PRESETS: Choices = choices!["plain", "full"];
 
-/// Whose flotor.
+/// Flotors with published data.
 const FLOTORS: Choices = choices!["thesis", "utah"];
 
-/// What the hand does.
+/// Intended motions of the hand.
 const HANDS: Choices = choices!["oscillate", "press", "release", "hold", "open"];
 
-/// Scripts that need no file.
+/// Built-in scripts.
 const SCRIPTS: Choices = choices!(= &Script::NAMES);
 
-/// How the hand holds.
+/// Grips of the hand.
 const GRIPS: Choices = choices!["firm", "relaxed"];
 
-/// How velocity is estimated.
+/// Velocity estimators.
 const ESTIMATORS: Choices = choices!["low-pass", "difference", "kalman"];
 
-/// What breaks.
+/// Kinds of faults.
 const FAULTS: Choices = choices![
     "none",
     "sensor-loss",
@@ -38,7 +38,7 @@ const FAULTS: Choices = choices![
 
 const DEMO: FlotorParameters = FlotorParameters::THESIS;
 
-/// The schema. Defaults are those of preset `plain`, flotor `thesis`, an oscillating firm hand.
+/// Schema of the parameters. Defaults are those of preset `plain`, flotor `thesis`, an oscillating firm hand.
 pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice(
         "preset",

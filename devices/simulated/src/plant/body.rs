@@ -1,4 +1,4 @@
-//! Mass and forces of what moves: the flotor alone, or the flotor with the mass, spring and damper of a hand.
+//! Mass and forces of the moving body: the flotor alone, or with the mass, spring and damper of a hand.
 
 use super::motion::Motion;
 use super::translation::Oscillator;
@@ -7,29 +7,29 @@ use crate::hand::Impedance;
 use crate::ledger::MechanicalEnergy;
 use flotor_hal::glam::{DMat3, DVec3};
 
-/// A rigid body and the linear laws that act on it, prepared for the integrator.
+/// A rigid body with its linear force laws, prepared for the integrator.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Body {
-    /// The flotor in it.
+    /// The flotor as part of the body.
     flotor: FlotorParameters,
-    /// The hand on it; all zero when there is none.
+    /// Impedance of the hand; all zero without one.
     pub(super) hand: Impedance,
     /// Drag of the field.
     pub(super) drag: Drag,
-    /// One over the mass of both, 1/kg.
+    /// Inverse of the total mass, 1/kg.
     pub(super) inverse_mass_per_kg: f64,
     /// Common centre of mass, flotor frame, m.
     pub(super) centre_of_mass_m: DVec3,
-    /// Inertia of both about the common centre of mass, flotor frame, kg m².
+    /// Inertia of flotor and hand about the common centre of mass, flotor frame, kg m².
     pub(super) inertia_kg_m2: DMat3,
-    /// Its inverse, 1/(kg m²).
+    /// Inverse of `inertia_kg_m2`, 1/(kg m²).
     pub(super) inverse_inertia: DMat3,
     /// Upward compensation force at the flotor's centre of mass, N.
     pub(super) feed_forward_n: f64,
-    /// Compensation less weight, device frame, N: exactly zero when they are set equal.
+    /// Compensation minus weight, device frame, N: exactly zero if set equal.
     pub(super) lift_n: DVec3,
-    /// How far the flotor's centre of mass lies beyond the common one, in units of the distance from the
-    /// origin to that: mass of the hand divided by that of the flotor (law of the lever).
+    /// Distance of the flotor's centre of mass from the common one, relative to the distance of the common one from the
+    /// origin: mass of the hand divided by that of the flotor (law of the lever).
     pub(super) lift_lever: f64,
     /// Damping of drag and hand together, per axis, N s/m.
     pub(super) damping_ns_per_m: DVec3,
@@ -37,11 +37,11 @@ pub(super) struct Body {
     pub(super) rotational_damping_nms_per_rad: f64,
     /// Translation as three oscillators.
     pub(super) oscillator: Oscillator,
-    /// Bound of the rates of rotation, 1/s.
+    /// Upper bound of the rotational rates, 1/s.
     pub(super) rotation_rate_per_s: f64,
 }
 
-/// No hand.
+/// Impedance of an absent hand.
 const NO_HAND: Impedance = Impedance {
     stiffness_n_per_m: DVec3::ZERO,
     damping_ns_per_m: DVec3::ZERO,
@@ -51,19 +51,18 @@ const NO_HAND: Impedance = Impedance {
 };
 
 impl Body {
-    /// The flotor alone. Real-time: bounded, no allocation.
+    /// Creates the body of the flotor alone. Real-time: bounded, no allocation.
     pub(super) fn free(flotor: &FlotorParameters) -> Self {
         Self::held(flotor, &NO_HAND)
     }
 
-    /// The flotor in a hand whose mass sits at the origin of the flotor frame. Real-time: bounded, no
+    /// Creates the body of the flotor in a hand with its mass at the origin of the flotor frame. Real-time: bounded, no
     /// allocation.
     pub(super) fn held(flotor: &FlotorParameters, hand: &Impedance) -> Self {
         let mass_kg = flotor.mass_kg + hand.mass_kg;
         let flotor_share = flotor.mass_kg / mass_kg;
         let centre_of_mass_m = flotor.centre_of_mass_m * flotor_share;
-        // Two masses at distance c turn about their common centre like their reduced mass at c (Koenig,
-        // Steiner).
+        // Two masses at distance c rotate about their common centre like their reduced mass at c (Koenig, Steiner).
         let reduced_mass_kg = hand.mass_kg * flotor_share;
         let inertia_kg_m2 = DMat3::from_diagonal(flotor.inertia_kg_m2)
             + rotation::point_inertia(flotor.centre_of_mass_m) * reduced_mass_kg;
@@ -92,8 +91,8 @@ impl Body {
         body
     }
 
-    /// Bound of the rates of rotation, 1/s: its own laws plus those of translation on the arm of the centre
-    /// of mass, over the least moment of inertia.
+    /// Returns an upper bound of the rotational rates, 1/s: rotational stiffness and damping plus those of translation on
+    /// the arm of the centre of mass, over the least moment of inertia.
     fn rotation_rate(&self) -> f64 {
         let arm_m = self.centre_of_mass_m.length();
         // Largest rates of a damped oscillator: sqrt(K / I) and B / I.
@@ -106,7 +105,7 @@ impl Body {
         (stiffness_nm / least_kg_m2).sqrt().max(damping_nms / least_kg_m2)
     }
 
-    /// Kinetic energy of the flotor and its potential energy above home. Real-time: bounded, no allocation.
+    /// Returns kinetic energy and potential energy above home of the flotor. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn energy(&self, motion: &Motion) -> MechanicalEnergy {
         let (centre_m, spin) = (self.flotor.centre_of_mass_m, motion.spin_rad_per_s);
@@ -116,7 +115,7 @@ impl Body {
             velocity += motion.turned(spin.cross(centre_m));
             turning_j = 0.5 * spin.dot(self.flotor.inertia_kg_m2 * spin);
         }
-        // Of the centre of mass: m v² / 2 + w.I w / 2, and m g h above home.
+        // Energy of the centre of mass: m v² / 2 + w.I w / 2, and m g h above home.
         let height_m = motion.position_m.z + (motion.turned(centre_m) - centre_m).z;
         MechanicalEnergy {
             kinetic_j: 0.5 * self.flotor.mass_kg * velocity.length_squared() + turning_j,

@@ -1,17 +1,17 @@
-//! What the integrator carries from step to step: the motion of the flotor and the pull of the hand.
+//! State of the integrator between steps: motion of the flotor and intention of the hand.
 
 use super::State;
 use crate::hand::Intention;
 use flotor_hal::glam::{DMat3, DQuat, DVec3};
 
-/// Beyond these the numbers are no flotor's: m, m/s and rad/s alike.
+/// Largest physical magnitude: m, m/s and rad/s alike.
 const PHYSICAL_LIMIT: f64 = 1.0e6;
 
-/// Below this a number (m, m/s, rad/s or quaternion component) is set to zero: a decaying motion would
-/// otherwise end in subnormal numbers, with which a processor calculates many times slower.
+/// Magnitude (m, m/s, rad/s or quaternion component) below which a number is set to zero: a decaying motion would otherwise
+/// end in subnormal numbers, with which processors are many times slower.
 const NEGLIGIBLE: f64 = 1.0e-100;
 
-/// Pose and velocity, with the angular velocity in the frame the integrator needs it in.
+/// Pose and velocity, with the angular velocity in the flotor frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Motion {
     /// Position of the origin, device frame, m.
@@ -25,8 +25,8 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// From what the outside sees, settled: a straight step settles only what it changes. Real-time: bounded, no
-    /// allocation.
+    /// Converts a state and sets negligible numbers to zero: a straight step settles only the numbers it changes.
+    /// Real-time: bounded, no allocation.
     pub(super) fn of(state: &State) -> Self {
         let orientation = state.orientation.normalize();
         Self {
@@ -38,7 +38,7 @@ impl Motion {
         .settled()
     }
 
-    /// What the outside sees. Real-time: bounded, no allocation.
+    /// Returns the motion as a state, in the device frame. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn state(&self) -> State {
         State {
@@ -49,31 +49,31 @@ impl Motion {
         }
     }
 
-    /// A vector of the flotor frame in the device frame. Real-time: bounded, no allocation.
+    /// Rotates a vector from the flotor frame to the device frame. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn turned(&self, vector: DVec3) -> DVec3 {
-        // Upright, as most hands hold the flotor, the product would be the vector itself but for the sign of a zero.
+        // Upright, the most frequent orientation, the product is the vector itself but for the sign of a zero.
         if self.orientation == DQuat::IDENTITY { vector } else { self.orientation * vector }
     }
 
-    /// The same pose without velocity. Real-time: bounded, no allocation.
+    /// Returns the same pose without velocity. Real-time: bounded, no allocation.
     pub(super) fn at_rest(&self) -> Self {
         Self { velocity_m_per_s: DVec3::ZERO, spin_rad_per_s: DVec3::ZERO, ..*self }
     }
 
-    /// False for NaN as well. Real-time: bounded, no allocation.
+    /// Returns true within the physical limits; false for NaN. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn is_physical(&self) -> bool {
         self.moves_physically() && within(self.spin_rad_per_s) && self.orientation.is_finite()
     }
 
-    /// [`Self::is_physical`] of a motion that does not turn. Real-time: bounded, no allocation.
+    /// Returns [`Self::is_physical`] of a motion without rotation. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn moves_physically(&self) -> bool {
         within(self.position_m) && within(self.velocity_m_per_s)
     }
 
-    /// The same motion with what is negligible set to zero. Real-time: bounded, no allocation.
+    /// Returns the motion with negligible numbers set to zero. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn settled(&self) -> Self {
         let q = self.orientation;
@@ -84,7 +84,7 @@ impl Motion {
         }
     }
 
-    /// [`Self::settled`] of a motion that does not turn. Real-time: bounded, no allocation.
+    /// Returns [`Self::settled`] of a motion without rotation. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn moving_settled(&self) -> Self {
         Self {
@@ -95,7 +95,7 @@ impl Motion {
     }
 }
 
-/// False for NaN as well.
+/// Returns true within the physical limit; false for NaN.
 #[inline]
 fn within(vector: DVec3) -> bool {
     vector.length_squared() <= PHYSICAL_LIMIT * PHYSICAL_LIMIT
@@ -106,22 +106,22 @@ fn settle(number: f64) -> f64 {
     if number.abs() < NEGLIGIBLE { 0.0 } else { number }
 }
 
-/// How the centre of mass lies from the origin and swings about it, device frame.
+/// Position and velocity of the centre of mass relative to the origin, device frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Swing {
-    /// Flotor to device frame.
+    /// Rotation from flotor to device frame.
     pub(super) attitude: DMat3,
-    /// From the origin to the centre of mass, m.
+    /// Vector from the origin to the centre of mass, m.
     pub(super) arm: DVec3,
     /// Angular velocity, rad/s.
     pub(super) turning: DVec3,
-    /// Velocity of the centre of mass less that of the origin, m/s.
+    /// Velocity of the centre of mass minus that of the origin, m/s.
     pub(super) velocity: DVec3,
 }
 
 impl Swing {
-    /// For a centre of mass (m) and an angular velocity (rad/s) in the flotor frame. Real-time: bounded, no
-    /// allocation.
+    /// Computes the swing of a centre of mass (m) with an angular velocity (rad/s), both in the flotor frame. Real-time:
+    /// bounded, no allocation.
     #[inline]
     pub(super) fn new(orientation: DQuat, spin: DVec3, centre_of_mass: DVec3) -> Self {
         let attitude = DMat3::from_quat(orientation);
@@ -131,23 +131,23 @@ impl Swing {
     }
 }
 
-/// The hand during a step: its intention at the start and the constant velocity it moves on with.
+/// The hand during a step: its intention at the start, with constant velocity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
     /// Intended position at the start, m.
     pub(super) intended_m: DVec3,
-    /// Its rate, m/s.
+    /// Velocity of the intended position, m/s.
     pub(super) pace_m_per_s: DVec3,
     /// Intended orientation.
     pub(super) intended_orientation: DQuat,
-    /// Its rate, device frame, rad/s.
+    /// Intended angular velocity, device frame, rad/s.
     pub(super) turning_rad_per_s: DVec3,
     /// Intended force at the origin, device frame, N.
     pub(super) force_n: DVec3,
 }
 
 impl Contact {
-    /// Stands in where no hand holds the flotor (the impedance is zero then).
+    /// Placeholder without a hand (the impedance is zero then).
     pub(super) const NONE: Self = Self {
         intended_m: DVec3::ZERO,
         pace_m_per_s: DVec3::ZERO,
@@ -156,7 +156,7 @@ impl Contact {
         force_n: DVec3::ZERO,
     };
 
-    /// Of a hand with an intention. Real-time: bounded, no allocation.
+    /// Converts the intention of a hand. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn with(intention: &Intention) -> Self {
         Self {
@@ -168,7 +168,7 @@ impl Contact {
         }
     }
 
-    /// The same hand `time_s` later. Real-time: bounded, no allocation.
+    /// Returns the contact `time_s` later. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn later(&self, time_s: f64) -> Self {
         Self { intended_m: self.intended_m + self.pace_m_per_s * time_s, ..*self }

@@ -2,7 +2,7 @@
 
 use flotor_hal::glam::{DMat3, DQuat, DVec3};
 
-/// Angular acceleration in the body frame, rad/s², from Euler's equations `I w' = T - w x I w`.
+/// Returns the angular acceleration in the body frame, rad/s², from Euler's equations `I w' = T - w x I w`.
 ///
 /// Real-time: bounded, no allocation.
 #[inline]
@@ -15,24 +15,24 @@ pub(super) fn angular_acceleration(
     *inverse_inertia * (torque_nm - spin_rad_per_s.cross(*inertia_kg_m2 * spin_rad_per_s))
 }
 
-/// Rate of the orientation (body to device frame) at an angular velocity in the body frame: `q' = q w / 2`.
+/// Returns the rate of the orientation (body to device frame) for an angular velocity in the body frame: `q' = q w / 2`.
 ///
 /// Real-time: bounded, no allocation.
 #[inline]
 pub(super) fn quaternion_rate(orientation: DQuat, spin_rad_per_s: DVec3) -> DQuat {
-    // The product with a pure quaternion, without its zeros.
+    // Product with a pure quaternion, without the zero terms.
     let half = spin_rad_per_s * 0.5;
     let axis = orientation.xyz();
     let vector = half * orientation.w + axis.cross(half);
     DQuat::from_xyzw(vector.x, vector.y, vector.z, -axis.dot(half))
 }
 
-/// Small rotation from `orientation` to `target` in the body frame, rad: `2 sin(angle / 2)` about the common
+/// Returns the small rotation from `orientation` to `target` in the body frame, rad: `2 sin(angle / 2)` about the common
 /// axis.
 ///
-/// It differs from the rotation vector by less than a thousandth over ±7 degrees, needs no arc function, is
-/// smooth up to half a turn, and a torque proportional to it has a potential (`4 k (1 - cos(angle / 2))`).
-/// Real-time: bounded, no allocation.
+/// The result differs from the rotation vector by less than a thousandth over ±7 degrees, needs no arc function, is smooth
+/// up to half a turn, and a torque proportional to it has a potential (`4 k (1 - cos(angle / 2))`). Real-time: bounded, no
+/// allocation.
 #[inline]
 pub(super) fn misalignment_rad(orientation: DQuat, target: DQuat) -> DVec3 {
     // Vector part of `orientation* target`; q and -q are one rotation: take the shorter way.
@@ -41,7 +41,7 @@ pub(super) fn misalignment_rad(orientation: DQuat, target: DQuat) -> DVec3 {
     sine * 2.0_f64.copysign(orientation.dot(target))
 }
 
-/// Inertia of a unit point mass at `position_m` about the origin, m².  Real-time: bounded, no allocation.
+/// Returns the inertia of a unit point mass at `position_m` about the origin, m². Real-time: bounded, no allocation.
 pub(super) fn point_inertia(position_m: DVec3) -> DMat3 {
     let outer =
         DMat3::from_cols(position_m * position_m.x, position_m * position_m.y, position_m * position_m.z);

@@ -1,7 +1,7 @@
-//! From pieces of time to steps: how many, how long, and what each length needs computed once.
+//! Division of pieces of time into steps, with tables for each step length.
 //!
-//! A flotor that neither turns nor is turned moves exactly however long the step. One that turns is followed
-//! in finer steps, by the fastest rate of its rotation and of what pulls on it off its centre of mass.
+//! A flotor without rotation and torque is integrated exactly for any step length. A rotating one is integrated in finer
+//! steps, limited by the fastest rate of its rotation and of the forces off its centre of mass.
 
 use super::body::Body;
 use super::motion::{Contact, Motion};
@@ -13,15 +13,15 @@ use crate::ledger::Work;
 use crate::validation::InvalidParameter;
 use flotor_hal::glam::DVec3;
 
-/// Longest step of a turning flotor times the fastest rate of its rotation and, where the two are coupled, of
-/// its translation (pure number). The energy books of a firm hand that grips the flotor askew then close to
-/// 1e-11 of what the hand's springs held.
+/// Longest step of a rotating flotor times the fastest rate of its rotation and, where the two are coupled, of its
+/// translation (pure number). The energy balance of a firm hand that grips the flotor askew then closes to 1e-11 of the
+/// energy in the hand's springs.
 const MAX_TURNING_STEP: f64 = 0.1;
 
-/// Most steps a piece is cut into.
+/// Largest number of steps of a piece.
 const MAX_STEPS: u32 = 128;
 
-/// A body with the tables of two piece lengths: the nominal one and the latest other one.
+/// A body with the tables of two piece lengths: the nominal and the last other one.
 #[derive(Clone, Debug)]
 pub(super) struct Scheme {
     body: Body,
@@ -29,23 +29,23 @@ pub(super) struct Scheme {
     other: Table,
 }
 
-/// The two ways to cut a piece of some length into steps.
+/// The two divisions of a piece length into steps.
 #[derive(Clone, Copy, Debug)]
 struct Table {
     piece_ns: u64,
-    /// For a flotor that does not turn.
+    /// Grid for a flotor without rotation.
     straight: Grid,
-    /// For one that turns.
+    /// Grid for a rotating flotor.
     turning: Grid,
 }
 
-/// Equal steps, and what the oscillator does in one.
+/// Grid of equal steps, with the response of the oscillator in a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     steps: u32,
     /// Length of a step, s.
     pub(super) step_s: f64,
-    /// When the Runge-Kutta method looks.
+    /// Evaluation times of the Runge-Kutta method.
     nodes: [Node; NODES.len()],
     /// Integral of velocity squared over a step.
     pub(super) gramian: Gramian,
@@ -56,14 +56,14 @@ pub(super) struct Grid {
 pub(super) struct Node {
     /// Time since the start of the step, s.
     pub(super) time_s: f64,
-    /// Response after that time.
+    /// Response after `time_s`.
     pub(super) later: Response,
-    /// Response after the opposite of that time.
+    /// Response after `-time_s`.
     pub(super) earlier: Response,
 }
 
 impl Scheme {
-    /// Prepares a body. Real-time: bounded, no allocation.
+    /// Prepares the tables of a body. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// If the longest piece would need more than [`MAX_STEPS`] steps.
@@ -78,12 +78,12 @@ impl Scheme {
         Ok(Self { body, nominal, other: nominal })
     }
 
-    /// The body. Real-time: bounded, no allocation.
+    /// Returns the body. Real-time: bounded, no allocation.
     pub(super) fn body(&self) -> &Body {
         &self.body
     }
 
-    /// Moves on by `piece_ns` in one straight step, if that will do; gives the new motion and the work done.
+    /// Advances by `piece_ns` in one straight step; returns the new motion and the work done, or `None` if not exact.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -101,8 +101,8 @@ impl Scheme {
         Step::new(body, &table.straight, coils, contact, from).straight()
     }
 
-    /// Moves on by `piece_ns`, for which [`Self::step`] did not do, in as many steps as it takes; gives the new motion and
-    /// the work done.
+    /// Advances by `piece_ns` in the necessary number of steps, after [`Self::step`] returned `None`; returns the new
+    /// motion and the work done.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -119,7 +119,7 @@ impl Scheme {
                 Step::new(body, &table.straight, coils, contact, motion).straight()
             })
         };
-        // One step was tried: it turns.
+        // A failed single step implies rotation.
         let (motion, work) = (table.straight.steps > 1)
             .then(straight)
             .flatten()
@@ -132,7 +132,7 @@ impl Scheme {
         (motion.settled(), work)
     }
 
-    /// The body and the table for a piece of `piece_ns`, computed unless it is at hand.
+    /// Returns the body and the table for a piece of `piece_ns`, computed unless stored.
     #[inline]
     fn prepared(&mut self, piece_ns: u64) -> (&Body, &Table) {
         if piece_ns == self.nominal.piece_ns {
@@ -176,19 +176,19 @@ impl Grid {
         }
     }
 
-    /// Number `index` of the nodes; the end of the step beyond them.
+    /// Returns the node at `index`, clamped to the end of the step.
     #[inline]
     pub(super) fn node(&self, index: usize) -> &Node {
         &self.nodes[index.min(END)]
     }
 
-    /// The end of the step.
+    /// Returns the node at the end of the step.
     #[inline]
     pub(super) fn end(&self) -> &Node {
         &self.nodes[END]
     }
 
-    /// Takes all steps of the grid, or gives up where `step` does. Real-time: bounded, no allocation.
+    /// Takes all steps of the grid; `None` as soon as `step` returns `None`. Real-time: bounded, no allocation.
     #[inline]
     fn march(
         &self,
@@ -197,7 +197,7 @@ impl Grid {
         step: impl Fn(&Contact, &Motion) -> Option<(Motion, Work)>,
     ) -> Option<(Motion, Work)> {
         let (mut motion, mut work) = (*from, Work::default());
-        // One place from which `step` is called: it has to be inlined.
+        // A single call site of `step`, so that it is inlined.
         for left in (0..self.steps).rev() {
             let (next, done) = step(&contact, &motion)?;
             motion = next;
@@ -216,12 +216,12 @@ impl Node {
     }
 }
 
-/// Steps a piece needs for the series of the oscillator, not rounded up. Real-time: bounded, no allocation.
+/// Returns the steps of a piece for the series of the oscillator, not rounded up. Real-time: bounded, no allocation.
 fn straight_steps(body: &Body, piece_ns: u64) -> f64 {
     body.oscillator.rate_per_s() * seconds(piece_ns) / MAX_STEP_TIMES_RATE
 }
 
-/// Steps a piece needs for the accuracy of rotation, not rounded up. Real-time: bounded, no allocation.
+/// Returns the steps of a piece for the accuracy of rotation, not rounded up. Real-time: bounded, no allocation.
 fn turning_steps(body: &Body, piece_ns: u64) -> f64 {
     let coupled = body.centre_of_mass_m != DVec3::ZERO;
     let coupled_rate_per_s = if coupled { body.oscillator.rate_per_s() } else { 0.0 };

@@ -1,22 +1,21 @@
-//! One step of the plant: the oscillator carried exactly, everything else by a Runge-Kutta method.
+//! One step of the plant: the oscillator exactly, the remainder by a Runge-Kutta method.
 //!
-//! Let `s` be the displacement of the centre of mass since the start of the step, `d` that part of it that is
-//! only the swing of the centre of mass about the origin, so that the origin moved by `s - d`. Then
+//! Let `s` be the displacement of the centre of mass since the start of the step, and `d` the part caused by its swing
+//! about the origin, so that the origin moved by `s - d`. Then
 //!
 //! ```text
 //! s'' = a + j t - beta s' - kappa s + n,      n = beta d' + kappa d
 //! ```
 //!
-//! is the oscillator of `translation` plus a remainder `n` that vanishes when nothing rotates (`d = 0`) or
-//! the centre of mass is at the origin. What `n` does is told as the displacement and velocity that the
-//! undisturbed oscillator would have had to start with to be where it is: a change of variables after which
-//! only `n` is left to integrate (Lawson 1967, SIAM J. Numer. Anal. 4:372). The Runge-Kutta method of
-//! `tableau` integrates it together with quaternion and angular velocity.
+//! is the oscillator of `translation` plus a remainder `n` that vanishes when nothing rotates (`d = 0`) or the centre of
+//! mass is at the origin. The effect of `n` is expressed as the initial displacement and velocity of an undisturbed
+//! oscillator that reaches the same state: a change of variables after which only `n` is left to integrate (Lawson 1967,
+//! SIAM J. Numer. Anal. 4:372). The Runge-Kutta method of `tableau` integrates these variables together with quaternion and
+//! angular velocity.
 //!
-//! The works are integrated along with the motion. What is a total differential is taken as such (a constant
-//! force times a displacement, the hand's spring), the integral of velocity squared is exact for the
-//! oscillator (`Gramian`), and only what rotation adds to that is integrated numerically, with the weights of
-//! the method.
+//! The works are integrated along with the motion. Total differentials are evaluated directly (a constant force times a
+//! displacement, the hand's spring), the integral of velocity squared is exact for the oscillator (`Gramian`), and only the
+//! contribution of rotation is integrated numerically, with the weights of the method.
 
 use super::body::Body;
 use super::motion::{Contact, Motion, Swing};
@@ -27,36 +26,36 @@ use super::{Wrench, rotation};
 use crate::ledger::Work;
 use flotor_hal::glam::{DQuat, DVec3};
 
-/// One step: everything that is fixed during it.
+/// One step with its constants.
 pub(super) struct Step<'a> {
     body: &'a Body,
     grid: &'a Grid,
     coils: &'a Wrench,
     contact: &'a Contact,
     start: &'a Motion,
-    /// Force of coils and hand at the origin while nothing has moved and nothing moves, device frame, N.
+    /// Force of coils and hand at the origin, at the start position and at rest, device frame, N.
     pull: DVec3,
-    /// Stiffness of the hand times the pace of its intention, N/s.
+    /// Stiffness of the hand times the intended velocity, N/s.
     yank: DVec3,
-    /// Damping of the hand times the rate at which it means to turn, device frame, N·m.
+    /// Damping of the hand times the intended angular velocity, device frame, N·m.
     lead_nm: DVec3,
-    /// Torque of coils and hand while nothing has turned and nothing turns, device frame, N·m.
+    /// Torque of coils and hand, at the start orientation and at rest, device frame, N·m.
     twist_nm: DVec3,
 }
 
 /// The unknowns of the Runge-Kutta method, or their derivatives.
 #[derive(Clone, Copy)]
 struct Unknowns {
-    /// Displacement (m) and velocity (m/s) the oscillator would have had to start with.
+    /// Initial displacement (m) and velocity (m/s) of the equivalent undisturbed oscillator.
     displacement: DVec3,
     velocity: DVec3,
-    /// Flotor to device frame, of unit length only to the order of the step.
+    /// Orientation, flotor to device frame; of unit length only to the order of the step.
     orientation: DQuat,
     /// Angular velocity in the flotor frame, rad/s.
     spin: DVec3,
 }
 
-/// What rotation adds to the power of coils, hand and drag, W.
+/// Power of coils, hand and drag caused by rotation, W.
 #[derive(Clone, Copy)]
 struct Power {
     coils_w: f64,
@@ -65,7 +64,7 @@ struct Power {
 }
 
 impl<'a> Step<'a> {
-    /// Prepares a step. Real-time: bounded, no allocation.
+    /// Computes the constants of a step. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn new(
         body: &'a Body,
@@ -85,8 +84,8 @@ impl<'a> Step<'a> {
         Self { body, grid, coils, contact, start, pull, yank, lead_nm, twist_nm }
     }
 
-    /// The motion at the end and the work done if nothing turns the flotor: the oscillator's motion, exact
-    /// however long the step.
+    /// Returns the motion at the end and the work done by the exact solution of the oscillator, for any step length; `None`
+    /// if a torque rotates the flotor.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -105,8 +104,8 @@ impl<'a> Step<'a> {
         Some((motion, self.work(&drive, &motion, displacement)))
     }
 
-    /// True if the flotor does not turn and nothing turns it during the step: neither coils nor hand by a
-    /// torque, nor any force by passing beside the centre of mass.
+    /// Returns true if the flotor neither rotates nor is subject to a torque during the step: neither of coils or hand, nor
+    /// of a force beside the centre of mass.
     #[inline]
     fn is_balanced(&self, drive: &Drive) -> bool {
         let (body, start) = (self.body, self.start);
@@ -116,15 +115,15 @@ impl<'a> Step<'a> {
         {
             return false;
         }
-        // Forces pass through a centre of mass that lies at the origin, or with them on one axis of the
-        // device. (Where they do so on a slanted line, rounding would tell them apart from it anyhow.)
+        // Forces pass through a centre of mass that lies at the origin, or on one device axis together with the forces. (On
+        // a slanted line, rounding would hide that anyhow.)
         let arm = start.turned(body.centre_of_mass_m);
         let forces = [self.still_force(), drive.velocity, drive.acceleration, drive.jerk];
         arm == DVec3::ZERO || (axes([arm]) | axes(forces)).count_ones() <= 1
     }
 
-    /// The motion at the end and the work done, whatever turns. Real-time: bounded, no allocation.
-    #[inline(never)] // keeps the straight step, in whose place it would be inlined, small
+    /// Returns the motion at the end and the work done with rotation. Real-time: bounded, no allocation.
+    #[inline(never)] // keeps the straight step, which would inline this, small
     pub(super) fn turning(&self) -> (Motion, Work) {
         let swing = Swing::new(self.start.orientation, self.start.spin_rad_per_s, self.body.centre_of_mass_m);
         let drive = self.drive(self.start.velocity_m_per_s + swing.velocity);
@@ -140,7 +139,7 @@ impl<'a> Step<'a> {
         self.finish(&drive, &swing, &end, &power)
     }
 
-    /// The unknowns at the start, moved on along each slope by a share of the step.
+    /// Returns the initial unknowns, advanced along each slope by a fraction of the step.
     #[inline]
     fn moved_on(&self, slopes: &[Unknowns; STAGES], shares: &[f64]) -> Unknowns {
         let mut at = Unknowns {
@@ -156,7 +155,7 @@ impl<'a> Step<'a> {
         at
     }
 
-    /// What drives the oscillator from a velocity of the centre of mass, m/s.
+    /// Returns the drive of the oscillator for an initial velocity of the centre of mass, m/s.
     #[inline]
     fn drive(&self, velocity: DVec3) -> Drive {
         let body = self.body;
@@ -167,15 +166,14 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// Force at the origin while nothing has moved and nothing moves, device frame, N. The lift, which acts at
-    /// the flotor's centre of mass, is in it as the force at the origin that turns the body just as much (law
-    /// of the lever).
+    /// Returns the force at the origin, at the start position and at rest, device frame, N. The lift, which acts at the
+    /// flotor's centre of mass, is included as the force at the origin of equal torque on the body (law of the lever).
     #[inline]
     fn still_force(&self) -> DVec3 {
         self.pull - self.body.lift_n * self.body.lift_lever
     }
 
-    /// Derivatives at a stage, and the power that rotation adds there.
+    /// Returns the derivatives at a stage, and the power of rotation there.
     #[inline]
     fn slope(&self, drive: &Drive, start: &Swing, node: &Node, at: &Unknowns) -> (Unknowns, Power) {
         let body = self.body;
@@ -184,7 +182,7 @@ impl<'a> Step<'a> {
         let swung = swing.arm - start.arm;
         let (undisturbed, undisturbed_velocity) = (later.displacement(drive), later.velocity(drive));
         let (disturbance, disturbance_velocity) = later.carry(&body.oscillator, at.displacement, at.velocity);
-        // Of the origin, less that of the undisturbed oscillator.
+        // Displacement of the origin, minus that of the undisturbed oscillator.
         let sway = disturbance - swung;
         let moved = undisturbed + sway;
         let velocity = undisturbed_velocity + disturbance_velocity - swing.velocity;
@@ -220,7 +218,7 @@ impl<'a> Step<'a> {
         (slope, power)
     }
 
-    /// From the unknowns at the end back to the motion of the origin, with the works.
+    /// Converts the final unknowns to the motion of the origin, with the works.
     #[inline]
     fn finish(&self, drive: &Drive, start: &Swing, end: &Unknowns, power: &Power) -> (Motion, Work) {
         let body = self.body;
@@ -240,7 +238,7 @@ impl<'a> Step<'a> {
         (motion, self.work_of_turning(self.work(drive, &motion, moved), moved, swung, power))
     }
 
-    /// Work of a step in which the origin was displaced by `moved` (m), and the centre of mass with it.
+    /// Returns the work of a step that displaces origin and centre of mass by `moved` (m).
     #[inline]
     fn work(&self, drive: &Drive, end: &Motion, moved: DVec3) -> Work {
         let body = self.body;
@@ -253,11 +251,11 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// The same if the centre of mass was displaced by `swung` (m) more, and turning added the `mean` power.
+    /// Returns the work if the centre of mass is displaced by a further `swung` (m), with the `mean` power of rotation.
     #[inline]
     fn work_of_turning(&self, straight: Work, moved: DVec3, swung: DVec3, mean: &Power) -> Work {
         let (body, h) = (self.body, self.grid.step_s);
-        // The flotor's centre of mass swings farther than the common one, in proportion.
+        // The flotor's centre of mass swings farther than the common one, in proportion to the lever.
         let lifted_m = moved.z + swung.z * (1.0 + body.lift_lever);
         Work {
             coils_j: straight.coils_j + mean.coils_w * h,
@@ -267,7 +265,7 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// Work of the hand's force, spring, damper and mass on a translation, J.
+    /// Returns the work of the hand's force, spring, damper and mass on a translation, J.
     #[inline]
     fn hand_work_j(&self, drive: &Drive, end: &Motion, moved: DVec3, velocity2: DVec3) -> f64 {
         let (hand, h) = (&self.body.hand, self.grid.step_s);
@@ -276,7 +274,7 @@ impl<'a> Step<'a> {
         let before = self.contact.intended_m - self.start.position_m;
         let after = before + pace * h - moved;
         let stretch_integral = before * h + pace * (0.5 * h * h) - displacement_integral;
-        // Spring: K e x' = K e x_h' - K e e', with e the stretch; the second part is a total differential.
+        // Spring: K e x' = K e x_h' - K e e', with e the stretch; the second term is a total differential.
         let spring_j = self.yank.dot(stretch_integral)
             - 0.5 * hand.stiffness_n_per_m.dot(after * after - before * before);
         let damper_j = hand.damping_ns_per_m.dot(pace * moved - velocity2);
@@ -287,7 +285,7 @@ impl<'a> Step<'a> {
     }
 }
 
-/// The axes along which any of the vectors reaches, as bits.
+/// Returns the axes with a nonzero component in any of the vectors, as bits.
 #[inline]
 fn axes<const N: usize>(vectors: [DVec3; N]) -> u32 {
     let [mut x, mut y, mut z] = [0; 3];
@@ -296,7 +294,7 @@ fn axes<const N: usize>(vectors: [DVec3; N]) -> u32 {
         y |= vector.y.to_bits();
         z |= vector.z.to_bits();
     }
-    // All that zero may have is a sign.
+    // The shift drops the sign bit: -0 counts as zero.
     let reaches = |bits: u64| u32::from(bits << 1 != 0);
     reaches(x) | reaches(y) << 1 | reaches(z) << 2
 }
@@ -322,7 +320,7 @@ impl Unknowns {
 impl Power {
     const NONE: Self = Self { coils_w: 0.0, hand_w: 0.0, drag_w: 0.0 };
 
-    /// Adds a share of another power.
+    /// Adds a fraction of another power.
     #[inline]
     fn add(&mut self, other: &Self, share: f64) {
         self.coils_w += other.coils_w * share;

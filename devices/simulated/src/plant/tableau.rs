@@ -1,19 +1,19 @@
 //! Butcher's Runge-Kutta method of order six with seven stages, as data.
 //!
-//! Butcher 1964, "On Runge-Kutta processes of high order", J. Austral. Math. Soc. 4:179. Seven stages are the
-//! fewest an explicit method of order six can have. Beside the classical method of order four it costs
-//! three more evaluations a step and allows a step six times longer at the accuracy the energy books ask for.
+//! Butcher 1964, "On Runge-Kutta processes of high order", J. Austral. Math. Soc. 4:179. Seven stages are the fewest of any
+//! explicit method of order six. Compared with the classical method of order four it costs three more evaluations a step
+//! and allows steps six times longer at the accuracy required by the energy balance.
 
-/// Evaluations a step.
+/// Number of evaluations per step.
 pub(super) const STAGES: usize = 7;
 
-/// Distinct times of evaluation, as shares of the step.
+/// Distinct times of evaluation, as fractions of the step.
 pub(super) const NODES: [f64; 5] = [0.0, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0];
 
-/// The last of [`NODES`]: the end of the step.
+/// Index of the last of [`NODES`]: the end of the step.
 pub(super) const END: usize = NODES.len() - 1;
 
-/// When a stage evaluates (an index into [`NODES`]), and how far along each earlier slope it goes to get there.
+/// A stage: its evaluation time (an index into [`NODES`]), and the coefficients of the earlier slopes.
 pub(super) struct Stage {
     pub(super) node: usize,
     pub(super) along: &'static [f64],
@@ -29,7 +29,7 @@ pub(super) const TABLEAU: [Stage; STAGES] = [
     Stage { node: END, along: &[9.0 / 44.0, -9.0 / 11.0, 63.0 / 44.0, 18.0 / 11.0, 0.0, -16.0 / 11.0] },
 ];
 
-/// Share of each slope in the whole step.
+/// Weight of each slope in the whole step.
 pub(super) const WEIGHTS: [f64; STAGES] =
     [11.0 / 120.0, 0.0, 27.0 / 40.0, 27.0 / 40.0, -4.0 / 15.0, -4.0 / 15.0, 11.0 / 120.0];
 

@@ -1,9 +1,8 @@
 //! Exact translation over a step in which the forces are constant or grow linearly.
 //!
-//! Per axis the handle obeys `x'' = a + j t - beta x' - kappa (x - x0)`: `beta` is drag plus hand damping
-//! over mass, `kappa` the hand's stiffness over mass, `a + j t` everything the coils, gravity and the moving
-//! intention push. With start velocity `v` its exact solution needs only the impulse response of the
-//! oscillator and its integrals,
+//! Per axis the handle obeys `x'' = a + j t - beta x' - kappa (x - x0)`: `beta` is drag plus hand damping over mass,
+//! `kappa` the hand's stiffness over mass, `a + j t` the acceleration by coils, gravity and the moving intention. With
+//! start velocity `v` its exact solution needs only the impulse response of the oscillator and its integrals,
 //!
 //! ```text
 //! x - x0 = v p1 + a p2 + j p3,     x' = v p0 + a p1 + j p2,     p0 = p1',  p[n+1] = integral of p[n].
@@ -12,21 +11,21 @@
 //! The usual formulas for `p1` (sine, exponential, hyperbolic sine) divide by a difference that vanishes at
 //! critical damping and without stiffness. But the `p[n]` are entire functions of `beta`, `kappa` and time:
 //! the Taylor series `p[n](t) = t^n sum c[k] / (n+k)!`, `c[k+1] = -beta t c[k] - kappa t^2 c[k-1]`, holds in
-//! every damping regime, and for steps short against the oscillator (which the plant sees to) a few terms
-//! reach rounding. The two highest are summed, the others follow from the equation of motion,
-//! `p[n] = t^n/n! - beta p[n+1] - kappa p[n+2]`, without cancellation. This is the zero-order-hold
-//! discretisation of any text on sampled-data control, written for small steps.
+//! every damping regime, and for steps short against the oscillator (ensured by the plant) a few terms reach rounding. The
+//! two highest are summed, the others follow from the equation of motion, `p[n] = t^n/n! - beta p[n+1] - kappa p[n+2]`,
+//! without cancellation. This is the zero-order-hold discretisation of any textbook on sampled-data control, written for
+//! small steps.
 
 use flotor_hal::glam::DVec3;
 
-/// A step is short enough for the series if rate times step stays below this (pure number).
+/// Limit of rate times step for the series (pure number).
 pub(super) const MAX_STEP_TIMES_RATE: f64 = 0.25;
 
 /// Terms of the series. The first one left out is below `0.41^14 / 18! * 4!`, 1e-20 of the sum: `0.41` is the
 /// largest root of `c^2 = B c + K` at `B = 0.25`, `K = 0.0625`.
 const TERMS: usize = 14;
 
-/// Highest response function in use.
+/// Order of the highest response function.
 const ORDER: usize = 4;
 
 /// `1 / n!`, pure numbers.
@@ -41,14 +40,14 @@ pub(super) struct Oscillator {
     pub(super) stiffness_per_s2: DVec3,
 }
 
-/// What drives the oscillators during a step: the coefficients `v`, `a`, `j` of the module's equations.
+/// Drive of the oscillators during a step: the coefficients `v`, `a`, `j` of the module's equations.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Drive {
     /// Velocity at the start, m/s.
     pub(super) velocity: DVec3,
-    /// Acceleration at the start but for the damping of `velocity`, m/s².
+    /// Acceleration at the start, without the damping of `velocity`, m/s².
     pub(super) acceleration: DVec3,
-    /// Its rate, m/s³.
+    /// Rate of the acceleration, m/s³.
     pub(super) jerk: DVec3,
 }
 
@@ -69,12 +68,12 @@ pub(super) struct Gramian {
 }
 
 impl Oscillator {
-    /// Fastest rate of any axis, 1/s. Real-time: bounded, no allocation.
+    /// Returns the fastest rate of any axis, 1/s. Real-time: bounded, no allocation.
     pub(super) fn rate_per_s(&self) -> f64 {
         self.damping_per_s.max_element().max(self.stiffness_per_s2.max_element().sqrt())
     }
 
-    /// Response after `time_s`, which times [`Self::rate_per_s`] is at most [`MAX_STEP_TIMES_RATE`].
+    /// Returns the response after `time_s`; `time_s` times [`Self::rate_per_s`] is at most [`MAX_STEP_TIMES_RATE`].
     ///
     /// Real-time: bounded, no allocation.
     pub(super) fn response(&self, time_s: f64) -> Response {
@@ -90,7 +89,7 @@ impl Oscillator {
             sum4 += term * of_p4;
             (previous, term) = (term, damping * term + stiffness * previous);
         }
-        // The lower ones by p[n] = t^n / n! - beta p[n+1] - kappa p[n+2].
+        // The lower orders by p[n] = t^n / n! - beta p[n+1] - kappa p[n+2].
         let square = time_s * time_s;
         let p4 = sum4 * (square * square);
         let p3 = sum3 * (square * time_s);
@@ -100,12 +99,11 @@ impl Oscillator {
         Response([p0, p1, p2, p3, p4])
     }
 
-    /// Integrals over a step of `step_s`, under the condition of [`Self::response`]. Real-time: bounded, no
+    /// Returns the integrals over a step of `step_s`, under the condition of [`Self::response`]. Real-time: bounded, no
     /// allocation.
     ///
-    /// Five Gauss-Legendre nodes integrate polynomials up to degree 9 exactly; what the products of response
-    /// functions hold beyond is below 1e-13 of the integral at the longest step allowed and below rounding at
-    /// a usual one.
+    /// Five Gauss-Legendre nodes integrate polynomials up to degree 9 exactly; the error for the products of response
+    /// functions is below 1e-13 of the integral at the longest step allowed, and below rounding at a usual one.
     pub(super) fn gramian(&self, step_s: f64) -> Gramian {
         let mut sum = Gramian::default();
         for (node, weight) in GAUSS_LEGENDRE_5 {
@@ -123,28 +121,28 @@ impl Oscillator {
 }
 
 impl Response {
-    /// Distance moved since the start, m. Real-time: bounded, no allocation.
+    /// Returns the displacement since the start, m. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn displacement(&self, drive: &Drive) -> DVec3 {
         let Self([_, p1, p2, p3, _]) = self;
         drive.velocity * *p1 + drive.acceleration * *p2 + drive.jerk * *p3
     }
 
-    /// Velocity, m/s. Real-time: bounded, no allocation.
+    /// Returns the velocity, m/s. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn velocity(&self, drive: &Drive) -> DVec3 {
         let Self([p0, p1, p2, ..]) = self;
         drive.velocity * *p0 + drive.acceleration * *p1 + drive.jerk * *p2
     }
 
-    /// Integral of the displacement since the start, m s. Real-time: bounded, no allocation.
+    /// Returns the integral of the displacement since the start, m s. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn displacement_integral(&self, drive: &Drive) -> DVec3 {
         let Self([_, _, p2, p3, p4]) = self;
         drive.velocity * *p2 + drive.acceleration * *p3 + drive.jerk * *p4
     }
 
-    /// Displacement (m) and velocity (m/s) left of those at the start, without a drive. Real-time: bounded, no
+    /// Returns displacement (m) and velocity (m/s) for those at the start, without a drive. Real-time: bounded, no
     /// allocation.
     #[inline]
     pub(super) fn carry(
@@ -161,8 +159,8 @@ impl Response {
         )
     }
 
-    /// Displacement (m) and velocity (m/s) left of a velocity change made at the start. Real-time: bounded,
-    /// no allocation.
+    /// Returns displacement (m) and velocity (m/s) after a change of velocity at the start. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub(super) fn after_kick(&self, velocity: DVec3) -> (DVec3, DVec3) {
         let Self([p0, p1, ..]) = self;
@@ -171,7 +169,7 @@ impl Response {
 }
 
 impl Gramian {
-    /// Integral of velocity squared over the step, per axis, m²/s. Real-time: bounded, no allocation.
+    /// Returns the integral of velocity squared over the step, per axis, m²/s. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn squared_velocity(&self, drive: &Drive) -> DVec3 {
         let Drive { velocity: v, acceleration: a, jerk: j } = *drive;
@@ -182,7 +180,7 @@ impl Gramian {
     }
 }
 
-/// Nodes and weights on 0..1 (Abramowitz and Stegun, table 25.4, moved from -1..1).
+/// Gauss-Legendre nodes and weights on 0..1 (Abramowitz and Stegun, table 25.4, moved from -1..1).
 const GAUSS_LEGENDRE_5: [(f64, f64); 5] = [
     (0.046_910_077_030_668_004, 0.118_463_442_528_094_54),
     (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),

@@ -1,21 +1,19 @@
-//! Diodes, lenses and cells: from a pose to six coordinates of light, and back.
+//! Diodes, lenses and cells: six spot coordinates of a pose, and the inverse.
 //!
-//! The published descriptions name three diodes, three lateral-effect cells and an iterative solution, no
-//! dimensions. This layout is synthetic: the diodes stand on a circle of 60 mm radius about the origin of the
-//! flotor frame, each faced by a lens 90 mm farther out that looks inwards along the radius and images it on a
-//! cell 30 mm behind. A diode at `q` (device frame) in front of a lens with radius `e`, tangent `t` and depth
-//! `D = L - q e` makes a spot at
+//! The published descriptions mention three diodes, three lateral-effect cells and an iterative solution, without
+//! dimensions. This layout is synthetic: the diodes stand on a circle of 60 mm radius about the origin of the flotor frame,
+//! each opposite a lens 90 mm farther out that looks inwards along the radius and images the diode on a cell 30 mm behind.
+//! A diode at `q` (device frame) in front of a lens with radius `e`, tangent `t` and depth `D = L - q e` makes a spot at
 //!
 //! ```text
 //! u = f (q t) / D,      v = f (q z) / D
 //! ```
 //!
-//! **Back**: Gauss-Newton from the last pose. A small motion (`dx`, rotation `dr` in the device frame) moves a
-//! diode by `dx + dr x (R p)`; the six linearised equations are solved, and again from there. As long as each
-//! step is much shorter than the one before, the equations of an earlier round still do: from one tick to the
-//! next the flotor moves so little that one set serves all rounds. What a step of length `s` after one of
-//! length `r` leaves is about `s s / r`, which says when to end. The iteration cannot run away: it is given a
-//! fixed number of rounds and a region, and says that there is no pose where either ends.
+//! **Inverse**: Gauss-Newton from the last pose. A small motion (`dx`, rotation `dr` in the device frame) moves a diode by
+//! `dx + dr x (R p)`; the six linearised equations are solved repeatedly. As long as each step is much shorter than the one
+//! before, the equations of an earlier round are reused: from one tick to the next the flotor moves so little that one set
+//! serves all rounds. After a step of length `s` that follows one of length `r` the residual is about `s s / r`, the
+//! criterion of convergence. The iteration is bounded: it fails after a fixed number of rounds or outside a fixed region.
 
 use crate::hand::Pose;
 use crate::validation::{Domain, InvalidParameter, number};
@@ -23,41 +21,41 @@ use flotor_hal::glam::{DMat3, DQuat, DVec3};
 use flotor_hal::math;
 use std::f64::consts::PI;
 
-/// Most rounds of the iteration: from home six find any pose the cells can see.
+/// Largest number of rounds: from home six find any pose visible to the cells.
 const MAX_ROUNDS: usize = 12;
 
-/// Error that is left in the end, m and rad alike.
+/// Residual at convergence, m and rad alike.
 const LEFT: f64 = 3.0e-11;
 
-/// The first step counts as if one of this length (m and rad alike) had gone before: the size of the layout.
+/// Assumed length of the step before the first one (m and rad alike): the size of the layout.
 const LAYOUT_SIZE: f64 = 60.0e-3;
 
-/// Equations serve as long as each step is shorter than this share of the one before.
+/// Largest ratio of successive steps for which the equations are reused.
 const SHRINKAGE: f64 = 0.02;
 
-/// Farther from home than this (m) there is no flotor: twice the range of motion.
+/// Radius of the region of poses, m: twice the range of motion.
 const REGION_M: f64 = 24.0e-3;
 
-/// More turned than this (half the sine of the angle, 20 degrees) there is none either.
+/// Largest rotation of the region of poses, as the sine of half the angle (20 degrees).
 const REGION_SIN_HALF: f64 = 0.174;
 
-/// Where diodes, lenses and cells are.
+/// Layout of diodes, lenses and cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpticsGeometry {
     /// Azimuths of the diodes in the flotor frame, rad.
     pub diode_azimuths_rad: [f64; 3],
-    /// Radius of the circle they stand on, m.
+    /// Radius of the circle of the diodes, m.
     pub diode_radius_m: f64,
     /// Radius of the circle of the lenses, m.
     pub lens_radius_m: f64,
-    /// From a lens to its cell, m.
+    /// Distance from a lens to its cell, m.
     pub image_distance_m: f64,
     /// Half the width of a cell, m.
     pub cell_half_width_m: f64,
 }
 
 impl OpticsGeometry {
-    /// The layout of the module's description. Cells of 18 mm see every pose of ±12 mm and ±8 degrees.
+    /// Layout of the module's description. Cells of 18 mm cover every pose of ±12 mm and ±8 degrees.
     pub const MAGLEV: Self = Self {
         diode_azimuths_rad: [0.0, 2.0 * PI / 3.0, 4.0 * PI / 3.0],
         diode_radius_m: 60.0e-3,
@@ -67,26 +65,26 @@ impl OpticsGeometry {
     };
 }
 
-/// Where the spots fall, m: a component of each vector per diode.
+/// Coordinates of the light spots, m: one component of each vector per diode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spots {
-    /// Along the parallel, `u`.
+    /// Coordinates along the parallel, `u`.
     pub across_m: DVec3,
-    /// Upwards, `v`.
+    /// Coordinates upwards, `v`.
     pub up_m: DVec3,
 }
 
-/// One diode with its lens.
+/// A diode with its lens.
 #[derive(Clone, Copy, Debug)]
 struct Eye {
-    /// Of the diode in the flotor frame, m.
+    /// Position of the diode in the flotor frame, m.
     diode: DVec3,
-    /// Outwards, and along the parallel; device frame.
+    /// Unit vectors outwards and along the parallel; device frame.
     radius: DVec3,
     tangent: DVec3,
 }
 
-/// The three of them.
+/// The three diodes with their lenses.
 #[derive(Clone, Copy, Debug)]
 pub struct Optics {
     geometry: OpticsGeometry,
@@ -97,7 +95,7 @@ impl Optics {
     /// Prepares a layout. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a length is not positive, or the diodes stand in a line: they show no rotation about it.
+    /// If a length is not positive, or the diodes stand in a line, which hides the rotation about that line.
     pub fn new(geometry: &OpticsGeometry) -> Result<Self, InvalidParameter> {
         number("led_radius_mm", geometry.diode_radius_m, Domain::Positive)?;
         let gap_m = geometry.lens_radius_m - geometry.diode_radius_m - REGION_M;
@@ -116,18 +114,18 @@ impl Optics {
         optics.equations(&Pose::HOME).map(|_| optics).ok_or(InvalidParameter::DiodesInALine)
     }
 
-    /// Where the spots fall; nothing if one is beside its cell. Real-time: bounded, no allocation.
+    /// Returns the light spots of a pose; `None` if one is outside its cell. Real-time: bounded, no allocation.
     #[must_use]
     pub fn spots(&self, pose: &Pose) -> Option<Spots> {
         let spots = self.images(pose);
         let largest_m = spots.across_m.abs().max(spots.up_m.abs()).max_element();
         let finite = spots.across_m.is_finite() && spots.up_m.is_finite();
-        // Behind its lens a diode would make a spot as well, upside down.
+        // A diode behind its lens would also give a spot, upside down.
         let in_front = pose.position_m.length_squared() <= REGION_M * REGION_M;
         (finite && in_front && largest_m <= self.geometry.cell_half_width_m).then_some(spots)
     }
 
-    /// Spots as bent cells report them: outwards by `edge` (a share of the half width) at the edge.
+    /// Returns the spots shifted by the cells' nonlinearity: outwards by `edge` (a fraction of the half width) at the edge.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
@@ -139,13 +137,13 @@ impl Optics {
         Spots { across_m: spots.across_m * factor, up_m: spots.up_m * factor }
     }
 
-    /// Spot over diode displacement at home (pure number). Real-time: bounded, no allocation.
+    /// Returns the ratio of spot to diode displacement at home (pure number). Real-time: bounded, no allocation.
     #[must_use]
     pub fn magnification(&self) -> f64 {
         self.geometry.image_distance_m / (self.geometry.lens_radius_m - self.geometry.diode_radius_m)
     }
 
-    /// The pose that makes these spots (m), looked for from `near`; nothing if there is none in reach.
+    /// Returns the pose with these spots (m), found by iteration from `near`; `None` without convergence.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
@@ -177,7 +175,7 @@ impl Optics {
         None
     }
 
-    /// Where lenses of any width would put the spots of a pose.
+    /// Returns the spots of a pose without the limits of the cells.
     #[inline]
     fn images(&self, pose: &Pose) -> Spots {
         let attitude = DMat3::from_quat(pose.orientation);
@@ -191,7 +189,7 @@ impl Optics {
         }
     }
 
-    /// Where one lens puts its spot: across and up, m.
+    /// Returns the spot of one lens: across and up, m.
     #[inline]
     fn image(&self, eye: &Eye, position_m: DVec3, attitude: &DMat3) -> (f64, f64) {
         let at = position_m + *attitude * eye.diode;
@@ -199,13 +197,13 @@ impl Optics {
         (scale * at.dot(eye.tangent), scale * at.z)
     }
 
-    /// Image over object size for a diode at `at`.
+    /// Returns the ratio of image to object size for a diode at `at`.
     #[inline]
     fn scale(&self, eye: &Eye, at: DVec3) -> f64 {
         self.geometry.image_distance_m / (self.geometry.lens_radius_m - at.dot(eye.radius))
     }
 
-    /// How the spots of a pose move with it; nothing if they do not show all of its motion.
+    /// Returns the linearised equations of the spots at a pose; `None` if the spots do not determine the motion.
     #[inline]
     fn equations(&self, pose: &Pose) -> Option<Equations> {
         let attitude = DMat3::from_quat(pose.orientation);
@@ -222,7 +220,7 @@ impl Optics {
         )
     }
 
-    /// The rows of one eye: across and up.
+    /// Returns the rows of one diode: across and up.
     #[inline]
     fn rows(&self, eye: &Eye, position_m: DVec3, attitude: &DMat3) -> (Row, Row) {
         let arm = *attitude * eye.diode;
@@ -240,33 +238,33 @@ impl Optics {
     }
 }
 
-/// How one coordinate of a spot moves with (x, y, yaw) and with (z, pitch, roll).
+/// Derivative of one spot coordinate by (x, y, yaw) and by (z, pitch, roll).
 type Row = (DVec3, DVec3);
 
-/// The six linearised equations in two halves: the spots' motion across their cells shows mostly `x, y` and yaw,
-/// their motion up mostly `z`, pitch and roll. What each shows of the other is small, so that the halves can be
-/// solved one after the other without choosing pivots.
+/// The six linearised equations in two halves: the spots' motion across their cells depends mostly on `x, y` and yaw, their
+/// motion up mostly on `z`, pitch and roll. The cross terms are small, so that the halves can be solved one after the other
+/// without pivoting.
 #[derive(Clone, Copy)]
 struct Equations {
     /// `across = A (x, y, yaw) + B (z, pitch, roll)`, `up = C (x, y, yaw) + D (z, pitch, roll)`.
     inverse_a: DMat3,
     b: DMat3,
     c: DMat3,
-    /// Of what is left of D when the first half is solved, `D - C A^-1 B`.
+    /// Inverse of the Schur complement `D - C A^-1 B`.
     inverse_rest: DMat3,
 }
 
 impl Equations {
-    /// Smallest determinant, as a share of what the size of the layout lets expect (pure number; three diodes
-    /// evenly around a circle have 2.6).
+    /// Smallest determinant, relative to the one expected from the size of the layout (pure number; three diodes evenly
+    /// around a circle have 2.6).
     const LEAST_DETERMINANT: f64 = 1.0e-3;
 
-    /// `across` is `[A, B]`, `up` is `[C, D]`, `sizes` what determinants of A and D should be about.
+    /// Factorises the equations; `across` is `[A, B]`, `up` is `[C, D]`, `sizes` the expected determinants of A and D.
     #[inline]
     fn new([a, b]: [DMat3; 2], [c, d]: [DMat3; 2], sizes: [f64; 2]) -> Option<Self> {
         let invertible = |matrix: &DMat3, size: f64| {
             let determinant = matrix.determinant().abs();
-            // Infinite entries are as useless as dependent ones.
+            // Infinite entries are rejected like dependent rows.
             determinant > Self::LEAST_DETERMINANT * size && determinant.is_finite()
         };
         if !invertible(&a, sizes[0]) {
@@ -277,7 +275,7 @@ impl Equations {
         invertible(&rest, sizes[1]).then(|| Self { inverse_a, b, c, inverse_rest: rest.inverse() })
     }
 
-    /// The small motion (m, rad) that moves the spots by this much.
+    /// Returns the small motion (m, rad) that moves the spots by this much.
     #[inline]
     fn motion(&self, spots: &Spots) -> Motion {
         let first = self.inverse_a * spots.across_m;
@@ -296,11 +294,11 @@ struct Motion {
     turn_rad: DVec3,
 }
 
-/// Moves a pose and gives the length of the motion, m and rad alike.
+/// Moves a pose and returns the length of the motion, m and rad alike.
 #[inline]
 fn move_by(pose: &mut Pose, Motion { shift_m, turn_rad }: Motion) -> f64 {
     pose.position_m += shift_m;
-    // A rotation to second order in the step, which vanishes as the iteration ends.
+    // Accurate to second order in the step, which vanishes at convergence.
     let half = turn_rad * 0.5;
     pose.orientation = (DQuat::from_xyzw(half.x, half.y, half.z, 1.0) * pose.orientation).normalize();
     (shift_m.length_squared() + turn_rad.length_squared()).sqrt()

@@ -1,13 +1,13 @@
-//! Velocity from a row of poses: three estimates to choose from, and what each trades.
+//! Velocity from a sequence of poses: three estimators with their trade-offs.
 //!
-//! - **Difference**: change over time. No lag but half a tick; noise and steps of the sensor are divided by the
-//!   tick, so 2 µm at 1 kHz are 2 mm/s. (A public client of the device gives up: "calculating velocity this
-//!   way causes instability".)
-//! - **Low-pass**: the same behind a first-order filter. Quieter, and later by the filter's time constant.
-//! - **Kalman**: position and velocity estimated together, under the assumption that acceleration is noise of
-//!   known strength. In the steady state this is the alpha-beta filter with the gains of Kalata (1984, IEEE
-//!   Trans. Aerosp. Electron. Syst. 20:174): as quiet as the lag it takes allows. Needs two numbers, noise of the
-//!   sensor and liveliness of the hand.
+//! - **Difference**: change over time. A lag of only half a tick; noise and steps of the sensor are divided by the tick, so
+//!   2 µm at 1 kHz are 2 mm/s. (A public client of the device rejects this: "calculating velocity this way causes
+//!   instability".)
+//! - **Low-pass**: the difference behind a first-order filter. Quieter, with the lag of the filter's time constant.
+//! - **Kalman**: position and velocity estimated together, under the assumption that acceleration is noise of known
+//!   strength. In the steady state this is the alpha-beta filter with the gains of Kalata (1984, IEEE Trans. Aerosp.
+//!   Electron. Syst. 20:174), the best trade-off of noise and lag. Needs two numbers, noise of the sensor and acceleration
+//!   of the hand.
 
 use crate::hand::Pose;
 use crate::lag::Lag;
@@ -15,21 +15,21 @@ use crate::validation::{Check, Domain, number};
 use flotor_hal::glam::DVec3;
 use flotor_hal::orientation_from_rotation_vector;
 
-/// How velocity is estimated.
+/// Kind of the velocity estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EstimatorKind {
-    /// Change over time.
+    /// Difference quotient.
     Difference,
-    /// The same, filtered.
+    /// Difference quotient behind a first-order low-pass.
     LowPass {
         /// Corner of the filter, Hz.
         bandwidth_hz: f64,
     },
     /// Steady-state Kalman filter.
     Kalman {
-        /// Deviation of a measured position, m (of a rotation: over the arm of the sensor's diodes).
+        /// Standard deviation of a measured position, m (of a rotation: over the arm of the sensor's diodes).
         noise_m: f64,
-        /// Deviation of the acceleration, m/s².
+        /// Standard deviation of the acceleration, m/s².
         acceleration_m_per_s2: f64,
     },
 }
@@ -53,30 +53,30 @@ impl EstimatorKind {
 /// Linear and angular velocity, device frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Velocity {
-    /// m/s
+    /// Linear velocity, m/s.
     pub linear_m_per_s: DVec3,
-    /// rad/s
+    /// Angular velocity, rad/s.
     pub angular_rad_per_s: DVec3,
 }
 
 impl Velocity {
-    /// At rest.
+    /// Zero velocity.
     pub const ZERO: Self = Self { linear_m_per_s: DVec3::ZERO, angular_rad_per_s: DVec3::ZERO };
 }
 
-/// An estimate that goes on.
+/// A velocity estimator in operation.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimator {
     kind: EstimatorKind,
-    /// Of the low-pass.
+    /// Filter of the low-pass; `None` for the others.
     lag: Option<Lag>,
-    /// Last pose: measured, or estimated by the Kalman filter. None before the first.
+    /// Last pose: measured, or estimated by the Kalman filter; `None` before the first.
     last: Option<Pose>,
     velocity: Velocity,
 }
 
 impl Estimator {
-    /// Before the first pose. Real-time: bounded, no allocation.
+    /// Creates an estimator without a pose. Real-time: bounded, no allocation.
     #[must_use]
     pub fn new(kind: EstimatorKind) -> Self {
         let lag = match kind {
@@ -86,13 +86,13 @@ impl Estimator {
         Self { kind, lag, last: None, velocity: Velocity::ZERO }
     }
 
-    /// Forgets everything (the flotor was out of sight). Real-time: bounded, no allocation.
+    /// Resets the estimator (the flotor was out of sight). Real-time: bounded, no allocation.
     pub fn restart(&mut self) -> Velocity {
         *self = Self::new(self.kind);
         self.velocity
     }
 
-    /// Takes a pose measured `dt_s` (s) after the previous one. Real-time: bounded, no allocation.
+    /// Updates the estimate with a pose measured `dt_s` (s) after the previous one. Real-time: bounded, no allocation.
     pub fn update(&mut self, pose: &Pose, dt_s: f64) -> Velocity {
         let Some(last) = self.last.filter(|_| dt_s > 0.0) else {
             self.last = Some(*pose);
@@ -110,7 +110,7 @@ impl Estimator {
         self.velocity
     }
 
-    /// Moves the estimate a share of the way to the difference quotient.
+    /// Moves the estimate by a fraction of the way to the difference quotient.
     fn blend(&mut self, last: &Pose, pose: &Pose, dt_s: f64, share: f64) {
         let linear = (pose.position_m - last.position_m) / dt_s;
         let angular = last.rotation_to(pose) / dt_s;
@@ -119,8 +119,8 @@ impl Estimator {
         self.last = Some(*pose);
     }
 
-    /// Predicts, compares, corrects. `tracking_index` is the motion an acceleration makes in a tick over the
-    /// noise of the sensor; the gains are the steady state of the Kalman filter for it.
+    /// Updates the alpha-beta filter: predicts and corrects. `tracking_index` is the displacement by the acceleration in a
+    /// tick over the noise of the sensor; the gains are the steady state of the Kalman filter for this index.
     fn track(&mut self, last: &Pose, pose: &Pose, dt_s: f64, tracking_index: f64) {
         // Gains of the alpha-beta filter from the tracking index (Kalata 1984).
         let damping = 0.25 * (4.0 + tracking_index - (tracking_index * (8.0 + tracking_index)).sqrt());

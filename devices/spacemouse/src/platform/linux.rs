@@ -1,21 +1,21 @@
-//! Linux: hidraw, and udev, which says who may use it.
+//! Linux: hidraw, with permissions by udev.
 
 use hidapi::HidError;
 use std::io::ErrorKind;
 
-/// What the parameter `path` is.
+/// Help text of the parameter `path`.
 pub(crate) const PATH_HELP: &str = "Which puck, as /dev/hidraw2; the first one found if not said";
-/// What it may be.
+/// Example of the parameter `path`.
 pub(crate) const PATH_EXAMPLE: &str = "/dev/hidraw2";
-/// How a user is allowed to use it.
+/// Remedy for a missing permission.
 pub(crate) const ACCESS_REMEDY: &str = "put `KERNEL==\"hidraw*\", ATTRS{idVendor}==\"256f\", TAG+=\"uaccess\"` into \
     /etc/udev/rules.d/70-spacemouse.rules, run `sudo udevadm control --reload` and plug it in again";
 
-/// Whether this user may not use a device.
+/// Returns whether an error is a missing permission.
 pub(crate) fn is_refused(error: &HidError) -> bool {
     match error {
         HidError::IoError { error } => error.kind() == ErrorKind::PermissionDenied,
-        // It has only words for a path that it cannot open.
+        // hidapi has only text for a path that cannot be opened.
         other => other.to_string().contains("ermission"),
     }
 }

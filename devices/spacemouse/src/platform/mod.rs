@@ -1,4 +1,4 @@
-//! What differs between systems for a HID device: where it is, and what its user has to do.
+//! Parts of HID access that differ between systems: device paths and remedies.
 
 #[cfg(not(windows))]
 mod linux;

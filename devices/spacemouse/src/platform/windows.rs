@@ -3,18 +3,18 @@
 use hidapi::HidError;
 use std::io::ErrorKind;
 
-/// `ERROR_SHARING_VIOLATION`: another program has it for itself.
+/// `ERROR_SHARING_VIOLATION`: another program has the device open.
 const SHARING_VIOLATION: i32 = 32;
 
-/// What the parameter `path` is.
+/// Help text of the parameter `path`.
 pub(crate) const PATH_HELP: &str =
     r"Which puck, as \\?\HID#VID_256F and what follows there; the first one found if not said";
-/// What it may be.
+/// Example of the parameter `path`.
 pub(crate) const PATH_EXAMPLE: &str = r"\\?\HID#VID_256F and what follows there";
-/// How a user is allowed to use it.
+/// Remedy for denied access.
 pub(crate) const ACCESS_REMEDY: &str = "close the program that uses it";
 
-/// Whether access was denied, because another program has the device open.
+/// Returns whether an error is denied access, because another program has the device open.
 pub(crate) fn is_refused(error: &HidError) -> bool {
     let HidError::IoError { error } = error else { return false };
     error.kind() == ErrorKind::PermissionDenied || error.raw_os_error() == Some(SHARING_VIOLATION)

@@ -7,28 +7,28 @@ use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 use std::mem::MaybeUninit;
 use std::path::{Path, PathBuf};
 
-/// An open library.
+/// Handle of an open library.
 pub(crate) type Loaded = Library;
 
-/// Folders of the system.
+/// Library folders of the system.
 const SYSTEM: [&str; 5] = ["/usr/local/lib", "/usr/lib", "/usr/lib64", "/lib", "/opt/lib"];
-/// Bytes of the head of an ELF file that say what it is for.
+/// Bytes of an ELF header up to the processor.
 pub(crate) const HEAD: usize = 20;
 
-/// What the name of a library ends in.
+/// User text about the ending of a library's name.
 pub(crate) const LIBRARY_ENDING: &str = ".so or in .so and a version";
 
-/// How a user finds out why a library is refused.
+/// Returns the remedy for a library that cannot be loaded.
 pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("`ldd {}` lists what it needs and what of that is missing", path.display())
 }
 
-/// Names of the library's file.
+/// Returns the file names of the library.
 pub(crate) fn files(sdk: &Sdk) -> &'static [&'static str] {
     sdk.files
 }
 
-/// Where the library may be, in order, by the environment.
+/// Returns the folders to search, in order, by the environment.
 pub(crate) fn folders(sdk: &Sdk, said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     let machine = std::env::consts::ARCH;
     let of_sdk = sdk.variables.iter().filter_map(|variable| said(variable)).flat_map(|folder| {
@@ -43,7 +43,7 @@ pub(crate) fn folders(sdk: &Sdk, said: impl Fn(&str) -> Option<String>) -> Vec<P
     of_sdk.chain(loader).chain(own).chain(system).chain([of_machine]).collect()
 }
 
-/// Whether a file that begins like this is a library for this program.
+/// Checks by the first bytes of a file that it is a library for this program.
 pub(crate) fn fits(path: &Path, head: &[u8]) -> Result<(), LibraryProblem> {
     let Some([0x7f, b'E', b'L', b'F', class, _, .., low, high]) = head.get(..HEAD) else {
         return Err(LibraryProblem::NotALibrary { path: path.to_path_buf() });
@@ -58,7 +58,7 @@ pub(crate) fn fits(path: &Path, head: &[u8]) -> Result<(), LibraryProblem> {
     super::compared(path, found, processor(bits, machine))
 }
 
-/// For people.
+/// Returns the name of a processor, for an error.
 fn processor(bits: u32, machine: u16) -> String {
     match machine {
         3 | 62 => format!("{bits}-bit x86"),
@@ -67,10 +67,10 @@ fn processor(bits: u32, machine: u16) -> String {
     }
 }
 
-/// Opens a library: bound at once, and sharing no names with others. Not real-time.
+/// Opens a library with immediate binding and local symbols. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the loader.
 ///
 /// # Safety
 /// The caller trusts the library: opening it runs its constructors.
@@ -79,8 +79,8 @@ pub(crate) unsafe fn open(path: &Path) -> Result<Loaded, libloading::Error> {
     unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }
 }
 
-/// Runs `body` with all signals of this thread blocked, so that threads it starts never take one: a thread takes over the mask of the
-/// one that starts it, and signals belong to the host. Not real-time.
+/// Runs `body` with all signals of this thread blocked, so that threads started by `body` inherit the mask and never take a signal,
+/// which belongs to the host. Not real-time.
 pub fn without_signals<T>(body: impl FnOnce() -> T) -> T {
     let mut before = MaybeUninit::<libc::sigset_t>::zeroed();
     // SAFETY: two sets on this stack; the first is filled before it is read, the second is written by the system.

@@ -1,7 +1,7 @@
-//! What differs between systems for a library of an SDK. Each system has one module with the same items:
-//! - `files`, `folders`, `HEAD`, `fits`: what the library is called, where it may be, and whether it is for this program;
-//! - `Loaded`, `open`, `LIBRARY_ENDING`, `missing_remedy`: an open library, and what people are told of one;
-//! - `without_signals`: what its threads must not take.
+//! Parts of an SDK's library that differ between systems. Each system has one module with the same items:
+//! - `files`, `folders`, `HEAD`, `fits`: file names, folders to search, and check of the processor;
+//! - `Loaded`, `open`, `LIBRARY_ENDING`, `missing_remedy`: an open library, and user texts about files;
+//! - `without_signals`: signal mask for the threads of a library.
 
 #[cfg(not(windows))]
 mod linux;
@@ -19,7 +19,7 @@ pub(crate) use system::{HEAD, LIBRARY_ENDING, Loaded, files, fits, folders, miss
 use crate::problem::LibraryProblem;
 use std::path::Path;
 
-/// Whether a library is for this program, by bits and processor.
+/// Checks bits and processor of a library against this program.
 fn compared(path: &Path, found: Option<(u32, &str)>, told: String) -> Result<(), LibraryProblem> {
     let needed = (usize::BITS, if cfg!(target_arch = "aarch64") { "ARM" } else { "x86" });
     if found == Some(needed) {

@@ -6,27 +6,27 @@ use crate::search::Sdk;
 use libloading::os::windows::Library;
 use std::path::{Path, PathBuf};
 
-/// An open library.
+/// Handle of an open library.
 pub(crate) type Loaded = Library;
 
-/// Bytes of the head of a PE file that say what it is for: the program for DOS before it is short.
+/// Bytes of a file up to the processor in the PE header: the DOS stub before it is short.
 pub(crate) const HEAD: usize = 4096;
 
-/// What the name of a library ends in.
+/// User text about the ending of a library's name.
 pub(crate) const LIBRARY_ENDING: &str = ".dll";
 
-/// How a user finds out why a library is refused.
+/// Returns the remedy for a library that cannot be loaded.
 pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("a library that {} needs is missing; install the whole SDK", path.display())
 }
 
-/// Names of the library's file.
+/// Returns the file names of the library.
 pub(crate) fn files(sdk: &Sdk) -> &'static [&'static str] {
     sdk.files_on_windows
 }
 
-/// Where the library may be, in order, by the environment: in the SDK, beside the program's other libraries (`PATH`), and with those
-/// of the system, where drivers put theirs.
+/// Returns the folders to search, in order, by the environment: the SDK, `PATH`, and the system's folder, where drivers install
+/// their libraries.
 pub(crate) fn folders(sdk: &Sdk, said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     let of_sdk = sdk.variables.iter().filter_map(|variable| said(variable)).flat_map(|folder| {
         let folder = PathBuf::from(folder);
@@ -38,7 +38,7 @@ pub(crate) fn folders(sdk: &Sdk, said: impl Fn(&str) -> Option<String>) -> Vec<P
     of_sdk.chain(path).chain(system).collect()
 }
 
-/// Whether a file that begins like this is a library for this program.
+/// Checks by the first bytes of a file that it is a library for this program.
 pub(crate) fn fits(path: &Path, head: &[u8]) -> Result<(), LibraryProblem> {
     let Some(machine) = machine(head) else {
         return Err(LibraryProblem::NotALibrary { path: path.to_path_buf() });
@@ -56,7 +56,7 @@ pub(crate) fn fits(path: &Path, head: &[u8]) -> Result<(), LibraryProblem> {
     super::compared(path, found, told)
 }
 
-/// The number of the processor that a PE file is for.
+/// Returns the processor number of a PE file.
 fn machine(head: &[u8]) -> Option<u16> {
     let place = match head {
         [b'M', b'Z', ..] => u32::from_le_bytes(head.get(0x3c..0x40)?.try_into().ok()?),
@@ -71,7 +71,7 @@ fn machine(head: &[u8]) -> Option<u16> {
 /// Opens a library. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the loader.
 ///
 /// # Safety
 /// The caller trusts the library: opening it runs its constructors.
@@ -80,7 +80,7 @@ pub(crate) unsafe fn open(path: &Path) -> Result<Loaded, libloading::Error> {
     unsafe { Library::new(path) }
 }
 
-/// Runs `body`: no thread takes a signal here. Not real-time.
+/// Runs `body` unchanged: there are no signals to block. Not real-time.
 pub fn without_signals<T>(body: impl FnOnce() -> T) -> T {
     body()
 }

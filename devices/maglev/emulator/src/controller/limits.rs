@@ -1,8 +1,8 @@
-//! What the coils are never asked for, whatever the host says.
+//! Limits of the wrench on the coils, independent of the host.
 
 use flotor_hal::{DVec3, Wrench, math};
 
-/// Limits of the controller.
+/// Limits and boundary of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitConfig {
     /// Largest force along each axis, N.
@@ -17,24 +17,24 @@ pub struct LimitConfig {
     pub wall_m: f64,
     /// Stiffness of that wall, N/m.
     pub wall_n_per_m: f64,
-    /// Damping in it, N·s/m.
+    /// Damping of that wall, N·s/m.
     pub wall_ns_per_m: f64,
-    /// Distance from the origin, m, beyond which it does not wait for the sensors to lose the flotor: it lands.
+    /// Distance from the origin at which the controller lands, before the sensors lose the flotor, m.
     pub edge_m: f64,
-    /// How far ahead it looks for that, s: a flotor that would be beyond then is leaving the range.
+    /// Prediction time of the distance for `edge_m`, s.
     pub edge_ahead_s: f64,
-    /// Share of the full load that is borne for ever; the mean of the squared load is held against its square.
+    /// Fraction of the full load allowed permanently; the mean square of the load is compared with its square.
     pub continuous_load: f64,
     /// Time over which the load is averaged, s.
     pub load_time_s: f64,
 }
 
 impl LimitConfig {
-    /// The device as published (`facts`): the weaker force on the horizontal axes; full scale in a millisecond; 2 A
-    /// of 3.5 A mean over a minute. The wall begins just inside the sensors' range with the damping of the makers'
-    /// boundary mode, 15 N·s/m, and a stiffness that keeps it and a wall of the host (10 000 N/m, 15 N·s/m) together
-    /// below the limit of Gil et al. 2009 for a period and a delay of a millisecond: 30 / 0.0015 = 20 000 N/m. It
-    /// lands 0.05 mm short of the sensors' range of 12 mm, two cycles ahead: the one that sees it and the one that acts.
+    /// Published limits of the device (`facts`): the weaker force on the horizontal axes; full scale in a millisecond; 2 A
+    /// of 3.5 A mean over a minute. The wall begins just inside the sensors' range with the makers' damping, 15 N·s/m, and
+    /// a stiffness that keeps the sum of this wall and one of the host (10 000 N/m, 15 N·s/m) below the limit of Gil et al.
+    /// 2009 for a period and a delay of a millisecond: 30 / 0.0015 = 20 000 N/m. Landing starts 0.05 mm short of the
+    /// sensors' range of 12 mm, predicted two cycles ahead: one to detect, one to react.
     pub const MAGLEV: Self = Self {
         max_force_n: DVec3::new(55.0, 55.0, 140.0),
         max_torque_nm: DVec3::new(6.3, 6.3, 12.2),
@@ -49,8 +49,7 @@ impl LimitConfig {
         load_time_s: 60.0,
     };
 
-    /// Force of the controller's own wall; nothing inside. It resists going out and does not pull back what comes
-    /// back by itself.
+    /// Returns the force of the controller's own wall; `None` inside the wall. The damping resists outward motion only.
     pub(super) fn wall(&self, position_m: DVec3, velocity_m_per_s: DVec3) -> Option<DVec3> {
         let distance_m = position_m.length();
         let depth_m = distance_m - self.wall_m;
@@ -62,7 +61,7 @@ impl LimitConfig {
         Some(outward * -(self.wall_n_per_m * depth_m + self.wall_ns_per_m * leaving_m_per_s))
     }
 
-    /// True if the flotor is at the edge of the range, or will be before anything can be done about it.
+    /// Returns true if the flotor is at the edge of the range, or will be within the prediction time.
     pub(super) fn is_leaving(&self, position_m: DVec3, velocity_m_per_s: DVec3) -> bool {
         let distance_m = position_m.length();
         let outward = position_m / distance_m.max(f64::MIN_POSITIVE);
@@ -70,7 +69,7 @@ impl LimitConfig {
         distance_m + leaving_m_per_s * self.edge_ahead_s >= self.edge_m
     }
 
-    /// The wrench within force and torque, each axis for itself.
+    /// Returns the wrench clamped to the limits of each axis.
     pub(super) fn clamped(&self, wrench: &Wrench) -> Wrench {
         Wrench::new(
             wrench.force().clamp(-self.max_force_n, self.max_force_n),
@@ -78,7 +77,7 @@ impl LimitConfig {
         )
     }
 
-    /// From `last` towards `wanted`, no faster than the coils may.
+    /// Returns the next wrench from `last` towards `wanted` within the slew limits.
     pub(super) fn slewed(&self, last: &Wrench, wanted: &Wrench, dt_s: f64) -> Wrench {
         let step = |from: DVec3, to: DVec3, most: f64| from + (to - from).clamp_length_max(most * dt_s);
         Wrench::new(
@@ -87,21 +86,21 @@ impl LimitConfig {
         )
     }
 
-    /// Largest share of any axis' limit that a wrench takes.
+    /// Returns the largest fraction of any axis' limit in a wrench.
     fn share(&self, wrench: &Wrench) -> f64 {
         let force = (wrench.force() / self.max_force_n).abs().max_element();
         force.max((wrench.torque() / self.max_torque_nm).abs().max_element())
     }
 }
 
-/// Mean of the squared load, with the time constant of a coil's temperature: I²t.
+/// Mean square of the load, with the time constant of a coil's temperature: I²t.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
     mean_square: f64,
 }
 
 impl Load {
-    /// Bears a wrench for a time; true if that was too much for too long.
+    /// Updates the mean square with a wrench applied for `dt_s`; returns true if the continuous limit is exceeded.
     pub fn bear(&mut self, wrench: &Wrench, dt_s: f64, limits: &LimitConfig) -> bool {
         let share = limits.share(wrench);
         self.mean_square += (share * share - self.mean_square) * -math::exp_m1(-dt_s / limits.load_time_s);

@@ -1,4 +1,4 @@
-//! The state machine.
+//! State machine of the controller.
 
 use super::limits::{LimitConfig, Load};
 use flotor_hal::{DVec3, Pose, Twist, Wrench};
@@ -6,20 +6,20 @@ use flotor_maglev::protocol::{
     Answer, AnswerFrame, Condition, Description, Intake, Mode, Rejection, Request, RequestFrame, Status,
 };
 
-/// What a controller is made of.
+/// Configuration of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerConfig {
-    /// What it says about itself.
+    /// Description sent to hosts.
     pub description: Description,
-    /// What it never does.
+    /// Limits of the wrench.
     pub limits: LimitConfig,
-    /// How long it holds before it lands, µs.
+    /// Time in the mode Holding before landing, µs.
     pub hold_us: u64,
-    /// How long landing takes, µs.
+    /// Duration of a landing, µs.
     pub landing_us: u64,
-    /// Damping while it holds and lands, N·s/m and N·m·s/rad.
+    /// Damping while holding and landing, N·s/m and N·m·s/rad.
     pub hold_damping: [f64; 2],
-    /// Fastest handle it follows, m/s.
+    /// Speed of the handle that is a fault, m/s.
     pub max_speed_m_per_s: f64,
 }
 
@@ -34,28 +34,28 @@ pub struct Sample {
     pub in_range: bool,
     /// True if a coil is too hot.
     pub too_hot: bool,
-    /// Buttons, one bit each.
+    /// State of the buttons, one bit each.
     pub buttons: u32,
 }
 
 impl Sample {
-    /// At home, at rest.
+    /// Sample at home and at rest.
     pub const HOME: Self =
         Self { pose: Pose::HOME, twist: Twist::ZERO, in_range: true, too_hot: false, buttons: 0 };
 }
 
-/// What is to be answered.
+/// Kind of a reply.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reply {
-    /// The status, acknowledging this sequence.
+    /// The status, acknowledging this sequence number.
     Status(u32),
-    /// Likewise, after a command that is obeyed.
+    /// The status after an accepted command, acknowledging this sequence number.
     Commanded(u32),
-    /// A page of the description.
+    /// A page of the description, encoded.
     Page(AnswerFrame),
 }
 
-/// The newest command, and when it came.
+/// The newest command with its time of arrival.
 #[derive(Clone, Copy, Debug)]
 struct Command {
     wrench: Wrench,
@@ -63,21 +63,21 @@ struct Command {
     since_us: u64,
 }
 
-/// A controller in operation. Times are µs of its own clock and never go back.
+/// A controller in operation. Times are µs of its monotonic clock.
 #[derive(Clone, Debug)]
 pub struct Controller {
     config: ControllerConfig,
     mode: Mode,
-    /// Since when it is in this mode.
+    /// Start of the current mode.
     mode_since_us: u64,
     condition: Condition,
-    /// The session it listens to; 0: none.
+    /// Current session; 0: none.
     session: u32,
-    /// The one before: an old frame must not begin it again.
+    /// Previous session: an old frame must not restart that session.
     last_session: u32,
     watchdog_us: u64,
     period_us: u32,
-    /// When the host was last heard in this session.
+    /// Time of the last accepted request of this session.
     heard_us: u64,
     intake: Intake,
     command: Option<Command>,
@@ -89,7 +89,7 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller with its coils off.
+    /// Creates a controller with its coils off.
     #[must_use]
     pub fn new(config: ControllerConfig) -> Self {
         Self {
@@ -112,37 +112,37 @@ impl Controller {
         }
     }
 
-    /// What it is doing.
+    /// Returns the current mode.
     #[must_use]
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// What is wrong or limited.
+    /// Returns the faults and active limits.
     #[must_use]
     pub fn condition(&self) -> Condition {
         self.condition
     }
 
-    /// What it did not act on, by reason.
+    /// Returns the replay protection with the numbers of rejected requests.
     #[must_use]
     pub fn intake(&self) -> &Intake {
         &self.intake
     }
 
-    /// Time between two commands the host promised when it armed, µs; 0 before.
+    /// Returns the command period announced on arming, µs; 0 before.
     #[must_use]
     pub fn period_us(&self) -> u32 {
         self.period_us
     }
 
-    /// How long the host of the session has been silent, µs.
+    /// Returns the time since the last accepted request of the session, µs.
     #[must_use]
     pub fn silence_us(&self, now_us: u64) -> u64 {
         now_us.saturating_sub(self.heard_us)
     }
 
-    /// Acts on what arrived, if it may, and says what to answer; nothing to what is not acted on.
+    /// Executes a received request and returns the reply; `None` for a rejected request.
     pub fn receive(&mut self, packet: &[u8], now_us: u64) -> Option<Reply> {
         match RequestFrame::decode(packet) {
             Ok(frame) => self.obey(&frame, now_us),
@@ -153,19 +153,19 @@ impl Controller {
         }
     }
 
-    /// Something arrived that is no packet.
+    /// Rejects and counts received data that is no packet.
     pub fn receive_malformed(&mut self) {
         self.intake.reject(Rejection::Length);
     }
 
     fn obey(&mut self, frame: &RequestFrame, now_us: u64) -> Option<Reply> {
-        // Asking is allowed to anybody, and changes nothing.
+        // A description request is open to every host and changes nothing.
         if let Request::Describe { page } = frame.request {
             let page = self.config.description.page(page).map_err(|rejection| self.intake.reject(rejection));
             return page.ok().map(|page| Reply::Page(self.answer(Answer::Description(page), frame.sequence)));
         }
         match frame.request {
-            // With no session there is nothing to protect, and switching off twice is switching off.
+            // Without a session there is nothing to protect, and disarming is idempotent.
             Request::Disarm if self.session == 0 => {
                 self.disarm(now_us);
                 return Some(Reply::Status(frame.sequence));
@@ -175,7 +175,7 @@ impl Controller {
             {
                 self.intake.restart();
             }
-            // A host that has been replaced, or one that never armed, moves nothing.
+            // Rejects hosts that were replaced or never armed.
             _ if frame.session != self.session || self.session == 0 => {
                 self.intake.reject(Rejection::Session);
                 return None;
@@ -204,13 +204,13 @@ impl Controller {
             }
             (Request::Land, Mode::Levitating | Mode::Holding) => self.enter(Mode::Landing, now_us),
             (Request::Disarm, _) => self.disarm(now_us),
-            // Anything else does not fit the mode: the status in the answer says which that is.
+            // Other requests do not fit the mode; the reply contains the mode.
             _ => {}
         }
         Some(Reply::Status(frame.sequence))
     }
 
-    /// The link to the host broke: coils off, now.
+    /// Switches the coils off at once after the loss of the link.
     pub fn link_lost(&mut self, now_us: u64) {
         if self.mode != Mode::Disarmed {
             self.disarm(now_us);
@@ -218,13 +218,13 @@ impl Controller {
         }
     }
 
-    /// Takes a sample of the sensors.
+    /// Stores a sample of the sensors.
     pub fn observe(&mut self, now_us: u64, sample: &Sample) {
         self.sample = *sample;
         self.sampled_us = now_us;
     }
 
-    /// The wrench for the coils over the next `dt_us`. Call it once a cycle, after a sample.
+    /// Returns the wrench for the coils over the next `dt_us`. Call once per cycle, after a sample.
     pub fn drive(&mut self, now_us: u64, dt_us: u64) -> Wrench {
         self.watch(now_us);
         let sample = self.sample;
@@ -264,7 +264,7 @@ impl Controller {
         driven
     }
 
-    /// What time and sensors say, whatever the host says.
+    /// Changes the mode on timeouts, sensor faults and the edge of the range, independently of requests.
     fn watch(&mut self, now_us: u64) {
         if matches!(self.mode, Mode::Disarmed | Mode::Fault) {
             return;
@@ -296,7 +296,7 @@ impl Controller {
             Mode::Armed | Mode::Levitating if now_us.saturating_sub(self.heard_us) >= self.watchdog_us => {
                 let flying = self.mode == Mode::Levitating;
                 self.condition = self.condition.with(Condition::WATCHDOG);
-                // The session is over at this moment: a host that wakes up finds nobody who listens.
+                // The session ends now: requests of a host that resumes are rejected.
                 self.session = 0;
                 self.command = None;
                 self.enter(if flying { Mode::Holding } else { Mode::Fault }, now_us);
@@ -313,7 +313,7 @@ impl Controller {
         }
     }
 
-    /// Resists motion, and nothing else.
+    /// Returns a wrench of pure damping.
     fn damping(&self) -> Wrench {
         let [linear, angular] = self.config.hold_damping;
         Wrench::new(self.sample.twist.linear() * -linear, self.sample.twist.angular() * -angular)
@@ -341,11 +341,11 @@ impl Controller {
         self.mode_since_us = now_us;
     }
 
-    /// The newest sample as an answer to the request of this sequence.
+    /// Returns the newest sample as a reply to the request `acknowledged`.
     pub fn status(&mut self, acknowledged: u32) -> AnswerFrame {
         let Sample { pose, twist, .. } = self.sample;
         let orientation = pose.orientation();
-        // q and -q are one rotation: the one whose scalar part need not be sent.
+        // q and -q are one rotation: send the one with a non-negative scalar part.
         let vector = if orientation.w < 0.0 { -orientation.xyz() } else { orientation.xyz() };
         let status = Status {
             mode: self.mode,
@@ -366,8 +366,8 @@ impl Controller {
     }
 }
 
-/// As the wire has it; what is not finite is 0, and the mode says that the sensors failed.
-#[allow(clippy::cast_possible_truncation)] // f32 has what a sensor has
+/// Converts to the wire format; non-finite values become 0, and the mode reports the failure of the sensors.
+#[allow(clippy::cast_possible_truncation)] // f32 exceeds the sensors' resolution
 fn narrow(vector: DVec3) -> [f32; 3] {
     vector.to_array().map(|value| if value.is_finite() { value as f32 } else { 0.0 })
 }

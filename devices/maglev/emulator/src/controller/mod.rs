@@ -1,9 +1,8 @@
-//! The controller's firmware as a state machine: what stands between the link and the coils, on the device's side.
+//! The controller's firmware as a state machine: the device's side between link and coils.
 //!
-//! The controller trusts nobody. It obeys one session at a time, each command once and only while it is valid;
-//! limits force, torque and their change; keeps the flotor inside its own boundary, and lands before the sensors lose
-//! one that leaves it all the same; and when the host falls silent it holds, sets the flotor down and stays faulted
-//! until it is disarmed.
+//! The controller trusts no host. It accepts one session at a time, each command once and only while valid; limits force,
+//! torque and their slew; keeps the flotor inside its own boundary, and lands before a flotor beyond that leaves the
+//! sensors' range; and when the host falls silent it holds, lands and stays faulted until disarmed.
 //!
 //! ```text
 //!            arm            take off              silence               held            down
@@ -14,8 +13,8 @@
 //!     +------------------------------------------------------------------------------------------+
 //! ```
 //!
-//! A lost link disarms at once, from any mode. Pure: time and samples come in, a wrench comes out; the emulator
-//! runs it, and so could a microcontroller. Real-time: bounded, no allocation.
+//! A lost link disarms at once, from any mode. Pure: time and samples in, a wrench out; runs in the emulator and could run
+//! on a microcontroller. Real-time: bounded, no allocation.
 
 mod limits;
 mod machine;

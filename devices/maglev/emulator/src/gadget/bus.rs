@@ -1,7 +1,7 @@
-//! The device on its bus: answers the host controller, and holds what waits on either side.
+//! The device side of the USB bus: answers the host controller and queues packets in both directions.
 //!
-//! A transfer towards the host that finds nothing to fetch waits (on a real bus: NAK) until there is something, or
-//! until it is taken back. Whether a host *uses* the device is told differently by each kind of device:
+//! An IN transfer without data waits (on a real bus: NAK) until a packet is available, or until it is unlinked. The start
+//! and end of use by a host are detected per kind of device:
 //!
 //! | | begins | ends |
 //! |---|---|---|
@@ -9,7 +9,7 @@
 //! | HID | the first report | the host fetches no more |
 //! | serial port | DTR | no DTR |
 //!
-//! and for all of them it ends with the cable.
+//! Unplugging ends every use.
 
 use super::personality::{CONFIGURATION, DEVICE, IN, OUT, Personality, REPORT, REPORT_DESCRIPTOR, STRING};
 use flotor_usbip::wire::{self, INPUT, Message, Transfer};
@@ -19,16 +19,16 @@ use std::os::unix::net::UnixStream;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Packets kept for a host that does not fetch them; then the oldest goes.
+/// Packets queued for a host that does not fetch them; beyond that the oldest is dropped.
 const KEPT_PACKETS: usize = 32;
-/// A host that reads asks for the next report within microseconds of the last.
+/// Pause after which a HID host counts as detached: a reading host requests the next report within microseconds.
 const FETCHES_NO_MORE: Duration = Duration::from_millis(5);
 
-/// A use of the device by a host; the next one has another number.
+/// Use of the device by a host, numbered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Attachment(u64);
 
-/// The host does not use the device any more.
+/// Error: the host no longer uses the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Detached;
 
@@ -46,15 +46,15 @@ struct State {
     plugged: bool,
     alternate: u8,
     line_coding: [u8; 7],
-    /// Transfers towards the host that wait for data, oldest first.
+    /// IN transfers that wait for data, oldest first.
     fetches: VecDeque<Transfer>,
-    /// Since when there is none.
+    /// Time of the last delivery or unlinking.
     fetched_since: Instant,
     to_host: VecDeque<Vec<u8>>,
     to_controller: VecDeque<Vec<u8>>,
 }
 
-/// What comes of a control transfer.
+/// Result of a control transfer.
 enum Answer {
     Data(Vec<u8>),
     Stall,
@@ -81,7 +81,7 @@ impl Bus {
         self.personality
     }
 
-    /// Answers the host controller until the cable is pulled.
+    /// Answers the host controller until the cable is unplugged.
     pub(super) fn serve(&self, requests: &mut impl Read) {
         while let Ok(message) = Message::read(requests) {
             let mut state = self.lock();
@@ -103,7 +103,7 @@ impl Bus {
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
-        // Whoever panicked left whole packets behind.
+        // Poisoning is ignored: a panic leaves whole packets in the queues.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -127,7 +127,7 @@ impl Bus {
                 }
                 Answer::Stall => wire::stall(&mut state.socket, &transfer),
             },
-            // A notification that never comes: it waits for the end of the cable, or is taken back.
+            // A notification, which never arrives: the transfer waits until unplugged or unlinked.
             _ => {
                 state.fetches.push_back(transfer);
                 Ok(())
@@ -150,7 +150,7 @@ impl Bus {
                 _ => Answer::Stall,
             },
             (0x81, 6, Personality::Hid) if value_high == REPORT => Answer::Data(REPORT_DESCRIPTOR.to_vec()),
-            // Set configuration: everything begins anew.
+            // Set configuration: resets the interface.
             (0x00, 9, _) => {
                 state.select(0);
                 done()
@@ -163,7 +163,7 @@ impl Bus {
             // Get status, of device, interface and endpoint; clear feature: no endpoint is ever halted.
             (0x80..=0x82, 0, _) => status(),
             (0x02, 1, _) => done(),
-            // Set idle: reports come when there are any.
+            // Set idle: ignored, reports are sent only when available.
             (0x21, 0x0a, Personality::Hid) => done(),
             // Line coding and modem lines.
             (0x21, 0x20, Personality::Serial) => {
@@ -188,7 +188,7 @@ impl Bus {
         self.lock().plugged
     }
 
-    /// Waits until a host uses the device.
+    /// Waits for a host to use the device; `None` on timeout or when unplugged.
     pub(super) fn wait_for_host(&self, patience: Duration) -> Option<Attachment> {
         let state = self.lock();
         let waited =
@@ -197,7 +197,7 @@ impl Bus {
         state.used
     }
 
-    /// Puts a packet where the host fetches it.
+    /// Queues a packet for the host.
     pub(super) fn send(&self, attachment: Attachment, packet: &[u8]) -> Result<(), Detached> {
         let mut state = self.lock();
         state.check(attachment)?;
@@ -208,7 +208,7 @@ impl Bus {
         state.deliver().map_err(|_| Detached)
     }
 
-    /// Waits until the host has sent something, or uses the device no more.
+    /// Waits until a packet from the host arrives, or the host detaches.
     pub(super) fn wait_for_packet(&self, attachment: Attachment, patience: Duration) {
         drop(self.wait(self.lock(), attachment, patience));
     }
@@ -225,7 +225,7 @@ impl Bus {
         waited.unwrap_or_else(PoisonError::into_inner).0
     }
 
-    /// The oldest packet of the host, waiting for it for at most `patience`.
+    /// Returns the oldest packet from the host, waiting at most `patience`.
     pub(super) fn take(
         &self,
         attachment: Attachment,
@@ -281,7 +281,7 @@ impl State {
         self.to_controller.push_back(packet.to_vec());
     }
 
-    /// Ends the transfers that can end.
+    /// Completes waiting IN transfers with the queued packets.
     fn deliver(&mut self) -> io::Result<()> {
         while let Some(index) = self.fetches.iter().position(|transfer| transfer.endpoint == IN) {
             let Some(mut packet) = self.to_host.pop_front() else { break };

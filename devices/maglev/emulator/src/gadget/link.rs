@@ -1,4 +1,4 @@
-//! What the emulator sees of the cable: packets, or the bytes of a serial port.
+//! The emulator's end of the cable: packets, or the bytes of a serial port.
 
 use super::bus::{Attachment, Bus};
 use super::personality::Personality;
@@ -9,7 +9,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The link to the host that uses the device.
+/// Returns the link to the host that uses the device.
 pub(super) fn open(bus: Arc<Bus>, attachment: Attachment) -> Box<dyn Transport> {
     match bus.personality() {
         Personality::Serial => {
@@ -72,11 +72,11 @@ impl Transport for SerialLink {
     }
 }
 
-/// The device's side of a serial port.
+/// Device side of a serial port.
 struct GadgetPort {
     bus: Arc<Bus>,
     attachment: Attachment,
-    /// A packet of the host, and how much of it was read.
+    /// Packet from the host, read up to `taken`.
     rest: Vec<u8>,
     taken: usize,
 }

@@ -1,17 +1,17 @@
-//! The controller's end of a USB cable, in software: a device that the kernel of this machine enumerates, binds its
-//! drivers to and hands to programs like any other.
+//! The controller as an emulated USB device: the kernel of this machine enumerates the device, binds drivers and offers it
+//! to programs like any other.
 //!
 //! ```text
 //! plugin -> libusb, hidraw or tty -> kernel -> vhci_hcd ~ USB/IP on a socket ~ bus -> link -> emulator
 //! ```
 //!
-//! - [`personality`]: what the device claims to be: interrupt or bulk endpoints, HID, a serial port.
-//! - `bus`: answers what the kernel asks: descriptors, settings, transfers; nothing to say is a transfer that waits.
-//! - `link`: what the emulator sees of it.
+//! - [`personality`]: kinds of the device: interrupt or bulk endpoints, HID, a serial port.
+//! - `bus`: replies to the kernel: descriptors, settings, transfers; a transfer without data waits.
+//! - `link`: the emulator's access to the bus.
 //!
-//! The messages between kernel and bus are `flotor-usbip`'s.
+//! The messages between kernel and bus are encoded by `flotor-usbip`.
 //!
-//! Needs Linux with the module `vhci_hcd`, and the right to plug something in. Not real-time.
+//! Needs Linux with the module `vhci_hcd`, and permission to attach a device. Not real-time.
 
 mod bus;
 mod link;
@@ -32,7 +32,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// A device that is plugged in; dropping it pulls the cable.
+/// A plugged-in device; dropping unplugs the cable.
 pub struct Gadget {
     bus: Arc<Bus>,
     socket: UnixStream,
@@ -43,7 +43,7 @@ impl Gadget {
     /// Plugs a device into this machine.
     ///
     /// # Errors
-    /// What the system says: usually that the module `vhci_hcd` is not loaded, or that this user may not.
+    /// Errors of the system: usually the module `vhci_hcd` is not loaded, or this user lacks permission.
     pub fn plug_in(personality: Personality, serial: &str) -> io::Result<Self> {
         let (ours, kernels) = UnixStream::pair()?;
         let gadget = Self::serve(personality, serial, ours)?;
@@ -51,7 +51,7 @@ impl Gadget {
         Ok(gadget)
     }
 
-    /// A device at the end of a stream on which somebody speaks USB/IP.
+    /// Serves a device at the end of a stream for USB/IP.
     fn serve(personality: Personality, serial: &str, stream: UnixStream) -> io::Result<Self> {
         let bus = Arc::new(Bus::new(personality, serial, stream.try_clone()?));
         let (serving, mut requests) = (Arc::clone(&bus), stream.try_clone()?);
@@ -60,13 +60,13 @@ impl Gadget {
         Ok(Self { bus, socket: stream, server: Some(server) })
     }
 
-    /// False once the other end of the cable is gone.
+    /// Returns false once the other end of the cable is unplugged.
     #[must_use]
     pub fn is_plugged_in(&self) -> bool {
         self.bus.is_plugged_in()
     }
 
-    /// Waits until a host uses the device, and gives the link to it; nothing if none came in time.
+    /// Waits until a host uses the device and returns the link to the host; `None` on timeout or when unplugged.
     #[must_use]
     pub fn wait_for_host(&self, patience: Duration) -> Option<Box<dyn Transport>> {
         let attachment = self.bus.wait_for_host(patience)?;

@@ -1,16 +1,16 @@
-//! What the device claims to be: descriptors (USB 2.0, chapter 9; HID 1.11; CDC PSTN 1.2).
+//! USB descriptors of the device by kind (USB 2.0, chapter 9; HID 1.11; CDC PSTN 1.2).
 
 use flotor_maglev::protocol::FRAME_BYTES;
 
-/// Vendor of all of them: pid.codes, whose first sixteen products are reserved for tests.
+/// Vendor id of all kinds: pid.codes, with its first sixteen products reserved for tests.
 pub const VENDOR: u16 = 0x1209;
 
-/// A way to be a USB device.
+/// Kind of the emulated USB device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Personality {
     /// A pair of interrupt endpoints in alternate setting 1; setting 0 is empty.
     Interrupt,
-    /// Likewise, of bulk endpoints.
+    /// A pair of bulk endpoints in alternate setting 1; setting 0 is empty.
     Bulk,
     /// A HID device with reports of one frame each way.
     Hid,
@@ -18,10 +18,10 @@ pub enum Personality {
     Serial,
 }
 
-/// Address of the endpoint from the host, and to the host.
+/// Addresses of the endpoints from the host and to the host.
 pub(super) const OUT: u8 = 0x01;
 pub(super) const IN: u8 = 0x81;
-/// Where a serial port would report its modem lines; it has nothing to say there.
+/// Address of the serial port's notification endpoint, which never sends.
 pub(super) const NOTIFY: u8 = 0x82;
 
 /// Types of descriptors.
@@ -37,12 +37,12 @@ const CLASS_SPECIFIC: u8 = 0x24;
 /// Types of endpoints.
 const TYPE_BULK: u8 = 2;
 const TYPE_INTERRUPT: u8 = 3;
-/// Largest packet of a bulk endpoint at high speed; USB 2.0 allows no other.
+/// Largest packet of a bulk endpoint at high speed, the only size that USB 2.0 allows.
 const BULK_BYTES: u16 = 512;
 const INTERRUPT_BYTES: u16 = 64;
 const _: () = assert!(INTERRUPT_BYTES as usize == FRAME_BYTES);
 
-/// A vendor's collection of 64 bytes in and 64 bytes out, without report numbers.
+/// Vendor-defined collection of 64 bytes in and 64 bytes out, without report numbers.
 pub(super) const REPORT_DESCRIPTOR: [u8; 27] = [
     0x06, 0x00, 0xff, // usage page: vendor
     0x09, 0x01, // usage 1
@@ -55,7 +55,7 @@ pub(super) const REPORT_DESCRIPTOR: [u8; 27] = [
 ];
 
 impl Personality {
-    /// Product number: each personality is a product, so that no system takes one for another.
+    /// Returns the product id: one per kind, so that no system confuses their drivers.
     #[must_use]
     pub const fn product(self) -> u16 {
         match self {
@@ -66,7 +66,7 @@ impl Personality {
         }
     }
 
-    /// The address the plugin finds it by (`usb`, `hid`).
+    /// Returns the address for the plugin's parameter `address` (transports `usb`, `hid`).
     #[must_use]
     pub fn address(self) -> String {
         format!("{VENDOR:04x}:{:04x}", self.product())
@@ -75,7 +75,7 @@ impl Personality {
     pub(super) fn device(self) -> Vec<u8> {
         let [vendor_low, vendor_high] = VENDOR.to_le_bytes();
         let [product_low, product_high] = self.product().to_le_bytes();
-        // A serial port says what it is in the device, the others in their interface.
+        // A serial port has its class in the device descriptor, the others in the interface descriptor.
         let class = if self == Self::Serial { 2 } else { 0 };
         let (usb_2, packet, strings, one_configuration) = ([0x00, 0x02], 64, [1, 2, 3], 1);
         let mut bytes = vec![18, DEVICE];
@@ -111,7 +111,7 @@ impl Personality {
             }
             Self::Serial => {
                 body.extend(interface(0, 0, 1, [2, 2, 1]));
-                // Header 1.10; calls are data on interface 1; line coding and state are understood; union of 0 and 1.
+                // Header 1.10; calls as data on interface 1; line coding and state are supported; union of 0 and 1.
                 body.extend([5, CLASS_SPECIFIC, 0, 0x10, 0x01, 5, CLASS_SPECIFIC, 1, 0, 1]);
                 body.extend([4, CLASS_SPECIFIC, 2, 2, 5, CLASS_SPECIFIC, 6, 0, 1]);
                 body.extend(endpoint(NOTIFY, TYPE_INTERRUPT, 8, EVERY_16_MILLISECONDS));
@@ -128,7 +128,7 @@ impl Personality {
         bytes
     }
 
-    /// A string; 0 says which languages there are.
+    /// Returns a string descriptor; number 0 lists the languages.
     pub(super) fn string(self, number: u8, serial: &str) -> Option<Vec<u8>> {
         let text = match number {
             0 => return Some(vec![4, STRING, 0x09, 0x04]), // American English
@@ -137,14 +137,14 @@ impl Personality {
             3 => serial,
             _ => return None,
         };
-        // A descriptor has one byte for its length.
+        // The length field of a descriptor has one byte.
         let mut bytes: Vec<u8> = text.encode_utf16().take(126).flat_map(u16::to_le_bytes).collect();
         bytes.splice(0..0, [u8::try_from(bytes.len() + 2).unwrap_or(u8::MAX), STRING]);
         Some(bytes)
     }
 }
 
-/// `bInterval` at high speed: 2^(n-1) microframes of 125 µs.
+/// Values of `bInterval` at high speed: 2^(n-1) microframes of 125 µs.
 const EVERY_MICROFRAME: u8 = 1;
 const EVERY_16_MILLISECONDS: u8 = 8;
 

@@ -1,59 +1,59 @@
-//! What goes wrong on purpose: on a connection, on the tick, in the machine; once, when the flotor is in a state.
+//! Injected faults: on a connection, on the tick, in the machine; each once, in a given state of the flotor.
 
 use super::controller::Flight;
 use flotor_maglev::ml_api::{FaultBits, Status};
 use std::fmt;
 use std::str::FromStr;
 
-/// How long a fault of the machine lasts, s.
+/// Duration of an injected fault of the machine, s.
 const MACHINE_FAULT_S: f64 = 0.5;
 
-/// What goes wrong.
+/// Kind of an injected fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MisbehaviorKind {
-    /// The client is never answered again.
+    /// No more replies to this client.
     Silence,
-    /// Half a reply, and then nothing.
+    /// Half a reply, and no more after that.
     HalfFrame,
-    /// The client's connections are closed in order.
+    /// Orderly close of the client's connections.
     Close,
-    /// They are reset.
+    /// Reset of the client's connections.
     Reset,
-    /// A reply comes three seconds late.
+    /// A reply delayed by three seconds.
     Stall,
-    /// A reply is four bytes short.
+    /// A reply shortened by four bytes.
     WrongLength,
-    /// Every so many calls are answered with this status.
+    /// This status in every Nth reply.
     Status(Status, u32),
-    /// A tick comes 50 ms late.
+    /// A tick delayed by 50 ms.
     LateTick,
-    /// The machine has this fault.
+    /// A fault of the machine.
     Machine(FaultBits),
 }
 
-/// When it does.
+/// State in which a fault occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum When {
-    /// At once.
+    /// In any state.
     Anytime,
-    /// In a state of the flotor.
+    /// In this state of the flotor.
     In(Flight),
-    /// In the air with ticks wanted.
+    /// While levitating, with a client registered for ticks.
     Ticking,
 }
 
-/// What goes wrong, and when.
+/// An injected fault with its state and delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misbehavior {
-    /// What.
+    /// Kind of the fault.
     pub kind: MisbehaviorKind,
-    /// When.
+    /// State in which the fault occurs.
     pub when: When,
-    /// How long after that began, s.
+    /// Delay after the start of the state, s.
     pub after_s: f64,
 }
 
-/// What cannot be read as a misbehavior.
+/// Error: text that describes no fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unknown(String);
 
@@ -120,28 +120,28 @@ impl FromStr for Misbehavior {
     }
 }
 
-/// What is done to a call.
+/// Treatment of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Deed {
-    /// It is answered.
+    /// Normal reply.
     Answer,
-    /// Nothing is sent, now and later.
+    /// No reply, now and later.
     Silence,
-    /// Half of the reply is sent, and nothing later.
+    /// Half of the reply, and no more after that.
     HalfFrame,
-    /// The connections are closed in order.
+    /// Orderly close of the connections.
     Close,
-    /// They are reset.
+    /// Reset of the connections.
     Reset,
-    /// The reply comes late.
+    /// Delayed reply.
     Stall,
-    /// The reply is four bytes short.
+    /// Reply shortened by four bytes.
     WrongLength,
-    /// The reply says this and nothing is done.
+    /// Reply with this status, without any effect of the call.
     Status(Status),
 }
 
-/// Misbehaviors that are still to come, and the client that suffers.
+/// Pending faults, and the affected client.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plan {
     pending: Vec<(Misbehavior, f64)>,
@@ -156,7 +156,7 @@ impl Plan {
         Self { pending: misbehaviors.into_iter().map(|one| (one, 0.0)).collect(), ..Self::default() }
     }
 
-    /// A servo interval of this length, s, in this state; what the machine has for a fault.
+    /// Advances by a servo interval, s, in this state; returns the injected faults of the machine.
     pub(super) fn advance(&mut self, flight: Flight, is_ticking: bool, dt_s: f64) -> FaultBits {
         for (one, in_state_s) in &mut self.pending {
             *in_state_s = if is_now(one.when, flight, is_ticking) { *in_state_s + dt_s } else { 0.0 };
@@ -174,7 +174,7 @@ impl Plan {
         self.machine.map_or(FaultBits::NONE, |(bits, _)| bits)
     }
 
-    /// The first that is due of some kind.
+    /// Takes the first due fault of a kind.
     fn take(&mut self, is_wanted: impl Fn(MisbehaviorKind) -> bool) -> Option<MisbehaviorKind> {
         let is_due =
             |(one, in_state_s): &(Misbehavior, f64)| is_wanted(one.kind) && *in_state_s > one.after_s;
@@ -182,17 +182,17 @@ impl Plan {
         Some(self.pending.remove(place).0.kind)
     }
 
-    /// Whether the next tick is to come late; once.
+    /// Returns true once for a delayed tick.
     pub(super) fn delays_tick(&mut self) -> bool {
         std::mem::take(&mut self.is_tick_late)
     }
 
-    /// Whether a client is never answered again.
+    /// Returns true if the client gets no more replies.
     pub(super) fn has_silenced(&self, client: u64) -> bool {
         self.silenced == Some(client)
     }
 
-    /// What is done to a client's next call.
+    /// Returns the treatment of a client's next call.
     pub(super) fn deed(&mut self, client: u64) -> Deed {
         if self.has_silenced(client) {
             return Deed::Silence;

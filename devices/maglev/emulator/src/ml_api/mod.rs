@@ -1,12 +1,12 @@
-//! The controller of the Maglev 200 as its clients see it: the ML API on TCP, gains per axis, procedures, events.
+//! The controller of the Maglev 200 as seen by its clients: the ML API on TCP, gains per axis, procedures, events.
 //!
 //! ```text
 //! connections -> server -> controller: requests, gains, procedures -> wrench -> plant -> sample -> ticks, events
 //! ```
 //!
-//! - [`controller`]: what the machine does. Pure: requests and samples come in, replies and a wrench come out.
+//! - [`controller`]: the machine's behaviour. Pure: requests and samples in, replies and a wrench out.
 //! - [`server`]: connections, clients, callback connections, events.
-//! - [`misbehavior`]: what goes wrong on purpose.
+//! - [`misbehavior`]: injected faults.
 //! - [`Machine`]: the servo loop over a [`Plant`](crate::Plant); [`proxy`]: the host's loop over any device.
 
 pub mod controller;

@@ -1,8 +1,8 @@
-//! Any device for programs that were written for the Maglev 200: the controller as a force model.
+//! Any device for programs written for the Maglev 200: the controller as a force model.
 //!
-//! The host runs the device, with its envelope, its watchdog and its recording; this model takes the handle's pose for the
-//! flotor's, and what the clients command through the controller for its wrench. A tick of the loop is a servo interval; a
-//! command acts from the next tick on.
+//! The host runs the device, with its envelope, watchdog and recording; this model uses the handle's pose as the flotor's,
+//! and the wrench commanded by the clients as its output. A tick of the loop is a servo interval; a command acts from the
+//! next tick on.
 
 use super::controller::{Commanders, Controller, ControllerConfig, ForceCommand, Silence};
 use super::server::{Hub, Server};
@@ -49,7 +49,7 @@ const SCHEMA: &[Parameter] = &[
     ),
 ];
 
-/// The controller as a model.
+/// The controller as a force model.
 pub struct MlApiModel {
     hub: Arc<Hub>,
     listen: Option<String>,
@@ -57,7 +57,7 @@ pub struct MlApiModel {
     server: Option<Server>,
     values: [f64; SCHEMA.len()],
     period_s: f64,
-    /// What was answered last: a step never waits for a client's call.
+    /// Last output, repeated while a client's call holds the lock: a step never waits.
     wrench: Wrench,
 }
 
@@ -92,7 +92,7 @@ impl ForceModel for MlApiModel {
             *value = settings.number_or_default(parameter.id());
         }
         Ok(Self {
-            // Nobody writes lines in a tick.
+            // No log: a tick must not write lines.
             hub: Arc::new(Hub::new(Controller::new(config), Vec::new(), false, Box::new(|_| ()))),
             listen: settings.text("listen").map(str::to_owned),
             reach: match settings.choice_or_default("reach") {
@@ -121,7 +121,7 @@ impl ForceModel for MlApiModel {
         Ok(())
     }
 
-    /// One call of the system at most, which wakes the threads of the connections.
+    /// Runs one servo interval. One system call at most, to wake the threads of the connections.
     fn step(&mut self, input: &Input) -> Output {
         if !(input.pose.is_finite() && input.twist.is_finite()) {
             return Output::new(Wrench::ZERO, f64::NAN, StepStatus::InvalidInput);

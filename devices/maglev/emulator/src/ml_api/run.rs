@@ -1,4 +1,4 @@
-//! The servo loop: a plant, a controller, a clock.
+//! The servo loop over a plant, a controller and a clock.
 
 use super::server::Hub;
 use crate::ml_api::server::TickWait;
@@ -8,40 +8,40 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Longest delay that is made up for; what is more is lost.
+/// Longest delay to catch up; any excess is dropped.
 const MADE_UP: Duration = Duration::from_secs(1);
-/// How far behind its time the loop may fall because it waits for clients that answer late.
+/// Longest delay of the loop caused by waiting for slow clients.
 const LENIENCE: Duration = Duration::from_millis(60);
-/// How long a lockstep loop waits for an acknowledgement before it looks whether it is to end.
+/// Poll interval of a lockstep loop for its stop flag, while waiting for an acknowledgement.
 const LOOK: Duration = Duration::from_millis(50);
-/// How long a lockstep loop sleeps where nothing happens.
+/// Period of a lockstep loop without clients.
 const NAP: Duration = Duration::from_millis(1);
 
-/// How long a loop that is so late waits for the answers to its ticks, after an interval of this length. Most machines keep a
-/// client from running for some milliseconds now and then: the loop falls behind with it and makes the intervals up. Beyond
-/// [`LENIENCE`] it catches up, whoever does not answer, and still gives a client that does a chance.
+/// Returns the timeout for tick acknowledgements, for the present delay of the loop and its period. Most machines suspend a
+/// client for some milliseconds now and then: the loop is delayed as well and catches up later. Beyond [`LENIENCE`] it
+/// catches up without waiting for slow clients, and still waits half a period for the others.
 fn patience(late: Duration, period: Duration) -> Duration {
     LENIENCE.saturating_sub(late).max(period / 2)
 }
 
-/// A plant under the controller.
+/// A plant driven by the controller.
 pub struct Machine<P> {
     hub: Arc<Hub>,
     plant: P,
     pace: Pace,
-    /// Time of the plant so far, s and, rounded, µs.
+    /// Time of the plant, s, and rounded to µs.
     now_s: f64,
     now_us: u64,
 }
 
 impl<P: Plant> Machine<P> {
-    /// A machine at rest.
+    /// Creates a machine at rest.
     pub fn new(hub: Arc<Hub>, pace: Pace, mut plant: P) -> Self {
         hub.observe(&plant.advance(0, &Wrench::ZERO));
         Self { hub, plant, pace, now_s: 0.0, now_us: 0 }
     }
 
-    /// Runs until `stop`.
+    /// Runs the servo loop until `stop`.
     pub fn run(&mut self, stop: &AtomicBool) {
         match self.pace {
             Pace::RealTime => self.run_in_real_time(stop),
@@ -67,7 +67,7 @@ impl<P: Plant> Machine<P> {
         }
     }
 
-    /// An interval for each acknowledged tick. Procedures go on as fast as they can; where nobody waits, time passes slowly.
+    /// Runs an interval per acknowledged tick. Procedures run as fast as possible; without clients time passes slowly.
     fn run_in_lockstep(&mut self, stop: &AtomicBool) {
         let mut sample = self.plant.advance(0, &Wrench::ZERO);
         while !stop.load(Ordering::Relaxed) {
@@ -96,7 +96,7 @@ impl<P: Plant> Machine<P> {
     fn advance(&mut self, period_s: f64) -> crate::controller::Sample {
         let wrench = self.hub.drive(period_s);
         self.now_s += period_s;
-        // A period need not be a whole number of µs: the plant follows within one.
+        // A period need not be a whole number of µs: the plant is accurate to one.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a time, positive
         let until_us = (self.now_s * 1.0e6).round() as u64;
         let dt_us = until_us - self.now_us;

@@ -1,10 +1,10 @@
 //! USB: packets on a pair of interrupt (or bulk) endpoints, through libusb.
 //!
-//! Where the endpoints are, and what kind they are, is read from the descriptors. They are looked for in alternate
-//! settings other than 0 first: a device that keeps setting 0 empty is told by the kernel when this process dies.
+//! The endpoints and their kind are read from the descriptors. Alternate settings other than 0 are tried first: the kernel
+//! notifies a device with an empty setting 0 when this process dies.
 //!
-//! Reads wait on the bus all the time, several of them, and a write is submitted and not waited for (`queue`): a tick
-//! only ever takes what is there.
+//! Several reads are always pending on the bus, and a write is submitted without a wait (`queue`): a tick only takes
+//! packets already received.
 
 mod queue;
 
@@ -17,10 +17,11 @@ use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbCon
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// A device node is there before the kernel has configured the device (seen: up to 14 ms; udev rules take longer).
+/// Timeout of a claim: the kernel may configure a device after its node appears (seen: up to 14 ms; udev rules take
+/// longer).
 const CLAIM_PATIENCE: Duration = Duration::from_secs(2);
 const CLAIM_NAP: Duration = Duration::from_millis(10);
-/// A pair of endpoints and how to select them.
+/// Pair of endpoints, with the interface and setting that select them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Endpoints {
     interface: u8,
@@ -34,14 +35,14 @@ struct Endpoints {
 pub struct UsbLink {
     handle: Arc<DeviceHandle<Context>>,
     endpoints: Endpoints,
-    /// Gone only while the link is dropped: nothing may be in flight when the setting changes.
+    /// `None` only while the link is dropped: no transfer may be in flight when the setting changes.
     queue: Option<Queue>,
 }
 
-/// Opens and claims a device. Not real-time.
+/// Opens and claims a USB device. Not real-time.
 ///
 /// # Errors
-/// [`OpenError`].
+/// [`OpenError`] if the address is invalid, or no device can be claimed there.
 pub fn open(address: &str) -> Result<UsbLink, OpenError> {
     let wanted = UsbAddress::parse(address).ok_or_else(|| UsbAddress::misread(address))?;
     let refused = |error| refused(address, &wanted, error);
@@ -72,7 +73,7 @@ fn claim(device: &Device<Context>, wanted: &UsbAddress) -> Result<(DeviceHandle<
     loop {
         let tried = try_claim(device, wanted);
         match tried {
-            // Too early, or really so: time tells.
+            // Either not ready yet, or a lasting error: retry until the timeout.
             Err(Error::NotFound | Error::Busy | Error::Access) if started.elapsed() < CLAIM_PATIENCE => {
                 std::thread::sleep(CLAIM_NAP);
             }
@@ -93,14 +94,14 @@ fn try_claim(
         }
     }
     let endpoints = endpoints(device)?.ok_or(Error::NotSupported)?;
-    // A generic driver of the kernel steps aside; where that is not supported there is none.
+    // Detaches a generic driver of the kernel; where detaching is not supported, no such driver exists.
     let _ = handle.set_auto_detach_kernel_driver(true);
     handle.claim_interface(endpoints.interface)?;
     handle.set_alternate_setting(endpoints.interface, endpoints.alternate)?;
     Ok((handle, endpoints))
 }
 
-/// The best pair of endpoints: interrupt before bulk, alternate settings before setting 0.
+/// Returns the best pair of endpoints: interrupt before bulk, alternate settings before setting 0.
 fn endpoints(device: &Device<Context>) -> Result<Option<Endpoints>, Error> {
     let configuration = device.active_config_descriptor()?;
     let mut found = Vec::new();
@@ -148,7 +149,7 @@ impl Transport for UsbLink {
 impl Drop for UsbLink {
     fn drop(&mut self) {
         self.queue = None;
-        // Told in so many words; the kernel would say it too.
+        // Ends the use of the device explicitly, as the kernel would do anyway.
         let _ = self.handle.set_alternate_setting(self.endpoints.interface, 0);
         let _ = self.handle.release_interface(self.endpoints.interface);
     }
@@ -159,7 +160,7 @@ fn refused(address: &str, wanted: &UsbAddress, error: Error) -> OpenError {
     match error {
         Error::Access => OpenError::Forbidden { address, remedy: remedy("usb", wanted) },
         Error::Busy => OpenError::Busy { address },
-        // libusb opens no device whose driver it cannot speak to.
+        // libusb cannot open a device with an incompatible driver.
         Error::NotSupported => match driver_remedy(wanted.vendor, wanted.product) {
             Some(remedy) => OpenError::NoDriver { address, remedy },
             None => OpenError::Missing { address, cause: error.to_string() },

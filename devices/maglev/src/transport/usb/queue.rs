@@ -1,8 +1,8 @@
-//! Transfers in flight: several reads that wait for the device, and one write.
+//! Transfers in flight: several pending reads, and one write.
 //!
-//! A read that has ended is delivered and submitted again from its own end, so that the device always finds one
-//! waiting; a packet costs one wake-up, and no tick waits for the bus. `rusb` wraps only transfers that block, so this
-//! module talks to libusb itself, and is the one place of this crate that does.
+//! A completed read is delivered and resubmitted from its own callback, so that the device always finds one pending; a
+//! packet costs one wake-up, and no tick waits for the bus. `rusb` wraps only blocking transfers, so this module calls
+//! libusb directly, the only one of this crate to do so.
 //!
 //! ```text
 //!            submit (tick)                     libusb's thread            take (tick)
@@ -31,30 +31,30 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Reads that wait on the bus: one is being delivered while the next is filled, and two for a late thread.
+/// Number of pending reads: one is being delivered while the next is filled, and two for a late thread.
 const WAITING_READS: usize = 4;
-/// Packets between libusb's thread and the tick: a few periods.
+/// Capacity of the channel from libusb's thread to the tick, packets: a few periods.
 const KEPT_PACKETS: usize = 16;
-/// A multiple of every packet size, or a longer packet would be lost to an overflow.
+/// Buffer size: a multiple of every packet size, or a longer packet would be lost to an overflow.
 const BUFFER_BYTES: usize = 512;
-/// A device that takes nothing for so long has lost this command; the ones since were dropped anyway.
+/// Write timeout: after that time a device has lost the command; later ones were dropped meanwhile.
 const WRITE_TIMEOUT_MS: u32 = 20;
-/// How often libusb's thread looks whether it is still wanted.
+/// Poll interval of libusb's thread for its end flag.
 const LOOK_AROUND: Duration = Duration::from_millis(50);
 
-/// What the ends of transfers tell the rest.
+/// State shared with the callbacks of the transfers.
 struct Shared {
     packets: SyncSender<Incoming>,
-    /// Transfers that libusb has.
+    /// Number of transfers owned by libusb.
     in_flight: AtomicUsize,
     writing: AtomicBool,
     lost: AtomicBool,
     ending: AtomicBool,
 }
 
-/// Reads and a write on a claimed interface.
+/// Queue of reads and a write on a claimed interface.
 pub(super) struct Queue {
-    // Before the handle, in the order of dropping: freeing a transfer frees the device, in a live context.
+    // Declared before the handle, so dropped first: freeing a transfer uses the device, in a live context.
     reads: Vec<Transfer>,
     write: Transfer,
     handle: Arc<DeviceHandle<Context>>,
@@ -63,11 +63,11 @@ pub(super) struct Queue {
     events: Option<JoinHandle<()>>,
 }
 
-/// A transfer of libusb's with its buffer, both owned, and what its end tells.
+/// A libusb transfer with its buffer, both owned, and the state shared with its callback.
 struct Transfer {
     raw: NonNull<libusb_transfer>,
     buffer: NonNull<[u8; BUFFER_BYTES]>,
-    /// The `user_data` of the transfer: lives as long as it.
+    /// Target of the transfer's `user_data`; lives as long as the transfer.
     shared: Arc<Shared>,
 }
 
@@ -76,7 +76,7 @@ struct Transfer {
 unsafe impl Send for Transfer {}
 
 impl Queue {
-    /// Submits the reads. Not real-time.
+    /// Creates the transfers, submits the reads and starts libusb's thread. Not real-time.
     pub(super) fn start(
         handle: Arc<DeviceHandle<Context>>,
         endpoints: Endpoints,
@@ -95,7 +95,7 @@ impl Queue {
         let reads = (0..WAITING_READS).map(|_| make(endpoints.input, read_ended as Ended, 0));
         let reads = reads.collect::<Result<Vec<_>, _>>()?;
         let write = make(endpoints.output, write_ended as Ended, WRITE_TIMEOUT_MS)?;
-        // From here on the value itself waits for all that is in flight when it is dropped.
+        // From here on, dropping the value waits for all transfers in flight.
         let mut queue = Self { reads, write, handle, shared, packets, events: None };
         for read in &queue.reads {
             // SAFETY: made above, and submitted here for the first time.
@@ -105,7 +105,7 @@ impl Queue {
         let thread = std::thread::Builder::new().name("flotor-usb".to_owned());
         let events = thread.spawn(move || {
             while !shared.ending.load(Ordering::Acquire) {
-                // An interrupted wait is tried again; the ends of transfers say what is wrong with the device.
+                // An interrupted wait is retried; the callbacks report errors of the device.
                 let _ = context.handle_events(Some(LOOK_AROUND));
             }
         });
@@ -113,8 +113,7 @@ impl Queue {
         Ok(queue)
     }
 
-    /// Sends a packet unless the one before is still on its way. Real-time: bounded, no allocation; one call of the
-    /// system.
+    /// Sends a packet unless the previous one is still in transit. Real-time: bounded, no allocation; one system call.
     pub(super) fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost> {
         if self.shared.lost.load(Ordering::Acquire) {
             return Err(LinkLost);
@@ -132,7 +131,7 @@ impl Queue {
         })
     }
 
-    /// The oldest packet. Real-time: bounded, no allocation.
+    /// Returns the oldest packet, if any. Real-time: bounded, no allocation.
     pub(super) fn receive(&self) -> Result<Incoming, LinkLost> {
         match self.packets.try_recv() {
             Ok(incoming) => Ok(incoming),
@@ -140,7 +139,7 @@ impl Queue {
         }
     }
 
-    /// The oldest packet, waiting for it. Not real-time.
+    /// Returns the oldest packet, waiting at most `patience`. Not real-time.
     pub(super) fn wait(&self, patience: Duration) -> Result<Incoming, LinkLost> {
         match self.packets.recv_timeout(patience) {
             Ok(incoming) => Ok(incoming),
@@ -163,7 +162,7 @@ impl Drop for Queue {
         if let Some(events) = self.events.take() {
             let _ = events.join();
         }
-        // Every cancelled transfer ends once more; until then libusb has its buffer.
+        // Every cancelled transfer ends with a callback; until then libusb owns its buffer.
         for _ in 0..ENDING_LOOKS {
             if self.shared.in_flight.load(Ordering::Acquire) == 0 {
                 break;
@@ -171,16 +170,16 @@ impl Drop for Queue {
             let _ = self.handle.context().handle_events(Some(LOOK_AROUND));
         }
         if self.shared.in_flight.load(Ordering::Acquire) != 0 {
-            // The transfers stay (see their `drop`), and so does the device they are on.
+            // The transfers are leaked (see their `drop`), and so is their device.
             std::mem::forget(Arc::clone(&self.handle));
         }
     }
 }
 
-/// Two seconds, after which the kernel is not waited for any longer.
+/// Limit of waits for cancelled transfers: two seconds in total.
 const ENDING_LOOKS: u32 = 40;
 
-/// What libusb calls at the end of a transfer.
+/// Callback at the end of a transfer.
 type Ended = extern "system" fn(*mut libusb_transfer);
 
 impl Transfer {
@@ -195,7 +194,7 @@ impl Transfer {
         // SAFETY: no isochronous packets; the result is checked.
         let raw = NonNull::new(unsafe { libusb_alloc_transfer(0) }).ok_or(rusb::Error::NoMem)?;
         let buffer = NonNull::from(Box::leak(Box::new([0_u8; BUFFER_BYTES])));
-        // A write is a frame, a read whatever comes.
+        // A write sends a frame, a read accepts up to the whole buffer.
         let length = if endpoint & 0x80 == 0 { FRAME_BYTES } else { BUFFER_BYTES };
         let fields = raw.as_ptr();
         // SAFETY: freshly allocated by libusb and nobody else's yet. Each field is written in place: the zeros in between
@@ -217,7 +216,7 @@ impl Transfer {
         Ok(Self { raw, buffer, shared: Arc::clone(shared) })
     }
 
-    /// Hands the transfer to libusb until it ends. Real-time: bounded, no allocation; one call of the system.
+    /// Submits the transfer to libusb. Real-time: bounded, no allocation; one system call.
     ///
     /// # Safety
     /// The transfer is not in flight.
@@ -238,7 +237,7 @@ impl Transfer {
 impl Drop for Transfer {
     fn drop(&mut self) {
         if self.shared.in_flight.load(Ordering::Acquire) != 0 {
-            // A kernel that does not give transfers back: what it may still write to is never freed.
+            // The kernel has not returned the transfers: memory that it may still write to is never freed.
             std::mem::forget(Arc::clone(&self.shared));
             return;
         }
@@ -265,12 +264,12 @@ extern "system" fn read_ended(transfer: *mut libusb_transfer) {
         }
         LIBUSB_TRANSFER_OVERFLOW => Some(Incoming::Malformed),
         LIBUSB_TRANSFER_TIMED_OUT => Some(Incoming::Nothing),
-        // Gone, halted, or taken back at the end.
+        // Device gone, endpoint halted, or transfer cancelled.
         _ => None,
     };
     if let Some(incoming) = incoming {
         if incoming != Incoming::Nothing {
-            // A tick that does not take them loses the newest ones, and learns so from the sequence numbers.
+            // A full channel drops the newest packets; the sequence numbers show the loss.
             let _ = shared.packets.try_send(incoming);
         }
         // SAFETY: it has just ended, so it is not in flight.

@@ -1,4 +1,4 @@
-//! Recordings of runs: MCAP files with poses in Foxglove's schema.
+//! Reader of recordings of runs: MCAP files with poses in Foxglove's schema.
 
 use super::Sample;
 use flotor_hal::glam::{DQuat, DVec3};
@@ -9,14 +9,14 @@ use std::io::{Read, Seek};
 /// Schema of a pose in a recording.
 const POSE_SCHEMA: &str = "foxglove.FrameTransform";
 
-/// Remedy for a file that is something else.
+/// Remedy for another kind of file.
 const HOW_TO_MAKE_ONE: &str = "`flotor run --record FILE.mcap` makes one";
 
 /// Problem and remedy of a recording without its end.
 const TRUNCATED: &str = "is truncated: the end of the run is missing; record again, or name the copy that `mcap recover` \
                          makes of what is there";
 
-/// What of `foxglove.FrameTransform` is read (<https://docs.foxglove.dev/docs/sdk/schemas/frame-transform>).
+/// Decoded fields of `foxglove.FrameTransform` (<https://docs.foxglove.dev/docs/sdk/schemas/frame-transform>).
 #[derive(Clone, PartialEq, Message)]
 struct FrameTransform {
     #[prost(message, optional, tag = "4")]
@@ -56,11 +56,11 @@ const ENCODING: &str = "protobuf";
 #[derive(Clone, Copy)]
 enum Topic {
     Pose,
-    /// Of these only the numbers count: a gap between them is a gap of the trajectory.
+    /// Ticks; only their sequence numbers are used: a gap there is a gap in the trajectory.
     Tick,
 }
 
-/// Reads the poses of a recording, of which not one may be missing.
+/// Reads the poses of a recording; an error if a single tick is missing.
 pub(super) fn read(file: impl Read + Seek) -> Result<Vec<Sample>, String> {
     let mut messages = MessageReader::open(file, topic_of).map_err(|error| match error {
         OpenError::Io(cause) => format!("cannot be read: {cause}"),

@@ -1,4 +1,4 @@
-//! Tables of comma-separated values.
+//! Reader of trajectories from tables of comma-separated values.
 
 use super::Sample;
 use flotor_hal::glam::DVec3;
@@ -6,10 +6,10 @@ use flotor_hal::{HashLines, Table, TextProblem, orientation_from_rotation_vector
 
 /// Columns, in this order; the last three may be missing.
 const COLUMNS: [&str; 7] = ["time_s", "x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
-/// Columns that must be there.
+/// Number of required columns.
 const LEAST_COLUMNS: usize = 4;
 
-/// Reads a table.
+/// Reads a trajectory.
 pub(super) fn read(text: &str) -> Result<Vec<Sample>, TextProblem> {
     let table = Table::parse(text, HashLines::Comments)?;
     let columns = table.columns().len();

@@ -1,4 +1,4 @@
-//! From the text of a script to its legs: every number checked, every complaint with file, line and key.
+//! Parser of scripts: checks every number and reports errors with file, line and key.
 
 use super::{Grip, Leg, Movement, Place, Script};
 use flotor_hal::glam::DVec3;
@@ -10,31 +10,31 @@ use std::path::Path;
 
 /// Largest script read, bytes: a person writes a few hundred.
 const MAX_BYTES: u64 = 1 << 20;
-/// Most movements of a script, repetitions included.
+/// Limit of movements in a script, repetitions included.
 const MAX_LEGS: usize = 10_000;
 /// Longest movement, s.
 const LONGEST_S: f64 = 3600.0;
-/// Shortest movement, s: below that it is a blow, not a movement.
+/// Shortest movement, s; anything shorter is an impact.
 const SHORTEST_S: f64 = 0.01;
-/// Farthest place to aim at along each axis, mm. A relaxed hand aims deep into what it presses.
+/// Largest distance of a place along each axis, mm: a relaxed hand must aim deep into the object it presses.
 const FARTHEST_MM: f64 = 100.0;
-/// Largest rotation to aim at about each axis, degrees.
+/// Largest rotation about each axis, degrees.
 const MOST_TURNED_DEG: f64 = 45.0;
-/// Largest force to mean along each axis, N.
+/// Largest intended force along each axis, N.
 const STRONGEST_N: f64 = 100.0;
-/// Most pulses of force in a row.
+/// Largest number of force pulses in a row.
 const MOST_PULSES: u32 = 100;
-/// Slowest repetition, Hz.
+/// Smallest frequency, Hz.
 const SLOWEST_HZ: f64 = 0.05;
-/// Fastest repetition, Hz: twice what a hand can do (about 10 Hz).
+/// Largest frequency, Hz: twice the limit of a hand (about 10 Hz).
 const FASTEST_HZ: f64 = 20.0;
 
-/// What is wrong with a script. Prints file, line, key, and what would be right.
+/// Error in a script. Prints file, line, key, and the expected content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScriptError {
     /// The file, or the name of a built-in script.
     pub file: String,
-    /// Line, from 1; 0 where it is about the file as a whole.
+    /// Line, from 1; 0 for the file as a whole.
     pub line: usize,
     /// Key and problem.
     pub problem: String,
@@ -114,7 +114,7 @@ struct PushText {
 #[serde(deny_unknown_fields)]
 struct ReleaseText {}
 
-/// How often the sequence is run through.
+/// Number of repetitions of the sequence.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(try_from = "i64")]
 struct Repeat(usize);
@@ -134,7 +134,7 @@ impl TryFrom<i64> for Repeat {
     }
 }
 
-/// A time, s.
+/// Duration, s.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(try_from = "f64")]
 struct Duration(f64);
@@ -154,7 +154,7 @@ impl Duration {
     }
 }
 
-/// Repetitions a second, Hz.
+/// Frequency, Hz.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(try_from = "f64")]
 struct Frequency(f64);
@@ -233,7 +233,7 @@ impl TryFrom<[f64; 3]> for Forces {
 }
 
 fn within(number: f64, least: f64, most: f64, unit: &str) -> Result<f64, String> {
-    // Written so that NaN is refused too.
+    // Written so that NaN is rejected too.
     if number >= least && number <= most {
         Ok(number)
     } else {
@@ -265,7 +265,7 @@ pub(super) fn read_file(path: &Path) -> Result<Script, ScriptError> {
     read(&file, &text)
 }
 
-/// Reads a script from its text.
+/// Parses a script.
 pub(super) fn read(file: &str, text: &str) -> Result<Script, ScriptError> {
     let script: ScriptText = toml::from_str(text).map_err(|error| {
         let message = error.message().lines().next().unwrap_or("not valid TOML");
@@ -291,7 +291,7 @@ pub(super) fn read(file: &str, text: &str) -> Result<Script, ScriptError> {
     Ok(laid_out(&script, count))
 }
 
-/// Puts one movement after the other.
+/// Lays out the movements in sequence.
 fn laid_out(script: &ScriptText, count: usize) -> Script {
     let (mut from, mut start_ns) = (Place::HOME, 0);
     let mut legs = Vec::with_capacity(count);
@@ -312,7 +312,7 @@ fn laid_out(script: &ScriptText, count: usize) -> Script {
     Script { grip, legs: legs.into(), release_ns }
 }
 
-/// What a step does from a place on, and for how long; nothing if it opens the hand.
+/// Returns the movement of a step from a place, with its duration; `None` for a release.
 fn movement(step: &StepText, from: &Place) -> Option<(Movement, Duration)> {
     let zero = DVec3::ZERO;
     Some(match step {
@@ -332,7 +332,7 @@ fn movement(step: &StepText, from: &Place) -> Option<(Movement, Duration)> {
             (Movement::Oscillate { amplitude, frequency_hz: frequency_hz.0 }, *duration_s)
         }
         StepText::Push(PushText { force_n, frequency_hz, pulses }) => {
-            // Whole pulses, so that the force ends as it began.
+            // Whole pulses, so that the force ends at zero.
             let duration = Duration(f64::from(pulses.0) / frequency_hz.0);
             (Movement::Push { force_n: force_n.0, frequency_hz: frequency_hz.0 }, duration)
         }
@@ -340,7 +340,7 @@ fn movement(step: &StepText, from: &Place) -> Option<(Movement, Duration)> {
     })
 }
 
-/// A complaint about a place in the text: its line, and the key that stands before it.
+/// Builds an error at a place in the text, with its line and the preceding key.
 fn complaint(file: &str, text: &str, span: Option<Range<usize>>, message: &str) -> ScriptError {
     let before = text.get(..span.map_or(0, |span| span.start)).unwrap_or(text);
     let line = before.matches('\n').count() + 1;
@@ -350,10 +350,10 @@ fn complaint(file: &str, text: &str, span: Option<Range<usize>>, message: &str) 
     ScriptError { file: file.to_owned(), line, problem }
 }
 
-/// The key in front of a value, given the line up to the value: `step = { duration_s = ` has `duration_s`.
+/// Returns the key before a value, given the line up to the value: `step = { duration_s = ` has `duration_s`.
 fn key_of_the_value(line: &str) -> Option<&str> {
     let (before, after) = line.rsplit_once('=')?;
-    // Behind the equals sign there may be the start of a list, but no other key.
+    // After the equals sign a list may begin, but no other key.
     let is_value = after.chars().all(|c| !c.is_alphabetic());
     let key = before.trim_end().rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next()?;
     (is_value && !key.is_empty()).then_some(key)

@@ -1,5 +1,5 @@
-//! The controller of the magnetic-levitation device without the device: its firmware and protocol on a real link,
-//! over the simulated flotor. `flotor emulate maglev` starts it.
+//! Emulator of the maglev device's controller: firmware and protocol on a real link, over the simulated flotor. `flotor
+//! emulate maglev` starts this program.
 
 mod ml_api;
 mod plant;
@@ -40,13 +40,13 @@ use std::sync::atomic::AtomicBool;
     flotor emulate maglev --pace lockstep --set preset=full --set hand=press --once\n  \
     flotor emulate maglev --calibration-rig /tmp/flotor-force")]
 struct Arguments {
-    /// What it speaks
+    /// Protocol of the controller
     #[arg(long, value_enum, default_value = "flotor")]
     protocol: ProtocolOption,
-    /// What the host connects by
+    /// Transport to the host
     #[arg(long, value_enum, default_value = "tcp")]
     transport: TransportOption,
-    /// Tcp: where to listen (port 0: any free one; default 127.0.0.1, port 5679, with the ML API 5678)
+    /// Tcp: address to listen at (port 0: any free one; default 127.0.0.1, port 5679, with the ML API 5678)
     #[arg(long, value_name = "HOST:PORT")]
     listen: Option<String>,
     #[command(flatten)]
@@ -54,7 +54,7 @@ struct Arguments {
     /// Pty: a name for the terminal, as a symbolic link
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// Who says when a cycle runs
+    /// Clock of the controller's cycles
     #[arg(long, value_enum, default_value = "real")]
     pace: PaceOption,
     /// Set a parameter of the simulated flotor (repeatable)
@@ -65,13 +65,13 @@ struct Arguments {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
-    /// Serial number it tells
+    /// Serial number of the controller
     #[arg(long, default_value = "emulated", value_name = "TEXT")]
     serial: String,
     /// Plugin file of the plant (default: the simulated flotor beside this program)
     #[arg(long, value_name = "FILE")]
     plant: Option<PathBuf>,
-    /// End when the first host is gone
+    /// End when the first host disconnects
     #[arg(long)]
     once: bool,
     #[command(flatten)]
@@ -88,14 +88,14 @@ enum ProtocolOption {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum TransportOption {
-    /// A connection
+    /// A TCP connection
     Tcp,
     /// A pseudo terminal: a serial port to the host
     Pty,
     /// A USB device with interrupt endpoints (with the module vhci_hcd, as root)
     #[cfg(target_os = "linux")]
     Usb,
-    /// Likewise, with bulk endpoints
+    /// A USB device with bulk endpoints (with the module vhci_hcd, as root)
     #[cfg(target_os = "linux")]
     UsbBulk,
     /// A USB HID device
@@ -108,9 +108,9 @@ enum TransportOption {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum PaceOption {
-    /// The machine's clock
+    /// Cycles by the machine's clock
     Real,
-    /// The host's commands: for a host on a virtual clock
+    /// A cycle for each command of the host, for a host on a virtual clock
     Lockstep,
 }
 
@@ -186,7 +186,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Listens where it is said, or at this port of this machine, and says where.
+/// Listens at the given address, or at this port of the loopback interface, and prints the address.
 fn listen(arguments: &Arguments, port: u16) -> Result<Port, Box<dyn Error>> {
     let at = arguments.listen.clone().unwrap_or_else(|| format!("127.0.0.1:{port}"));
     let port =
@@ -199,7 +199,7 @@ fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
     let mut clients = Clients::of(listen(arguments, tcp::PORT)?)?;
     loop {
         let stream = clients.wait_for_one()?;
-        // One that has left again is no failure.
+        // A client that has already disconnected is no error.
         let (Ok(from), Ok(stream)) = (stream.peer_addr(), prepared(stream)) else { continue };
         say(&format!("connected {from}"));
         let mut link = ServedHost { link: StreamLink::new(stream), tenure: Tenure::begin(&mut clients) };
@@ -210,7 +210,7 @@ fn serve_tcp(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
     }
 }
 
-/// A link that is lost when the tenure of its client is over; a request that is answered counts as a message.
+/// A link with the time limits of its client, lost when a limit is exceeded; each answered request counts as a message.
 struct ServedHost<'c, L> {
     link: L,
     tenure: Tenure<'c>,
@@ -233,7 +233,7 @@ impl<L: Transport> Transport for ServedHost<'_, L> {
 fn serve_pty(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     use serialport::{SerialPort, TTYPort};
     use std::time::Duration;
-    /// How often the terminal is looked at while nobody has it open.
+    /// Poll interval of the terminal while the other end is closed.
     const NAP: Duration = Duration::from_millis(2);
 
     let (mut ours, theirs) = TTYPort::pair()?;
@@ -246,7 +246,7 @@ fn serve_pty(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
     say(&format!("listening pty {name}"));
     let mut link = StreamLink::new(ours);
     loop {
-        // Until somebody opens the other end, reading says that it is closed.
+        // A read reports the other end as closed until a program opens it.
         while !link.is_open() {
             std::thread::sleep(NAP);
         }
@@ -258,7 +258,7 @@ fn serve_pty(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
     }
 }
 
-/// One line an event, at once: somebody may be waiting for it.
+/// Prints one line per event, unbuffered, as another program may wait for it.
 fn tell(event: Event) {
     match event {
         Event::Mode { mode, condition, silence_us, at_us } => {

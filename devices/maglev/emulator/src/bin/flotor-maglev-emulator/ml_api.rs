@@ -1,4 +1,4 @@
-//! The ML API: a flotor on its stator or in a hand, and the server its clients connect to.
+//! Serves the ML API: a flotor on its stator or in a simulated hand, and the server for clients.
 
 use super::{Arguments, TransportOption, listen};
 use crate::plant::LoadedPlant;
@@ -16,18 +16,18 @@ use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// A flotor of the Utah device that nobody holds, at rest on its stator, whose weight nothing but the controller carries.
+/// Settings for a free Utah flotor at rest on its stator, with the weight compensated only by the controller.
 const ON_STATOR: &[(&str, &str)] =
     &[("flotor", "utah"), ("hand", "open"), ("feedforward_n", "0"), ("start_z_mm", "-9.5")];
 
 #[derive(Args)]
 #[command(next_help_heading = "ML API")]
 pub(crate) struct MlApiArguments {
-    /// Serve this device, by the id of its plugin, instead of the emulated one: `--set` is for its parameters, the host's
-    /// envelope and watchdog stay in between
+    /// Serve this device, by the id of its plugin, instead of the emulated one: `--set` is for its parameters; the host's
+    /// envelope and watchdog stay active
     #[arg(long, value_name = "ID", conflicts_with_all = ["faults", "presses", "plant", "calibration_rig"])]
     pub(crate) device: Option<String>,
-    /// Recording of a device that is served
+    /// Recording file of the run with `--device`
     #[arg(long, default_value = "ml-api.mcap", value_name = "FILE")]
     pub(crate) record: std::path::PathBuf,
     /// Longest time of a tick of the host that serves a device, in ms (default: that of every run)
@@ -36,44 +36,44 @@ pub(crate) struct MlApiArguments {
     /// Run although a kill of this program's control group ends the watchdog process with it, which alone stops a device then
     #[arg(long, requires = "device")]
     pub(crate) accept_shared_control_group: bool,
-    /// Who holds the flotor at the start
+    /// Hand on the flotor at the start
     #[arg(long, value_enum, default_value = "none", value_name = "WHO")]
     hand: HandOption,
-    /// What a force command does to the gains
+    /// Effect of a force command on the gains
     #[arg(long, value_enum, default_value = "replace", value_name = "WHAT")]
     force_command: ForceOption,
-    /// Who may command: the first client that does, or all
+    /// Clients that may command: the first one that does, or all
     #[arg(long, value_enum, default_value = "one", value_name = "WHO")]
     commanders: CommandersOption,
-    /// What becomes of a flotor in the air whose client is gone or acknowledges no tick
+    /// Reaction to the loss of a client, or of its tick acknowledgements, while the flotor is levitating
     #[arg(long, value_enum, default_value = "land", value_name = "WHAT")]
     on_silence: SilenceOption,
-    /// Longest time without an acknowledged tick while a client drives by forces and wants ticks, in ms
+    /// Longest time without an acknowledged tick while a client commands forces and is registered for ticks, in ms
     #[arg(long, default_value_t = 500.0, value_name = "MS", value_parser = watchdog_ms)]
     watchdog_ms: f64,
-    /// What goes wrong, as KIND[@STATE][+MS], like reset@flying+200 (repeatable): silence, half-frame, close, reset, stall,
+    /// Fault to inject, as KIND[@STATE][+MS], like reset@flying+200 (repeatable): silence, half-frame, close, reset, stall,
     /// wrong-length, status=CODE/N (every Nth call), late-tick, out-of-range, over-temperature, over-current, over-speed;
     /// states landed, taking-off, flying, ticking, landing
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<Misbehavior>,
-    /// When a button is pressed, as left@1.5-2, in s from the start (repeatable)
+    /// Button press, as left@1.5-2, in s from the start (repeatable)
     #[arg(long = "press", value_name = "BUTTON@FROM-TO")]
     presses: Vec<Press>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum HandOption {
-    /// Nobody: it lies on the stator, and nothing but the controller carries its weight
+    /// No hand: the flotor lies on the stator, and only the controller compensates its weight
     None,
-    /// The simulated hand, as the parameters of the simulated flotor say; there is no stator
+    /// The simulated hand, configured by the parameters of the simulated flotor; there is no stator
     Simulated,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum ForceOption {
-    /// It takes their place
+    /// The force replaces the gains
     Replace,
-    /// It comes on top of them
+    /// The force is added to the gains
     Add,
 }
 
@@ -85,9 +85,9 @@ enum CommandersOption {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum SilenceOption {
-    /// It lands
+    /// Land the flotor
     Land,
-    /// It stays where it is
+    /// Continue without a reaction
     Ignore,
 }
 
@@ -96,7 +96,7 @@ fn watchdog_ms(text: &str) -> Result<f64, String> {
 }
 
 impl MlApiArguments {
-    /// Settings of the plant unless others are given.
+    /// Returns the default settings of the plant.
     pub(crate) fn plant_defaults(&self) -> &'static [(&'static str, &'static str)] {
         match self.hand {
             HandOption::None => ON_STATOR,
@@ -104,7 +104,7 @@ impl MlApiArguments {
         }
     }
 
-    /// Parameters of the model that is the controller of a device that is served.
+    /// Returns the parameters of the controller model for `--device`, as TOML.
     pub(crate) fn model_parameters(&self) -> String {
         let force_command = if matches!(self.force_command, ForceOption::Add) { "add" } else { "replace" };
         let commanders = if matches!(self.commanders, CommandersOption::All) { "all" } else { "one" };
@@ -136,7 +136,7 @@ impl MlApiArguments {
     }
 }
 
-/// Serves until the process is ended.
+/// Serves clients until the process ends.
 pub(crate) fn serve(plant: LoadedPlant, pace: Pace, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let options = &arguments.ml_api;
     if arguments.once || !matches!(arguments.transport, TransportOption::Tcp) {

@@ -1,4 +1,4 @@
-//! A plugin as the plant: what the host would do with it, the controller does.
+//! A device plugin as the plant, driven by the controller in place of a host.
 
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting, read_metadata};
@@ -8,12 +8,12 @@ use flotor_maglev_emulator::controller::Sample;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Id of the plugin that stands in for the flotor.
+/// Id of the default plant plugin, the simulated flotor.
 pub(crate) const SIMULATED: &str = "simulated";
-/// Time between two cycles unless a command says otherwise, ns.
+/// Period of a cycle in the loop configuration, ns.
 const PERIOD_NS: u64 = 1_000_000;
 
-/// Where plugins are, seen from the folder of a program: built by cargo, or installed.
+/// Plugin folders, relative to the folder of the program: built by cargo, or installed.
 const PLUGIN_FOLDERS: [&str; 4] = ["deps", "", "plugins", "../lib/flotor/plugins"];
 
 /// Loads the plugin of a file, or the simulated flotor from the folders beside this program.
@@ -51,17 +51,17 @@ fn load_file(file: &Path) -> Result<Plugin, Box<dyn Error>> {
     Ok(unsafe { Plugin::load(file) }?)
 }
 
-/// An active device behind the controller.
+/// An active device plugin as the plant of the controller.
 pub(crate) struct LoadedPlant {
     plugin: Plugin,
     settings: Vec<Setting>,
     seed: u64,
-    /// Nothing if it could not be started again: out of range for good.
+    /// `None` after a failed restart; every sample is then out of range.
     device: Option<ActiveDevice>,
     tick: u64,
     time_ns: u64,
     state: DeviceState,
-    /// What carries and weighs the moving part, N, and who feels the rest; nothing without a force sensor.
+    /// Own feed-forward minus weight of the moving part, N, and the force sensor; `None` without a sensor.
     sensor: Option<(f64, crate::rig::SensedForce)>,
 }
 
@@ -86,7 +86,7 @@ impl LoadedPlant {
         Ok((plant, capabilities))
     }
 
-    /// Presses on a force sensor from now on: with what is delivered beyond the weight, as at rest.
+    /// Attaches a force sensor; the sensor gets the delivered force beyond the weight, as at rest.
     pub(crate) fn sense(&mut self, force: crate::rig::SensedForce) -> Result<(), Box<dyn Error>> {
         let mut opened = self.plugin.open_device(&self.settings)?;
         let mut number = |id: &str| {

@@ -1,5 +1,5 @@
-//! A device of Flotor for programs written for the Maglev 200: a scene with that device and the controller as its model, run by
-//! the host. What stands between program and hand is what stands there in every run.
+//! Any device of Flotor for programs written for the Maglev 200: a scene with the device and the controller as its model,
+//! run by the host with the safety layers of every run.
 
 use super::plant::SIMULATED;
 use super::{Arguments, ProtocolOption, plant};
@@ -16,18 +16,18 @@ use std::os::fd::AsRawFd;
 use std::os::unix::process::CommandExt;
 use std::process::Command;
 
-/// The flotor of a Maglev 200, whose weight nothing but the controller carries, in a hand that rests at home: a hand that moves
-/// would keep the controller from finding the gravity.
+/// Settings for the flotor of a Maglev 200, with the weight compensated only by the controller, in a hand resting at home:
+/// a moving hand would disturb the controller's search for the gravity.
 const RESTING: &[(&str, &str)] =
     &[("flotor", "utah"), ("feedforward_n", "0"), ("hand", "hold"), ("hand_depth_mm", "0")];
 
-/// Becomes `flotor run`; comes back only if that cannot be.
+/// Replaces this process by `flotor run`; returns only on failure.
 pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if arguments.protocol != ProtocolOption::MlApi {
         return Err(Refusal::parameter("--device needs --protocol ml-api").into());
     }
     let scene = anonymous_file(&scene(device, arguments)?)?;
-    // The descriptor stays open across `exec`: its path names the file for this process alone.
+    // The descriptor stays open across `exec`: only this process can use its path.
     let file = format!("/dev/fd/{}", scene.as_raw_fd());
     let host = std::env::current_exe()?.with_file_name(format!("flotor{}", std::env::consts::EXE_SUFFIX));
     let record = &arguments.ml_api.record;
@@ -35,8 +35,7 @@ pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box
     Err(format!("{}: {error}; `cargo build --release` makes it", host.display()).into())
 }
 
-/// Writes a text to a file without a name: nobody else can put another one in its place, and it ends with the last process that
-/// has it open.
+/// Writes a text to an unnamed file: no other process can replace the file, and it is freed with its last descriptor.
 fn anonymous_file(text: &str) -> std::io::Result<File> {
     let mut file = File::from(memfd_create("flotor-scene", MemfdFlags::empty())?);
     file.write_all(text.as_bytes())?;
@@ -44,7 +43,7 @@ fn anonymous_file(text: &str) -> std::io::Result<File> {
 }
 
 fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    // Until Ctrl-C.
+    // About a year: the run ends on Ctrl-C.
     let mut scene = format!("duration_s = 3.0e7\n[device]\nplugin = {device:?}\n[device.parameters]\n");
     let mut sets = Vec::new();
     for text in &arguments.sets {
@@ -55,7 +54,7 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
     }
     sets.splice(0..0, resting(device, &sets));
     for (key, value) in &sets {
-        // Numbers as they are, everything else as text.
+        // Numbers are written as numbers, other values as strings.
         match value.parse::<f64>() {
             Ok(number) => writeln!(scene, "{key} = {number:?}")?,
             Err(_) => writeln!(scene, "{key} = {value:?}")?,
@@ -85,7 +84,7 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
     Ok(scene)
 }
 
-/// Settings of the simulated flotor that come before those of the command line, unless these describe a hand.
+/// Returns default settings of the simulated flotor for keys not given; none if the command line configures a hand.
 fn resting(device: &str, sets: &[(&str, &str)]) -> Vec<(&'static str, &'static str)> {
     if device != SIMULATED || sets.iter().any(|(key, _)| key.starts_with("hand")) {
         return Vec::new();
@@ -94,7 +93,7 @@ fn resting(device: &str, sets: &[(&str, &str)]) -> Vec<(&'static str, &'static s
     RESTING.iter().filter(is_free).copied().collect()
 }
 
-/// What a device can do; nothing if it cannot be opened: the host says why.
+/// Returns the capabilities of a device; `None` if it cannot be opened: the host reports the error.
 fn capabilities(device: &str, sets: &[(&str, &str)]) -> Option<Capabilities> {
     let plugin = plant::load_device(device).ok()?;
     let settings = sets.iter().map(|(key, value)| Setting::parse(plugin.parameters(), key, value));
@@ -102,8 +101,8 @@ fn capabilities(device: &str, sets: &[(&str, &str)]) -> Option<Capabilities> {
     plugin.open_device(&settings).ok()?.capabilities().ok()
 }
 
-/// Forces of a device that does not drive all three directions, N. The host wants the others given up by name; that a program
-/// commands six axes says nothing about the device.
+/// Returns the force limits of a device without actuators on all three axes, N; else `None`. The host requires an explicit
+/// limit of 0 on the others, as the controller model commands all six axes.
 fn felt(device: &Capabilities) -> Option<[f64; 3]> {
     let is_driven = [Axes::X, Axes::Y, Axes::Z].map(|axis| device.actuated.contains(axis));
     let mut felt_n = device.max_force_n;

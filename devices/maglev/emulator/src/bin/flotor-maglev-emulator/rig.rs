@@ -1,5 +1,5 @@
-//! The emulated device in the rig of the vertical calibration (`flotor_emulation::rig`): what it weighs, how the stand holds
-//! it, and the force on the sensor.
+//! The emulated device in the rig of the vertical calibration (`flotor_emulation::rig`): mass, stand, and the force on the
+//! sensor.
 
 use flotor_emulation::rig::Stand;
 use std::error::Error;
@@ -9,11 +9,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Mass of flotor, plates, screws and bolts, kg: 8.58 N (Varadharajan 2007, section 3.4) at standard gravity.
 const MASS_KG: f64 = 0.874_917;
-/// The stand: stiff and damped, N/m and N·s/m.
+/// Stiffness and damping of the stand, N/m and N·s/m.
 const STIFFNESS_N_PER_M: f64 = 20_000.0;
 const DAMPING_NS_PER_M: f64 = 250.0;
 
-/// What it feels, N; shared with whoever answers.
+/// Force on the sensor, N; clones share the value.
 #[derive(Clone, Default)]
 pub(crate) struct SensedForce(Arc<AtomicU64>);
 
@@ -27,7 +27,7 @@ impl SensedForce {
     }
 }
 
-/// Settings of the simulated flotor in the rig; the stand's steps are written to a file beside the sensor's name.
+/// Returns the settings of the simulated flotor in the rig; writes the stand's steps to a file beside the link.
 pub(crate) fn settings(link: &Path, stand: Stand) -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
     let script = link.with_extension("stand.toml");
     std::fs::write(&script, stand.script()).map_err(|error| format!("{}: {error}", script.display()))?;

@@ -1,14 +1,14 @@
-//! What the simulated flotor does not have: a stator to lie on, and buttons to press.
+//! Additions to the simulated flotor: a stator and buttons.
 
 use flotor_hal::{DVec3, Wrench, rotation_vector};
 use flotor_maglev_emulator::Plant;
 use flotor_maglev_emulator::controller::Sample;
 use std::str::FromStr;
 
-/// Height of the flotor where it begins to touch the lower stator, m.
+/// Height of the flotor at first contact with the lower stator, m.
 const TOUCH_M: f64 = -9.0e-3;
-/// The bowl of the stator: stiffness and damping along z, across, and of rotation. Stiff enough that the weight of the
-/// flotor sinks in by half a millimetre, damped enough that a fall ends without a bounce, stable at a cycle of 10 ms.
+/// Stiffness and damping of the stator's bowl along z, across, and of rotation. Stiff enough for a sinkage of half a
+/// millimetre under the flotor's weight, damped enough for a fall without a bounce, stable at a cycle of 10 ms.
 const STIFFNESS_N_PER_M: f64 = 10_000.0;
 const DAMPING_NS_PER_M: f64 = 60.0;
 const ACROSS_N_PER_M: f64 = 2000.0;
@@ -16,10 +16,10 @@ const ACROSS_NS_PER_M: f64 = 30.0;
 const TURN_NM_PER_RAD: f64 = 2.0;
 const TURN_NMS_PER_RAD: f64 = 0.03;
 
-/// How long the flotor is given to come to rest on its stator before anybody sees it, and in what steps, ms.
+/// Settling time of the flotor on its stator before the emulation starts, in steps of 1 ms.
 const SETTLING_MS: u64 = 500;
 
-/// A plant above a stator.
+/// A plant with a stator below.
 pub(crate) struct OnStator<P> {
     plant: P,
     sample: Sample,
@@ -35,7 +35,7 @@ impl<P: Plant> OnStator<P> {
         settled
     }
 
-    /// The force of the stator on the flotor.
+    /// Returns the contact wrench of the stator on the flotor.
     fn contact(&self) -> Wrench {
         let (position, velocity) = (self.sample.pose.position(), self.sample.twist.linear());
         let depth_m = TOUCH_M - position.z;
@@ -66,7 +66,7 @@ impl<P: Plant> Plant for OnStator<P> {
     }
 }
 
-/// A time in which a button is pressed.
+/// Interval in which a button is pressed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Press {
     bit: u32,
@@ -92,7 +92,7 @@ impl FromStr for Press {
     }
 }
 
-/// A plant with buttons.
+/// A plant with scripted button presses.
 pub(crate) struct Pressed<P> {
     plant: P,
     presses: Vec<Press>,

@@ -1,4 +1,4 @@
-//! The controller as a device on this machine's own USB.
+//! Serves the controller as a USB device of this machine.
 
 use super::{Arguments, tell};
 use crate::plant::LoadedPlant;
@@ -9,7 +9,7 @@ use std::error::Error;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// How long is waited for a host at a time.
+/// Timeout of one wait for a host.
 const PATIENCE: Duration = Duration::from_secs(3600);
 
 pub(crate) fn serve(

@@ -1,4 +1,4 @@
-//! Requests: what is looked up, what is changed, what begins.
+//! Execution of requests: queries, settings, procedures.
 
 use super::machine::{Command, Controller, Flight, narrow, vector};
 use super::procedure::Ticket;
@@ -6,26 +6,26 @@ use flotor_maglev::ml_api::{
     Axis, AxisMode, Cell, Function, GainSet, Pid, Reply, Request, Results, Six, Status, Version, WirePose,
 };
 
-/// What the controller calls itself.
+/// Version of the controller.
 const VERSION: &[u8] = b"1.5b-flotor";
 /// Slowest and fastest servo rate, Hz.
 const SERVO_HZ: [f32; 2] = [100.0, 10_000.0];
-/// Largest voltage of the spare output.
+/// Largest voltage of the spare output, V.
 const AUX_LIMIT_V: f32 = 10.0;
-/// Reach of a cell, m.
+/// Range of a position sensor, m.
 const CELL_LIMIT_M: f32 = 9.0e-3;
 
-/// What comes of a request.
+/// Answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
-    /// This, at once.
+    /// An immediate reply.
     Now(Reply),
-    /// The reply of a procedure, when it is over.
+    /// The reply of a procedure, at its end.
     When(Ticket),
 }
 
 impl Controller {
-    /// Obeys a request. What concerns connections (disconnecting, callbacks) is the server's and only confirmed here.
+    /// Executes a request. Requests about connections (disconnecting, callbacks) are the server's and only confirmed here.
     pub fn answer(&mut self, request: &Request) -> Answer {
         match *request {
             Request::Plain(Function::FindGravity) => self.find_gravity(),
@@ -57,7 +57,7 @@ impl Controller {
     fn take_off_for_a_client(&mut self) -> Answer {
         match self.flight {
             _ if !self.faults.is_empty() => Self::refused(Function::Takeoff, self.cause_status()),
-            // From wherever it is: also on its way down.
+            // Allowed from any height, also during a landing.
             Flight::Landed | Flight::Landing => Answer::When(self.begin_take_off()),
             Flight::TakingOff | Flight::Flying => Self::refused(Function::Takeoff, Status::TAKEN_OFF),
         }
@@ -66,7 +66,7 @@ impl Controller {
     fn land_for_a_client(&mut self) -> Answer {
         match self.flight {
             Flight::Landed => Self::refused(Function::Land, Status::LANDED),
-            // A second one waits with the first.
+            // A second request waits for the landing in progress.
             Flight::Landing => match self.procedure {
                 Some((landing, _)) => Answer::When(landing),
                 None => Answer::When(self.begin_landing()),
@@ -82,7 +82,7 @@ impl Controller {
         }
     }
 
-    /// The wrench in force, as the wire has it.
+    /// Returns the applied wrench in the wire format.
     fn forces(&self) -> Six {
         let applied = self.applied();
         narrow(applied.force(), applied.torque())
@@ -119,7 +119,7 @@ impl Controller {
         })
     }
 
-    #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+    #[allow(clippy::cast_possible_truncation)] // the wire format is f32
     fn currents_a(&self) -> Six {
         match self.command {
             Command::Currents(currents_a) if self.faults.is_empty() => currents_a,
@@ -127,7 +127,7 @@ impl Controller {
         }
     }
 
-    /// The desired position, within the ranges of constrained axes.
+    /// Returns the desired position, clamped to the ranges of constrained axes.
     fn desired_told(&self) -> Six {
         let mut told = self.desired_told;
         for axis in Axis::ALL {
@@ -139,7 +139,7 @@ impl Controller {
         told
     }
 
-    /// What has neither arguments nor results.
+    /// Executes a function with neither arguments nor results.
     fn act(&mut self, function: Function) -> Status {
         match function {
             Function::DefyGravity => {
@@ -160,7 +160,7 @@ impl Controller {
                 self.end_procedure(Status::OFF_LINE);
                 self.end_resets(Status::OFF_LINE, |_| true);
                 let mut anew = Self::new(self.config);
-                // Calls that wait for a procedure still get their reply.
+                // Calls waiting for a procedure still get their reply.
                 (anew.finished, anew.last_ticket) = (std::mem::take(&mut self.finished), self.last_ticket);
                 anew.injected = self.injected;
                 anew.observe(&self.sample);
@@ -184,7 +184,7 @@ impl Controller {
             moves && !matches!(request.function(), Function::SetDesiredPosition | Function::SetVelocity);
         match self.flight {
             Flight::TakingOff | Flight::Landing if moves => return Status::OFF_LINE,
-            // A program that goes on commanding after it has landed does not lift the flotor with bare forces.
+            // A program that continues after a landing must not lift the flotor with bare forces.
             Flight::Landed if drives => return Status::LANDED,
             _ => {}
         }
@@ -234,7 +234,7 @@ impl Controller {
                 self.cell_offsets = offsets;
                 Status::OK
             }
-            // Of the server.
+            // Handled by the server.
             _ => Status::OK,
         }
     }
@@ -288,7 +288,7 @@ impl Controller {
         Status::OK
     }
 
-    /// Where the flotor is sent from when it is told a velocity: its target while it follows one, else where it is.
+    /// Returns the start of a velocity command: the target in position or velocity control, else the actual position.
     pub(super) fn at_target(&self) -> [f64; 6] {
         match self.command {
             Command::Position | Command::Velocity(_) => self.desired,

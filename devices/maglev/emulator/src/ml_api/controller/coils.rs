@@ -1,4 +1,4 @@
-//! Currents, temperatures, and what the sensors' cells see: the coil, heat and light models of the simulated flotor.
+//! Currents, temperatures and light spots: the coil, thermal and optical models of the simulated flotor.
 
 use flotor_hal::{Pose, Wrench};
 use flotor_maglev::ml_api::{Cell, Six};
@@ -9,22 +9,22 @@ use flotor_simulated::actuation::thermal::{
 use flotor_simulated::plant;
 use flotor_simulated::sensing::optics::{Optics, OpticsGeometry};
 
-/// Volt of an electrode that gets all of the light.
+/// Voltage of an electrode that receives all of the light, V.
 const FULL_V: f64 = 10.0;
 
-/// Coils of the machine, their limits and their heat.
+/// Coils with limits and temperatures, and the optics of the position sensors.
 #[derive(Clone, Debug)]
 pub(super) struct CoilSet {
     coils: Option<Coils>,
     optics: Option<Optics>,
     thermal: Thermal,
-    /// Largest current of each coil, A, as a client set it.
+    /// Current limit of each coil set by a client, A.
     pub(super) limits_a: Six,
     currents_a: Currents,
 }
 
 impl Default for CoilSet {
-    #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+    #[allow(clippy::cast_possible_truncation)] // the wire format is f32
     fn default() -> Self {
         Self {
             coils: Coils::new(&CoilGeometry::MAGLEV).ok(),
@@ -41,7 +41,7 @@ impl CoilSet {
         f64::from(self.limits_a[coil]).min(CURRENT_LIMIT_A)
     }
 
-    /// The currents for a wrench, and the wrench they make: less in the same direction where a coil is at its limit.
+    /// Returns the currents for a wrench and the resulting wrench, scaled down where a coil is at its limit.
     pub(super) fn driven(&self, wanted: &Wrench) -> (Currents, Wrench) {
         let Some(coils) = &self.coils else { return ([0.0; COILS], *wanted) };
         let asked = plant::Wrench { force_n: wanted.force(), torque_nm: wanted.torque() };
@@ -60,7 +60,7 @@ impl CoilSet {
         (currents_a, delivered)
     }
 
-    /// Currents within the limits; true if one was clipped.
+    /// Clips currents to the limits; returns true if one was clipped.
     pub(super) fn clipped(&self, asked_a: &Six) -> (Six, bool) {
         #[allow(clippy::cast_possible_truncation)] // an f32 or a limit
         let clip = |(coil, current): (usize, &f32)| {
@@ -73,20 +73,20 @@ impl CoilSet {
         (within, within != *asked_a)
     }
 
-    /// The wrench some currents make.
+    /// Returns the wrench of the given currents.
     pub(super) fn wrench(&self, currents_a: &Six) -> Wrench {
         let made = self.coils.as_ref().map(|coils| coils.wrench(&currents_a.map(f64::from)));
         made.map_or(Wrench::ZERO, |made| Wrench::new(made.force_n, made.torque_nm))
     }
 
-    /// Carries currents for a time, s.
+    /// Heats the coils with currents over `dt_s`.
     pub(super) fn carry(&mut self, currents_a: &Currents, dt_s: f64) {
         self.currents_a = *currents_a;
         self.thermal.heat(currents_a, dt_s);
     }
 
-    /// Temperatures, °C.
-    #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+    /// Returns the temperatures of the coils, °C.
+    #[allow(clippy::cast_possible_truncation)] // the wire format is f32
     pub(super) fn temperatures_c(&self) -> Six {
         self.thermal.temperatures_c().map(|value| value as f32)
     }
@@ -99,15 +99,15 @@ impl CoilSet {
         self.thermal.mean_current_a() > MEAN_CURRENT_LIMIT_A
     }
 
-    /// Light spots of a pose on their cells, m.
-    #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+    /// Returns the light spots of a pose on the position sensors, m.
+    #[allow(clippy::cast_possible_truncation)] // the wire format is f32
     pub(super) fn cells(&self, pose: &Pose) -> [Cell; 3] {
         let Some(spots) = self.spots(pose) else { return [Cell::default(); 3] };
         spots.map(|[x, y]| Cell { x: x as f32, y: y as f32, is_valid: true })
     }
 
-    /// Voltages of the four electrodes of each cell: the light falls on two of them in proportion, along and across.
-    #[allow(clippy::cast_possible_truncation)] // f32 is what the wire has
+    /// Returns the voltages of each sensor's four electrodes: two along and two across share the light in proportion.
+    #[allow(clippy::cast_possible_truncation)] // the wire format is f32
     pub(super) fn voltages(&self, pose: &Pose) -> [f32; 12] {
         let mut voltages = [0.0; 12];
         let half_m = OpticsGeometry::MAGLEV.cell_half_width_m;

@@ -1,8 +1,8 @@
-//! Gains of each axis in each set, and what they make of an error.
+//! Gains of each axis in each set, and the PIDF law.
 
 use flotor_maglev::ml_api::{Axis, Gain, GainSet, Pid, Status};
 
-/// Gains of the public client of the University of Utah, which may or may not be those a controller starts with.
+/// Gains of the public client of the University of Utah; a real controller may start with others.
 const NORMAL: [[f32; 3]; 6] = [
     [2400.0, 15.0, 0.0],
     [2400.0, 15.0, 0.0],
@@ -22,12 +22,12 @@ const STIFF: [[f32; 3]; 6] = [
 
 fn default_of(set: GainSet) -> [Pid; 6] {
     let table = if set == GainSet::Normal { NORMAL } else { STIFF };
-    // The weight is carried where an axis is free or locked; constraint and boundary come on top of that.
+    // The weight is compensated on free or locked axes; constraint and boundary gains are added to these.
     let carries = matches!(set, GainSet::Normal | GainSet::Locked);
     table.map(|[p, d, ff]| Pid { p, i: 0.0, d, ff: if carries { ff } else { 0.0 } })
 }
 
-/// All gains of a controller.
+/// All gain sets of a controller.
 #[derive(Clone, Debug)]
 pub(super) struct Gains {
     sets: [[Pid; 6]; 4],
@@ -52,7 +52,7 @@ impl Gains {
         *self.of(set, axis).gain_mut(gain)
     }
 
-    /// Takes gains of some axes: all of them or, if one is not legal, none.
+    /// Sets the gains of some axes: all, or none if one is invalid.
     pub(super) fn take(&mut self, set: GainSet, gains: &[(Axis, Pid)]) -> Status {
         let legal = |pid: &Pid| {
             [pid.p, pid.i, pid.d].iter().all(|gain| gain.is_finite() && *gain >= 0.0) && pid.ff.is_finite()
@@ -66,7 +66,7 @@ impl Gains {
         Status::OK
     }
 
-    /// Part of the way from some gains to the defaults of a set, 0 to 1.
+    /// Interpolates the gains of a set from `from` to the defaults, `share` from 0 to 1.
     pub(super) fn glide(&mut self, set: GainSet, from: &[Pid; 6], share: f32) {
         let mix = |from: f32, to: f32| if share >= 1.0 { to } else { from + (to - from) * share };
         for ((place, from), to) in self.sets[set as usize].iter_mut().zip(from).zip(default_of(set)) {
@@ -79,7 +79,7 @@ impl Gains {
         }
     }
 
-    /// Gains to let the flotor down with: those it starts with, and the feed-forward that carries it now.
+    /// Returns the gains for a landing: the defaults with the present feed-forward.
     pub(super) fn landing(&self) -> [Pid; 6] {
         let mut gains = default_of(GainSet::Normal);
         for (pid, carried) in gains.iter_mut().zip(self.set(GainSet::Normal)) {
@@ -91,14 +91,14 @@ impl Gains {
     }
 }
 
-/// How far an axis is from where it should be: m or rad, m/s or rad/s.
+/// Control error of an axis: m or rad, m/s or rad/s.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AxisError {
     pub(super) off: f64,
     pub(super) speed_off: f64,
 }
 
-/// Force or torque of the PIDF law without its integral, N or N·m.
+/// Returns force or torque of the PIDF law without its integral, N or N·m.
 pub(super) fn force(pid: Pid, error: AxisError) -> f64 {
     f64::from(pid.p) * error.off + f64::from(pid.d) * error.speed_off + f64::from(pid.ff)
 }

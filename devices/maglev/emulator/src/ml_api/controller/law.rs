@@ -1,4 +1,4 @@
-//! The law: what the gains make of where the flotor is, what a command does to that, and the boundary sphere.
+//! The control law: gains, commands and the boundary sphere.
 
 use super::gains::{AxisError, force};
 use super::machine::{Command, Controller, Flight, ForceCommand, vector, wrench};
@@ -6,7 +6,7 @@ use flotor_hal::{DVec3, Wrench};
 use flotor_maglev::ml_api::{Axis, AxisMode, GainSet, Pid};
 
 impl Controller {
-    /// The wrench that is wanted of the coils now.
+    /// Returns the demanded wrench, before the limits of the coils.
     pub(super) fn wanted(&self) -> Wrench {
         if !self.faults.is_empty() {
             return Wrench::ZERO;
@@ -29,12 +29,12 @@ impl Controller {
         }
     }
 
-    /// The wrench the coils give now: what is wanted, within the current limits.
+    /// Returns the applied wrench: the demanded one within the current limits.
     pub(super) fn applied(&self) -> Wrench {
         self.coils.driven(&self.wanted()).1
     }
 
-    /// What the gains give on an axis.
+    /// Returns force or torque of the gains on an axis.
     fn held(&self, axis: Axis) -> f64 {
         let index = axis as usize;
         let error = self.error(axis, self.desired[index], 0.0);
@@ -58,8 +58,8 @@ impl Controller {
         AxisError { off: to - self.at[index], speed_off: wanted_speed - self.speed[index] }
     }
 
-    /// Gains that act on an axis in the air: those of its mode and, beyond the range of a constrained axis, on top of them
-    /// those that push back. On top, because it is the normal gains that carry the weight.
+    /// Returns the gains on an axis while flying: those of its mode and, beyond the range of a constrained axis, those of
+    /// the constraint. Both add up, because the normal gains compensate the weight.
     pub(super) fn laws(&self, axis: Axis) -> [(Pid, AxisError); 2] {
         let index = axis as usize;
         let wanted_speed = match self.command {
@@ -83,8 +83,8 @@ impl Controller {
         [mode, beyond]
     }
 
-    /// Carries the integrals on by a cycle, s. What is summed is force: a gain that changes acts from then on, and one that
-    /// is zero forgets.
+    /// Advances the integrals by a cycle, s. The sum is a force: a changed gain acts from then on, and a gain of zero
+    /// resets the sum.
     pub(super) fn integrate(&mut self, dt_s: f64) {
         let are_held = self.flight == Flight::Flying
             && (matches!(self.command, Command::Position | Command::Velocity(_))
@@ -100,7 +100,7 @@ impl Controller {
         }
     }
 
-    /// Where an axis should be: the desired position, within the range of a constrained axis.
+    /// Returns the target of an axis: the desired position, clamped to the range of a constrained axis.
     pub(super) fn target(&self, axis: Axis) -> f64 {
         let (desired, [least, most]) = (self.desired[axis as usize], self.ranges[axis as usize]);
         match self.modes[axis as usize] {
@@ -109,7 +109,7 @@ impl Controller {
         }
     }
 
-    /// What pushes back beyond the sphere: a spring along the way home, a damper against going out.
+    /// Returns the wrench of the boundary sphere: a spring towards home, a damper against outward motion.
     fn boundary(&self) -> Wrench {
         let (position, velocity) = (vector(&self.at, 0), vector(&self.speed, 0));
         let distance = position.length();
@@ -127,7 +127,7 @@ impl Controller {
         Wrench::from_force(-(outward * depth) * spring - (outward * speed) * damper + gain(|pid| pid.ff))
     }
 
-    /// -1 below the range of a constrained axis, 1 above it.
+    /// Returns -1 below the range of a constrained axis, 1 above it, else 0.
     pub(super) fn side(&self, axis: Axis) -> i8 {
         let ([least, most], at) = (self.ranges[axis as usize], self.at[axis as usize]);
         match self.modes[axis as usize] {

@@ -1,4 +1,4 @@
-//! The state of the machine, its cycle, and the law that makes the wrench.
+//! State of the controller and its servo cycle.
 
 use super::coils::CoilSet;
 use super::gains::Gains;
@@ -9,50 +9,50 @@ use flotor_maglev::ml_api::{
     Axis, AxisMode, Buttons, CellOffset, Event, FaultBits, GainSet, Pid, Reply, Six, Status, angles,
 };
 
-/// What a force command does to the gains.
+/// Effect of a force command on the gains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ForceCommand {
-    /// It takes their place.
+    /// The force replaces the gains.
     Replaces,
-    /// It comes on top of them.
+    /// The force is added to the gains.
     Adds,
 }
 
-/// What becomes of a flotor in the air whose client is gone.
+/// Reaction to the loss of a client while levitating.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Silence {
-    /// It lands.
+    /// The flotor lands.
     Lands,
-    /// It stays where it is.
+    /// The flotor continues to levitate.
     Ignored,
 }
 
-/// Who may command.
+/// Clients that may command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Commanders {
-    /// The first client that does, until it is gone; the others are told so.
+    /// The first commanding client, until disconnected; others get [`Status::RECEIVE_ONLY`].
     One,
-    /// Everybody.
+    /// All clients.
     All,
 }
 
-/// What a controller is made of.
+/// Configuration of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerConfig {
-    /// What a force command does to the gains.
+    /// Effect of a force command on the gains.
     pub force_command: ForceCommand,
-    /// What becomes of a flotor whose client is gone.
+    /// Reaction to the loss of a client while levitating.
     pub silence: Silence,
-    /// Who may command.
+    /// Clients that may command.
     pub commanders: Commanders,
-    /// Longest time a force stays without an acknowledged tick while ticks are wanted, s.
+    /// Timeout of a force command without an acknowledged tick, while its client is registered for ticks, s.
     pub watchdog_s: f64,
-    /// Height of a flotor on its stator, m: where landing ends.
+    /// Height of a flotor on its stator, m: the end of a landing.
     pub floor_m: f64,
 }
 
 impl ControllerConfig {
-    /// Bypass, landing, one commander, half a second, and a floor 9.5 mm below home.
+    /// Replacing forces, landing, one commander, half a second, and a floor 9.5 mm below home.
     pub const DEFAULT: Self = Self {
         force_command: ForceCommand::Replaces,
         silence: Silence::Lands,
@@ -62,20 +62,20 @@ impl ControllerConfig {
     };
 }
 
-/// What the flotor does.
+/// State of the flotor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flight {
-    /// It lies on the stator, the gains give no force.
+    /// On the stator, without force.
     Landed,
-    /// It is being lifted.
+    /// Rising to home.
     TakingOff,
-    /// It is in the air.
+    /// Levitating.
     Flying,
-    /// It is being let down.
+    /// Descending to the stator.
     Landing,
 }
 
-/// What the last command was: position, velocity, force and current exclude one another.
+/// Last command: position, velocity, force and current exclude one another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Command {
     Position,
@@ -84,20 +84,20 @@ pub(super) enum Command {
     Currents(Six),
 }
 
-/// A fault that is made on purpose.
+/// Faults injected for a test.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Injected(pub FaultBits);
 
-/// How far inside a boundary the flotor is back inside, m or rad: the resolution of the sensors.
+/// Hysteresis of a boundary, m or rad: the resolution of the sensors.
 const INSIDE_M: f64 = 2.0e-6;
 
-/// Replies and events that have room before anybody takes them.
+/// Capacity for replies and events that are not yet read.
 pub(super) const KEPT: usize = 64;
 
-/// Boundary sphere and constraints crossed: -1, 0, 1 for each axis, then 1 outside the sphere.
+/// Crossed boundaries: -1, 0, 1 for each constrained axis, then 1 outside the sphere.
 type Sides = [i32; 7];
 
-/// The controller.
+/// The controller of a Maglev 200.
 #[derive(Clone, Debug)]
 pub struct Controller {
     pub(super) config: ControllerConfig,
@@ -105,7 +105,7 @@ pub struct Controller {
     pub(super) coils: CoilSet,
     pub(super) flight: Flight,
     pub(super) procedure: Option<(Ticket, Procedure)>,
-    /// Gains that glide to their defaults, one at most a set.
+    /// Gains on the way to their defaults, at most one entry per set.
     pub(super) resets: Vec<GainReset>,
     pub(super) finished: Vec<(Ticket, Reply)>,
     pub(super) last_ticket: Ticket,
@@ -115,11 +115,11 @@ pub struct Controller {
     pub(super) ranges: [[f32; 2]; 6],
     pub(super) desired: [f64; 6],
     pub(super) desired_told: Six,
-    /// What the integrals have come to, N and N·m.
+    /// Force and torque of the integrals, N and N·m.
     pub(super) integral_n: [f64; 6],
-    /// What finding gravity adds, N and N·m.
+    /// Offset added by the search for gravity, N and N·m.
     pub(super) trim: [f64; 6],
-    /// Gains while landing, and the share of them that is left.
+    /// Gains for the landing, and the fraction not yet faded.
     pub(super) landing: ([Pid; 6], f64),
     pub(super) faults: FaultBits,
     pub(super) injected: Injected,
@@ -141,7 +141,7 @@ pub struct Controller {
     pub(super) events: Vec<Event>,
 }
 
-/// What is kept of a grasp that the machine does not have.
+/// Stored settings of a grasp; the machine has none.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Grasp {
     pub(super) gains: Pid,
@@ -150,7 +150,7 @@ pub(super) struct Grasp {
 }
 
 impl Controller {
-    /// A controller whose flotor lies on the stator.
+    /// Creates a controller with the flotor on the stator.
     #[must_use]
     pub fn new(config: ControllerConfig) -> Self {
         Self {
@@ -191,53 +191,53 @@ impl Controller {
         }
     }
 
-    /// What it does.
+    /// Returns the configuration.
     #[must_use]
     pub fn config(&self) -> &ControllerConfig {
         &self.config
     }
 
-    /// What the flotor does.
+    /// Returns the state of the flotor.
     #[must_use]
     pub fn flight(&self) -> Flight {
         self.flight
     }
 
-    /// What is wrong.
+    /// Returns the present faults.
     #[must_use]
     pub fn faults(&self) -> FaultBits {
         self.faults
     }
 
-    /// Servo rate, Hz.
+    /// Returns the servo rate, Hz.
     #[must_use]
     pub fn servo_hz(&self) -> f64 {
         f64::from(self.servo_hz)
     }
 
-    /// True while a procedure is in progress.
+    /// Returns true while a procedure or a gain reset is in progress.
     #[must_use]
     pub fn is_busy(&self) -> bool {
         self.procedure.is_some() || !self.resets.is_empty()
     }
 
-    /// True while the flotor is held by a force that a client has to keep up.
+    /// Returns true while a client's force or current command levitates the flotor.
     #[must_use]
     pub fn is_driven_by_forces(&self) -> bool {
         self.flight == Flight::Flying && matches!(self.command, Command::Forces(_) | Command::Currents(_))
     }
 
-    /// Makes faults on purpose; nothing ends it.
+    /// Sets the injected faults, until the next call.
     pub fn inject(&mut self, injected: Injected) {
         self.injected = injected;
     }
 
-    /// What happened since the last call.
+    /// Takes the events since the last call.
     pub fn take_events(&mut self) -> impl Iterator<Item = Event> + '_ {
         self.events.drain(..)
     }
 
-    /// The pose as clients see it, in their frame.
+    /// Returns the pose in the clients' frame.
     #[must_use]
     pub fn pose(&self) -> flotor_maglev::ml_api::WirePose {
         let out_of_range = !self.is_in_range();
@@ -247,20 +247,20 @@ impl Controller {
         flotor_maglev::ml_api::WirePose { out_of_range, at: narrow(position, turn) }
     }
 
-    /// Velocity in the clients' frame.
+    /// Returns the velocity in the clients' frame.
     pub(super) fn velocity(&self) -> Six {
         let user = angles::orientation(three(&self.frame, 3));
         narrow(user * vector(&self.speed, 0), user * vector(&self.speed, 3))
     }
 
-    /// Begins a servo interval of this length, s: takes the sample it starts with and carries procedures on.
+    /// Begins a servo interval of this length, s: stores its first sample, checks for faults and advances procedures.
     pub fn sense(&mut self, sample: &Sample, dt_s: f64) {
         self.observe(sample);
         self.watch();
         self.advance(dt_s);
     }
 
-    /// The wrench over the interval, s: what the newest command asks for, within the limits of the coils.
+    /// Returns the wrench over the interval, s, for the newest command within the limits of the coils.
     pub fn drive(&mut self, dt_s: f64) -> Wrench {
         let wanted = self.wanted();
         self.integrate(dt_s);
@@ -269,7 +269,7 @@ impl Controller {
         driven
     }
 
-    /// Takes a sample without acting on it: before time begins.
+    /// Stores a sample without any reaction, before the first interval.
     pub fn observe(&mut self, sample: &Sample) {
         if sample.in_range && sample.pose.is_finite() && sample.twist.is_finite() {
             let (position, turn) = (sample.pose.position(), angles::angles(sample.pose.orientation()));
@@ -286,10 +286,10 @@ impl Controller {
             && !self.injected.0.contains(FaultBits::SENSOR_RANGE)
     }
 
-    /// Faults whose cause is there now.
+    /// Returns the faults with a present cause.
     pub(super) fn causes(&self) -> FaultBits {
         let too_fast = self.speed.iter().zip(&self.speed_limits).any(|(speed, limit)| {
-            // A limit that a client made zero would fault at the first bit of noise: that is what it asked for.
+            // A limit set to zero by a client faults at the first bit of noise, as requested.
             speed.abs() > f64::from(*limit)
         });
         let when = |is: bool, fault| if is { fault } else { FaultBits::NONE };
@@ -307,7 +307,7 @@ impl Controller {
             || self.injected.0.contains(FaultBits::OVER_TEMPERATURE)
     }
 
-    /// Looks for faults and for what clients want to know of.
+    /// Checks for faults, and queues events for changes.
     fn watch(&mut self) {
         let found = self.faults.with(self.causes());
         if found != self.faults {
@@ -336,7 +336,7 @@ impl Controller {
         self.events.push(Event::Fault(faults));
     }
 
-    /// A fault switches the coils off.
+    /// Switches the coils off after a fault.
     fn drop_flotor(&mut self) {
         self.end_procedure(self.cause_status());
         self.flight = Flight::Landed;
@@ -345,7 +345,7 @@ impl Controller {
         self.trim = [0.0; 6];
     }
 
-    /// What says a refusal because of a fault.
+    /// Returns the status for a rejection because of a fault.
     pub(super) fn cause_status(&self) -> Status {
         let causes = [
             (FaultBits::OVER_TEMPERATURE, Status::OVERHEATED),
@@ -357,7 +357,7 @@ impl Controller {
         found.map_or(Status::OFF_LINE, |(_, status)| *status)
     }
 
-    /// Temperatures, °C; one made up where over-temperature is.
+    /// Returns the temperatures of the coils, °C; a made-up one for an injected over-temperature.
     pub(super) fn temperatures_c(&self) -> Six {
         let mut all = self.coils.temperatures_c();
         if self.is_too_hot() && !self.coils.is_too_hot() {
@@ -370,7 +370,7 @@ impl Controller {
         Buttons { left: self.sample.buttons & 1 != 0, right: self.sample.buttons & 2 != 0 }
     }
 
-    /// Where the flotor is by boundary. It is back inside a bit before it is: one that rests at its boundary crosses it once.
+    /// Returns the crossed boundaries, with hysteresis: a flotor that rests at its boundary crosses it once.
     fn sides_now(&self) -> Sides {
         let mut sides = [0; 7];
         for axis in Axis::ALL {
@@ -390,7 +390,7 @@ impl Controller {
     }
 }
 
-/// Three of six numbers.
+/// Returns three of six numbers.
 pub(super) fn vector(six: &[f64; 6], first: usize) -> DVec3 {
     let at = |index: usize| six.get(index).copied().unwrap_or(0.0);
     DVec3::new(at(first), at(first + 1), at(first + 2))
@@ -404,7 +404,7 @@ pub(super) fn wrench(six: &[f64; 6]) -> Wrench {
     Wrench::new(vector(six, 0), vector(six, 3))
 }
 
-/// As the wire has it.
+/// Converts to the wire format.
 #[allow(clippy::cast_possible_truncation)]
 pub(super) fn narrow(linear: DVec3, angular: DVec3) -> Six {
     [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z].map(|value| value as f32)

@@ -1,7 +1,7 @@
-//! The machine: gains, locks, constraints, boundary, limits, faults, and the procedures that lift the flotor and let it down.
+//! The controller of the Maglev 200: gains, locks, constraints, boundary, limits, faults, take-off and landing.
 //!
-//! What is not known of the real one (`[?]` in the book's chapter) is decided here for a program's sake: a command that
-//! makes no sense is refused with the status nearest to it, nothing but a fault switches off.
+//! Unknown behaviour of the real controller (`[?]` in the book's chapter) is decided here in favour of client programs:
+//! invalid commands are rejected with the closest status, and only a fault switches the coils off.
 
 mod answer;
 mod coils;

@@ -1,31 +1,31 @@
-//! What takes seconds: taking off, landing and finding gravity, one at a time; a new one takes the place of the one before.
-//! Gains glide to their defaults meanwhile: that neither ends a landing nor waits for it.
+//! Procedures that take seconds: take-off, landing and the search for gravity, one at a time; a new one replaces the
+//! previous one. A reset of gains runs in parallel and neither ends nor delays a landing.
 
 use super::machine::{Command, Controller, Flight, KEPT, narrow, vector};
 use flotor_hal::DVec3;
 use flotor_maglev::ml_api::{Axis, GainSet, Pid, Reply, Results, Status};
 
-/// Which call waits for a procedure.
+/// Handle of a call that waits for a procedure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ticket(u64);
 
-/// How fast the target glides, m/s and rad/s.
+/// Speed of the moving target, m/s and rad/s.
 const GLIDE_M_PER_S: f64 = 15.0e-3;
 const GLIDE_RAD_PER_S: f64 = 0.2;
-/// Home is reached within this, m and rad ...
+/// Home is reached within this distance, m and rad ...
 const HOME_M: f64 = 1.0e-3;
 const HOME_RAD: f64 = 0.02;
-/// ... or when the target has been there for so long, s: a hand may hold the flotor elsewhere.
+/// ... or after this time with the target at home, s: a hand may hold the flotor elsewhere.
 const HOME_PATIENCE_S: f64 = 2.0;
-/// How long gains take to fade at the end of landing, s.
+/// Fade time of the gains at the end of a landing, s.
 const FADE_S: f64 = 0.4;
-/// How long gains take to glide to their defaults, s.
+/// Duration of a reset of gains to their defaults, s.
 const RESET_S: f64 = 2.0;
-/// Finding gravity: time to settle, s, samples that are averaged, and rounds at most.
+/// Search for gravity: time to settle, s, samples to average, and limit of rounds.
 const SETTLE_S: f64 = 0.25;
 const SAMPLES: u32 = 50;
 const ROUNDS: u32 = 30;
-/// What is left when it is found, N and N·m.
+/// Residual at which the search ends, N and N·m.
 const FOUND_N: f64 = 2.0e-3;
 const FOUND_NM: f64 = 1.0e-4;
 
@@ -37,7 +37,7 @@ pub(super) enum Procedure {
     FindGravity(Search),
 }
 
-/// Gains of a set on their way to the defaults.
+/// Reset of a gain set to its defaults, in progress.
 #[derive(Clone, Debug)]
 pub(super) struct GainReset {
     ticket: Ticket,
@@ -56,13 +56,13 @@ pub(super) struct Search {
 }
 
 impl Controller {
-    /// The reply to a procedure that is over; nothing while it goes on.
+    /// Returns the reply to a finished procedure; `None` while in progress.
     #[must_use]
     pub fn reply(&self, ticket: Ticket) -> Option<Reply> {
         self.finished.iter().find(|(of, _)| *of == ticket).map(|(_, reply)| *reply)
     }
 
-    /// Lands if there is anything to land, without anybody who waits for it.
+    /// Begins a landing if the flotor is levitating, without a waiting call.
     pub fn land(&mut self) {
         if matches!(self.flight, Flight::TakingOff | Flight::Flying) {
             self.begin_landing();
@@ -87,7 +87,7 @@ impl Controller {
     }
 
     pub(super) fn begin_search(&mut self) -> Ticket {
-        // Where it is, unless the gains hold it somewhere already.
+        // The actual position, unless the gains hold a target already.
         (self.desired, self.command) = (self.at_target(), Command::Position);
         self.desired_told = narrow(vector(&self.desired, 0), vector(&self.desired, 3));
         self.begin(Procedure::FindGravity(Search::default()))
@@ -100,7 +100,7 @@ impl Controller {
         ticket
     }
 
-    /// Ends the glides of some sets where they are.
+    /// Ends the resets of the selected sets at their present gains.
     pub(super) fn end_resets(&mut self, status: Status, is_meant: impl Fn(GainSet) -> bool) {
         while let Some(place) = self.resets.iter().position(|reset| is_meant(reset.set)) {
             let ticket = self.resets.swap_remove(place).ticket;
@@ -120,7 +120,7 @@ impl Controller {
         self.last_ticket
     }
 
-    /// Ends what is in progress, with an error unless it is done.
+    /// Ends the procedure in progress with a status.
     pub(super) fn end_procedure(&mut self, status: Status) {
         self.trim = [0.0; 6];
         if let Some((ticket, procedure)) = self.procedure.take() {
@@ -133,14 +133,14 @@ impl Controller {
     }
 
     fn finish(&mut self, ticket: Ticket, reply: Reply) {
-        // Several may wait for one, and whoever waited may be gone: the newest are kept.
+        // Several calls may wait, and their clients may be disconnected: only the newest replies are stored.
         if self.finished.len() >= KEPT {
             self.finished.remove(0);
         }
         self.finished.push((ticket, reply));
     }
 
-    /// Carries the procedure on by a cycle, s; velocity commands too.
+    /// Advances the procedure by a cycle, s, and the target of a velocity command.
     pub(super) fn advance(&mut self, dt_s: f64) {
         if let (Command::Velocity(speeds), Flight::Flying) = (self.command, self.flight) {
             for (desired, speed) in self.desired.iter_mut().zip(speeds) {
@@ -166,13 +166,13 @@ impl Controller {
         let mut finished = None;
         for reset in resets {
             reset.elapsed_s += dt_s;
-            #[allow(clippy::cast_possible_truncation)] // a share
+            #[allow(clippy::cast_possible_truncation)] // a fraction
             gains.glide(reset.set, &reset.from, (reset.elapsed_s / RESET_S).min(1.0) as f32);
             if reset.elapsed_s >= RESET_S {
                 finished = Some(reset.set);
             }
         }
-        // One a cycle: a second one that is over has its defaults already.
+        // One per cycle: a second finished reset has reached its defaults already.
         if let Some(set) = finished {
             self.end_resets(Status::OK, |other| other == set);
         }
@@ -205,7 +205,7 @@ impl Controller {
         })
     }
 
-    /// Moves the target by a step; true if it is there.
+    /// Moves the target by a step; returns true at the end.
     fn glide(&mut self, to: &[f64; 6], dt_s: f64) -> bool {
         let step = |from: DVec3, to: DVec3, most: f64| {
             let way = to - from;
@@ -217,7 +217,7 @@ impl Controller {
         there && turned
     }
 
-    /// Averages the error and adds what the gains make of it, until it is small.
+    /// Averages the error and adds its proportional force to the trim, until the addition is small.
     fn search(&mut self, search: &mut Search, dt_s: f64) -> Option<Reply> {
         search.settled_s += dt_s;
         if search.settled_s < SETTLE_S {

@@ -1,4 +1,4 @@
-//! A callback connection: an event, its acknowledgement, the next event.
+//! Callback connection: sends an event and waits for its acknowledgement before the next one.
 
 use super::control::{is_gone, send, token_reply};
 use super::hub::{Hub, Id};
@@ -7,12 +7,12 @@ use flotor_maglev::ml_api::{Event, Intake, Taken};
 use std::net::{Shutdown, TcpStream};
 use std::time::Duration;
 
-/// How often a connection that waits is looked after.
+/// Poll interval for the end of a waiting connection.
 const LOOK: Duration = Duration::from_millis(50);
-/// How late a tick comes that is to come late.
+/// Delay of a late tick, as an injected fault.
 const LATE: Duration = Duration::from_millis(50);
 
-/// Serves a connection that has asked for its token, until it is gone.
+/// Serves a callback connection after its token request, until its end.
 pub(super) fn serve(mut stream: TcpStream, hub: &Hub, token: Id) {
     let ready = stream.set_read_timeout(Some(LOOK)).is_ok();
     if ready && send(&mut stream, token_reply(token).bytes()) {
@@ -24,7 +24,7 @@ pub(super) fn serve(mut stream: TcpStream, hub: &Hub, token: Id) {
     hub.callback_gone(token);
 }
 
-/// Tells events until there is an end.
+/// Sends events until the end of the connection.
 fn tell(stream: &mut TcpStream, hub: &Hub, token: Id) -> CallbackEnd {
     let mut intake = Intake::default();
     loop {
@@ -48,7 +48,7 @@ fn tell(stream: &mut TcpStream, hub: &Hub, token: Id) -> CallbackEnd {
         }
         loop {
             match intake.take(stream) {
-                // Whatever the handler returned: nothing is known to depend on it.
+                // The handler's return value is ignored: no known effect depends on it.
                 Taken::Frame(_) => break,
                 Taken::Malformed | Taken::Lost => return CallbackEnd::Gone,
                 Taken::Nothing => {

@@ -1,4 +1,4 @@
-//! A control connection: one request, one reply.
+//! Control connection: one reply per request.
 
 use super::callback;
 use super::hub::{Hub, Id};
@@ -10,12 +10,12 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
-/// How late a reply comes that is to come late.
+/// Delay of a stalled reply, as an injected fault.
 const STALL: Duration = Duration::from_secs(3);
-/// How often a client that waits for a procedure is looked after.
+/// Poll interval for the end of a client that waits for a procedure.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Serves a connection until it is gone.
+/// Serves a connection until its end.
 pub(super) fn serve(mut stream: TcpStream, hub: &Hub) {
     let from = stream.peer_addr().map_or_else(|_| "?".to_owned(), |address| address.to_string());
     let id = hub.connect(&from);
@@ -23,7 +23,7 @@ pub(super) fn serve(mut stream: TcpStream, hub: &Hub) {
     let mut deadline = Some(Instant::now() + FIRST_MESSAGE);
     // Dropping the connection resets it.
     while let Taken::Frame(_) = intake.take(&mut Timed { stream: &mut stream, deadline }) {
-        // A client may be silent for as long as it likes, but not in the middle of a request.
+        // A client may be silent between requests without limit, but not within one.
         deadline = intake.is_in_the_middle().then(|| Instant::now() + FIRST_MESSAGE);
         let request = Request::decode(intake.frame());
         if request == Ok(Request::Plain(Function::RequestToken)) {
@@ -34,11 +34,11 @@ pub(super) fn serve(mut stream: TcpStream, hub: &Hub) {
             break;
         }
     }
-    // Before the connection is dropped: whoever sees it closed finds the flotor landing.
+    // Before the connection is dropped: at its close the flotor is landing already.
     hub.disconnect(id);
 }
 
-/// A connection from which a whole request is read before a deadline, which the first bytes of the request set where there is none.
+/// A connection with a deadline per request; without one the first bytes of the request start the deadline.
 struct Timed<'s> {
     stream: &'s mut TcpStream,
     deadline: Option<Instant>,
@@ -57,7 +57,7 @@ impl Read for Timed<'_> {
     }
 }
 
-/// Handles one request; false if the connection is to be dropped.
+/// Handles one request; returns false if the connection must be dropped.
 fn call(
     stream: &mut TcpStream,
     hub: &Hub,
@@ -90,7 +90,7 @@ fn call(
     }
 }
 
-/// The reply of a procedure; nothing if its client does not wait for it any more.
+/// Waits for the reply of a procedure; `None` if its client disconnects.
 fn wait(stream: &TcpStream, hub: &Hub, ticket: Ticket) -> Option<Reply> {
     loop {
         if let Some(reply) = hub.wait_for_reply(ticket, LOOK) {
@@ -102,7 +102,7 @@ fn wait(stream: &TcpStream, hub: &Hub, ticket: Ticket) -> Option<Reply> {
     }
 }
 
-/// True if the other end has closed the connection, or it is broken.
+/// Returns true if the connection is closed by the other end, or broken.
 pub(super) fn is_gone(stream: &TcpStream) -> bool {
     let looked = stream.set_nonblocking(true).and_then(|()| stream.peek(&mut [0]));
     let gone = match looked {
@@ -112,12 +112,12 @@ pub(super) fn is_gone(stream: &TcpStream) -> bool {
     gone || stream.set_nonblocking(false).is_err()
 }
 
-/// One write a frame: what is collected for a second one would wait for an acknowledgement.
+/// Sends a frame in one write: a second one would wait for an acknowledgement (Nagle).
 pub(super) fn send(stream: &mut TcpStream, bytes: &[u8]) -> bool {
     stream.write_all(bytes).is_ok()
 }
 
-/// A frame without its last four bytes, with a length that says so.
+/// Returns a frame without its last four bytes, with a matching length field.
 fn shortened(frame: &Frame) -> Vec<u8> {
     let kept = frame.bytes().len().saturating_sub(4);
     let mut bytes = frame.bytes().get(..kept).unwrap_or_default().to_vec();
@@ -127,7 +127,7 @@ fn shortened(frame: &Frame) -> Vec<u8> {
     bytes
 }
 
-/// The reply to a client that asks for a token.
+/// Returns the reply to a token request.
 pub(super) fn token_reply(token: Id) -> Frame {
     let token = i32::try_from(token).unwrap_or(i32::MAX);
     Reply { status: Status::OK, results: Results::Token(token) }.encode()

@@ -1,4 +1,4 @@
-//! The state that connections and servo loop share: the controller, the clients, what is to be told to whom.
+//! State shared by connections and servo loop: the controller, the clients, pending events.
 
 use super::state::{Callback, CallbackEnd, Client, EVENTS, Next, State};
 use crate::controller::Sample;
@@ -10,30 +10,30 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A tick that is unanswered for so long is waited for no more, s.
+/// Age of an unacknowledged tick beyond which the loop no longer waits for it, s.
 const GIVEN_UP_S: f64 = 0.06;
 
-/// Where lines about what happens go.
+/// Callback for log lines.
 pub type Log = Box<dyn Fn(std::fmt::Arguments<'_>) + Send + Sync>;
 
-/// Number of a connection; that of a callback connection is its token.
+/// Number of a connection; for a callback connection, also the token.
 pub(super) type Id = u64;
 
-/// The shared state.
+/// Shared state with its lock.
 pub struct Hub {
     state: Mutex<State>,
     changed: Condvar,
     log: Log,
 }
 
-/// What is to be done with a call.
+/// Result of a call: treatment and answer.
 pub(super) struct Handled {
     pub(super) deed: Deed,
     pub(super) answer: Answer,
 }
 
 impl Hub {
-    /// A controller that nobody is connected to. `restarts_with_ticks`: registering for ticks starts the plant anew.
+    /// Creates a hub without clients. `restarts_with_ticks`: registering for ticks restarts the plant.
     #[must_use]
     pub fn new(
         controller: Controller,
@@ -46,32 +46,32 @@ impl Hub {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // A thread that panicked left whole values behind: no state spans two of them.
+        // Poisoning is ignored: no invariant spans two values.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    // ------------------------------------------------------------ of the servo loop
+    // ------------------------------------------------------------ servo loop
 
-    /// Servo interval, s.
+    /// Returns the servo interval, s.
     #[must_use]
     pub fn period_s(&self) -> f64 {
         1.0 / self.state().controller.servo_hz()
     }
 
-    /// True if the plant is to start anew; once.
+    /// Returns true once after a request to restart the plant.
     #[must_use]
     pub fn takes_restart(&self) -> bool {
         std::mem::take(&mut self.state().is_restart_wanted)
     }
 
-    /// Begins a servo interval: takes its sample, tells clients of it.
+    /// Begins a servo interval: stores its sample and queues events for clients.
     pub fn begin(&self, sample: &Sample, dt_s: f64) {
         self.state().begin(sample, dt_s, &self.log);
         self.changed.notify_all();
     }
 
-    /// A whole servo interval, for a loop that may not wait: nothing if a connection has the state just now. Real-time:
-    /// bounded, no allocation; one call of the system.
+    /// Runs a whole servo interval, for a loop that must not wait; `None` while a connection holds the lock. Real-time:
+    /// bounded, no allocation; one system call.
     #[must_use]
     pub fn try_cycle(&self, sample: &Sample, dt_s: f64) -> Option<Wrench> {
         let mut state = self.state.try_lock().ok()?;
@@ -82,18 +82,18 @@ impl Hub {
         Some(wrench)
     }
 
-    /// The wrench over the interval.
+    /// Returns the wrench over the interval.
     #[must_use]
     pub fn drive(&self, dt_s: f64) -> Wrench {
         self.state().controller.drive(dt_s)
     }
 
-    /// Takes a sample without beginning an interval.
+    /// Stores a sample without beginning an interval.
     pub fn observe(&self, sample: &Sample) {
         self.state().controller.observe(sample);
     }
 
-    /// Waits until no tick is on its way to a client that answers, or until the time is over.
+    /// Waits until all ticks are acknowledged by the clients that respond, or until the timeout.
     #[must_use]
     pub fn wait_for_ticks_taken(&self, patience: Duration) -> TickWait {
         let until = Instant::now() + patience;
@@ -121,7 +121,7 @@ impl Hub {
         }
     }
 
-    // ------------------------------------------------------------ of control connections
+    // ------------------------------------------------------------ control connections
 
     pub(super) fn connect(&self, from: &str) -> Id {
         let mut state = self.state();
@@ -133,7 +133,7 @@ impl Hub {
         id
     }
 
-    /// A client is gone: what it held in the air lands.
+    /// Removes a client; lands the flotor if this client commanded it.
     pub(super) fn disconnect(&self, id: Id) {
         let mut state = self.state();
         let Some(place) = state.clients.iter().position(|client| client.id == id) else { return };
@@ -155,11 +155,11 @@ impl Hub {
         (self.log)(format_args!("closed client={id}"));
     }
 
-    /// Handles a request, or what could not be read as one.
+    /// Handles a decoded request, or the error of an invalid one.
     pub(super) fn handle(&self, id: Id, request: Result<Request, Unreadable>) -> Handled {
         let mut state = self.state();
         let deed = state.plan.deed(id);
-        // Nobody waits for a command: to wake the servo loop for it would delay its reply.
+        // No thread waits for a command: waking the servo loop would delay the reply.
         let wakes = deed != Deed::Answer || !request.is_ok_and(|request| is_command(request.function()));
         let answer = match (deed, request) {
             (Deed::Status(status), request) => {
@@ -186,7 +186,7 @@ impl Hub {
         Handled { deed, answer }
     }
 
-    /// The reply of a procedure; nothing if it is not over in time.
+    /// Waits for the reply of a procedure; `None` on timeout.
     pub(super) fn wait_for_reply(&self, ticket: Ticket, patience: Duration) -> Option<Reply> {
         let until = Instant::now() + patience;
         let mut state = self.state();
@@ -200,9 +200,9 @@ impl Hub {
         }
     }
 
-    // ------------------------------------------------------------ of callback connections
+    // ------------------------------------------------------------ callback connections
 
-    /// A connection that was taken for a client carries events from now on; its token.
+    /// Turns a client into a callback connection and returns its token.
     pub(super) fn becomes_callback(&self, id: Id) -> Id {
         let mut state = self.state();
         state.clients.retain(|client| client.id != id);
@@ -219,7 +219,7 @@ impl Hub {
         id
     }
 
-    /// What is to be sent next; nothing if there is nothing in time.
+    /// Waits for the next event to send; `None` on timeout.
     pub(super) fn next(&self, token: Id, patience: Duration) -> Option<Next> {
         let until = Instant::now() + patience;
         let mut state = self.state();
@@ -235,7 +235,7 @@ impl Hub {
         }
     }
 
-    /// What was sent is acknowledged.
+    /// Marks the last tick as acknowledged.
     pub(super) fn acknowledged(&self, token: Id) {
         if let Some(callback) = self.state().callback(Some(token)) {
             callback.tick_open_s = None;
@@ -243,7 +243,7 @@ impl Hub {
         self.changed.notify_all();
     }
 
-    /// Whether a callback connection is to end without a word.
+    /// Returns the cause of an end without an end event, if due.
     pub(super) fn is_over(&self, token: Id) -> Option<CallbackEnd> {
         let mut state = self.state();
         state
@@ -251,7 +251,7 @@ impl Hub {
             .map_or(Some(CallbackEnd::Gone), |callback| callback.end.filter(|end| *end != CallbackEnd::Asked))
     }
 
-    /// A callback connection is gone.
+    /// Removes a callback connection and the registrations of its client.
     pub(super) fn callback_gone(&self, token: Id) {
         let mut state = self.state();
         state.callbacks.retain(|callback| callback.token != token);
@@ -265,7 +265,7 @@ impl Hub {
     }
 }
 
-/// Whether a function only sets the target or the wrench of the next servo interval.
+/// Returns true for a function that only sets the target or the wrench of the next servo interval.
 fn is_command(function: Function) -> bool {
     matches!(
         function,
@@ -277,16 +277,16 @@ fn is_command(function: Function) -> bool {
     )
 }
 
-/// Whether ticks are on their way.
+/// Result of a wait for acknowledgements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TickWait {
-    /// Nobody wants any, and a procedure is in progress.
+    /// No client is registered for ticks, and a procedure is in progress.
     Busy,
-    /// Nobody wants any.
+    /// No client is registered for ticks.
     Unwanted,
-    /// All are acknowledged.
+    /// All ticks are acknowledged.
     Taken,
-    /// One still is.
+    /// A tick is still unacknowledged.
     Open,
 }
 

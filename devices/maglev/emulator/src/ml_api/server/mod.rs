@@ -1,11 +1,10 @@
-//! Connections: a thread each, and one state that all of them share with the servo loop.
+//! Connections: one thread each, with a state shared with the servo loop.
 //!
-//! A connection is a control connection until its client asks for a token: from then on it carries events. A control
-//! connection always answers at once, but for procedures; it never waits for what another connection does, because a
-//! client's handler of an event may be inside a call. Of ticks the newest waits, those in between are dropped; other events
-//! wait in order.
+//! A connection is a control connection until its client requests a token; from then on it carries events. A control
+//! connection replies at once, except to procedures; it never waits for another connection, because a client's event
+//! handler may be inside a call. Of the ticks only the newest is queued; other events are queued in order.
 //!
-//! Whoever is thrown out is reset: a client does not notice that a connection was closed in order, and waits for ever.
+//! Rejected connections are reset: clients do not detect an orderly close and would wait for ever.
 
 mod callback;
 mod control;
@@ -21,23 +20,23 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-/// Connections at a time; more are reset.
+/// Largest number of connections; more are reset.
 const CONNECTIONS: usize = 60;
-/// Pause after a connection could not be accepted: there may be no descriptor left.
+/// Pause after a failed accept: the process may have no descriptor left.
 const PAUSE: Duration = Duration::from_millis(10);
-/// How long a client may take to read a reply.
+/// Write timeout: the longest time for a client to read a reply.
 const WRITE_PATIENCE: Duration = Duration::from_secs(2);
 
-/// A server that accepts connections in a thread of its own.
+/// A server with its own accept thread.
 pub struct Server {
     hub: Arc<Hub>,
 }
 
 impl Server {
-    /// Accepts connections of a port from now on, as long as the process lives.
+    /// Starts to accept connections of a port, until the process ends.
     ///
     /// # Errors
-    /// The system's error.
+    /// Errors of the system when starting the thread.
     pub fn start(port: Port, hub: Arc<Hub>) -> io::Result<Self> {
         let shared = Arc::clone(&hub);
         let open = Arc::new(AtomicUsize::new(0));
@@ -64,14 +63,14 @@ impl Server {
         Ok(Self { hub })
     }
 
-    /// What the connections share.
+    /// Returns the state shared by the connections.
     #[must_use]
     pub fn hub(&self) -> &Hub {
         &self.hub
     }
 }
 
-/// A connection that sends small frames at once, and that is reset when it is dropped or its process dies.
+/// Configures a connection to send small frames at once, and to reset when it is dropped or the process dies.
 fn prepared(stream: TcpStream) -> io::Result<TcpStream> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_PATIENCE))?;

@@ -1,4 +1,4 @@
-//! What the shared state knows of clients and their callback connections, and what each of them is told.
+//! Shared state of clients and callback connections, with their pending events.
 
 use super::hub::{Id, Log};
 use crate::controller::Sample;
@@ -9,7 +9,7 @@ use flotor_maglev::ml_api::{
 };
 use std::collections::VecDeque;
 
-/// Events that wait at most; a client that reads none loses the oldest.
+/// Largest number of queued events; a client that reads none loses the oldest.
 pub(super) const EVENTS: usize = 256;
 /// Number of the first connection.
 const FIRST: Id = 101;
@@ -31,7 +31,7 @@ pub(super) struct Client {
     pub(super) id: Id,
     pub(super) callback: Option<Id>,
     pub(super) registered: Vec<EventKind>,
-    /// How long ago its callback connection was lost while it wanted ticks, s.
+    /// Time since the loss of the callback connection while registered for ticks, s.
     pub(super) ticks_lost_s: Option<f64>,
 }
 
@@ -39,23 +39,23 @@ pub(super) struct Callback {
     pub(super) token: Id,
     pub(super) events: VecDeque<Event>,
     pub(super) tick: Option<WirePose>,
-    /// How long ago the tick was sent that is not acknowledged yet, s.
+    /// Age of the unacknowledged tick, s.
     pub(super) tick_open_s: Option<f64>,
     pub(super) end: Option<CallbackEnd>,
 }
 
-/// Why a callback connection ends.
+/// Cause of the end of a callback connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CallbackEnd {
-    /// Its client wants that: it is told.
+    /// Requested by the client; an end event is sent.
     Asked,
-    /// Its client is gone.
+    /// The client is disconnected.
     Gone,
-    /// It is closed in order, without a word.
+    /// Orderly close without an end event.
     Close,
 }
 
-/// What is to be sent on a callback connection next.
+/// Next item to send on a callback connection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Next {
     Event(Event),
@@ -203,9 +203,9 @@ impl State {
         }
     }
 
-    /// A force that nobody keeps up ends in a landing.
+    /// Lands the flotor if a force command is no longer refreshed by its client.
     fn watch_silence(&mut self, dt_s: f64, log: &Log) {
-        // A client whose call waits for a procedure cannot acknowledge what its handler commands in.
+        // A client waiting for a procedure cannot acknowledge ticks from the handler that made the call.
         if self.controller.is_busy() {
             return;
         }
