@@ -1,25 +1,25 @@
-//! Angles measured by polynomials: smooth where the angle itself is not, and no inverse trigonometry.
+//! Polynomial measures of angles: smooth where the angle itself is not, and without inverse trigonometry.
 //!
-//! An elastic energy needs the square of an angle between two directions, or a twist, and their derivatives. An
-//! arc cosine loses half its digits near zero and has a kink at half a turn. Both measures below are truncated
-//! Taylor series in `1 - cos`, which a pose gives without cancellation as half the squared distance of two unit
-//! vectors. Up to [`TRUSTED_VERSINE`] they are the angle to a relative 2e-5 (to rounding below 17 degrees);
-//! beyond, up to half a turn and over it, they fall behind the angle but stay smooth, so that an energy built
-//! on them is smooth on all rotations and its derivative is exactly the derivative of what is evaluated.
+//! An elastic energy needs the square of an angle between two directions, or a twist, and their derivatives. An arc
+//! cosine loses half its digits near zero and has a kink at half a turn. Both measures below are truncated Taylor
+//! series in `1 - cos`, which follows from a pose without cancellation as half the squared distance of two unit
+//! vectors. Up to [`TRUSTED_VERSINE`] they equal the angle to a relative 2e-5 (to rounding below 17 degrees). Beyond,
+//! up to half a turn and over it, they are less than the angle but smooth, so that an energy built on them is smooth on
+//! all rotations and its derivative is exact.
 //!
 //! Source: series of `asin² s` and `asin s / sqrt(1 - s²)` at `s = sin(angle / 2)`, NIST DLMF 4.24.
 
 use crate::{Real, polynomial};
 
-/// `1 - cos` of 60 degrees: beyond it the measures are a continuation.
+/// Versine `1 - cos` of 60 degrees: beyond it the measures only continue smoothly.
 pub const TRUSTED_VERSINE: f64 = 0.5;
 
-/// `angle² / c` by powers of `c = 1 - cos`: `2^(n+2) / ((n+1)² binomial(2n+2, n+1))` for `n = 0, 1, ...`.
+/// Coefficients of `angle² / c` by powers of `c = 1 - cos`: `2^(n+2) / ((n+1)² binomial(2n+2, n+1))`, `n = 0, 1, ...`.
 const SQUARE_SERIES: [f64; 6] = series(2.0, true);
-/// `angle / sin` by powers of `c`: `2^n n!² / (2n+1)!`. It is a quotient, and needs two more terms for the same accuracy.
+/// Coefficients of `angle / sin` by powers of `c`: `2^n n!² / (2n+1)!`. Two more terms than above give the same accuracy.
 const TWIST_SERIES: [f64; 8] = series(1.0, false);
 
-/// Either series, by the quotient of neighbours.
+/// Computes either series from the quotients of successive coefficients.
 const fn series<const TERMS: usize>(first: f64, is_square: bool) -> [f64; TERMS] {
     let mut coefficients = [first; TERMS];
     let mut i = 1;
@@ -35,23 +35,23 @@ const fn series<const TERMS: usize>(first: f64, is_square: bool) -> [f64; TERMS]
 /// Square of the angle between two directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SquaredAngle<R = f64> {
-    /// `angle²` (rad²).
+    /// Squared angle `angle²` (rad²).
     pub value: R,
-    /// Its derivative by `1 - cos angle`, two at zero.
+    /// Derivative by `1 - cos angle`, two at zero.
     pub slope: R,
 }
 
-/// A signed angle of rotation about a known axis.
+/// Signed angle of rotation about a known axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twist<R = f64> {
-    /// The angle (rad); odd, and zero again at half a turn.
+    /// Angle (rad); odd, and zero again at half a turn.
     pub value: R,
-    /// Its derivative by the true angle, one at zero.
+    /// Derivative by the true angle, one at zero.
     pub slope: R,
 }
 
-/// Squares of three angles from their versines `1 - cos`, 0 to 2, and a twist from its versine and sine. Real-time: bounded,
-/// no allocation, no branch.
+/// Returns the squares of three angles from their versines `1 - cos`, 0 to 2, and a twist from its versine and sine.
+/// Real-time: bounded, no allocation, no branch.
 #[inline(always)]
 #[must_use]
 pub fn measures<R: Real>(
@@ -63,7 +63,7 @@ pub fn measures<R: Real>(
     let [quotient, slope] = polynomial(twist_versine, &TWIST_SERIES);
     let twist_slope =
         slope * (twist_sine * twist_sine) + quotient * (twist_versine.like(1.0) - twist_versine);
-    // No closures in here: the compiler would have to inline them before it may use wide registers.
+    // No closures here: the compiler would have to inline them before it may use wide registers.
     (
         [squared_angle(a), squared_angle(b), squared_angle(c)],
         Twist { value: quotient * twist_sine, slope: twist_slope },

@@ -1,8 +1,8 @@
-//! The arc tangent as a polynomial quotient, for angles whose tangent of the half is at hand.
+//! Arc tangent as a rational function, for angles with a known tangent of the half angle.
 //!
-//! A pose never gives an angle but always sides of a triangle, and from them the tangent of *half* the angle
-//! without trigonometry: `tan(angle / 2) = opposite / (hypotenuse + adjacent)`, between 0 and 1 up to a right
-//! angle. What remains is one smooth function on one interval, without cases:
+//! A pose gives not angles but sides of triangles, and from them the tangent of *half* the angle without trigonometry:
+//! `tan(angle / 2) = opposite / (hypotenuse + adjacent)`, between 0 and 1 up to a right angle. That leaves one smooth
+//! function on one interval, without cases:
 //!
 //! ```text
 //! atan(t) = t q(t²)        q(u) = 1 - u P(u) / Q(u),  0 <= u <= 1
@@ -14,7 +14,7 @@
 
 use crate::Real;
 
-/// `P`, from the constant term.
+/// Coefficients of `P`, from the constant term.
 const NUMERATOR: [f64; 6] = [
     0.333_333_333_333_331_5,
     0.746_627_814_866_754_2,
@@ -23,7 +23,7 @@ const NUMERATOR: [f64; 6] = [
     0.023_697_973_039_698_48,
     0.000_748_606_855_418_659_9,
 ];
-/// `Q`, from the constant term.
+/// Coefficients of `Q`, from the constant term.
 const DENOMINATOR: [f64; 7] = [
     1.0,
     2.839_883_444_599_726_7,
@@ -34,14 +34,14 @@ const DENOMINATOR: [f64; 7] = [
     0.000_829_647_470_658_052,
 ];
 
-/// `q(u) = atan(sqrt u) / sqrt u` for `0 <= u <= 1`, to one unit in the last place. Real-time: bounded, no
+/// Returns `q(u) = atan(sqrt u) / sqrt u` for `0 <= u <= 1`, to one unit in the last place. Real-time: bounded, no
 /// allocation, no branch.
 #[inline(always)]
 #[must_use]
 pub fn quotient<R: Real>(u: R) -> R {
     let [p0, p1, p2, p3, p4, p5] = NUMERATOR;
     let [q0, q1, q2, q3, q4, q5, q6] = DENOMINATOR;
-    // Even and odd powers apart: short dependency chains.
+    // Even and odd powers separately: short dependency chains.
     let u2 = u * u;
     let numerator = ((u2 * p4 + p2) * u2 + p0) + ((u2 * p5 + p3) * u2 + p1) * u;
     let denominator = (((u2 * q6 + q4) * u2 + q2) * u2 + q0) + ((u2 * q5 + q3) * u2 + q1) * u;

@@ -1,4 +1,4 @@
-//! Polynomials along the rod and the points at which its energy is summed.
+//! Polynomial basis along a rod, with the quadrature points of its energy.
 //!
 //! A field along the rod is a straight line from its value at the lower plate (zero, by choice of
 //! coordinates) to that at the upper plate, plus `K` *bubbles* that vanish at both plates. Bubble `k` is the
@@ -13,23 +13,22 @@
 use flotor_hal::math;
 use std::f64::consts::PI;
 
-/// `K` bubbles and `Q` quadrature stations on the rod, arc length scaled to 0..1.
+/// Tables of `K` bubbles at `Q` quadrature stations on the rod, arc length scaled to 0..1.
 ///
-/// The tables are kept in both orders, so that sums over bubbles and sums over stations both run over
-/// neighbours in memory.
+/// Each table exists in both index orders, so that sums over bubbles and over stations both read consecutive memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Basis<const K: usize, const Q: usize> {
-    /// Gauss weights, of sum 1.
+    /// Gauss weights; their sum is 1.
     pub weight: [f64; Q],
-    /// Scaled arc length of the stations; also the value there of the straight line.
+    /// Scaled arc length of the stations; also the value of the straight line there.
     pub station: [f64; Q],
     /// Bubbles at the stations, `[k][i]`.
     pub bubble: [[f64; Q]; K],
-    /// Their slopes per scaled arc length.
+    /// Slopes of the bubbles per scaled arc length, `[k][i]`.
     pub slope: [[f64; Q]; K],
-    /// The same, `[i][k]`.
+    /// Bubbles at the stations, `[i][k]`.
     pub bubble_at: [[f64; K]; Q],
-    /// Their slopes, `[i][k]`.
+    /// Slopes of the bubbles per scaled arc length, `[i][k]`.
     pub slope_at: [[f64; K]; Q],
 }
 
@@ -64,7 +63,7 @@ impl<const K: usize, const Q: usize> Basis<K, Q> {
     }
 }
 
-/// The first `K` bubbles and their slopes per scaled arc length, at scaled arc length `(1 + t) / 2`.
+/// Returns the first `K` bubbles and their slopes per scaled arc length, at scaled arc length `(1 + t) / 2`.
 pub fn bubbles<const K: usize>(t: f64) -> ([f64; K], [f64; K]) {
     let (mut bubble, mut slope) = ([0.0; K], [0.0; K]);
     let mut legendre = Legendre::at(t);
@@ -102,14 +101,14 @@ impl Legendre {
         *self = Self { argument, degree: degree + 1.0, value: next, previous: value };
     }
 
-    /// Derivative, for arguments inside -1..1.
+    /// Returns the derivative, for arguments inside -1..1.
     fn derivative(&self) -> f64 {
         // (x² - 1) P'(n) = n (x P(n) - P(n-1)).
         self.degree * (self.argument * self.value - self.previous) / (self.argument * self.argument - 1.0)
     }
 }
 
-/// Node `i` in ascending order of the rule with `count` nodes on -1..1, and its weight.
+/// Returns node `i`, ascending, and its weight of the Gauss rule with `count` nodes on -1..1.
 pub fn gauss_legendre(count: usize, i: usize) -> (f64, f64) {
     let legendre = |t| {
         let mut polynomial = Legendre::at(t);
@@ -117,7 +116,7 @@ pub fn gauss_legendre(count: usize, i: usize) -> (f64, f64) {
         polynomial
     };
     let mut node = -math::cos(PI * (i as f64 + 0.75) / (count as f64 + 0.5));
-    // From this estimate Newton's method doubles the digits: 3, 6, 12, all; one more round for the last bit.
+    // Newton's method doubles the digits of this estimate: 3, 6, 12, all; one more iteration for the last bit.
     for _ in 0..5 {
         let polynomial = legendre(node);
         node -= polynomial.value / polynomial.derivative();

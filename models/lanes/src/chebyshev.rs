@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use flotor_hal::glam::DVec4;
 use flotor_hal::math;
 
-/// Interpolates functions on -1..1 at the Chebyshev nodes: their powers, from the constant on. Real-time: bounded, no allocation.
+/// Interpolates functions on -1..1 at the Chebyshev nodes; returns powers from the constant on. Real-time: bounded, no allocation.
 #[must_use]
 pub fn interpolated<const TERMS: usize>(mut function: impl FnMut(f64) -> DVec4) -> [DVec4; TERMS] {
     let terms = TERMS as f64;
@@ -23,7 +23,7 @@ pub fn interpolated<const TERMS: usize>(mut function: impl FnMut(f64) -> DVec4) 
     }
     chebyshev[0] *= 0.5;
 
-    // The same recurrence, carried along as powers.
+    // The recurrence again, in powers.
     let mut powers = [DVec4::ZERO; TERMS];
     let (mut current, mut next) = ([0.0; TERMS], [0.0; TERMS]);
     current[0] = 1.0;

@@ -20,14 +20,14 @@
 
 use crate::Real;
 
-/// Terms of the power series: at `z / 16 = -3.75` the first one left out is below 1e-17 of the sum.
+/// Terms of the power series: at `z / 16 = -3.75` the first omitted one is below 1e-17 of the sum.
 const TERMS: usize = 12;
 
-/// `G1` and `G2` by powers of `-z`.
+/// Coefficients of `G1` and `G2` by powers of `-z`.
 const G1_SERIES: [f64; TERMS] = power_series(1);
 const G2_SERIES: [f64; TERMS] = power_series(2);
 
-/// Coefficients of `Gn`: `(-1/2)^k (2n+1)!! / (k! (2n+2k+1)!!)`, by the quotient of neighbours.
+/// Computes the coefficients of `Gn`: `(-1/2)^k (2n+1)!! / (k! (2n+2k+1)!!)`, by quotients of successive ones.
 const fn power_series(n: usize) -> [f64; TERMS] {
     let mut coefficients = [1.0; TERMS];
     let mut k = 1;
@@ -38,7 +38,7 @@ const fn power_series(n: usize) -> [f64; TERMS] {
     coefficients
 }
 
-/// Sum of a series by Estrin's scheme, pairs of pairs: dependency chains a third as long as Horner's.
+/// Sums a series by Estrin's scheme, pairs of pairs: dependency chains a third as long as Horner's.
 #[inline(always)]
 fn sum<R: Real>(coefficients: &[f64; TERMS], w: R) -> R {
     let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11] = *coefficients;
@@ -55,7 +55,7 @@ fn four<R: Real>(w: R, w2: R, [c0, c1, c2, c3]: [f64; 4]) -> R {
     (w * c3 + c2) * w2 + (w * c1 + c0)
 }
 
-/// `C0`, `G0`, `G1`, `G2` at one argument.
+/// Values of `C0`, `G0`, `G1`, `G2` at one argument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EntireFunctions<R = f64> {
     /// `cos x`
@@ -78,7 +78,7 @@ impl EntireFunctions {
 }
 
 impl<R: Real> EntireFunctions<R> {
-    /// All four at `z`. Real-time: bounded, no allocation, no branch.
+    /// Evaluates all four functions at `z`. Real-time: bounded, no allocation, no branch.
     ///
     /// Error below 5e-15 of the larger of 1 and the value for -60 <= z <= 9.5 (a half-wave is at 9.87), below
     /// 2e-14 up to 60. An argument outside -60..60 is moved to the nearer end and NaN to the lower one, so the
@@ -95,7 +95,7 @@ impl<R: Real> EntireFunctions<R> {
         Self { c0, g0, g1, g2 }.doubled(w * 2.0).doubled(w * 8.0)
     }
 
-    /// From `z` to `4 z`, that is from `x` to `2 x`, given `2 z`.
+    /// Doubles the argument from `x` to `2 x`, that is from `z` to `4 z`, given `2 z`.
     #[inline(always)]
     fn doubled(self, twice_z: R) -> Self {
         let Self { c0, g0, g1, g2 } = self;
@@ -109,7 +109,7 @@ impl<R: Real> EntireFunctions<R> {
         }
     }
 
-    /// `h = 6 (1 - G0(4 z)) / (4 z) = 6 (2x - sin 2x) / (2x)³`, one at zero and free of the cancellation there.
+    /// Returns `h = 6 (1 - G0(4 z)) / (4 z) = 6 (2x - sin 2x) / (2x)³`, one at zero and free of cancellation there.
     #[inline(always)]
     #[must_use]
     pub fn h(&self) -> R {

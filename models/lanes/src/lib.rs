@@ -1,18 +1,18 @@
-//! One formula for one pose and for several side by side.
+//! Numerical formulas that run on one pose or on several side by side.
 //!
 //! The laws of a model are written once, over any [`Real`]: `f64` for the servo's one pose, [`Wide`] for a batch, several
 //! poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order written, and no product is
 //! fused with a sum, so a lane of a batch holds *the same bits* as the scalar law, on every machine.
 //!
-//! A comparison gives a mask, a truth value per lane. What is rare (strong tension, saturation, a plate below the
-//! other) stands behind `if R::any(mask)`: for one pose an ordinary branch, for several a branch taken when one of
-//! them needs it, with [`Real::select`] keeping the others as they were.
+//! A comparison returns a mask, a truth value per lane. Rare cases (strong tension, saturation, a plate below the
+//! other) stand behind `if R::any(mask)`: for one pose an ordinary branch, for several a branch taken if any lane needs
+//! it; [`Real::select`] restores the other lanes.
 //!
-//! [`angle`] gives squared angles and twists, [`arctangent`] angles from sides, [`saturation`] keeps a quantity short of a pole: polynomials
-//! over [`Real`], without the functions of a math library. [`entire`] and [`stability`] are the functions of a loaded column. [`chebyshev`]
-//! fits polynomials, [`basis`] has those of a field along a rod, and [`matrix`] solves small symmetric systems.
+//! [`angle`] computes squared angles and twists, [`arctangent`] angles from sides, [`saturation`] limits a quantity below a pole:
+//! polynomials over [`Real`], without the functions of a math library. [`entire`] and [`stability`] are the functions of a loaded column.
+//! [`chebyshev`] fits polynomials, [`basis`] has those of a field along a rod, and [`matrix`] solves small symmetric systems.
 //!
-//! The lanes come from the crate `pulp`, which finds the instruction set of the machine at run time.
+//! The lanes come from the crate `pulp`, which detects the instruction set of the machine at run time.
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Sub};
 
@@ -27,16 +27,16 @@ pub mod matrix;
 pub mod saturation;
 pub mod stability;
 
-/// Functions that are always inlined. In lanes they must be: only where the code around them is compiled for a set of
-/// instructions do they become those. With `#[inline]` alone a batch takes ten times as many (`energy` 3436 a pose instead
-/// of 326, `closed-form` 1961 instead of 192, tests/instructions), and that holds for the laws over [`Real`] as well.
+/// Marks functions `#[inline(always)]`. Only inlined into code compiled for an instruction set do lane functions use
+/// its instructions. With `#[inline]` alone a batch takes ten times as many (`energy` 3436 a pose instead of 326,
+/// `closed-form` 1961 instead of 192, tests/instructions); this applies to the laws over [`Real`] as well.
 macro_rules! in_lanes {
     ($($(#[$meta:meta])* $visibility:vis fn $name:ident $arguments:tt -> $result:ty $body:block)*) => {
         $($(#[$meta])* #[inline(always)] $visibility fn $name $arguments -> $result $body)*
     };
 }
 
-/// A real number, or one in each lane. Everything on it is real-time: bounded, no allocation.
+/// Real number, or one per lane. All methods are real-time: bounded, no allocation.
 pub trait Real:
     Copy
     + Neg<Output = Self>
@@ -48,63 +48,63 @@ pub trait Real:
     + Sub<f64, Output = Self>
     + Mul<f64, Output = Self>
 {
-    /// A truth value per lane.
+    /// Truth value per lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
-    /// The same value in as many lanes as `self` has.
+    /// Fills as many lanes as `self` has with a value.
     #[must_use]
     fn like(self, value: f64) -> Self;
 
-    /// Square root, correctly rounded.
+    /// Returns the square root, correctly rounded.
     #[must_use]
     fn sqrt(self) -> Self;
 
-    /// Magnitude.
+    /// Returns the absolute value.
     #[must_use]
     fn abs(self) -> Self;
 
-    /// Lanes below; false for NaN.
+    /// Compares each lane with a bound: true below; false for NaN.
     #[must_use]
     fn below(self, bound: f64) -> Self::Mask;
 
-    /// Lanes above; false for NaN.
+    /// Compares each lane with a bound: true above; false for NaN.
     #[must_use]
     fn above(self, bound: f64) -> Self::Mask;
 
-    /// Lane by lane one or the other.
+    /// Selects `yes` or `no` lane by lane.
     #[must_use]
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
-    /// True if any lane is.
+    /// Returns true if any lane is true.
     #[must_use]
     fn any(mask: Self::Mask) -> bool;
 
-    /// A scalar function in every lane, one after the other: for what is too rare to be written in lanes.
+    /// Applies a scalar function to every lane, one after the other: for cases too rare to vectorise.
     #[must_use]
     fn map(self, function: impl Fn(f64) -> f64) -> Self;
 
-    /// One over it.
+    /// Returns the reciprocal.
     #[inline(always)]
     #[must_use]
     fn inverse(self) -> Self {
         self.like(1.0) / self
     }
 
-    /// The number or the floor, whichever is larger; the floor for NaN.
+    /// Returns the larger of the number and the floor; the floor for NaN.
     #[inline(always)]
     #[must_use]
     fn at_least(self, floor: f64) -> Self {
         Self::select(self.above(floor), self, self.like(floor))
     }
 
-    /// The number or the ceiling, whichever is smaller; the ceiling for NaN.
+    /// Returns the smaller of the number and the ceiling; the ceiling for NaN.
     #[inline(always)]
     #[must_use]
     fn at_most(self, ceiling: f64) -> Self {
         Self::select(self.below(ceiling), self, self.like(ceiling))
     }
 
-    /// Lanes that are neither infinite nor NaN.
+    /// Returns true for lanes that are neither infinite nor NaN.
     #[inline(always)]
     #[must_use]
     fn finite(self) -> Self::Mask {
@@ -156,7 +156,7 @@ impl Real for f64 {
     }
 }
 
-/// As many numbers as a vector register of the instruction set `S` holds.
+/// Vector register of numbers for the instruction set `S`.
 #[derive(Clone, Copy, Debug)]
 pub struct Wide<S: Simd> {
     simd: S,
@@ -165,13 +165,13 @@ pub struct Wide<S: Simd> {
 
 impl<S: Simd> Wide<S> {
     in_lanes! {
-        /// Numbers as they lie in a register.
+        /// Wraps a register.
         #[must_use]
         pub fn new(simd: S, lanes: S::f64s) -> Self {
             Self { simd, lanes }
         }
 
-        /// The register.
+        /// Returns the register.
         #[must_use]
         pub fn lanes(self) -> S::f64s {
             self.lanes
@@ -179,7 +179,7 @@ impl<S: Simd> Wide<S> {
     }
 }
 
-/// A truth value per lane of a [`Wide`].
+/// Truth values of the lanes of a [`Wide`].
 #[derive(Clone, Copy, Debug)]
 pub struct WideMask<S: Simd> {
     simd: S,
@@ -213,7 +213,7 @@ impl<S: Simd> Neg for Wide<S> {
     }
 }
 
-/// An arithmetic operator between lanes, and between lanes and one number for all of them.
+/// Implements an arithmetic operator between lanes, and between lanes and a scalar.
 macro_rules! lane_operator {
     ($($trait:ident $method:ident $instruction:ident),*) => {$(
         impl<S: Simd> $trait for Wide<S> {
@@ -282,7 +282,7 @@ impl<S: Simd> Real for Wide<S> {
     }
 }
 
-/// Two numbers, or two registers of them, in step: while one waits for a division the other computes.
+/// Two numbers, or two registers, computed together: while one waits for a division the other proceeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair<R>(pub R, pub R);
 
@@ -313,7 +313,7 @@ impl<R: Real> Neg for Pair<R> {
     }
 }
 
-/// The operators of a pair, from those of its parts.
+/// Implements the operators of a pair from those of its parts.
 macro_rules! pair_operator {
     ($($trait:ident $method:ident),*) => {$(
         impl<R: Real> $trait for Pair<R> {
@@ -327,7 +327,7 @@ macro_rules! pair_operator {
     )*};
 }
 
-/// The same with one number for both parts.
+/// Implements the operators between a pair and a scalar.
 macro_rules! pair_operator_by_number {
     ($($trait:ident $method:ident),*) => {$(
         impl<R: Real> $trait<f64> for Pair<R> {
@@ -382,8 +382,8 @@ impl<R: Real> Real for Pair<R> {
     }
 }
 
-/// A polynomial, by powers from the constant on, and its derivative: four terms or more, an even number. Even and odd powers
-/// apart: short dependency chains. Real-time: bounded, no allocation, no branch.
+/// Evaluates a polynomial, by powers from the constant on, and its derivative: four terms or more, an even number. Even
+/// and odd powers separately: short dependency chains. Real-time: bounded, no allocation, no branch.
 #[inline(always)]
 #[must_use]
 pub fn polynomial<R: Real, const TERMS: usize>(x: R, powers: &[f64; TERMS]) -> [R; 2] {
@@ -402,32 +402,32 @@ pub fn polynomial<R: Real, const TERMS: usize>(x: R, powers: &[f64; TERMS]) -> [
     [odd * x + even, (odd_slope * x + even_slope) * (x + x) + odd]
 }
 
-/// Three components, a [`Real`] each.
+/// Vector of three [`Real`] components.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vector<R> {
-    /// Along x.
+    /// Component along x.
     pub x: R,
-    /// Along y.
+    /// Component along y.
     pub y: R,
-    /// Along z.
+    /// Component along z.
     pub z: R,
 }
 
 impl<R: Real> Vector<R> {
     in_lanes! {
-        /// From its components.
+        /// Creates a vector from its components.
         #[must_use]
         pub fn new(x: R, y: R, z: R) -> Self {
             Self { x, y, z }
         }
 
-        /// Inner product.
+        /// Returns the inner product.
         #[must_use]
         pub fn dot(self, other: Self) -> R {
             self.x * other.x + self.y * other.y + self.z * other.z
         }
 
-        /// Outer product.
+        /// Returns the cross product.
         #[must_use]
         pub fn cross(self, other: Self) -> Self {
             Self {

@@ -1,18 +1,18 @@
-//! A small symmetric matrix as a product `L D Lᵀ`, which also counts its negative eigenvalues.
+//! Small symmetric matrix as a product `L D Lᵀ`, with the number of its negative eigenvalues.
 //!
 //! By Sylvester's law of inertia the signs of the pivots `D` are those of the eigenvalues. The number of
 //! negative ones of a second variation is the Morse index of the equilibrium: zero where it is stable.
 //!
-//! Source: Golub and Van Loan, *Matrix Computations*, 4.1 and 8.1.5. Without pivoting: for a definite matrix
-//! none is needed, and an indefinite one is only counted, then shifted until it is definite.
+//! Source: Golub and Van Loan, *Matrix Computations*, 4.1 and 8.1.5. Without pivoting: a definite matrix needs none; of
+//! an indefinite one only the negative pivots are counted, before it is shifted until definite.
 
-/// Steps of inverse iteration: the smallest eigenvalue to a few percent.
+/// Steps of inverse iteration: they give the smallest eigenvalue to a few percent.
 const INVERSE_ITERATIONS: u32 = 3;
 
 /// Factors of a symmetric matrix of order `N`.
 ///
-/// The triangle is kept by columns and by rows, each filled up with zeros: both substitutions then run over
-/// neighbours in memory and over a length known to the compiler.
+/// The triangle is stored by columns and by rows, each padded with zeros: both substitutions then read consecutive
+/// memory over a length known to the compiler.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Factored<const N: usize> {
     column: [[f64; N]; N],
@@ -22,13 +22,12 @@ pub struct Factored<const N: usize> {
 }
 
 impl<const N: usize> Factored<N> {
-    /// The factors of the unit matrix.
+    /// Returns the factors of the unit matrix.
     pub fn unit() -> Self {
         Self { column: [[0.0; N]; N], row: [[0.0; N]; N], inverse_pivot: [1.0; N], negative: 0 }
     }
 
-    /// Factors `matrix + shift * unit`, of which the lower triangle is read. Real-time: bounded, no
-    /// allocation.
+    /// Factors `matrix + shift * unit`; reads only the lower triangle. Real-time: bounded, no allocation.
     pub fn new(matrix: &[[f64; N]; N], shift: f64) -> Self {
         let mut rest = *matrix;
         let mut factored = Self::unit();
@@ -45,7 +44,7 @@ impl<const N: usize> Factored<N> {
                 let factor = column[i] * inverse;
                 factored.column[j][i] = factor;
                 factored.row[i][j] = factor;
-                // Zeros up to j keep what is finished as it is; beyond i nothing is read again.
+                // Zeros up to j preserve finished entries; those beyond i are never read again.
                 for (entry, above) in rest[i].iter_mut().zip(&column) {
                     *entry -= factor * above;
                 }
@@ -54,8 +53,8 @@ impl<const N: usize> Factored<N> {
         factored
     }
 
-    /// Smallest eigenvalue of a definite matrix, by inverse iteration from the direction of the smallest pivot, which is an
-    /// upper bound and no more. Real-time: bounded, no allocation.
+    /// Returns an upper bound of the smallest eigenvalue of a definite matrix, close to it, by inverse iteration from
+    /// the direction of the smallest pivot. Real-time: bounded, no allocation.
     pub fn smallest_eigenvalue(&self) -> f64 {
         let largest = |(a, x): (usize, f64), (b, y): (usize, f64)| if y > x { (b, y) } else { (a, x) };
         let (softest, _) = self.inverse_pivot.iter().copied().enumerate().fold((0, 0.0), largest);
@@ -70,12 +69,12 @@ impl<const N: usize> Factored<N> {
         1.0 / inverse
     }
 
-    /// Number of negative eigenvalues.
+    /// Returns the number of negative eigenvalues.
     pub fn negative(&self) -> usize {
         self.negative
     }
 
-    /// Newton's step against a slope: minus the solution. Real-time: bounded, no allocation.
+    /// Returns Newton's step against a slope: minus the solution. Real-time: bounded, no allocation.
     #[inline]
     pub fn step_down(&self, slope: &[f64; N]) -> [f64; N] {
         let mut step = self.solve(slope);
@@ -108,13 +107,13 @@ impl<const N: usize> Factored<N> {
     }
 }
 
-/// Matrix times vector.
+/// Multiplies a matrix and a vector.
 #[inline]
 pub fn product<const N: usize, const R: usize>(matrix: &[[f64; N]; R], vector: &[f64; N]) -> [f64; R] {
     std::array::from_fn(|row| dot(&matrix[row], vector))
 }
 
-/// Sum of the products of entries, summed in two lanes.
+/// Returns the inner product, summed in two lanes.
 #[inline(always)]
 pub fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     let mut lanes = [0.0; 2];
@@ -131,13 +130,13 @@ pub fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     sum
 }
 
-/// Euclidean length.
+/// Returns the Euclidean length.
 #[inline(always)]
 pub fn length<const N: usize>(vector: &[f64; N]) -> f64 {
     dot(vector, vector).sqrt()
 }
 
-/// `sum + factor * vector`.
+/// Returns `sum + factor * vector`.
 #[inline(always)]
 pub fn added<const N: usize>(sum: &[f64; N], factor: f64, vector: &[f64; N]) -> [f64; N] {
     let mut result = *sum;

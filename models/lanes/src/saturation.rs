@@ -1,23 +1,23 @@
-//! Smooth (C2) saturation of a quantity below a pole.
+//! Smooth (C2) saturation that limits a quantity below a pole.
 //!
-//! Near buckling, formulas run into poles. A hard limit would put a kink into the energy and a step into the
-//! stiffness; saturation keeps it twice differentiable, so force *and* stiffness stay continuous.
+//! Near buckling, formulas have poles. A hard limit would put a kink into the energy and a step into the stiffness;
+//! with smooth saturation the energy is twice differentiable, so force *and* stiffness are continuous.
 
 use crate::Real;
 
-/// A quantity after saturation.
+/// Result of a saturation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Saturated<R: Real = f64> {
-    /// After saturation.
+    /// Saturated quantity.
     pub value: R,
-    /// Derivative by the quantity before saturation.
+    /// Derivative of `value` by the original quantity.
     pub slope: R,
-    /// Whether it was changed at all.
+    /// True where the quantity was changed.
     pub saturated: R::Mask,
 }
 
-/// The quantity itself up to `knee`; with the excess `d` beyond it, `knee + d / sqrt(1 + (d / reach)²)`, which
-/// stays below `knee + reach`. Real-time: bounded, no allocation.
+/// Limits a quantity below `knee + reach`: unchanged up to `knee`, then `knee + d / sqrt(1 + (d / reach)²)` with the
+/// excess `d` beyond it. Real-time: bounded, no allocation.
 #[inline(always)]
 pub fn saturate_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<R> {
     let saturated = quantity.above(knee);
@@ -25,7 +25,7 @@ pub fn saturate_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<
     if !R::any(saturated) {
         return Saturated { value: quantity, slope: unit, saturated };
     }
-    // d / sqrt(1 + (d / reach)²), and its derivative (1 + (d / reach)²)^(-3/2).
+    // Computes d / sqrt(1 + (d / reach)²), and its derivative (1 + (d / reach)²)^(-3/2).
     let excess = quantity - knee;
     let reached = excess * (1.0 / reach);
     let square = (reached * reached + 1.0).inverse();
@@ -37,7 +37,7 @@ pub fn saturate_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<
     }
 }
 
-/// The mirror image of [`saturate_above`]: never below `knee - reach`.
+/// Limits a quantity above `knee - reach`; the mirror image of [`saturate_above`].
 #[inline(always)]
 pub fn saturate_below<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<R> {
     let saturated = quantity.below(knee);

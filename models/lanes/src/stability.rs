@@ -1,4 +1,4 @@
-//! The stability functions of a straight column under an axial load: how its resistance to rotations of its ends changes.
+//! Stability functions of a straight column under axial load: its resistance to rotations of its ends.
 //!
 //! Quotients of the entire functions of [`crate::entire`] in the signed argument `z` of the load.
 
@@ -14,14 +14,14 @@ pub struct StabilityFunctions<R = f64> {
     pub bow: R,
     /// `G1 / G0 = 3 (1 - x cot x) / x²`: bending share of the sway flexibility, relative to the unloaded rod.
     pub sway: R,
-    /// `h / G0²`, the share of writhe in a bow and a sway at right angles.
+    /// `h / G0²`: fraction of writhe in a bow and a sway at right angles.
     pub writhe: R,
     /// `d(sway)/dz`.
     pub sway_slope: R,
 }
 
 impl<R: Real> StabilityFunctions<R> {
-    /// At argument `z`; poles at `z = pi², 4 pi², ...`. Real-time: bounded, no allocation.
+    /// Evaluates the functions at `z`; poles at `z = pi², 4 pi², ...`. Real-time: bounded, no allocation.
     ///
     /// Accurate for every `z <= 60`, however negative; above, see [`EntireFunctions::at`].
     #[inline(always)]
@@ -29,7 +29,7 @@ impl<R: Real> StabilityFunctions<R> {
     pub fn at(z: R) -> Self {
         let f = EntireFunctions::at(z);
         let inverse = f.g0.inverse();
-        // bow C0 / G0 and sway G1 / G0, and the slope of sway by z from dG0/dz = -G1 / 6 and dG1/dz = -G2 / 10.
+        // Computes bow C0 / G0 and sway G1 / G0, and the slope of sway by z from dG0/dz = -G1 / 6 and dG1/dz = -G2 / 10.
         let (bow, sway) = (f.c0 * inverse, f.g1 * inverse);
         let sway_slope = sway * sway * (1.0 / 6.0) - f.g2 * inverse * 0.1;
         let regular = Self { bow, sway, writhe: writhe(bow, sway), sway_slope };
@@ -37,26 +37,27 @@ impl<R: Real> StabilityFunctions<R> {
         if R::any(strong) { Self::in_strong_tension(z).or_where_not(strong, regular) } else { regular }
     }
 
-    /// `d(bow)/dz`.
+    /// Returns `d(bow)/dz`.
     #[inline(always)]
     #[must_use]
     pub fn bow_slope(&self) -> R {
         self.writhe * (-1.0 / 3.0)
     }
 
-    /// `d(writhe)/dz`, from `writhe = (3 - bow sway) / 2`.
+    /// Returns `d(writhe)/dz`, from `writhe = (3 - bow sway) / 2`.
     #[inline(always)]
     #[must_use]
     pub fn writhe_slope(&self) -> R {
         (self.bow_slope() * self.sway + self.bow * self.sway_slope) * -0.5
     }
 
-    /// The functions at a far negative argument, by `x coth x`, which does not overflow where its parts would. The differences cancel nothing
+    /// Evaluates the functions at a far negative argument through `x coth x`, which does not overflow; nothing cancels
+    /// there.
     /// once `x coth x` is far from one.
     #[inline(always)]
     #[must_use]
     pub fn in_strong_tension(z: R) -> Self {
-        // Lanes that are not in tension have no root; their numbers are not used.
+        // Lanes that are not in tension have no root; their results are discarded.
         let x = (-z).sqrt();
         let bow = x / x.map(math::tanh);
         let sway = (z.like(1.0) - bow) * 3.0 / z;

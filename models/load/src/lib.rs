@@ -1,15 +1,15 @@
-//! A load: the same force wherever the handle is, felt or exerted. The stimulus of a force-discrimination experiment.
+//! Load: a force independent of the handle's position, felt or exerted. Stimulus of a force-discrimination experiment.
 //!
-//! CMU-RI-TR-07-21 (section 7) asks why people tell weights apart so much better than springs, and whether it matters if a
-//! force is experienced or applied. The two kinds here differ in nothing else:
+//! CMU-RI-TR-07-21 (section 7) asks why people discriminate weights so much better than springs, and whether it matters
+//! if a force is experienced or applied. The two kinds here differ in that alone:
 //!
 //! ```text
-//! felt      F_z = -F                         a weight: it pulls down all the time, the hand holds against it
-//! exerted   F_z =  F tanh(d / d0),  d > 0    a resistance: nothing is felt until the hand pushes down, and then F
+//! felt      F_z = -F                         a weight: it pulls down all the time, the hand resists
+//! exerted   F_z =  F tanh(d / d0),  d > 0    a resistance: no force until the hand pushes down, then F
 //! ```
 //!
-//! with depth `d = -z` below home and an onset `d0` that keeps the law smooth. Both have an energy, `F z` and
-//! `F d0 ln cosh(d / d0)`, so nothing is gained on a way there and back.
+//! with depth `d = -z` below home and an onset `d0` that smooths the law. Both have an energy, `F z` and `F d0 ln
+//! cosh(d / d0)`, so a closed path generates none.
 
 use flotor_hal::{
     Choices, DQuat, DVec3, Demand, ForceModel, Form, Input, ModelInfo, OutOfRange, Output, Parameter, Part,
@@ -17,21 +17,21 @@ use flotor_hal::{
     choices, math,
 };
 
-/// Farther from home than this there is no handle, m: the energy there is that at the edge, and the answer says so.
+/// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
 
 const KINDS: Choices = choices!["felt", "exerted"];
 
-/// How the force comes about.
+/// Kind of a load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// It pulls down.
+    /// Weight: pulls down.
     Felt,
-    /// It resists being pushed down.
+    /// Resistance: opposes being pushed down.
     Exerted,
 }
 
-/// A load.
+/// Load of one handle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Load {
     kind: Kind,
@@ -40,13 +40,13 @@ pub struct Load {
     drawn: Shape,
 }
 
-/// Radius of the disc in the hand, and half its height, m.
+/// Radius and half height of the drawn disc in the hand, m.
 const DRAWN_HANDLE_M: [f64; 2] = [8.0e-3, 1.0e-3];
-/// Half a side of the block beneath it, m: the same for every force, so that nobody sees a stimulus.
+/// Half a side of the drawn block beneath the disc, m: equal for every force, so that the picture does not reveal the stimulus.
 const DRAWN_HALF_M: f64 = 10.0e-3;
 
 impl Load {
-    /// A load of so many newtons; `onset_m` is the depth over which a resistance comes up.
+    /// Creates a load of `force_n` newtons; `onset_m`: depth over which a resistance rises.
     #[must_use]
     pub fn new(kind: Kind, force_n: f64, onset_m: f64) -> Self {
         Self { kind, force_n, onset_m, drawn: Shape::default() }
@@ -110,7 +110,7 @@ impl ForceModel for Load {
         let position_m = input.pose.position();
         let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
         let force_n = self.force_n(reached_m.z);
-        // Most of what a resistance costs.
+        // Skip the energy if not requested: most of the cost of a resistance.
         let is_asked = input.demand.contains(Demand::ENERGY);
         let energy_j = if is_asked { self.energy_j(reached_m.z) } else { f64::NAN };
         let status = if reached_m == position_m { StepStatus::Ok } else { StepStatus::Clamped };
@@ -139,7 +139,7 @@ impl ForceModel for Load {
 }
 
 impl ShapeModel for Load {
-    /// A disc in the hand, and beneath it a block: a weight hangs on the hand, a resistance is pushed down by it.
+    /// Draws a disc in the hand, and beneath it a block: a weight hangs on the hand, a resistance is pushed down by it.
     fn shape(&mut self, input: &Input) -> &Shape {
         let handle_m = input.pose.position();
         let [radius_m, half_height_m] = DRAWN_HANDLE_M;
@@ -161,7 +161,7 @@ impl ShapeModel for Load {
 }
 
 impl SoftRangeModel for Load {
-    /// What a hand holds without tiring, from nothing on; the host's own ceiling is 20 N.
+    /// From zero to a force that a hand holds without tiring; the host's own limit is 20 N.
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("force_n", 0.0, 15.0, 0.1)];
 }
 

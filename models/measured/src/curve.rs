@@ -1,30 +1,30 @@
-//! Force over compression between knots: cubic pieces that meet with one slope and never fall where the knots do not.
+//! Force over compression: a monotone cubic spline through knots.
 //!
-//! The slopes at the knots are Fritsch and Butland's weighted harmonic means (SIAM J. Sci. Stat. Comput. 5:300, 1984): between
-//! two knots the curve is monotone if they are, so smoothing adds no bump that nobody measured.
+//! The slopes at the knots are Fritsch and Butland's weighted harmonic means (SIAM J. Sci. Stat. Comput. 5:300, 1984):
+//! between two knots the curve is monotone if they are, so the interpolation adds no bump that was not measured.
 
-/// Why knots are no curve of a spring.
+/// Defect of a list of knots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CurveError {
-    /// Fewer than three, or more than [`Curve::MOST_KNOTS`].
+    /// Number of knots below three or above [`Curve::MOST_KNOTS`].
     Count(usize),
-    /// The first is not without compression and without force.
+    /// First knot other than (0, 0).
     Start,
-    /// Compression does not grow, or the force falls, at this knot (from 0).
+    /// Index (from 0) of a knot at which the compression does not grow or the force falls.
     Order(usize),
 }
 
-/// One cubic piece: force as a polynomial of the distance from its knot, and the energy stored up to there.
+/// Cubic piece: force as a polynomial of the distance from its knot, with the energy stored up to the knot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Piece {
     from_m: f64,
-    /// N, N/m, N/m², N/m³.
+    /// Coefficients, N, N/m, N/m², N/m³.
     force: [f64; 4],
     energy_j: f64,
 }
 
 impl Piece {
-    /// Force, N, and energy, J, at a distance from the knot.
+    /// Returns force, N, and energy, J, at a distance from the knot.
     fn at(&self, distance_m: f64) -> (f64, f64) {
         let [a, b, c, d] = self.force;
         let s = distance_m;
@@ -34,23 +34,23 @@ impl Piece {
     }
 }
 
-/// A curve through knots.
+/// Curve through knots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     pieces: Vec<Piece>,
     deepest_m: f64,
-    /// Beyond the last knot: force, slope and energy there.
+    /// Force, N, slope, N/m, and energy, J, at the last knot.
     end: (f64, f64, f64),
 }
 
 impl Curve {
-    /// More than any test bench gives after smoothing; a search among them takes twelve steps.
+    /// Maximum number of knots, more than test benches give after smoothing; a lookup takes twelve steps.
     pub const MOST_KNOTS: usize = 4096;
 
-    /// A curve through knots of compression, m, and force, N, the first (0, 0). Not real-time.
+    /// Builds a curve through knots of compression, m, and force, N, the first (0, 0). Not real-time.
     ///
     /// # Errors
-    /// [`CurveError`].
+    /// A [`CurveError`] for a wrong count or order of knots.
     pub fn new(knots: &[(f64, f64)]) -> Result<Self, CurveError> {
         if knots.len() < 3 || knots.len() > Self::MOST_KNOTS {
             return Err(CurveError::Count(knots.len()));
@@ -58,7 +58,7 @@ impl Curve {
         if knots[0] != (0.0, 0.0) {
             return Err(CurveError::Start);
         }
-        // Written so that a NaN fails.
+        // Written so that NaN fails.
         let rises = |pair: &[(f64, f64)]| pair[1].0 > pair[0].0 && pair[1].1 >= pair[0].1;
         if let Some(at) = knots.windows(2).position(|pair| !rises(pair)) {
             return Err(CurveError::Order(at + 1));
@@ -79,14 +79,14 @@ impl Curve {
         Ok(Self { pieces, deepest_m, end: (force_n, slopes[slopes.len() - 1], energy_j) })
     }
 
-    /// Compression of the last knot, m: what was measured ends there.
+    /// Returns the compression of the last knot, the end of the measurement, m.
     #[must_use]
     pub fn deepest_m(&self) -> f64 {
         self.deepest_m
     }
 
-    /// Force against compression, N, and stored energy, J; beyond the last knot along its tangent, above the first none.
-    /// Real-time: bounded, no allocation.
+    /// Returns the force against compression, N, and the stored energy, J: along the tangent beyond the last knot, zero
+    /// above the first. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, compression_m: f64) -> (f64, f64) {
         if compression_m <= 0.0 {
@@ -103,7 +103,7 @@ impl Curve {
     }
 }
 
-/// The slope at each knot, N/m.
+/// Returns the slope at each knot, N/m.
 fn slopes(knots: &[(f64, f64)]) -> Vec<f64> {
     let widths: Vec<f64> = knots.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
     let chords: Vec<f64> =
@@ -116,7 +116,7 @@ fn slopes(knots: &[(f64, f64)]) -> Vec<f64> {
             0.0
         }
     });
-    // At an end a parabola through three knots, no steeper than keeps the piece monotone.
+    // At an end: a parabola through three knots, its slope limited so that the piece is monotone.
     let end = |h: [f64; 2], d: [f64; 2]| {
         (((2.0 * h[0] + h[1]) * d[0] - h[0] * d[1]) / (h[0] + h[1])).clamp(0.0, 3.0 * d[0])
     };

@@ -1,4 +1,4 @@
-//! The plugin: parameters, a step, and a body to draw.
+//! Plugin of the measured spring: parameters, step, and centreline for drawing.
 
 use crate::curve::Curve;
 use crate::table;
@@ -8,17 +8,17 @@ use flotor_hal::{
 };
 use std::path::Path;
 
-/// Without a table: spring 1 of the thesis, 0.68 N/mm, straight over 12 mm.
+/// Default table: spring 1 of the thesis, 0.68 N/mm, straight over 12 mm.
 const SPRING_1: &str = "compression_mm,force_n\n0,0\n6,4.08\n12,8.16\n";
 
-/// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
+/// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
 
-/// What the drawing takes for granted, because no table of forces tells it: turns, and wire over coil, of spring 1.
+/// Assumed shape of the drawn spring, not in a table of forces: turns, and wire over coil, of spring 1.
 const DRAWN_TURNS: f64 = 10.0;
 const DRAWN_WIRE_PER_COIL: f64 = 0.1;
 
-/// A spring with the curve of a real one.
+/// Spring with a measured curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     curve: Curve,
@@ -28,7 +28,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Force along z, N, energy, J, and how good the answer is, at a height. Real-time: bounded, no allocation.
+    /// Returns force along z, N, energy, J, and status at a height. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, height_m: f64) -> (f64, f64, StepStatus) {
         let reached_m = height_m.clamp(-REACH_M, REACH_M);
@@ -122,7 +122,7 @@ impl CenterlineModel for Measured {
         CenterlineInfo::coil(wire_radius_m, coil_radius_m, DRAWN_TURNS, coil_radius_m + wire_radius_m)
     }
 
-    /// From the fixed end straight up, leaning to where the handle is; loose at its free length where that is higher.
+    /// Draws the spring from its fixed end up, leaning to the handle; at its free length under a higher handle.
     fn centerline(&mut self, input: &Input, points: &mut [Pose]) -> usize {
         let foot_m = -DVec3::Z * self.free_length_m;
         let handle_m = input.pose.position();
@@ -130,7 +130,7 @@ impl CenterlineModel for Measured {
         let last = points.len().saturating_sub(1).max(1) as f64;
         for (index, point) in points.iter_mut().enumerate() {
             let share = index as f64 / last;
-            // Upright at both ends, as plates hold it.
+            // Upright at both ends, as plates hold a spring.
             let lean = share * share * (3.0 - 2.0 * share);
             let across_m = (top_m - foot_m).with_z(0.0) * lean;
             let position_m = foot_m + across_m + DVec3::Z * ((top_m.z - foot_m.z) * share);

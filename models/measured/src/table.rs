@@ -1,4 +1,4 @@
-//! The table a curve is read from.
+//! Reader of the table of a curve.
 //!
 //! ```text
 //! # comments and empty lines are skipped
@@ -7,19 +7,19 @@
 //! 2,1.36
 //! ```
 //!
-//! `flotor study spring MEASURED.csv --curve-scene SCENE.toml` makes one of a measurement: both strokes averaged, the force never
-//! falling.
+//! `flotor study spring MEASURED.csv --curve-scene SCENE.toml` writes such a table from a measurement: both strokes
+//! averaged, the force never falling.
 
 use crate::curve::{Curve, CurveError};
 use flotor_hal::{HashLines, Table, TextProblem};
 
-/// The header a table begins with.
+/// Header line of a table.
 pub const HEADER: &str = "compression_mm,force_n";
 
-/// Reads knots and makes a curve of them. Not real-time.
+/// Parses knots and builds their curve. Not real-time.
 ///
 /// # Errors
-/// The line that is wrong.
+/// A [`TextProblem`] with the line that is wrong.
 pub fn parse(text: &str) -> Result<Curve, TextProblem> {
     let table = Table::parse(text, HashLines::Comments)?;
     if table.columns().join(",") != HEADER {

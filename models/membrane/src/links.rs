@@ -1,8 +1,8 @@
-//! Springs in runs: consecutive masses, each linked to the one the same distance further on.
+//! Springs in runs: consecutive masses, each linked to another at the same index distance.
 //!
-//! A sheet numbered row by row has two such distances, one and a row; a run is then a row. Over a run all is a plain
-//! loop over slices, which the compiler turns into wide instructions; an irregular mesh has short runs, and only loses
-//! speed. Products and sums are in one fixed order and never contracted, so every instruction set gives the same bits.
+//! A sheet numbered row by row has two such distances, one and a row; a run is then a row. A run is a plain loop over
+//! slices, which the compiler vectorises; an irregular mesh has short runs and is only slower. Products and sums have
+//! one fixed order and are never contracted, so every instruction set gives the same bits.
 
 use crate::mesh::Link;
 use crate::network::Vectors;
@@ -14,7 +14,7 @@ use std::ops::Range;
 struct Run {
     first: usize,
     distance: usize,
-    /// Where its springs are in the arrays.
+    /// Indices of the run's springs in the arrays.
     springs: Range<usize>,
 }
 
@@ -24,12 +24,12 @@ pub(crate) struct Links {
     runs: Vec<Run>,
     rest_m: Vec<f64>,
     stiffness_n_per_m: Vec<f64>,
-    /// Forces of one run on its first ends, N.
+    /// Forces of one run on the masses at its first ends, N.
     scratch: Vectors,
 }
 
 impl Links {
-    /// Not real-time.
+    /// Sorts the springs into runs. Not real-time.
     pub(crate) fn new(links: &[Link]) -> Self {
         let mut sorted: Vec<Link> = links.to_vec();
         sorted.sort_by_key(|link| (link.ends[1] - link.ends[0], link.ends[0]));
@@ -37,7 +37,7 @@ impl Links {
         for (index, link) in sorted.iter().enumerate() {
             let [first, second] = link.ends;
             let distance = second - first;
-            // A run stays inside a block of masses, so that it rests when they do.
+            // A run stays inside one block of masses, so that it is inactive together with the block.
             let continued = runs.last_mut().filter(|run| {
                 let next = run.first + run.springs.len();
                 run.distance == distance && next == first && !first.is_multiple_of(BLOCK)
@@ -55,7 +55,7 @@ impl Links {
         }
     }
 
-    /// Blocks of masses that springs join. Not real-time.
+    /// Returns the pairs of blocks that springs connect. Not real-time.
     pub(crate) fn joined_blocks(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         self.runs.iter().flat_map(|run| {
             let ends = run.first..run.first + run.springs.len();
@@ -63,7 +63,7 @@ impl Links {
         })
     }
 
-    /// Adds the forces of all springs that touch a region active. Real-time: bounded, no allocation.
+    /// Adds the forces of all springs that touch an active block. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn add_forces(&mut self, positions_m: &Vectors, forces_n: &mut Vectors, regions: &Regions) {
         for run in &self.runs {
@@ -91,7 +91,7 @@ impl Links {
 }
 
 impl Vectors {
-    /// Forces on the masses `first` of springs to the masses `second`, into the first entries of `self`.
+    /// Computes the forces of springs on their `first` masses, into the first entries of `self`.
     #[inline]
     fn pull(
         &mut self,
@@ -101,10 +101,10 @@ impl Vectors {
         rest_m: &[f64],
         stiffness_n_per_m: &[f64],
     ) {
-        /// Two masses in one place pull nowhere: m².
+        /// Floor of a squared length, m²: two masses in one place give no force.
         const LEAST_SQUARE: f64 = 1.0e-300;
         let count = rest_m.len();
-        // Slices of one length, so that the loop below has no checks.
+        // Slices of equal length: no bounds checks in the loop below.
         let [ax, ay, az] = positions_m.slices(first);
         let [bx, by, bz] = positions_m.slices(second);
         let [fx, fy, fz] = self.slices_mut(0..count);

@@ -1,37 +1,37 @@
-//! What is linked to what: sheets, chains, and the edges of a mesh file. Not real-time.
+//! Masses and their links: sheets, chains, and the edges of a mesh file. Not real-time.
 
 use crate::obj::Obj;
 use crate::topology::{Topology, in_mm};
 use flotor_hal::{DVec3, TextProblem};
 
-/// A spring between two masses.
+/// Spring between two masses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
-    /// The mass with the smaller number, and the other.
+    /// Indices of the two masses, the smaller first.
     pub ends: [usize; 2],
-    /// Length without force, m.
+    /// Rest length, m.
     pub rest_m: f64,
     /// Stiffness, N/m.
     pub stiffness_n_per_m: f64,
 }
 
-/// Masses and springs before anything moves.
+/// Masses and springs in their initial state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Where each mass starts, m.
+    /// Initial position of each mass, m.
     pub positions_m: Vec<DVec3>,
-    /// Each mass, kg; 0 for one that is held where it is.
+    /// Mass at each node, kg; 0 for a fixed node.
     pub masses_kg: Vec<f64>,
-    /// The springs.
+    /// Springs between the masses.
     pub links: Vec<Link>,
-    /// Triangles of masses, for a drawing.
+    /// Triangles of masses, for drawing.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// What a sheet is made of.
+/// Parameters of a sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sheet {
-    /// Masses along a side, 3 and more; those of the border are held.
+    /// Number of masses along a side, at least 3; those of the border are fixed.
     pub nodes_per_side: usize,
     /// Length of a side, m.
     pub side_m: f64,
@@ -39,13 +39,13 @@ pub struct Sheet {
     pub mass_kg: f64,
     /// Stiffness of a spring, N/m.
     pub stiffness_n_per_m: f64,
-    /// Length of a spring over its length without force; 1 is a slack sheet.
+    /// Length of a spring over its rest length; 1 is a slack sheet.
     pub stretch: f64,
 }
 
 impl Mesh {
-    /// A square sheet at height 0 with its middle at the origin: each mass is linked to its four neighbours, which is
-    /// the five-point Laplacian of a membrane under the tension `stiffness (spacing - rest)` over a spacing.
+    /// Builds a square sheet at height 0 with its middle at the origin. Each mass is linked to its four neighbours: the
+    /// five-point Laplacian of a membrane under the tension `stiffness (spacing - rest)` per spacing.
     #[must_use]
     pub fn sheet(sheet: &Sheet) -> Self {
         let n = sheet.nodes_per_side;
@@ -62,7 +62,7 @@ impl Mesh {
             if column + 1 < n && row + 1 < n {
                 mesh.face(&[node, node + 1, node + n + 1, node + n]);
             }
-            // Springs along the border would join two masses that are held: they do nothing.
+            // Omit springs along the border: they would join two fixed masses.
             if column + 1 < n && ![0, n - 1].contains(&row) {
                 mesh.links.push(Link {
                     ends: [node, node + 1],
@@ -81,8 +81,8 @@ impl Mesh {
         mesh
     }
 
-    /// A chain of `links` equal springs along x between two held ends `span_m` apart, at height 0. `length_m` is its
-    /// length without force, `axial_n` the force that would double it, `mass_kg` its mass, half a link's at each end.
+    /// Builds a chain of `links` equal springs along x between two fixed ends `span_m` apart, at height 0. `length_m`:
+    /// rest length; `axial_n`: force that would double the length; `mass_kg`: total mass, half a link's at each end.
     #[must_use]
     pub fn chain(links: usize, span_m: f64, length_m: f64, axial_n: f64, mass_kg: f64) -> Self {
         let rest_m = length_m / links as f64;
@@ -99,11 +99,11 @@ impl Mesh {
         mesh
     }
 
-    /// Makes a network from the edges of a Wavefront OBJ file (`v`, `f`, `l` lines; metres, z up): springs at `stretch` times
-    /// their length without force. Edges of one face only are the border; their ends are held. The mass is shared out evenly.
+    /// Builds a network from the edges of a Wavefront OBJ file (`v`, `f`, `l` lines; metres, z up): springs at `stretch` times
+    /// their rest length. Edges of one face only are the border; their ends are fixed. The mass is distributed evenly.
     ///
     /// # Errors
-    /// The line or the place that is wrong.
+    /// A [`TextProblem`] with the line or the place that is wrong.
     pub fn from_obj(
         text: &str,
         mass_kg: f64,
@@ -140,7 +140,7 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// Adds a polygon to the drawing.
+    /// Adds a polygon to the drawing, as triangles.
     fn face(&mut self, corners: &[usize]) {
         let place = |corner: usize| u32::try_from(corner).unwrap_or(u32::MAX);
         if let [first, rest @ ..] = corners {
@@ -148,7 +148,7 @@ impl Mesh {
         }
     }
 
-    /// The longest spring as it starts, m.
+    /// Returns the initial length of the longest spring, m.
     #[must_use]
     pub fn coarseness_m(&self) -> f64 {
         let length_m = |link: &Link| self.positions_m[link.ends[0]].distance(self.positions_m[link.ends[1]]);

@@ -1,7 +1,7 @@
-//! The state of a network, and its step in time.
+//! State of a network, and its time step.
 //!
-//! Positions, velocities and forces are one array per coordinate. The step is the symplectic Euler method with damping
-//! taken implicitly,
+//! Positions, velocities and forces are one array per coordinate. The step is the symplectic Euler method with implicit
+//! damping,
 //!
 //! ```text
 //! v <- (v + h a) / (1 + h c),    x <- x + h v
@@ -16,7 +16,7 @@ use crate::regions::Regions;
 use flotor_hal::DVec3;
 use std::ops::Range;
 
-/// Three coordinates of many things, one array each.
+/// Vectors stored as one array per coordinate.
 #[derive(Debug)]
 pub struct Vectors {
     /// Components along x.
@@ -32,7 +32,7 @@ impl Clone for Vectors {
         Self { x: self.x.clone(), y: self.y.clone(), z: self.z.clone() }
     }
 
-    /// Without allocation, if there are as many.
+    /// Copies without allocation if the lengths are equal.
     fn clone_from(&mut self, other: &Self) {
         self.x.clone_from(&other.x);
         self.y.clone_from(&other.y);
@@ -41,7 +41,7 @@ impl Clone for Vectors {
 }
 
 impl Vectors {
-    /// This many zeros. Not real-time.
+    /// Returns `count` zero vectors. Not real-time.
     #[must_use]
     pub fn zero(count: usize) -> Self {
         Self { x: vec![0.0; count], y: vec![0.0; count], z: vec![0.0; count] }
@@ -52,10 +52,10 @@ impl Vectors {
         Self { x: component(|p| p.x), y: component(|p| p.y), z: component(|p| p.z) }
     }
 
-    /// One of them. Real-time: bounded, no allocation.
+    /// Returns the vector at an index. Real-time: bounded, no allocation.
     ///
     /// # Panics
-    /// If there are not so many.
+    /// If the index is out of range.
     #[must_use]
     pub fn get(&self, index: usize) -> DVec3 {
         DVec3::new(self.x[index], self.y[index], self.z[index])
@@ -76,12 +76,12 @@ impl Vectors {
         self.slices_mut(range).into_iter().for_each(|component| component.fill(0.0));
     }
 
-    /// Sum of the squares of all lengths.
+    /// Returns the sum of the squares of all lengths.
     fn sum_of_squares(&self) -> f64 {
         [&self.x, &self.y, &self.z].iter().map(|component| component.iter().map(|c| c * c).sum::<f64>()).sum()
     }
 
-    /// Square of the longest of a range.
+    /// Returns the square of the longest vector of a range.
     #[inline]
     pub(crate) fn longest_square(&self, range: Range<usize>) -> f64 {
         let [x, y, z] = self.slices(range);
@@ -93,27 +93,27 @@ impl Vectors {
     }
 }
 
-/// What acts on every mass.
+/// Forces on every mass from outside the network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
     /// Gravity downwards, m/s².
     pub gravity_m_per_s2: f64,
-    /// Rate at which drag takes velocity away, 1/s.
+    /// Rate of velocity decay by drag, 1/s.
     pub damping_per_s: f64,
-    /// Stiffness with which the ball pushes a mass out, N/m.
+    /// Stiffness of the contact between ball and mass, N/m.
     pub contact_n_per_m: f64,
 }
 
-/// What touches the network.
+/// Ball that touches the network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
-    /// Its centre, m.
+    /// Centre, m.
     pub centre_m: DVec3,
-    /// Its radius, m.
+    /// Radius, m.
     pub radius_m: f64,
 }
 
-/// What changes from step to step.
+/// State that changes from step to step.
 #[derive(Debug)]
 pub struct State {
     positions_m: Vectors,
@@ -122,7 +122,7 @@ pub struct State {
 }
 
 impl State {
-    /// Where the masses are, m.
+    /// Returns the positions of the masses, m.
     #[must_use]
     pub fn positions_m(&self) -> &Vectors {
         &self.positions_m
@@ -138,7 +138,7 @@ impl Clone for State {
         }
     }
 
-    /// Without allocation, between two states of one network.
+    /// Copies without allocation between two states of one network.
     fn clone_from(&mut self, other: &Self) {
         self.positions_m.clone_from(&other.positions_m);
         self.velocities_m_per_s.clone_from(&other.velocities_m_per_s);
@@ -151,20 +151,20 @@ impl Clone for State {
 pub struct Network {
     state: State,
     forces_n: Vectors,
-    /// 0 for a mass that is held.
+    /// Inverse of each mass; 0 for a fixed one.
     inverse_masses_per_kg: Vec<f64>,
-    /// Gravity on each mass, m/s²: none on one that is held.
+    /// Gravity on each mass, m/s²; 0 for a fixed one.
     weights_m_per_s2: Vec<f64>,
     links: Links,
     surroundings: Surroundings,
     longest_step_s: f64,
 }
 
-/// Share of the stability limit that is used: contact and stretching move the limit a little.
+/// Fraction of the stability limit in use: contact and stretching shift the limit a little.
 const SHARE_OF_LIMIT: f64 = 0.8;
 
 impl Network {
-    /// At rest where the mesh is. Not real-time.
+    /// Creates a network at rest in the mesh's positions. Not real-time.
     #[must_use]
     pub fn new(mesh: &Mesh, surroundings: Surroundings) -> Self {
         let nodes = mesh.positions_m.len();
@@ -195,42 +195,42 @@ impl Network {
         }
     }
 
-    /// Longest stable step, s.
+    /// Returns the longest stable step, s.
     #[must_use]
     pub fn longest_step_s(&self) -> f64 {
         self.longest_step_s
     }
 
-    /// Where the masses are, m.
+    /// Returns the positions of the masses, m.
     #[must_use]
     pub fn positions_m(&self) -> &Vectors {
         &self.state.positions_m
     }
 
-    /// What changes from step to step, to be put back later.
+    /// Returns the state, for a later [`Self::restore`].
     #[must_use]
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// Goes back to a state of this network. Real-time: bounded, no allocation.
+    /// Restores a state of this network. Real-time: bounded, no allocation.
     pub fn restore(&mut self, state: &State) {
         self.state.clone_from(state);
     }
 
-    /// How many masses are active. Real-time: bounded, no allocation.
+    /// Returns the number of active masses. Real-time: bounded, no allocation.
     #[must_use]
     pub fn active_nodes(&self) -> usize {
         self.state.regions.active().map(|range| range.len()).sum()
     }
 
-    /// Activates everything, as nothing was inactive in the beginning. Real-time: bounded, no allocation.
+    /// Activates all masses, as at the start. Real-time: bounded, no allocation.
     pub fn activate(&mut self) {
         self.state.regions.activate_all();
     }
 
-    /// One step of `step_s`, at most [`Self::longest_step_s`]; the force on the ball, N. Real-time: bounded, no
-    /// allocation.
+    /// Takes one step of `step_s`, at most [`Self::longest_step_s`]; returns the force on the ball, N. Real-time:
+    /// bounded, no allocation.
     pub fn step(&mut self, step_s: f64, ball: Option<&Ball>) -> DVec3 {
         let Self { state: State { positions_m, velocities_m_per_s, regions }, forces_n, .. } = self;
         if let Some(ball) = ball {
@@ -261,7 +261,7 @@ impl Network {
         on_ball_n
     }
 
-    /// Steps until all masses are inactive, at most so often; true if they do. Not real-time.
+    /// Steps until all masses are inactive, at most `most_steps` times; returns true if they are. Not real-time.
     pub fn come_to_rest(&mut self, most_steps: usize) -> bool {
         (0..most_steps).any(|_| {
             self.step(self.longest_step_s, None);
@@ -269,13 +269,13 @@ impl Network {
         })
     }
 
-    /// Steps without drag until the masses rest against a ball, at most so often: whenever the kinetic energy has passed a peak,
-    /// all velocities are taken away (Cundall 1976); true if they do. Not real-time.
+    /// Steps without drag until the masses rest against a ball, at most `most_steps` times; resets all velocities after
+    /// each peak of the kinetic energy (kinetic damping, Cundall 1976). Returns true if the masses rest. Not real-time.
     pub fn relax(&mut self, ball: &Ball, most_steps: usize) -> bool {
-        /// It rests when nothing moves by more of a ball's radius in a step: then a sheet is within some micrometres of where it
-        /// goes, a tenth of a pixel.
+        /// Largest movement in a step, in radii of the ball, that counts as rest (root sum of squares of all masses): a
+        /// sheet is then within some micrometres of its final position, a tenth of a pixel.
         const STILL: f64 = 1.0e-4;
-        // Without drag, contacts that come and go pump up what swings with three or four steps a period: not below eight.
+        // Without drag, intermittent contacts excite modes of three or four steps per period, but none of eight or more.
         let step_s = 0.5 * self.longest_step_s;
         let drag_per_s = std::mem::take(&mut self.surroundings.damping_per_s);
         let nodes = self.inverse_masses_per_kg.len();
@@ -299,14 +299,14 @@ impl Network {
         rests
     }
 
-    /// Changes what acts on every mass, but for the contact stiffness, which the longest step depends on. Real-time:
-    /// bounded, no allocation.
+    /// Sets the damping. The contact stiffness is fixed, because the longest step depends on it. Real-time: bounded, no
+    /// allocation.
     pub fn set_damping_per_s(&mut self, damping_per_s: f64) {
         self.surroundings.damping_per_s = damping_per_s;
     }
 }
 
-/// One coordinate of a block, one step.
+/// Advances one coordinate of a block by one step.
 #[inline]
 fn move_masses(
     x: &mut [f64],
@@ -336,7 +336,7 @@ fn move_masses(
     }
 }
 
-/// Pushes the masses of a block out of the ball; the force on the ball, N.
+/// Pushes the masses of a block out of the ball; returns the force on the ball, N.
 #[inline]
 fn push(
     ball: &Ball,
@@ -345,12 +345,12 @@ fn push(
     forces_n: &mut Vectors,
     range: Range<usize>,
 ) -> DVec3 {
-    /// A mass at the very centre is pushed nowhere: m².
+    /// Floor of a squared distance, m²: a mass at the very centre gets no force.
     const LEAST_SQUARE: f64 = 1.0e-300;
     let count = range.len();
     let [x, y, z] = positions_m.slices(range.clone());
     let centre_m = ball.centre_m;
-    // Most blocks are far away: one cheap pass finds out.
+    // Most blocks are far away: reject them in one cheap pass.
     let near = ball.radius_m * ball.radius_m;
     let mut inside = 0_u32;
     for i in 0..count {

@@ -1,11 +1,11 @@
-//! Reads Wavefront OBJ files: vertices, faces and lines as the file numbers them. Not real-time.
+//! Reader of Wavefront OBJ files: vertices, faces and lines. Not real-time.
 
 use flotor_hal::{DVec3, TextProblem};
 
 /// Largest number of vertices read: 40 000 masses, each written once for each of its six triangles.
 const MOST_VERTICES: usize = 240_000;
 
-/// Statements without an effect on the mesh: normals, texture, points, groups, materials, display.
+/// Ignored statements: normals, texture, points, groups, materials, display.
 const UNUSED: [&str; 15] = [
     "vn", "vt", "vp", "p", "o", "g", "s", "mg", "mtllib", "usemtl", "usemap", "bevel", "lod", "c_interp",
     "d_interp",
@@ -23,10 +23,10 @@ pub(crate) struct Obj {
 }
 
 impl Obj {
-    /// Reads the text of a file.
+    /// Parses the text of a file.
     ///
     /// # Errors
-    /// The line that is wrong, or the format that the file has instead.
+    /// A [`TextProblem`] with the line that is wrong, or the format of the file if it is not OBJ.
     pub(crate) fn read(text: &str) -> Result<Self, TextProblem> {
         let head = text.trim_start();
         if head.starts_with("solid") && head.contains("facet") {
@@ -55,7 +55,7 @@ impl Obj {
         let mut words = text.split_whitespace();
         match words.next() {
             Some("v") => {
-                // `nan` and `inf` are numbers to the parser, but no places.
+                // Reject `nan` and `inf`, which Rust parses as numbers.
                 let finite = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
                 let numbers: Vec<f64> = words.take(3).filter_map(finite).collect();
                 let [x, y, z] = numbers[..] else {
@@ -88,7 +88,7 @@ impl Obj {
     }
 }
 
-/// Returns the index that `7`, `7/1/3` or `-1` means: counted from the first vertex or, below 0, from the last one back.
+/// Returns the vertex index of `7`, `7/1/3` or `-1`: from the first vertex on or, below 0, back from the last.
 fn corner(word: &str, vertices: usize) -> Option<usize> {
     let number: i64 = word.split('/').next()?.parse().ok()?;
     let count = i64::try_from(vertices).ok()?;

@@ -1,4 +1,4 @@
-//! The membrane as a plugin: parameters and the step.
+//! Plugin of the membrane: parameters and step.
 
 use crate::mesh::{Mesh, Sheet};
 use crate::network::{Network, State, Surroundings};
@@ -10,17 +10,17 @@ use flotor_hal::{
 };
 use std::path::Path;
 
-/// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
+/// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
-/// A longer time between two steps is not caught up, s: the network stands still instead.
+/// Longest time between two steps that is simulated, s: after a longer one the network stands still.
 const LONGEST_TIME_S: f64 = 0.02;
-/// Steps in a millisecond that a servo may be asked for.
+/// Maximum number of network steps per millisecond.
 const MOST_STEPS_PER_MS: f64 = 100.0;
 
-/// Index of the one live parameter.
+/// Index of the only live parameter.
 const DAMPING: usize = 6;
 
-/// What it can be told.
+/// Parameters of the membrane.
 const SCHEMA: &[Parameter] = &[
     Parameter::real(
         "nodes_per_side",
@@ -60,14 +60,14 @@ const SCHEMA: &[Parameter] = &[
     ),
 ];
 
-/// A membrane of masses and springs, touched with a ball.
+/// Membrane of masses and springs, touched with a ball.
 pub struct Membrane {
     touch: Touch,
     radius_m: f64,
-    /// Distance of masses, m: the scale on which the sheet is no longer linear.
+    /// Distance between masses, m: the scale on which the sheet is no longer linear.
     coarseness_m: f64,
     parameters: [f64; SCHEMA.len()],
-    /// The masses of the last picture, at rest.
+    /// State of the last picture, at rest.
     pictured: State,
     /// Centre of the ball in the last picture, m.
     pictured_at_m: Option<DVec3>,
@@ -76,12 +76,12 @@ pub struct Membrane {
 }
 
 impl Membrane {
-    /// Centre of the ball for a position of the handle: at home it lies on the sheet.
+    /// Returns the centre of the ball for a position of the handle; at home the ball lies on the sheet.
     fn centre_m(&self, handle_m: DVec3) -> DVec3 {
         handle_m + DVec3::Z * self.radius_m
     }
 
-    /// Where the handle is, as far as it is let, and what to say about it.
+    /// Returns the handle's position limited to the workspace, with the status of the step.
     fn reached(input: &Input) -> Result<(DVec3, StepStatus), StepStatus> {
         if !input.pose.is_finite() {
             return Err(StepStatus::InvalidInput);
@@ -145,7 +145,7 @@ impl ForceModel for Membrane {
                  (at most {MOST_STEPS_PER_MS}); raise `mass_g` or lower the stiffness"
             )));
         }
-        // Under gravity it sags before anybody touches it.
+        // Under gravity the sheet sags before the first touch.
         if number("gravity_m_per_s2") > 0.0 {
             network.come_to_rest(MOST_SETTLING_STEPS);
             network.activate();
@@ -201,20 +201,20 @@ impl ForceModel for Membrane {
     }
 }
 
-/// Steps of a picture until the sheet rests: from picture to picture it moves little.
+/// Maximum number of relaxation steps per picture: the sheet moves little between pictures.
 const MOST_STEPS_A_PICTURE: usize = 2_000;
 
 impl ShapeModel for Membrane {
-    /// The sheet as it rests with the ball where it is, and the ball: an observer sees some of the ticks only, so it cannot follow
-    /// the sheet's swings.
+    /// Draws the sheet at rest under the ball, and the ball: an observer gets only some of the ticks, so it cannot
+    /// follow the sheet's oscillations.
     fn shape(&mut self, input: &Input) -> &Shape {
         let handle_m = Self::reached(input).map_or(DVec3::ZERO, |(handle_m, _)| handle_m);
         let centre_m = self.centre_m(handle_m);
-        // Nothing that may change in a run moves a sheet at rest but the ball.
+        // Of all that may change in a run, only the ball moves a sheet at rest.
         if self.pictured_at_m == Some(centre_m) {
             return &self.drawn;
         }
-        // What does not rest yet goes on from here at the next picture.
+        // An unfinished relaxation continues at the next picture.
         let rests = self.touch.rest_under(centre_m, &mut self.pictured, MOST_STEPS_A_PICTURE);
         self.pictured_at_m = rests.then_some(centre_m);
         let Shape { primitives, surface } = &mut self.drawn;
@@ -231,7 +231,7 @@ impl ShapeModel for Membrane {
     }
 }
 
-/// How far the ball is moved to feel the slope, over the distance of two masses: several come into contact on the way.
+/// Displacement of the ball for the slope, relative to the distance of two masses: several masses come into contact on the way.
 const PROBE_SHARE: f64 = 0.125;
 
 impl LinearFieldModel for Membrane {
@@ -239,16 +239,16 @@ impl LinearFieldModel for Membrane {
         let Ok((handle_m, _)) = Self::reached(input) else { return LinearField::NONE };
         let (centre_m, time_s) = (self.centre_m(handle_m), input.dt_s().min(LONGEST_TIME_S));
         let felt = self.touch.feel(centre_m, time_s, PROBE_SHARE * self.coarseness_m);
-        // Within half the distance of two masses others come into contact or leave it.
+        // Within half the distance of two masses other masses make or lose contact.
         LinearField::of_force(input, felt.force_n, felt.slope_n_per_m, 0.5 * self.coarseness_m)
     }
 }
 
-/// Steps until a sheet has come to rest under gravity, before it is taken as it is.
+/// Maximum number of steps to settle under gravity; after them the sheet is used as it is.
 const MOST_SETTLING_STEPS: usize = 20_000;
 
 impl SoftRangeModel for Membrane {
-    /// Below, the sheet swings on for seconds after a touch and pushes the hand about; above, it hardly follows the hand any more.
+    /// Below, the sheet oscillates for seconds after a touch and moves the hand; above, it hardly follows the hand.
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("damping_per_s", 5.0, 500.0, 5.0)];
 }
 

@@ -1,31 +1,31 @@
-//! Blocks of masses that rest: left out of the work until something moves beside them.
+//! Blocks of masses at rest: skipped until something moves beside them.
 //!
-//! A block is 64 masses in a row of numbers. It becomes inactive when all of them have been slow for a while, and
-//! activates when the ball comes near or a mass of a block it is linked to is no longer slow. While it is inactive its
-//! masses stand still: what is left out is a motion slower than [`QUIET_M_PER_S`].
+//! A block is 64 consecutive masses. It becomes inactive when all of them have been slow for a while, and active when
+//! the ball comes near or a mass of a linked block is no longer slow. The masses of an inactive block stand still: the
+//! omitted motion is slower than [`QUIET_M_PER_S`].
 
 use crate::network::{Ball, Vectors};
 use flotor_hal::DVec3;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Masses of a block: a few vector registers, and a row or so of a sheet.
+/// Masses per block: a few vector registers, and about a row of a sheet.
 pub(crate) const BLOCK: usize = 64;
-/// Slower than this is at rest, m/s: a micrometre in a second is far below what a hand or an eye can tell.
+/// Speed limit of rest, m/s: a micrometre per second is far below human perception.
 const QUIET_M_PER_S: f64 = 1.0e-6;
-/// Faster than this activates the neighbours, m/s: twice, so that a block on the edge does not flicker.
+/// Speed that activates the neighbours, m/s: twice the limit of rest, as hysteresis against flicker.
 const ACTIVATING_M_PER_S: f64 = 2.0 * QUIET_M_PER_S;
-/// Steps between two looks at a block.
+/// Steps between two checks of a block.
 const STEPS_BETWEEN_LOOKS: u64 = 8;
-/// Quiet looks before a block becomes inactive: turning points of a swing are shorter.
+/// Consecutive quiet checks before a block becomes inactive: turning points of a swing are shorter.
 const QUIET_LOOKS: u8 = 16;
 
-/// Which blocks are active.
+/// Activity of the blocks of a network.
 #[derive(Debug)]
 pub(crate) struct Regions {
     nodes: usize,
     blocks: Vec<Block>,
-    /// Blocks each block is linked to.
+    /// Blocks linked to each block.
     neighbours: Arc<[Box<[usize]>]>,
     steps: u64,
 }
@@ -34,7 +34,7 @@ pub(crate) struct Regions {
 struct Block {
     active: bool,
     quiet_looks: u8,
-    /// Box around its masses when it became inactive, m.
+    /// Bounding box of the masses when the block became inactive, m.
     lowest_m: DVec3,
     highest_m: DVec3,
 }
@@ -45,7 +45,7 @@ impl Clone for Regions {
         Self { nodes: *nodes, blocks: blocks.clone(), neighbours: Arc::clone(neighbours), steps: *steps }
     }
 
-    /// Without allocation, between two states of one network.
+    /// Copies without allocation between two states of one network.
     fn clone_from(&mut self, other: &Self) {
         self.blocks.clone_from(&other.blocks);
         (self.nodes, self.steps) = (other.nodes, other.steps);
@@ -54,13 +54,13 @@ impl Clone for Regions {
 }
 
 impl Regions {
-    /// Everything active, nothing linked: nothing is ever deactivated, or activated by another. For tests.
+    /// Creates active blocks without links: none is ever deactivated, or activated by another. For tests.
     #[cfg(test)]
     pub(crate) fn all_active(nodes: usize) -> Self {
         Self::new(nodes, std::iter::empty())
     }
 
-    /// Everything active. Not real-time.
+    /// Creates active blocks; `joined`: pairs of linked blocks. Not real-time.
     pub(crate) fn new(nodes: usize, joined: impl Iterator<Item = [usize; 2]>) -> Self {
         let count = nodes.div_ceil(BLOCK);
         let mut neighbours = vec![std::collections::BTreeSet::new(); count];
@@ -73,25 +73,25 @@ impl Regions {
         Self { nodes, blocks: vec![active; count], neighbours, steps: 0 }
     }
 
-    /// Real-time: bounded, no allocation.
+    /// Returns true if a block is active. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn is_active(&self, block: usize) -> bool {
         self.blocks.get(block).is_some_and(|block| block.active)
     }
 
-    /// Masses of the blocks that are active. Real-time: bounded, no allocation.
+    /// Returns the masses of each active block. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn active(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         let active = self.blocks.iter().enumerate().filter(|(_, block)| block.active);
         active.map(|(block, _)| block * BLOCK..(block * BLOCK + BLOCK).min(self.nodes))
     }
 
-    /// Wakes all. Real-time: bounded, no allocation.
+    /// Activates all blocks. Real-time: bounded, no allocation.
     pub(crate) fn activate_all(&mut self) {
         self.blocks.iter_mut().for_each(Block::activate);
     }
 
-    /// Wakes what the ball may touch. Real-time: bounded, no allocation.
+    /// Activates the blocks that the ball may touch. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn activate_near(&mut self, ball: &Ball) {
         for block in self.blocks.iter_mut().filter(|block| !block.active) {
@@ -102,8 +102,8 @@ impl Regions {
         }
     }
 
-    /// After a step: deactivates slow blocks, and activates the neighbours of those that are not. Real-time: bounded, no
-    /// allocation.
+    /// Updates activity after a step: deactivates slow blocks, and activates the neighbours of fast ones. Real-time:
+    /// bounded, no allocation.
     #[inline]
     pub(crate) fn settle(&mut self, positions_m: &Vectors, velocities_m_per_s: &mut Vectors) {
         self.steps += 1;
@@ -111,7 +111,7 @@ impl Regions {
         let neighbours = Arc::clone(&self.neighbours);
         for (index, linked) in neighbours.iter().enumerate() {
             let range = index * BLOCK..(index * BLOCK + BLOCK).min(self.nodes);
-            // A block all of whose neighbours are active matters to nobody between two looks.
+            // Between two checks only blocks with an inactive neighbour need work.
             let frontier = || linked.iter().any(|neighbour| !self.is_active(*neighbour));
             if !self.is_active(index) || !(look || frontier()) {
                 continue;

@@ -1,7 +1,7 @@
-//! Joins the faces of a file by the positions of their corners. Not real-time.
+//! Topology of a mesh file from the positions of its corners. Not real-time.
 //!
-//! Programs write one sheet in many ways: a vertex once for each face, texture or normal, vertices in another order, faces
-//! turned over, twice or without an area. What is connected therefore follows from positions alone, and vertices are numbered
+//! Programs write one sheet in many ways: a vertex once for each face, texture or normal, vertices in another order,
+//! faces flipped, twice or without area. Connections therefore follow from positions alone, and vertices are numbered
 //! by position: one sheet gives the same numbers, and the same bits of force, from each of these files.
 
 use crate::obj::Obj;
@@ -9,29 +9,29 @@ use flotor_hal::{DVec3, TextProblem};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Distance of vertices that are one, over the largest coordinate: some roundings of a file in single precision.
+/// Distance at which vertices are merged, over the largest coordinate: some roundings in single precision.
 const SAME_PLACE: f64 = 1.0e-6;
-/// Distance of a border from itself that is taken for a crack, over the length of the edge there.
+/// Distance between border vertices that counts as a crack, over the length of the edge there.
 const CRACK: f64 = 1.0e-3;
-/// Largest number of different vertices: those of the finest sheet.
+/// Maximum number of distinct vertices: those of the finest sheet.
 const MOST_PLACES: usize = 40_000;
 
-/// Vertices at different places, and their connections.
+/// Distinct vertices with their connections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Topology {
     /// Positions, in order of x, then y, then z, m.
     pub(crate) places_m: Vec<DVec3>,
     /// Corners of each face, at least three.
     pub(crate) faces: Vec<Vec<usize>>,
-    /// Ends of each edge, the smaller number first, in order; and the number of its faces.
+    /// Number of faces of each edge, by its ends in ascending order.
     pub(crate) edges: BTreeMap<[usize; 2], usize>,
 }
 
 impl Topology {
-    /// Joins what an OBJ file contains. Vertices without a face or a line are left out.
+    /// Merges the vertices of an OBJ file by position. Vertices without a face or a line are omitted.
     ///
     /// # Errors
-    /// The place of a crack, or the number of vertices where they are too many.
+    /// A [`TextProblem`] with the place of a crack, or with the number of vertices if there are too many.
     pub(crate) fn of(obj: &Obj) -> Result<Self, TextProblem> {
         let (places_m, place_of) = joined(obj);
         if places_m.len() > MOST_PLACES {
@@ -78,7 +78,7 @@ impl Topology {
         self.faces.push(corners);
     }
 
-    /// Returns the ends of all edges that one face has.
+    /// Returns the ends of all edges with a single face.
     #[must_use]
     pub(crate) fn border(&self) -> BTreeSet<usize> {
         self.border_edges().flatten().collect()
@@ -88,7 +88,7 @@ impl Topology {
         self.edges.iter().filter(|(_, faces)| **faces == 1).map(|(ends, _)| *ends)
     }
 
-    /// Returns a vertex of a part without any of these vertices.
+    /// Returns a vertex of a connected part that contains no vertex of `held`; `None` without such a part.
     #[must_use]
     pub(crate) fn part_without(&self, held: &BTreeSet<usize>) -> Option<DVec3> {
         let mut neighbours = vec![Vec::new(); self.places_m.len()];
@@ -129,13 +129,13 @@ impl Topology {
     }
 }
 
-/// Prints a place in millimetres.
+/// Formats a place in millimetres.
 pub(crate) fn in_mm(at_m: DVec3) -> String {
     let [x, y, z] = (at_m * 1.0e3).to_array();
     format!("({x:.3}, {y:.3}, {z:.3}) mm")
 }
 
-/// Returns the different places of the vertices in use, in order, and the number of each vertex's place.
+/// Returns the distinct positions of the vertices in use, sorted, and the index of each vertex's position.
 fn joined(obj: &Obj) -> (Vec<DVec3>, Vec<usize>) {
     let used: BTreeSet<usize> =
         obj.faces.iter().flatten().chain(obj.segments.iter().flatten()).copied().collect();
@@ -145,7 +145,7 @@ fn joined(obj: &Obj) -> (Vec<DVec3>, Vec<usize>) {
         order.iter().map(|&vertex| obj.vertices_m[vertex].abs().max_element()).fold(0.0, f64::max);
     let near_m = SAME_PLACE * largest_m;
 
-    // Cells as wide as the distance: what is near lies in the same cell or in a neighbour.
+    // Cells as wide as the distance: near vertices lie in the same or in neighbouring cells.
     #[allow(clippy::cast_possible_truncation)] // at most a million cells from the origin
     let cell =
         |at_m: DVec3| (at_m / near_m.max(f64::MIN_POSITIVE)).floor().to_array().map(|index| index as i64);
@@ -153,7 +153,7 @@ fn joined(obj: &Obj) -> (Vec<DVec3>, Vec<usize>) {
     let mut places_m: Vec<DVec3> = Vec::new();
     let mut place_of = vec![0; obj.vertices_m.len()];
     for vertex in order {
-        let at_m = obj.vertices_m[vertex] + DVec3::ZERO; // -0 and 0 are one place
+        let at_m = obj.vertices_m[vertex] + DVec3::ZERO; // merges -0 and 0
         let [x, y, z] = cell(at_m);
         let cells = (0..27).map(|index| [x + index % 3 - 1, y + index / 3 % 3 - 1, z + index / 9 - 1]);
         let near = cells.filter_map(|cell| places_in.get(&cell)).flatten();

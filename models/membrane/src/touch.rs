@@ -1,31 +1,31 @@
-//! The ball of a hand that walks through a network, and what a faster loop needs to know of it.
+//! Ball of a hand that moves through a network, and its force field for a faster loop.
 
 use crate::network::{Ball, Network, State};
 use flotor_hal::DVec3;
 
-/// A network, and the ball that touches it.
+/// Network with the ball that touches it.
 #[derive(Debug)]
 pub struct Touch {
     network: Network,
     ball: Ball,
-    /// The network before anybody touched it.
+    /// Initial state of the network.
     untouched: State,
-    /// Rooms for states while the field is felt: nothing is allocated then.
+    /// Preallocated states for [`Self::feel`].
     before: State,
     after: State,
 }
 
-/// Force on the ball, and how it changes with where the ball goes in the same time.
+/// Force on the ball, and its change with the end point of the ball's movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Felt {
     /// Force on the ball, N.
     pub force_n: DVec3,
-    /// Change of the force for a displacement along x, y and z, N/m.
+    /// Change of the force per displacement along x, y and z, N/m.
     pub slope_n_per_m: [DVec3; 3],
 }
 
 impl Touch {
-    /// A ball of a radius, its centre at `start_m`. Not real-time.
+    /// Creates a ball of a radius, centred at `start_m`. Not real-time.
     #[must_use]
     pub fn new(network: Network, radius_m: f64, start_m: DVec3) -> Self {
         let state = network.state().clone();
@@ -33,26 +33,26 @@ impl Touch {
         Self { network, ball, untouched: state.clone(), before: state.clone(), after: state }
     }
 
-    /// The network as it is now.
+    /// Returns the network in its present state.
     #[must_use]
     pub fn network(&self) -> &Network {
         &self.network
     }
 
-    /// The same, to change what acts on it.
+    /// Returns the network for changes of its parameters.
     pub fn network_mut(&mut self) -> &mut Network {
         &mut self.network
     }
 
-    /// Steps it takes to pass this time.
+    /// Returns the number of steps for a duration.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand, see the plugin
     pub fn steps_in(&self, duration_s: f64) -> u32 {
         (duration_s / self.network.longest_step_s()).ceil().max(1.0) as u32
     }
 
-    /// Moves the ball to `centre_m` in `duration_s`, steadily; the force on it at the end, N. Real-time: bounded by
-    /// [`Self::steps_in`], no allocation.
+    /// Moves the ball to `centre_m` in `duration_s` at constant speed; returns the force on the ball at the end, N.
+    /// Real-time: bounded by [`Self::steps_in`], no allocation.
     pub fn advance(&mut self, centre_m: DVec3, duration_s: f64) -> DVec3 {
         let (from_m, steps) = (self.ball.centre_m, self.steps_in(duration_s));
         let step_s = duration_s / f64::from(steps);
@@ -65,10 +65,10 @@ impl Touch {
         force_n
     }
 
-    /// The same, and how the force would differ had the ball gone elsewhere: the time is lived three more times, each
-    /// time with the ball ending `probe_m` farther along one axis, the way it went. So the slope has the network's inertia
-    /// and yielding in it, over just this time, and what the ball is about to meet. A short probe takes the blow of a single
-    /// mass that comes into contact for stiffness. Bounded by four times [`Self::steps_in`], no allocation.
+    /// Moves the ball as [`Self::advance`] does, and measures the slope of the force: repeats the time three times,
+    /// each with the ball ending `probe_m` farther along one axis, in its direction of motion. So the slope contains
+    /// the network's inertia and compliance over this time, and upcoming contacts. A short probe mistakes the impact of
+    /// a single mass for stiffness. Bounded by four times [`Self::steps_in`], no allocation.
     pub fn feel(&mut self, centre_m: DVec3, duration_s: f64, probe_m: f64) -> Felt {
         let from_m = self.ball.centre_m;
         let way_m = centre_m - from_m;
@@ -86,8 +86,8 @@ impl Touch {
         Felt { force_n, slope_n_per_m }
     }
 
-    /// Where the masses come to rest if the ball stays at `centre_m`, found from `state`, which is changed; the network itself is
-    /// as before. True if they rest after so many steps. Not real-time.
+    /// Relaxes `state` under a ball fixed at `centre_m`; the network itself does not change. Returns true if the masses
+    /// rest within `most_steps`. Not real-time.
     pub fn rest_under(&mut self, centre_m: DVec3, state: &mut State, most_steps: usize) -> bool {
         self.before.clone_from(self.network.state());
         self.network.restore(state);
@@ -97,7 +97,7 @@ impl Touch {
         rests
     }
 
-    /// Back to before anybody touched it, the ball at `start_m`. Real-time: bounded, no allocation.
+    /// Restores the initial state, with the ball at `start_m`. Real-time: bounded, no allocation.
     pub fn reset(&mut self, start_m: DVec3) {
         self.network.restore(&self.untouched);
         self.ball.centre_m = start_m;

@@ -1,8 +1,8 @@
-//! The energy of a sphere against a solid, as a function of where its centre is.
+//! Elastic energy of a sphere pressed into a solid, as a function of the position of the sphere's centre.
 //!
-//! Without friction the answer depends on the place of the centre alone, so that the whole law is one function of three
-//! coordinates, and the force its gradient: no path has a memory of its own, no closed path generates energy, and a
-//! tick costs the same wherever the sphere is. It is
+//! Without friction the force depends on the position of the centre alone. The whole law is therefore one function of
+//! three coordinates, and the force is its gradient: the law has no path memory, no closed path generates energy, and a
+//! tick costs the same wherever the sphere is. The energy is
 //!
 //! ```text
 //! E = P(d) g(place, sqrt(d / R)),       P(d) = 8/15 E* sqrt(R) d^(5/2) h(sqrt(d / R))
@@ -16,41 +16,41 @@ use crate::jet::Jet;
 use crate::remainder::Size;
 use crate::spline::{Curve, Volume};
 
-/// What is touched.
+/// Body that the sphere touches, with the tables of its law.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ground {
-    /// All below `z = 0`.
+    /// Half-space `z <= 0`.
     HalfSpace,
-    /// A block.
+    /// Block, its bottom clamped.
     Block {
-        /// Its size.
+        /// Dimensions, m.
         size: Size,
-        /// Ratio of energies on top (|x|, |y|), on the faces across x (|y|, z) and on those across y (|x|, z).
+        /// Energy ratios on top (|x|, |y|), on the faces across x (|y|, z) and on those across y (|x|, z).
         ratios: Box<[Volume; 3]>,
-        /// Radius of the edges, m.
+        /// Radius of the rounded edges, m.
         rounding_m: f64,
     },
-    /// A round cylinder, its bottom clamped.
+    /// Round cylinder, its bottom clamped.
     Cylinder {
-        /// Its radius, m.
+        /// Radius of the cylinder, m.
         radius_m: f64,
-        /// Its height, m.
+        /// Height of the cylinder, m.
         height_m: f64,
-        /// Ratio of energies over the distance from the axis; the second axis is idle.
+        /// Energy ratio over the distance from the axis; the second coordinate is unused.
         ratio: Box<Volume>,
-        /// Radius of the rim, m.
+        /// Radius of the rounded rim, m.
         rounding_m: f64,
     },
-    /// The plane top of a body of any shape: the whole plane is touched, and beyond the face's box the answer says so.
+    /// Plane top of a body of any shape. The law extends over the whole plane and reports positions off the face's box.
     Face {
         /// Smallest and largest x and y of the face, m.
         outline_m: [[f64; 2]; 2],
-        /// Ratio of energies over x and y.
+        /// Energy ratio over x and y.
         ratio: Box<Volume>,
     },
 }
 
-/// The law of one sphere.
+/// Force law of one sphere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Atlas {
     /// Radius of the sphere, m.
@@ -59,44 +59,44 @@ pub struct Atlas {
     pub hertz: f64,
     /// `h` over `sqrt(d / R)`.
     pub profile: Curve,
-    /// Depth from which on the stiffness falls to zero, over a tenth of the radius, m.
+    /// Depth at which the stiffness starts to fall to zero, over a tenth of the radius, m.
     pub deepest_m: f64,
-    /// What is touched.
+    /// Body that the sphere touches.
     pub ground: Ground,
 }
 
-/// Over how much of the root of depth over radius the ratio comes to its end, behind the deepest that is answered.
+/// Width over which the energy ratio levels off behind the deepest solved depth, as root of depth over radius.
 const RATIO_END: f64 = 0.022;
 
-/// Over how many radii the stiffness falls to zero, behind the deepest that is answered.
+/// Width over which the stiffness falls to zero behind the deepest solved depth, radii.
 const DEEPEST_FADE: f64 = 0.1;
 
-/// Distances whose square is below this are none, m2: their reciprocals would not be finite.
+/// Square of a distance below which it counts as zero, m2: its reciprocal would not be finite.
 const NOTHING_M2: f64 = 1.0e-30;
 
-/// Depth, and what the ratio is there.
+/// Depth of a contact with its energy ratio.
 struct Touch {
     depth_m: Jet,
     ratio: Jet,
     is_beyond: bool,
 }
 
-/// Power with which the depths below several faces are joined to the least of them.
-const SHARPNESS_ROOTS: u32 = 3; // 2^3: the eighth
+/// Number of square roots in the smooth minimum of [`least`]; its power is two to this number.
+const SHARPNESS_ROOTS: u32 = 3; // 2^3 = 8
 
-/// Energy, J, its gradient, N, and the depth, m.
+/// Energy, J, its gradient, N, and depth, m, of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Stored energy and its gradient.
     pub energy: Jet,
-    /// How far the face is inside the sphere; not positive without contact.
+    /// Depth of the undeformed face inside the sphere, m; not positive without contact.
     pub depth_m: f64,
-    /// True where the law is that of a place nearby: off a face, or on the side of a cylinder.
+    /// True where the law is that of a nearby position: off a face, or on the side of a cylinder.
     pub is_beyond: bool,
 }
 
 impl Atlas {
-    /// Energy of a sphere whose centre is at `centre_m` (finite). Real-time: bounded, no allocation.
+    /// Returns the energy of a sphere whose centre is at `centre_m` (finite). Real-time: bounded, no allocation.
     #[must_use]
     pub fn answer(&self, centre_m: [f64; 3]) -> Answer {
         let centre = [0, 1, 2].map(|axis| Jet::variable(centre_m[axis], axis));
@@ -124,8 +124,8 @@ impl Atlas {
         Answer { energy: self.unbounded(touch.depth_m) * touch.ratio, depth_m, is_beyond }
     }
 
-    /// The same of the top face of a block alone, as if it had no other: zero beyond its edges, and growing over half a radius before
-    /// them. Its force grows with the depth, which that of [`Self::answer`] does not where the nearest face is another. Real-time:
+    /// Returns the energy of the top face of a block alone: zero beyond its edges, fading in over half a radius inside
+    /// them. Its force grows with the depth; that of [`Self::answer`] does not where another face is nearer. Real-time:
     /// bounded, no allocation.
     #[must_use]
     pub fn top(&self, centre_m: [f64; 3]) -> Answer {
@@ -143,19 +143,19 @@ impl Atlas {
         Answer { energy, depth_m: depth_m.value, is_beyond: false }
     }
 
-    /// Coordinates of the ratio of a block's top.
+    /// Returns the coordinates of a block's top energy ratio.
     fn place_on_top(&self, centre: [Jet; 3], depth_m: Jet, ratio: &Volume, rounding_m: f64) -> [Jet; 3] {
         let across = |k: usize| ease_at(centre[k].abs(), ratio.range(k).1, rounding_m);
         [across(0), across(1), self.root(depth_m, ratio)]
     }
 
-    /// Root of depth over radius, up to where the ratio ends.
+    /// Returns the root of depth over radius, limited to the range of the energy ratio.
     fn root(&self, depth_m: Jet, ratio: &Volume) -> Jet {
         let value = (depth_m.value / self.radius_m).sqrt();
         ease_at(depth_m.chain(value, 0.5 * value / depth_m.value), ratio.range(2).1, RATIO_END)
     }
 
-    /// Depth and ratio at a plane face; `None` above it.
+    /// Returns depth and energy ratio at a plane face; `None` above the face.
     fn touch_face(&self, centre: [Jet; 3], outline_m: [[f64; 2]; 2], ratio: &Volume) -> Option<Touch> {
         let depth_m = -centre[2] + self.radius_m;
         if depth_m.value <= 0.0 {
@@ -170,7 +170,7 @@ impl Atlas {
         Some(Touch { depth_m, ratio: ratio.at([within(0), within(1), self.root(depth_m, ratio)]), is_beyond })
     }
 
-    /// Depth and ratio at a cylinder; `None` far from it.
+    /// Returns depth and energy ratio at a cylinder; `None` without contact.
     fn touch_cylinder(
         &self,
         centre: [Jet; 3],
@@ -196,7 +196,7 @@ impl Atlas {
         Some(Touch { depth_m, ratio, is_beyond: shares[0].value > 0.5 })
     }
 
-    /// `P(d)`: beyond the deepest, its second derivative falls to zero; from there on it is a straight line.
+    /// Evaluates `P(d)`. Beyond the deepest depth the second derivative falls to zero, then `P` is a straight line.
     fn unbounded(&self, depth_m: Jet) -> Jet {
         let within = depth_m.value.min(self.deepest_m);
         let root = (within / self.radius_m).sqrt();
@@ -223,7 +223,7 @@ impl Atlas {
         )
     }
 
-    /// Depth and ratio at a block; `None` far from it.
+    /// Returns depth and energy ratio at a block; `None` without contact.
     fn touch_block(
         &self,
         centre: [Jet; 3],
@@ -255,7 +255,7 @@ impl Atlas {
             let part = match axis {
                 0 => ratios[1].at([across(1, &ratios[1], 0), up(&ratios[1]), root]),
                 1 => ratios[2].at([across(0, &ratios[2], 0), up(&ratios[2]), root]),
-                // Of the clamped face too, where nothing is to be touched: in the middle of the block the law stays one.
+                // Also for the clamped face, which cannot be touched: the law stays uniform in the middle of the block.
                 _ => ratios[0].at(self.place_on_top(centre, depth_m, &ratios[0], rounding_m)),
             };
             ratio = ratio + share * part;
@@ -264,7 +264,7 @@ impl Atlas {
     }
 }
 
-/// Size of a number; round at zero, if `blunt` is positive, but for a constant.
+/// Returns the absolute value, rounded off within `blunt` of zero (apart from a constant) if `blunt` is positive.
 fn smooth_size(x: Jet, blunt: f64) -> Jet {
     if x.value.abs() >= blunt {
         return x.abs();
@@ -273,7 +273,7 @@ fn smooth_size(x: Jet, blunt: f64) -> Jet {
     (square * (square * -0.125 + 0.75) + 0.375) * blunt
 }
 
-/// The number itself up to `knee`, then bent until it stays at `knee + width`, which it reaches at `knee + 2 width`.
+/// Limits a number: unchanged up to `knee`, then bent to a plateau of `knee + width`, reached at `knee + 2 width`.
 fn ease(x: Jet, knee: f64, width: f64) -> Jet {
     let over = x.value - knee;
     if over <= 0.0 {
@@ -288,25 +288,25 @@ fn ease(x: Jet, knee: f64, width: f64) -> Jet {
     }
 }
 
-/// The same, staying at `end`, bent over `width` before it and as much behind.
+/// Limits a number to `end`, bent over `width` before `end` and as much behind it.
 pub(crate) fn ease_at(x: Jet, end: f64, width: f64) -> Jet {
     let eased = ease(x, end - width, width);
-    // Rounding must not leave the table.
+    // Rounding errors must not leave the table.
     if eased.value > end { Jet::constant(end) } else { eased }
 }
 
-/// What a number is above zero, bent over `width` on both sides of it. It less that of the opposite number is the number.
+/// Returns the smooth positive part of a number, bent over `width` on both sides of zero: `above(x) - above(-x) = x`.
 fn above(x: Jet, width: f64) -> Jet {
     if x.value <= -width { Jet::default() } else { x - ease(x, -width, width) }
 }
 
-/// Length of a vector.
+/// Returns the length of a vector.
 fn length(of: [Jet; 3]) -> Jet {
     let square = of[0] * of[0] + of[1] * of[1] + of[2] * of[2];
     if square.value > NOTHING_M2 { square.sqrt() } else { Jet::default() }
 }
 
-/// Smooth substitute for the least of three numbers, none of them negative: `(a^-8 + b^-8 + c^-8)^(-1/8)`.
+/// Returns a smooth minimum of three non-negative numbers: `(a^-8 + b^-8 + c^-8)^(-1/8)`.
 fn least(of: [Jet; 3]) -> Jet {
     let least = of.iter().copied().fold(of[0], |least, d| if d.value < least.value { d } else { least });
     if least.value * least.value <= NOTHING_M2 {
@@ -327,8 +327,8 @@ fn least(of: [Jet; 3]) -> Jet {
     least * root
 }
 
-/// Signed distance to a box (negative inside) from the distances beyond each pair of faces, and the weight of each pair in it. Where
-/// several pairs are as near, both are bent over `width` on both sides: second derivatives are continuous everywhere.
+/// Returns the signed distance to a box (negative inside) from the distances beyond each pair of faces, and the weight
+/// of each pair. Equally near pairs blend over `width` on both sides, with continuous second derivatives.
 fn distance(beyond: [Jet; 3], width: f64) -> (Jet, [Jet; 3]) {
     let outside = beyond.map(|b| above(b, width));
     let distance = length(outside) - least(beyond.map(|b| above(-b, width)));
@@ -342,7 +342,7 @@ fn distance(beyond: [Jet; 3], width: f64) -> (Jet, [Jet; 3]) {
     (distance, weights.map(|weight| weight * sum))
 }
 
-/// From zero at zero to one at one, with two continuous derivatives; one beyond.
+/// Smooth step from zero at zero to one at one, constant beyond, with two continuous derivatives.
 pub(crate) fn step(x: Jet) -> Jet {
     let s = x.value.clamp(0.0, 1.0);
     x.chain(s * s * s * (10.0 - s * (15.0 - 6.0 * s)), 30.0 * s * s * (1.0 - s) * (1.0 - s))
@@ -397,8 +397,8 @@ mod tests {
         assert_eq!(atlas.answer([0.0, 0.0, 0.0051]).energy, Jet::default());
     }
 
-    /// On the axis of a rounded edge, and where two faces are as near, directions meet: neither the energy nor the force depends on the side one comes from, and
-    /// faces of different stiffness do not make a force of their difference.
+    /// On the axis of a rounded edge, and where two faces are as near, directions meet: neither the energy nor the force
+    /// depends on the side one comes from, and faces of different stiffness do not make a force of their difference.
     #[test]
     fn the_axis_of_an_edge_is_a_place_like_others() {
         let atlas = with([1.0, 1.3, 0.8]);

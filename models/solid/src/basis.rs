@@ -1,6 +1,6 @@
-//! One dimension: points of a finite element, rules of integration, polynomials through points.
+//! One-dimensional tools: nodes of finite elements, quadrature rules, Lagrange polynomials.
 
-/// Points and weights of an integral over -1..1.
+/// Quadrature rule on -1..1.
 #[derive(Clone, Debug)]
 pub struct Rule {
     /// Points, ascending.
@@ -9,7 +9,7 @@ pub struct Rule {
     pub weights: Vec<f64>,
 }
 
-/// Legendre polynomial of a degree and its derivative, at a point inside -1..1.
+/// Returns the Legendre polynomial of a degree and its derivative, at a point inside -1..1.
 fn legendre(degree: usize, x: f64) -> (f64, f64) {
     let (mut before, mut value) = (1.0, x);
     for k in 2..=degree {
@@ -19,7 +19,7 @@ fn legendre(degree: usize, x: f64) -> (f64, f64) {
     (value, degree as f64 * (x * value - before) / (x * x - 1.0))
 }
 
-/// Root of a function in a bracket, by bisection to the last bit.
+/// Finds the root of a function in a bracket, by bisection to the last bit.
 fn bisect(mut low: f64, mut high: f64, function: impl Fn(f64) -> f64) -> f64 {
     let rising = function(high) > 0.0;
     for _ in 0..100 {
@@ -29,9 +29,9 @@ fn bisect(mut low: f64, mut high: f64, function: impl Fn(f64) -> f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// All roots of a function inside -1..1 that has exactly `count`, by a fine search for changes of sign.
+/// Finds all roots inside -1..1 of a function that has exactly `count`, by a fine search for sign changes.
 fn roots(count: usize, function: impl Fn(f64) -> f64) -> Vec<f64> {
-    let cells = 1000 * count.max(1) + 1; // odd: zero is no border
+    let cells = 1000 * count.max(1) + 1; // odd, so that zero is no cell border
     let at = |i: usize| -1.0 + 2.0 * (i as f64 + 0.5) / (cells as f64 + 1.0);
     let mut found = Vec::with_capacity(count);
     for i in 0..cells {
@@ -42,7 +42,7 @@ fn roots(count: usize, function: impl Fn(f64) -> f64) -> Vec<f64> {
     found
 }
 
-/// Gauss's rule, exact for polynomials of degree `2 count - 1`; `count` at least 2. Not real-time.
+/// Returns Gauss's rule, exact for polynomials of degree `2 count - 1`; `count` at least 2. Not real-time.
 #[must_use]
 pub fn gauss(count: usize) -> Rule {
     let points = roots(count, |x| legendre(count, x).0);
@@ -56,8 +56,8 @@ pub fn gauss(count: usize) -> Rule {
     Rule { points, weights }
 }
 
-/// Points of an element of an order: both ends, and the extrema of the Legendre polynomial between (Gauss and Lobatto).
-/// Order 2 is the ordinary quadratic element. Not real-time.
+/// Returns the nodes of an element of an order: both ends, and the extrema of the Legendre polynomial between
+/// (Gauss-Lobatto). Order 2 is the ordinary quadratic element. Not real-time.
 #[must_use]
 pub fn element_points(order: usize) -> Vec<f64> {
     let mut points = vec![-1.0];
@@ -68,7 +68,7 @@ pub fn element_points(order: usize) -> Vec<f64> {
     points
 }
 
-/// Values of the polynomials that are one at one of the points and zero at the others, at `x`.
+/// Evaluates at `x` the Lagrange polynomials of the points (each one at its point, zero at the others).
 pub fn lagrange(points: &[f64], x: f64, values: &mut [f64]) {
     for (i, value) in values.iter_mut().enumerate() {
         *value = 1.0;
@@ -80,7 +80,7 @@ pub fn lagrange(points: &[f64], x: f64, values: &mut [f64]) {
     }
 }
 
-/// Their derivatives.
+/// Evaluates the derivatives of the Lagrange polynomials at `x`.
 pub fn lagrange_slopes(points: &[f64], x: f64, slopes: &mut [f64]) {
     for (i, slope) in slopes.iter_mut().enumerate() {
         *slope = 0.0;

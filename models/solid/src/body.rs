@@ -1,8 +1,8 @@
-//! A body of any shape whose touched face is its plane top: the difference between its response and that of a half-space.
+//! Body of any shape with a plane touched top: difference between its response and that of a half-space.
 //!
-//! The half-space behind the touched face carries the pole of every contact, as for a block ([`crate::remainder`]); the mesh
-//! carries the rest: tractions that undo those of the half-space on the free surface, displacements that undo its own on the
-//! fixed one. So the mesh need not be fine under the tool.
+//! The half-space behind the touched face carries the singularity of every contact, as for a block
+//! ([`crate::remainder`]). The mesh carries the rest: tractions that cancel those of the half-space on the free
+//! surface, and displacements that cancel those on the fixed one. So the mesh need not be fine under the tool.
 
 use crate::dense::NotPositive;
 use crate::dissection::{Stiffness, subtract_forces};
@@ -15,21 +15,21 @@ use crate::recovery::twice_error_j;
 use crate::rigid::{MODES, RigidPatch};
 use crate::table::Table;
 
-/// Forces whose fields are solved for at once.
+/// Number of forces solved for at once.
 const BATCH: usize = 8;
 
-/// A body, factored.
+/// Body with its factored stiffness.
 #[derive(Debug)]
 pub struct Body<'a> {
     mesh: &'a Mesh,
     solid: HalfSpace,
     lame: Lame,
     stiffness: Stiffness,
-    /// Points of integration of the free surface, by facet.
+    /// Quadrature points of the free surface, by facet.
     quadrature: Vec<(&'a Facet, Vec<SurfacePoint>)>,
 }
 
-/// Smallest and largest x and y of the touched face, m.
+/// Returns smallest and largest x and y of the touched face, m.
 #[must_use]
 pub fn outline_m(mesh: &Mesh) -> [[f64; 2]; 2] {
     let nodes = || mesh.touched.iter().flat_map(|facet| &facet.nodes);
@@ -39,8 +39,8 @@ pub fn outline_m(mesh: &Mesh) -> [[f64; 2]; 2] {
     })
 }
 
-/// Largest height of the body above the touched face's middle, and largest distance of the touched face from its plane, m:
-/// both zero where the touched face is plane and the top.
+/// Returns the larger of two lengths, m: height of the body above the touched face's middle, and distance of the
+/// touched face from its plane. Zero where the touched face is plane and the top.
 #[must_use]
 pub fn unevenness_m(mesh: &Mesh) -> f64 {
     let above = mesh.free.iter().flat_map(|facet| &facet.nodes).map(|&node| mesh.nodes_m[node][2]);
@@ -48,7 +48,7 @@ pub fn unevenness_m(mesh: &Mesh) -> f64 {
     above.chain(beside).fold(0.0, f64::max)
 }
 
-/// A plate bonded to the touched face of a mesh, and the estimated relative error of its stiffness. Not real-time.
+/// Solves for a plate bonded to the touched face of a mesh; returns also the estimated relative error. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
@@ -60,7 +60,7 @@ pub fn plate(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> 
     Ok((patch, error))
 }
 
-/// A plate bonded to the touched face of a mesh, and the displacement of all nodes under each of its modes. Not real-time.
+/// Solves for a plate bonded to a mesh's touched face; returns also all nodal displacements by mode. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
@@ -74,7 +74,7 @@ pub fn plate_modes(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, Vec<f64>), No
 }
 
 impl<'a> Body<'a> {
-    /// Factors the stiffness. Not real-time.
+    /// Factors the stiffness of a mesh. Not real-time.
     ///
     /// # Errors
     /// [`NotPositive`] if the numbers do not describe a solid.
@@ -89,7 +89,7 @@ impl<'a> Body<'a> {
         Ok(Self { mesh, solid, lame, stiffness, quadrature })
     }
 
-    /// True if a point of the plane lies on the touched face.
+    /// Returns true if a point of the plane lies on the touched face.
     #[must_use]
     pub fn is_on_face(&self, at_m: [f64; 2]) -> bool {
         let nodes_m = &self.mesh.nodes_m;
@@ -97,7 +97,7 @@ impl<'a> Body<'a> {
         self.mesh.touched.iter().any(holds)
     }
 
-    /// The facet at a point of the plane, or the one nearest to it, and the shares of its nodes.
+    /// Finds the facet at or nearest to a point of the plane; returns also the weights of its nodes.
     fn sample(&self, at_m: [f64; 2]) -> (&Facet, Vec<f64>) {
         let mut best = (&self.mesh.touched[0], Vec::new());
         let mut least = f64::INFINITY;
@@ -110,7 +110,7 @@ impl<'a> Body<'a> {
         best
     }
 
-    /// Table of the remainder between all points of a grid; points off the face count as the nearest on it. Not real-time.
+    /// Tabulates the remainder between all points of a grid, each moved onto the face by `nearest`. Not real-time.
     #[must_use]
     pub fn table(&self, nodes_m: [Vec<f64>; 2], nearest: impl Fn([f64; 2]) -> [f64; 2]) -> Table {
         let points: Vec<[f64; 2]> =
@@ -121,8 +121,8 @@ impl<'a> Body<'a> {
         Table::of(nodes_m, &answers)
     }
 
-    /// Largest estimated error of the compliance at some points of the touched face, relative to that of a half-space under a
-    /// disc of half a radius. Not real-time.
+    /// Returns the largest estimated error of the compliance at some points of the touched face, relative to the
+    /// compliance of a half-space under a disc of half a radius. Not real-time.
     #[must_use]
     pub fn mesh_error(&self, radius_m: f64, places_m: &[[f64; 2]]) -> f64 {
         let nu = self.solid.poisson_ratio;
@@ -150,7 +150,7 @@ impl<'a> Body<'a> {
             .collect()
     }
 
-    /// Remainder at all nodes of three unit forces at each source.
+    /// Returns the remainder at all nodes of three unit forces at each source.
     fn displacement(&self, sources_m: &[[f64; 2]]) -> Vec<f64> {
         let columns = 3 * sources_m.len();
         let mut values = vec![0.0; 3 * self.mesh.nodes_m.len() * columns];
@@ -163,7 +163,7 @@ impl<'a> Body<'a> {
         values
     }
 
-    /// Adds the forces of the tractions that undo those of the half-space on the free surface.
+    /// Adds the nodal forces of the tractions that cancel those of the half-space on the free surface.
     fn add_tractions(&self, sources_m: &[[f64; 2]], forces: &mut [f64]) {
         let columns = 3 * sources_m.len();
         let mut tractions = vec![[0.0; 3]; columns];
@@ -193,7 +193,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Displacement that undoes the half-space's at the fixed nodes, m/N, zero elsewhere.
+    /// Returns the displacement that cancels that of the half-space at the fixed nodes, m/N; zero elsewhere.
     fn prescribed(&self, sources_m: &[[f64; 2]]) -> Vec<f64> {
         let columns = 3 * sources_m.len();
         let mut values = vec![0.0; 3 * self.mesh.nodes_m.len() * columns];

@@ -1,25 +1,25 @@
-//! Prepared laws on disk, so that a description is solved once.
+//! Disk cache of prepared laws, so that a description is solved once.
 //!
-//! A file holds its description in full, its numbers and a sum over both; one that differs anywhere is ignored and made
-//! anew. The last few are kept in memory too, so that without a folder to write to every start prepares, but not every instance.
-//! Not real-time.
+//! A file contains its full description, its numbers and a checksum of both; a file that differs anywhere is ignored
+//! and rewritten. The last few laws are cached in memory too: without a writable folder every start prepares anew, but
+//! not every instance. Not real-time.
 
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-/// First bytes of a file. The version changes when the same description would give other numbers.
+/// Magic bytes of a file. Raise the version when the same description would give other numbers.
 const MAGIC: &[u8; 16] = b"flotor-solid 02\n";
 
-/// `FNV-1a` over 64 bits: finds damage, proves nothing.
+/// Returns the `FNV-1a` hash over 64 bits: detects damage, not tampering.
 pub(crate) fn digest(bytes: &[u8]) -> u64 {
     bytes
         .iter()
         .fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// `$XDG_CACHE_HOME/flotor`, else `~/.cache/flotor`; relative folders do not count.
+/// Returns `$XDG_CACHE_HOME/flotor`, else `~/.cache/flotor`; relative folders are ignored.
 fn folder() -> Option<PathBuf> {
     let own = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|path| path.is_absolute());
     let home = || std::env::var_os("HOME").map(PathBuf::from).filter(|path| path.is_absolute());
@@ -52,9 +52,9 @@ fn decode(description: &str, bytes: &[u8]) -> Option<Vec<f64>> {
     left.is_empty().then(|| chunks.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect())
 }
 
-/// Descriptions with their numbers, the latest last.
+/// Descriptions with their numbers, the most recent last.
 static LATEST: Mutex<Vec<(String, Vec<f64>)>> = Mutex::new(Vec::new());
-/// How many are kept in memory.
+/// Capacity of the memory cache.
 const KEPT: usize = 4;
 
 fn keep(description: &str, numbers: &[f64]) {
@@ -71,7 +71,7 @@ fn kept(description: &str) -> Option<Vec<f64>> {
     latest.iter().find(|(other, _)| other == description).map(|(_, numbers)| numbers.clone())
 }
 
-/// The numbers of a description, if they are there and whole.
+/// Returns the numbers of a description, if cached and intact.
 #[must_use]
 pub fn load(description: &str) -> Option<Vec<f64>> {
     if let Some(numbers) = kept(description) {
@@ -80,7 +80,7 @@ pub fn load(description: &str) -> Option<Vec<f64>> {
     decode(description, &fs::read(file(description)?).ok()?)
 }
 
-/// Keeps numbers. Says nothing if that fails: the next start prepares again.
+/// Stores numbers in memory and on disk. Ignores a failure: the next start prepares again.
 pub fn store(description: &str, numbers: &[f64]) {
     keep(description, numbers);
     let Some(path) = file(description) else { return };
@@ -88,7 +88,7 @@ pub fn store(description: &str, numbers: &[f64]) {
     if fs::create_dir_all(folder).is_err() {
         return;
     }
-    // Never half a file under the final name, whoever else prepares the same.
+    // Write to a temporary file and rename it: concurrent writers never leave half a file under the final name.
     let own = path.with_extension(format!("{}.tmp", std::process::id()));
     if fs::write(&own, encode(description, numbers)).is_err() || fs::rename(&own, &path).is_err() {
         let _ = fs::remove_file(&own);

@@ -1,8 +1,8 @@
 //! Elements of a body of any shape: quadratic tetrahedra of 10 nodes and bricks of 20.
 //!
-//! Nodes run as Gmsh numbers them: corners first, then the middles of the edges. Both elements have more degrees of freedom
-//! than a nearly incompressible material has constraints: they do not lock, though bricks of 20 nodes stiffen a little above
-//! a Poisson's ratio of 0.45.
+//! Nodes are numbered as in Gmsh: corners first, then the middles of the edges. Both elements have more degrees of
+//! freedom than a nearly incompressible material has constraints, so they do not lock; bricks of 20 nodes stiffen
+//! slightly above a Poisson's ratio of 0.45.
 
 use crate::basis::gauss;
 use crate::grid::Lame;
@@ -10,13 +10,13 @@ use crate::grid::Lame;
 /// Shape of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// 10 nodes.
+    /// Quadratic tetrahedron of 10 nodes.
     Tetrahedron,
-    /// 20 nodes.
+    /// Quadratic brick of 20 nodes.
     Brick,
 }
 
-/// A point of integration: where, and its weight.
+/// Quadrature point: coordinates in the reference element, and weight.
 pub type Point<const N: usize> = ([f64; N], f64);
 
 const TETRAHEDRON_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [2, 3], [1, 3]];
@@ -25,7 +25,7 @@ const BRICK_EDGES: [[usize; 2]; 12] =
 const TETRAHEDRON_FACES: [&[usize]; 4] = [&[0, 2, 1], &[0, 1, 3], &[0, 3, 2], &[1, 2, 3]];
 const BRICK_FACES: [&[usize]; 6] =
     [&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
-/// Signs of the corners of a brick.
+/// Coordinates of the corners of a brick in the reference element.
 const BRICK_CORNERS: [[f64; 3]; 8] = [
     [-1.0, -1.0, -1.0],
     [1.0, -1.0, -1.0],
@@ -38,7 +38,7 @@ const BRICK_CORNERS: [[f64; 3]; 8] = [
 ];
 
 impl Kind {
-    /// Number of corners.
+    /// Returns the number of corners.
     #[must_use]
     pub fn corners(self) -> usize {
         match self {
@@ -47,7 +47,7 @@ impl Kind {
         }
     }
 
-    /// The corners at the ends of each edge; the middle of edge `i` is node `corners + i`.
+    /// Returns the two corners of each edge; the middle of edge `i` is node `corners + i`.
     #[must_use]
     pub fn edges(self) -> &'static [[usize; 2]] {
         match self {
@@ -56,7 +56,7 @@ impl Kind {
         }
     }
 
-    /// The corners of each face, counterclockwise seen from outside.
+    /// Returns the corners of each face, counterclockwise seen from outside.
     #[must_use]
     pub fn faces(self) -> &'static [&'static [usize]] {
         match self {
@@ -65,7 +65,7 @@ impl Kind {
         }
     }
 
-    /// Where the corners are in the reference element.
+    /// Returns the coordinates of the corners in the reference element.
     #[must_use]
     pub fn corner_places(self) -> Vec<[f64; 3]> {
         match self {
@@ -74,13 +74,13 @@ impl Kind {
         }
     }
 
-    /// Number of nodes.
+    /// Returns the number of nodes.
     #[must_use]
     pub fn nodes(self) -> usize {
         self.corners() + self.edges().len()
     }
 
-    /// Nodes of a face: its corners, then the middles of its edges, the first between its first two corners.
+    /// Returns the nodes of a face: corners, then middles of its edges, the first between the first two corners.
     #[must_use]
     pub fn face_nodes(self, face: usize) -> Vec<usize> {
         let corners = self.faces()[face];
@@ -93,8 +93,8 @@ impl Kind {
         nodes
     }
 
-    /// Shape functions of all nodes at a point of the reference element, and their slopes. A tetrahedron's corners are the
-    /// origin and the unit points, a brick is -1..1.
+    /// Returns the shape functions of all nodes at a point of the reference element, with their slopes. A tetrahedron's
+    /// corners are the origin and the unit points, a brick is -1..1.
     #[must_use]
     pub fn shapes(self, at: [f64; 3]) -> Vec<(f64, [f64; 3])> {
         match self {
@@ -134,7 +134,7 @@ impl Kind {
         }
     }
 
-    /// Points of integration over the reference element, exact for the stiffness of an element with straight edges.
+    /// Returns quadrature points of the reference element, exact for the stiffness of an element with straight edges.
     #[must_use]
     pub fn rule(self) -> Vec<Point<3>> {
         let line = gauss(3);
@@ -146,7 +146,7 @@ impl Kind {
                     points.push(match self {
                         Self::Brick => ([x, y, z], wx * wy * wz),
                         Self::Tetrahedron => {
-                            // A cube folded into a tetrahedron.
+                            // Duffy transformation of the cube into the tetrahedron.
                             let [a, b, c] = [x, y, z].map(|v| 0.5 * (1.0 + v));
                             let (left, area) = (1.0 - a, (1.0 - a) * (1.0 - b));
                             ([a, b * left, c * area], 0.125 * wx * wy * wz * left * area)
@@ -159,17 +159,17 @@ impl Kind {
     }
 }
 
-/// An element: its kind, and where its nodes are.
+/// Kind and node positions of an element.
 pub struct Geometry<'a> {
-    /// Shape.
+    /// Shape of the element.
     pub kind: Kind,
-    /// One for each node, m.
+    /// Position of each node, m.
     pub nodes_m: &'a [[f64; 3]],
 }
 
 impl Geometry<'_> {
-    /// Slopes of the shape functions along x, y, z, 1/m, and the volume of the reference element's unit there, m3: not
-    /// positive in an inverted element.
+    /// Returns the slopes of the shape functions along x, y, z, 1/m, and the Jacobian determinant, m3: not positive in
+    /// an inverted element.
     #[must_use]
     pub fn slopes(&self, at: [f64; 3]) -> (Vec<[f64; 3]>, f64) {
         let shapes = self.kind.shapes(at);
@@ -195,7 +195,7 @@ impl Geometry<'_> {
         (slopes, determinant)
     }
 
-    /// Stiffness, N/m: a square matrix, three unknowns to a node; by columns.
+    /// Returns the stiffness, N/m: a square matrix by columns, three unknowns to a node.
     #[must_use]
     pub fn stiffness(&self, lame: Lame) -> Vec<f64> {
         let count = self.kind.nodes();
@@ -223,8 +223,8 @@ impl Geometry<'_> {
     }
 }
 
-/// Shape functions of a face (3 corners or 4, then the middles of its edges) and their slopes. A triangle's corners are the
-/// origin and the unit points, a square is -1..1.
+/// Returns the shape functions of a face (3 corners or 4, then the middles of its edges) with their slopes. A
+/// triangle's corners are the origin and the unit points, a square is -1..1.
 #[must_use]
 pub fn face_shapes(corners: usize, at: [f64; 2]) -> Vec<(f64, [f64; 2])> {
     let [x, y] = at;
@@ -258,7 +258,7 @@ pub fn face_shapes(corners: usize, at: [f64; 2]) -> Vec<(f64, [f64; 2])> {
     signs.into_iter().map(corner).chain((0..4).map(middle)).collect()
 }
 
-/// Points of integration over a face, in four parts for the peaks of near forces.
+/// Returns quadrature points of a face, in four parts to resolve the peaks of nearby forces.
 #[must_use]
 pub fn face_rule(corners: usize) -> Vec<Point<2>> {
     let line = gauss(4);

@@ -1,4 +1,4 @@
-//! A round cylinder of bricks whose edges follow its rim.
+//! Meshes round cylinders with bricks whose edges follow the rim.
 
 use crate::cells::Kind;
 use crate::grid::graded;
@@ -7,14 +7,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 impl Mesh {
-    /// A round cylinder, its top about the origin and touched, its bottom fixed: bricks whose edges follow the rim, `m` times
-    /// `m` of them in a square in the middle. Lengths in m. Not real-time.
+    /// Meshes a round cylinder, top touched and about the origin, bottom fixed: bricks whose edges follow the rim, `m`
+    /// times `m` of them in a square in the middle. Lengths in m. Not real-time.
     ///
     /// # Errors
-    /// [`MeshError::Inverted`] for numbers that are no cylinder.
+    /// [`MeshError::Inverted`] if the numbers do not describe a cylinder.
     pub fn cylinder(radius_m: f64, height_m: f64, m: usize) -> Result<Self, MeshError> {
         let half = 0.45 * radius_m;
-        // All positions by twice their index, so that middles of edges are whole numbers too.
+        // Positions are indexed by twice their number, so that middles of edges have whole indices too.
         let line = |i: usize| half * (i as f64 / m as f64 - 1.0);
         let around = |t: usize| {
             let (side, along) = (t / (2 * m) % 4, t % (2 * m));
@@ -30,7 +30,7 @@ impl Mesh {
         let shares = graded(1.0, 0.0, rings, 1.35);
         let heights = graded(0.0, -height_m, m + 1, 1.35);
         let between = |borders: &[f64], i: usize| 0.5 * (borders[i / 2] + borders[i.div_ceil(2)]);
-        // Of a brick's 20 nodes each coordinate is -1, 0 or 1: the border before the brick, its middle, the border after.
+        // Each coordinate of a brick's 20 nodes is -1, 0 or 1: border before the brick, middle, border after.
         let index = |coordinate: f64, brick: usize| match coordinate {
             c if c < -0.5 => 2 * brick,
             c if c > 0.5 => 2 * brick + 2,
@@ -75,7 +75,7 @@ impl Mesh {
     }
 }
 
-/// Puts bricks together whose nodes are at the same places.
+/// Collects bricks and merges nodes at equal positions.
 struct Gatherer {
     parts: Parts,
     found: BTreeMap<[i64; 3], usize>,
@@ -83,7 +83,7 @@ struct Gatherer {
 }
 
 impl Gatherer {
-    /// One brick: `place` puts the signs of corners (and zero, of middles) where they belong.
+    /// Adds one brick; `place` maps the coordinates of its reference nodes to positions, m.
     fn brick(&mut self, place: &dyn Fn([f64; 3]) -> [f64; 3]) {
         let corners = Kind::Brick.corner_places();
         let mut places = corners.clone();
@@ -97,7 +97,7 @@ impl Gatherer {
 
     #[allow(clippy::cast_possible_truncation)] // 1e7 units to a radius
     fn node(&mut self, at: [f64; 3]) -> usize {
-        // Off the middle of a unit, so that rounding does not part what is one.
+        // Offset the rounding, so that rounding errors do not separate equal positions.
         let key = at.map(|c| (c / self.unit_m + 0.237).floor() as i64);
         let nodes_m = &mut self.parts.nodes_m;
         *self.found.entry(key).or_insert_with(|| {
@@ -106,7 +106,7 @@ impl Gatherer {
         })
     }
 
-    /// With the faces that lie at a height of a name.
+    /// Returns the parts, with the faces all of whose corners lie at a named height.
     fn into_parts(mut self, name: impl Fn(f64) -> Option<&'static str>) -> Parts {
         for element in &self.parts.elements {
             for face in element.kind.faces() {

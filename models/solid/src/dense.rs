@@ -1,22 +1,22 @@
-//! Dense symmetric matrices: the partial Cholesky factorisation a front needs, and solves for several right sides.
+//! Dense symmetric matrices: partial Cholesky factorisation of a front, and triangular solves.
 //!
-//! Every sum runs in one order whatever the machine: tiles are arrays of four that a compiler may put into registers of
-//! any width, products are rounded before they are added, so the bits never depend on the width.
+//! Every sum has one fixed order: tiles are arrays of four that a compiler may put into registers of any width, and
+//! products are rounded before they are added, so the result is the same to the bit at any width.
 
-/// Columns of a panel: a panel of a front of 2000 rows stays in the second-level cache.
+/// Columns of a panel: a panel of a front of 2000 rows fits the second-level cache.
 const PANEL: usize = 48;
-/// Side of a tile of the update.
+/// Side length of a tile of the update.
 const TILE: usize = 4;
 
-/// A pivot is not positive: the matrix is not positive definite.
+/// Error for a pivot that is not positive: the matrix is not positive definite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotPositive {
-    /// Which pivot.
+    /// Index of the pivot.
     pub pivot: usize,
 }
 
-/// Eliminates the first `eliminated` of `size` unknowns of a symmetric matrix, lower triangle by columns: its first columns
-/// become those of the Cholesky factor, the rest the Schur complement. What is above the diagonal is scratch. Not real-time.
+/// Eliminates the first `eliminated` of `size` unknowns of a symmetric matrix, lower triangle by columns: its first
+/// columns become the Cholesky factor, the rest the Schur complement; above the diagonal is scratch. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] with the first pivot that is zero, negative or NaN.
@@ -42,7 +42,7 @@ fn factor_panel(matrix: &mut [f64], size: usize, first: usize, last: usize) -> R
             current.iter_mut().zip(other).for_each(|(value, &o)| *value -= scale * o);
         }
         let pivot = current[0];
-        // NaN is not positive either.
+        // NaN counts as not positive.
         if pivot.is_nan() || pivot <= 0.0 {
             return Err(NotPositive { pivot: column });
         }
@@ -54,7 +54,7 @@ fn factor_panel(matrix: &mut [f64], size: usize, first: usize, last: usize) -> R
     Ok(())
 }
 
-/// Subtracts the product of the panel with itself from the columns behind it.
+/// Subtracts the product of the panel and its transpose from the columns behind it.
 fn update_rest(matrix: &mut [f64], size: usize, first: usize, last: usize, packed: &mut Vec<[f64; TILE]>) {
     let (width, rows) = (last - first, size - last);
     let tiles = rows.div_ceil(TILE);

@@ -1,28 +1,28 @@
 //! Sparse Cholesky factorisation of a grid or a mesh by nested dissection.
 //!
-//! A body is cut across its longest side until single elements are left. On the way back, the stiffness of two
-//! neighbours is added, the nodes that touch nothing outside are eliminated, and what is left is the stiffness of the pair
-//! to its border. Each step is a dense matrix, and the order of all sums follows from the elements alone: the same bits on
-//! every machine, with no search for an ordering and no threads.
+//! A body is cut across its longest side down to single elements. On the way back, the stiffnesses of two neighbours
+//! are added and the nodes without a neighbour outside are eliminated, which gives the stiffness of the pair at its
+//! border. Each step is a dense matrix, and the elements alone determine the order of all sums: the same bits on every
+//! machine, without a search for an ordering and without threads.
 
 use crate::dense::{self, NotPositive};
 use crate::grid::{Elements, Grid, Lame};
 
-/// Elements, their nodes and their stiffness.
+/// Source of elements, their nodes and their stiffness.
 pub trait Assembly {
-    /// Number of nodes.
+    /// Returns the number of nodes.
     fn node_count(&self) -> usize;
-    /// Number of elements.
+    /// Returns the number of elements.
     fn element_count(&self) -> usize;
-    /// Nodes of an element.
+    /// Returns the nodes of an element.
     fn nodes(&self, element: usize) -> Vec<usize>;
-    /// Stiffness of an element, N/m: three unknowns to a node, by columns.
+    /// Returns the stiffness of an element, N/m: by columns, three unknowns to a node.
     fn stiffness(&self, element: usize) -> Vec<f64>;
-    /// Two or more elements, cut in two.
+    /// Cuts two or more elements in two.
     fn halves(&self, elements: Vec<usize>) -> [Vec<usize>; 2];
 }
 
-/// The stiffness of a grid of one material.
+/// Stiffness of a grid of one material.
 #[derive(Clone, Debug)]
 pub struct GridStiffness<'a> {
     grid: &'a Grid,
@@ -31,7 +31,7 @@ pub struct GridStiffness<'a> {
 }
 
 impl<'a> GridStiffness<'a> {
-    /// Integrates single elements. Not real-time.
+    /// Prepares the element integrals. Not real-time.
     #[must_use]
     pub fn new(grid: &'a Grid, lame: Lame) -> Self {
         Self { grid, elements: Elements::new(grid.order), lame }
@@ -69,7 +69,7 @@ impl Assembly for GridStiffness<'_> {
         self.elements.stiffness(size_m, self.lame)
     }
 
-    /// Across the side with the most elements.
+    /// Cuts across the side with the most elements.
     fn halves(&self, elements: Vec<usize>) -> [Vec<usize>; 2] {
         let range = |axis: usize| {
             let all = || elements.iter().map(|&element| self.index(element)[axis]);
@@ -84,26 +84,26 @@ impl Assembly for GridStiffness<'_> {
     }
 }
 
-/// One dense step: some unknowns, and those of the border they couple to.
+/// Dense elimination step: the eliminated unknowns and the border they couple to.
 #[derive(Debug)]
 struct Front {
     /// Unknowns; the eliminated ones first.
     unknowns: Vec<u32>,
     eliminated: usize,
-    /// Columns of the factor, all rows.
+    /// Eliminated columns of the factor, all rows.
     panel: Vec<f64>,
 }
 
-/// A factored stiffness matrix with fixed unknowns.
+/// Factored stiffness matrix with fixed unknowns.
 #[derive(Debug)]
 pub struct Stiffness {
     fronts: Vec<Front>,
     unknowns: usize,
-    /// Three unknowns to a node: where each is fixed.
+    /// Fixed components of each node.
     fixed: Vec<[bool; 3]>,
 }
 
-/// What is left of some elements: their border.
+/// Stiffness of some elements, condensed to their border.
 struct Rest {
     unknowns: Vec<u32>,
     /// Lower triangle by columns.
@@ -116,16 +116,16 @@ struct Builder<'a, A> {
     fronts: Vec<Front>,
     /// Position of an unknown in the front that is being built.
     place: Vec<u32>,
-    /// Number of elements around a node, and of those in the part that is being built.
+    /// Number of elements around a node, in all and in the part that is being built.
     around: Vec<u32>,
     inside: Vec<u32>,
 }
 
 impl Stiffness {
-    /// Assembles and factors. `fixed` says of each node which displacements are prescribed. Not real-time.
+    /// Assembles and factors the stiffness. `fixed`: the prescribed components of each node. Not real-time.
     ///
     /// # Errors
-    /// [`NotPositive`] if the block can move freely, or the material is none.
+    /// [`NotPositive`] if the body can move freely, or the material is not elastic.
     pub fn new(assembly: &impl Assembly, fixed: Vec<[bool; 3]>) -> Result<Self, NotPositive> {
         let nodes = assembly.node_count();
         let elements: Vec<usize> = (0..assembly.element_count()).collect();
@@ -146,14 +146,14 @@ impl Stiffness {
         Ok(Self { fronts, unknowns: 3 * nodes, fixed })
     }
 
-    /// Numbers the factor holds: what a solve reads twice.
+    /// Returns the count of numbers in the factor; a solve reads each twice.
     #[must_use]
     pub fn factor_size(&self) -> usize {
         self.fronts.iter().map(|front| front.panel.len()).sum()
     }
 
-    /// Solves for `columns` right sides at once, in place: force in, displacement out, all columns of an unknown side by
-    /// side. Fixed unknowns come out as zero. Not real-time.
+    /// Solves for `columns` right sides at once, in place: force in, displacement out, all columns of an unknown side
+    /// by side. Fixed unknowns return as zero. Not real-time.
     pub fn solve(&self, values: &mut [f64], columns: usize) {
         for (node, fixed) in self.fixed.iter().enumerate() {
             for (component, _) in fixed.iter().enumerate().filter(|(_, fixed)| **fixed) {
@@ -240,7 +240,7 @@ impl<A: Assembly> Builder<'_, A> {
         rest
     }
 
-    /// Stiffness of one element, without what is fixed.
+    /// Returns the stiffness of one element without its fixed unknowns.
     fn element(&self, element: usize) -> Rest {
         let whole = self.assembly.stiffness(element);
         let nodes = self.assembly.nodes(element);
@@ -263,7 +263,7 @@ impl<A: Assembly> Builder<'_, A> {
         let mut unknowns: Vec<u32> = parts.iter().flat_map(|part| part.unknowns.iter().copied()).collect();
         unknowns.sort_unstable();
         unknowns.dedup();
-        // Nodes with all their elements in this part touch nothing outside.
+        // Nodes whose elements are all in this part have no neighbour outside.
         let (inside, border): (Vec<u32>, Vec<u32>) = unknowns.iter().partition(|&&unknown| {
             let node = unknown as usize / 3;
             self.inside[node] == self.around[node]
@@ -303,15 +303,15 @@ impl<A: Assembly> Builder<'_, A> {
     }
 }
 
-/// Numbers of unknowns fit: a body with more than 2^32 of them fits no machine.
+/// Narrows an index to 32 bits: no machine holds a body with more than 2^32 unknowns.
 #[allow(clippy::cast_possible_truncation)]
 fn narrow(index: usize) -> u32 {
     index as u32
 }
 
-/// Subtracts the forces `K u` of a displacement from `forces`, N: with `u` prescribed at fixed nodes, the right side of a
-/// problem whose fixed nodes move; with the whole `u`, the reactions. Elements without displacement are skipped. Not
-/// real-time.
+/// Subtracts the forces `K u` of a displacement from `forces`, N. With `u` prescribed at fixed nodes, this gives the
+/// right side of a problem whose fixed nodes move; with the whole `u`, the reactions. Elements without displacement are
+/// skipped. Not real-time.
 pub fn subtract_forces(assembly: &impl Assembly, displacement: &[f64], forces: &mut [f64], columns: usize) {
     for element in 0..assembly.element_count() {
         let nodes = assembly.nodes(element);

@@ -1,10 +1,10 @@
-//! What the solid looks like at a pose: its deformed surface, with the pressure of the contact, and the tool. Not real-time.
+//! Picture of the solid at a pose: its deformed surface, the pressure of the contact, and the tool. Not real-time.
 //!
-//! A plate is drawn from the finite elements of its body. Under a punch, the surface has the displacement of a half-space under
-//! the tractions of the punch. Under a sphere, it has the displacement of Hertz's contact (Johnson, *Contact Mechanics*, 1985,
-//! sections 3.4 and 4.2) at the depth that the force law gives. Both displacements fade to zero towards the fixed face. The body
-//! is not a half-space; the difference moves the surface by a few hundredths of the depth. The force contains this difference,
-//! the drawing does not.
+//! A plate is drawn from the finite elements of its body. Under a punch, the surface has the displacement of a
+//! half-space under the tractions of the punch. Under a sphere, it has the displacement of Hertz's contact (Johnson,
+//! *Contact Mechanics*, 1985, sections 3.4 and 4.2) at the depth that the force law gives. Both displacements fade to
+//! zero towards the fixed face. The body is not a half-space; the difference moves the surface by a few hundredths of
+//! the depth. The force contains this difference, the drawing does not.
 
 use crate::atlas::{Answer, Atlas};
 use crate::body;
@@ -22,59 +22,59 @@ use crate::skin::{Face, Focus, Skin};
 use flotor_hal::{DMat3, DQuat, DVec3, Form, Part, Pose, Primitive, ScalarField, Shape, SurfaceVertex, math};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Order of the elements of a plate's picture.
+/// Order of the elements in the picture of a plate.
 const ORDER: usize = 2;
 /// Bricks of a cylinder along a side of the square in its middle.
 const BRICKS: usize = 6;
 /// Cells of a punch from its middle to its rim.
 const FINENESS: usize = 6;
-/// Steps of a block's skin: about 5 000 triangles.
+/// Steps of a block's surface along x, y, z: about 5 000 triangles.
 const STEPS: [usize; 3] = [32, 32, 11];
-/// The same while its side is touched.
+/// Steps of a block's surface while a side is touched.
 const SIDE_STEPS: [usize; 3] = [20, 20, 28];
-/// Radius of the piece of a half-space that is drawn, in radii of the tool.
+/// Radius of the drawn piece of a half-space, in radii of the tool.
 const HALF_SPACE_RADII: f64 = 5.0;
-/// Thickness of a plate and height of a punch, in halves of its shortest side.
+/// Thickness of a plate and height of a punch, relative to half the shortest side.
 const THICKNESS: f64 = 0.3;
 
 const PRESSURE: ScalarField = ScalarField::new("contact pressure", "kPa");
 const DISPLACEMENT: ScalarField = ScalarField::new("displacement", "mm");
 
-/// Displacement and pressure of a skin under each mode of a rigid patch, for a modulus of 1 Pa.
+/// Displacement and pressure of a surface under each mode of a rigid patch, for a modulus of 1 Pa.
 #[derive(Clone, Debug)]
 struct Modal {
     skin: Skin,
-    /// By corner, m for a mode of one.
+    /// Displacement by corner, m for a mode of one.
     displacement: Vec<[DVec3; MODES]>,
-    /// By corner, Pa for a mode of one; empty: the displacement is shown.
+    /// Pressure by corner, Pa for a mode of one; if empty, the displacement is shown.
     pressure: Vec<[f64; MODES]>,
-    /// The tool at home.
+    /// Form and half sides of the tool, m.
     tool: (Form, [f64; 3]),
-    /// From the handle to the tool's centre, m.
+    /// Vector from the handle to the tool's centre, m.
     tool_centre_m: DVec3,
 }
 
-/// How a solid is drawn.
+/// Method of drawing a solid.
 #[derive(Clone, Debug)]
 enum Look {
-    /// Under a plate or a punch.
+    /// Modes of a plate or a punch.
     Bonded(Box<Modal>),
-    /// Under a sphere; the body's own skin for a mesh.
+    /// Contact with spheres; `Some`: the surface of a mesh.
     Sphere(Option<Skin>),
 }
 
-/// The pictures of a solid with its tool.
+/// Picture generator of a solid with its tool.
 #[derive(Clone, Debug)]
 pub struct Drawing {
     body: Body,
-    /// Height above what is fixed, m.
+    /// Height above the fixed face, m.
     height_m: f64,
     look: Look,
     shape: Shape,
 }
 
 impl Drawing {
-    /// Solves what a picture needs: nothing for a sphere, up to a second for a punch or a plate.
+    /// Solves for the fields of a picture: none under a sphere, up to a second of work under a punch or a plate.
     ///
     /// # Errors
     /// [`NotPositive`] if the numbers do not describe a solid.
@@ -99,7 +99,7 @@ impl Drawing {
         Ok(Self { body: description.body, height_m, look, shape: Shape::default() })
     }
 
-    /// Under a plate or a punch at a pose (finite).
+    /// Draws the solid under a plate or a punch at a pose (finite).
     pub fn bonded(&mut self, pose: &Pose, modulus_pa: f64) -> &Shape {
         if let Look::Bonded(modal) = &self.look {
             modal.draw(&mut self.shape, pose, modulus_pa);
@@ -107,14 +107,14 @@ impl Drawing {
         &self.shape
     }
 
-    /// Under a sphere with its centre at `centre_m` (finite), where the law's answer is `answer`.
+    /// Draws the solid under a sphere centred at `centre_m` (finite); `answer`: the law's result there.
     pub fn sphere(&mut self, atlas: &Atlas, centre_m: DVec3, answer: &Answer, modulus_pa: f64) -> &Shape {
         let contact = Contact::new(self.height_m, atlas, centre_m, answer, modulus_pa);
         let focus = Focus { at_m: contact.at_m, width_m: 0.6 * contact.radius_m.max(0.15 * atlas.radius_m) };
         self.under(&[contact], focus, atlas.radius_m)
     }
 
-    /// Under several spheres, where the law's answer is `answer`: the surface is as deep as under all of them together.
+    /// Draws the solid under several spheres; the surface sinks as under all of them together.
     pub fn spheres(&mut self, spheres: &Spheres, answer: &several::Answer, modulus_pa: f64) -> &Shape {
         let atlas = &spheres.atlas;
         let contacts: Vec<Contact> = (0..spheres.count())
@@ -122,7 +122,7 @@ impl Drawing {
                 let slope = (-answer.forces_n[i]).to_array();
                 let energy = Jet { value: 0.0, slope };
                 let alone = Answer { energy, depth_m: answer.depths_m[i], is_beyond: false };
-                // Seen from the surface as the others have pushed it down.
+                // Relative to the surface as lowered by the other spheres.
                 let lifted_m = answer.centres_m[i] + DVec3::Z * answer.sunk_m[i];
                 let contact = Contact::new(self.height_m, atlas, lifted_m, &alone, modulus_pa);
                 Contact { centre_m: answer.centres_m[i], ..contact }
@@ -133,7 +133,7 @@ impl Drawing {
         self.under(&contacts, Focus { at_m: middle_m, width_m: away_m }, away_m + atlas.radius_m)
     }
 
-    /// Under contacts, on a skin that is fine at a place; `tool_m`: how far the tool reaches from it.
+    /// Draws the solid under contacts, with a surface that is fine at `focus`; `tool_m`: reach of the tool from there.
     fn under(&mut self, contacts: &[Contact], focus: Focus, tool_m: f64) -> &Shape {
         let own;
         let skin = match (&self.look, self.body) {
@@ -167,7 +167,7 @@ impl Drawing {
     }
 }
 
-/// A place of the surface under contacts, deformed, and the pressure there.
+/// Returns a surface point deformed by contacts, with the pressure there.
 fn vertex(contacts: &[Contact], place_m: DVec3) -> SurfaceVertex {
     let moved_m: DVec3 = contacts.iter().map(|contact| contact.moved_m(place_m)).sum();
     let outside_m = contacts.iter().fold(place_m + moved_m, |at_m, contact| contact.outside_m(place_m, at_m));
@@ -175,12 +175,12 @@ fn vertex(contacts: &[Contact], place_m: DVec3) -> SurfaceVertex {
     SurfaceVertex { position_m: outside_m.to_array(), normal: [0.0; 3], value }
 }
 
-/// Share of a half-space's displacement that is drawn at a height: none at the fixed face.
+/// Returns the drawn fraction of a half-space's displacement at a height: zero at the fixed face.
 fn free_share(height_m: f64, z_m: f64) -> f64 {
     (1.0 + z_m / height_m).clamp(0.0, 1.0)
 }
 
-/// Height of a body whose bottom is fixed, m.
+/// Returns the height of a body whose bottom is fixed, m.
 fn height_m(body: Body, mesh: Option<&Mesh>) -> f64 {
     match body {
         Body::Block(size) => size.height_m,
@@ -192,17 +192,17 @@ fn height_m(body: Body, mesh: Option<&Mesh>) -> f64 {
     }
 }
 
-/// Hertz's contact with a sphere.
+/// Hertzian contact with a sphere.
 struct Contact {
     /// Middle of the contact on the undeformed surface, m.
     at_m: DVec3,
-    /// Out of the solid.
+    /// Outward normal of the solid.
     normal: DVec3,
-    /// Its radius, m; 0 without contact.
+    /// Radius of the contact, m; 0 without contact.
     radius_m: f64,
     /// Depression of the rim of the contact, m.
     rim_m: f64,
-    /// Pressure in its middle, kPa.
+    /// Pressure in the middle of the contact, kPa.
     peak_kpa: f64,
     centre_m: DVec3,
     sphere_m: f64,
@@ -227,13 +227,13 @@ impl Contact {
         Self { at_m, normal, radius_m, rim_m, peak_kpa, centre_m, sphere_m, height_m }
     }
 
-    /// How far a place of the surface moves, m.
+    /// Returns the displacement of a surface point, m.
     fn moved_m(&self, place_m: DVec3) -> DVec3 {
         let share = free_share(self.height_m, place_m.z);
         self.normal * -(share * self.sunk_m(place_m.distance(self.at_m)))
     }
 
-    /// A place of the surface that has moved to `at_m`, or where it is on the sphere: nothing is inside.
+    /// Moves a displaced surface point that lies inside the sphere out to the sphere's surface.
     fn outside_m(&self, place_m: DVec3, at_m: DVec3) -> DVec3 {
         if self.radius_m == 0.0 || at_m.distance_squared(self.centre_m) >= self.sphere_m * self.sphere_m {
             return at_m;
@@ -244,7 +244,7 @@ impl Contact {
         self.at_m + beside_m + self.normal * below_m
     }
 
-    /// From the middle of the contact, along the surface, m.
+    /// Returns the offset of a place from the contact's middle, along the surface, m.
     fn beside_m(&self, place_m: DVec3) -> DVec3 {
         let from_middle_m = place_m - self.at_m;
         from_middle_m - self.normal * from_middle_m.dot(self.normal)
@@ -256,7 +256,7 @@ impl Contact {
         if part > 0.0 && is_on_face { self.peak_kpa * part.sqrt() } else { 0.0 }
     }
 
-    /// Depression of the surface at a distance from the middle: inside the contact that of the sphere, outside that of Hertz.
+    /// Returns the depression of the surface at a distance from the middle: the sphere's inside the contact, Hertz's outside.
     fn sunk_m(&self, distance_m: f64) -> f64 {
         if self.radius_m == 0.0 {
             return 0.0;
@@ -270,12 +270,12 @@ impl Contact {
     }
 }
 
-/// Radius of the contact of a sphere at a depth, m: Hertz's radius, reduced at large depth, where a sphere is no paraboloid.
+/// Returns the contact radius of a sphere at a depth, m: Hertz's, reduced at large depth, where a sphere is no paraboloid.
 fn contact_radius_m(sphere_m: f64, depth_m: f64) -> f64 {
     (sphere_m * depth_m).sqrt() / (1.0 + 0.12 * depth_m / sphere_m)
 }
 
-/// Depression outside Hertz's contact, as a share of that at its rim, at a distance of `x` contact radii.
+/// Returns the depression outside Hertz's contact, relative to that at the rim, at a distance of `x` contact radii.
 fn outside(x: f64) -> f64 {
     ((2.0 - x * x) * math::asin(1.0 / x) + (x * x - 1.0).sqrt()) / FRAC_PI_2
 }
@@ -310,13 +310,13 @@ impl Modal {
     }
 }
 
-/// Displacement of a node under each mode.
+/// Returns the displacement of a node under each mode.
 fn columns(displacement: &[f64], node: usize) -> [DVec3; MODES] {
     let at = |axis: usize, mode: usize| displacement[(3 * node + axis) * MODES + mode];
     std::array::from_fn(|mode| DVec3::new(at(0, mode), at(1, mode), at(2, mode)))
 }
 
-/// Pictures of a plate: finite elements of second order, whatever the law's.
+/// Solves for the picture of a plate: elements of second order, independent of the law's.
 fn plate_modes(description: &Description, mesh: Option<&Mesh>) -> Result<Modal, NotPositive> {
     let lame = Lame::new(1.0, description.poisson_ratio);
     if let Some(mesh) = mesh {
@@ -338,7 +338,7 @@ fn plate_modes(description: &Description, mesh: Option<&Mesh>) -> Result<Modal, 
     let grid = Grid::new(borders, ORDER);
     let (_, displacement) = plate(&grid, lame, axis)?;
     let [x, y, z] = [0, 1, 2].map(|k| &grid.axes[k].nodes_m[..]);
-    // The clamped end of a beam and the bottom of a block are not seen; neither is what the plate covers.
+    // The clamped end of a beam and the bottom of a block are hidden, and so is the face under the plate.
     let faces: &[Face] = match axis {
         0 => &[Face::Top, Face::Bottom, Face::Front, Face::Back],
         _ => &[Face::Left, Face::Right, Face::Front, Face::Back],
@@ -359,7 +359,7 @@ fn plate_modes(description: &Description, mesh: Option<&Mesh>) -> Result<Modal, 
     })
 }
 
-/// Pictures of a punch.
+/// Computes the picture of a punch.
 fn punch_modes(
     description: &Description,
     mesh: Option<&Mesh>,
@@ -391,7 +391,7 @@ fn punch_modes(
     })
 }
 
-/// A half-space under the loads of a punch.
+/// Half-space under the loads of a punch.
 struct Loaded<'a> {
     solid: &'a HalfSpace,
     loads: &'a Loads,
@@ -423,7 +423,7 @@ impl<'a> Loaded<'a> {
             }
     }
 
-    /// Displacement, `share` of it, and pressure at a place, under each mode.
+    /// Returns the displacement, scaled by `share`, and the pressure at a place, under each mode.
     fn at(&self, at: DVec3, share: f64) -> ([DVec3; MODES], [f64; MODES]) {
         let mut displacement = [DVec3::ZERO; MODES];
         for ((corners, centre_m), (forces, area_m2)) in
@@ -443,7 +443,7 @@ impl<'a> Loaded<'a> {
         if !self.is_covered(at) {
             return (displacement, [0.0; MODES]);
         }
-        // The surface beneath is where the punch is, as far as it holds it; the sum above is so at the middles of cells only.
+        // Set the covered surface to the punch's displacement where bonded; the sum above is exact at cell centres only.
         for axis in (0..3).filter(|axis| self.bond == Bond::Bonded || *axis == 2) {
             for (mode, moved) in displacement.iter_mut().enumerate() {
                 let rigid = match mode {

@@ -1,16 +1,16 @@
-//! Faces of a mesh's surface: points of integration, and where a point of a plane face is.
+//! Faces of a mesh's surface: quadrature points, and lookup of a point on a plane face.
 
 use crate::cells::{face_rule, face_shapes};
 use crate::mesh::Facet;
 
-/// A point of integration of a surface.
+/// Quadrature point of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Where, m.
+    /// Position, m.
     pub position_m: [f64; 3],
     /// Outward normal times area, m2.
     pub normal_m2: [f64; 3],
-    /// Shares of the facet's nodes.
+    /// Weights of the facet's nodes (shape functions).
     pub shares: Vec<f64>,
 }
 
@@ -29,7 +29,7 @@ fn sum<const N: usize>(
 }
 
 impl Facet {
-    /// Points of integration. Not real-time.
+    /// Returns the quadrature points of the facet. Not real-time.
     #[must_use]
     pub fn points(&self, nodes_m: &[[f64; 3]]) -> Vec<SurfacePoint> {
         face_rule(self.corners)
@@ -47,7 +47,7 @@ impl Facet {
             .collect()
     }
 
-    /// False if a point given by its x and y is clearly outside. Not real-time.
+    /// Returns false if a point, given by its x and y, is clearly outside. Not real-time.
     #[must_use]
     pub fn may_hold(&self, nodes_m: &[[f64; 3]], at_m: [f64; 2]) -> bool {
         (0..2).all(|k| {
@@ -58,8 +58,8 @@ impl Facet {
         })
     }
 
-    /// Shares of the nodes at a point given by its x and y, and how far outside the facet it is (0: inside), in the facet's
-    /// own coordinates. Not real-time.
+    /// Finds a point given by its x and y: returns the weights of the nodes, and the distance outside the facet (0:
+    /// inside) in the facet's own coordinates. Not real-time.
     #[must_use]
     pub fn locate(&self, nodes_m: &[[f64; 3]], at_m: [f64; 2]) -> (Vec<f64>, f64) {
         let mut at = if self.corners == 3 { [1.0 / 3.0; 2] } else { [0.0; 2] };
@@ -73,7 +73,7 @@ impl Facet {
                 (u[0] * miss[1] - u[1] * miss[0]) / determinant,
             ];
             for (c, s) in at.iter_mut().zip(step) {
-                // Far outside the facet its curved edges mean nothing.
+                // Far outside the facet its curved edges have no meaning.
                 *c = (*c + s).clamp(-4.0, 4.0);
             }
             if step[0].abs() + step[1].abs() < 1.0e-13 {

@@ -1,11 +1,11 @@
-//! Coulomb friction of a sphere: a slider behind a spring along the face, as the wall has it.
+//! Coulomb friction of a sphere: a slider behind a spring along the face, as in the wall.
 //!
-//! The spring's stiffness is constant, that of a sticking contact of a quarter of the sphere's radius, and so is the plane
-//! it acts in while a contact lasts: its force has a potential, and the slider only ever takes energy out of it.
+//! The spring's stiffness is constant: that of a sticking contact of a quarter of the sphere's radius. Its plane is constant
+//! too while a contact lasts. So the spring's force has a potential, and the slider only ever dissipates energy.
 
 use flotor_hal::DVec3;
 
-/// What sticks and slips.
+/// State of the friction between a sphere and a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
     coefficient: f64,
@@ -16,14 +16,14 @@ pub struct Friction {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Slider {
-    /// Where the spring is fixed, m.
+    /// Anchor of the spring, m.
     anchor_m: DVec3,
-    /// Normal of the face that was touched first.
+    /// Normal of the face at first contact.
     normal: DVec3,
 }
 
 impl Friction {
-    /// Between a sphere and a solid. Not real-time.
+    /// Prepares the friction between a sphere and a solid. Not real-time.
     #[must_use]
     pub fn new(coefficient: f64, poisson_ratio: f64, radius_m: f64) -> Self {
         // A bonded disc of radius a moves by Q (2 - nu) / (8 G a): Mindlin 1949, J. Appl. Mech. 16, 259-268.
@@ -32,19 +32,19 @@ impl Friction {
         Self { coefficient, stiffness_m, contact: None }
     }
 
-    /// True without friction.
+    /// Returns true if the coefficient is zero.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
         self.coefficient == 0.0
     }
 
-    /// Forgets the contact. Real-time: bounded, no allocation.
+    /// Ends the contact: the slider starts anew at the next one. Real-time: bounded, no allocation.
     pub fn release(&mut self) {
         self.contact = None;
     }
 
-    /// Follows the handle; force along the face, N, and energy in the spring, J, under the force `pressing_n` of the smooth
-    /// contact on the sphere. Real-time: bounded, no allocation.
+    /// Moves the slider with the handle. Returns the force along the face, N, and the spring's energy, J, under the
+    /// force `pressing_n` of the smooth contact on the sphere. Real-time: bounded, no allocation.
     pub fn follow(&mut self, position_m: DVec3, pressing_n: DVec3, modulus_pa: f64) -> (DVec3, f64) {
         if self.is_smooth() {
             return (DVec3::ZERO, 0.0);
@@ -65,7 +65,7 @@ impl Friction {
     }
 }
 
-/// The axis nearest to a direction.
+/// Returns the coordinate axis nearest to a direction.
 fn main_direction(v: DVec3) -> DVec3 {
     let size = v.abs();
     let axis = if size.z >= size.x && size.z >= size.y {

@@ -1,7 +1,7 @@
-//! Gmsh's mesh format 4.1 in text: nodes, tetrahedra of 10 nodes, bricks of 20, and named surfaces. Not real-time.
+//! Reader for Gmsh's text mesh format 4.1: nodes, 10-node tetrahedra, 20-node bricks, named surfaces. Not real-time.
 //!
-//! The format is described in Gmsh's manual, "MSH file format". Elements of other kinds are refused, points and curves
-//! skipped. A line of the file stands in every error.
+//! The format is described in Gmsh's manual, "MSH file format". Elements of other kinds are rejected; points and curves
+//! are skipped. Every error contains the line number.
 
 use crate::cells::Kind;
 use crate::mesh::{Element, Parts};
@@ -9,12 +9,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::str::{FromStr, SplitAsciiWhitespace};
 
-/// Why a file is no such mesh.
+/// Error of a file that is not a supported mesh.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FormatError {
     /// Line of the file, from 1.
     pub line: usize,
-    /// What is wrong, and what to do.
+    /// Description of the problem and its remedy.
     pub problem: String,
 }
 
@@ -24,10 +24,10 @@ impl fmt::Display for FormatError {
     }
 }
 
-/// Most nodes and most elements: 40 000 nodes take about a gigabyte and some minutes of preparation.
+/// Maximum number of nodes and of elements: 40 000 nodes take about a gigabyte and some minutes of preparation.
 const MOST: usize = 40_000;
 
-/// The lines of a file.
+/// Line reader of a file.
 struct Lines<'a> {
     all: std::iter::Enumerate<std::str::Lines<'a>>,
     line: usize,
@@ -52,7 +52,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// The words of a line.
+/// Word reader of a line.
 struct Words<'a> {
     words: SplitAsciiWhitespace<'a>,
     line: usize,
@@ -74,7 +74,7 @@ impl Words<'_> {
         self.count_after(0)
     }
 
-    /// The number of entries that follow so many others.
+    /// Reads a number of entries; `others`: entries of the same kind so far, counted against [`MOST`].
     fn count_after(&mut self, others: usize) -> Result<usize, FormatError> {
         let count: usize = self.number()?;
         if others.saturating_add(count) > MOST {
@@ -95,18 +95,18 @@ impl Words<'_> {
 struct Reader {
     /// Names of physical surfaces, by tag.
     names: BTreeMap<i64, String>,
-    /// Tags of the physical groups of a surface, by its own tag.
+    /// Tags of the physical groups of a surface, by the surface's tag.
     groups: BTreeMap<i64, Vec<i64>>,
-    /// Numbers of the nodes, by tag.
+    /// Indices of the nodes, by tag.
     numbers: BTreeMap<usize, usize>,
     parts: Parts,
     has_format: bool,
 }
 
-/// Reads a mesh. Coordinates are metres.
+/// Reads a mesh; coordinates in metres.
 ///
 /// # Errors
-/// A [`FormatError`] with the line.
+/// A [`FormatError`] with the line number.
 pub fn read(text: &str) -> Result<Parts, FormatError> {
     let mut lines = Lines { all: text.lines().enumerate(), line: 1 };
     let mut reader = Reader::default();
@@ -280,7 +280,7 @@ impl Reader {
         }
         nodes.truncate(if kind == 9 { 3 } else { 4 });
         for group in self.groups.get(&entity).into_iter().flatten() {
-            // The sign tells the orientation; a group without a name goes by its number.
+            // The sign is the orientation; a group without a name is named by its number.
             let name = i64::try_from(group.unsigned_abs()).ok().and_then(|tag| self.names.get(&tag)).cloned();
             let name = name.unwrap_or_else(|| group.unsigned_abs().to_string());
             self.parts.surfaces.entry(name).or_default().push(nodes.clone());

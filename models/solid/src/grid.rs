@@ -1,21 +1,21 @@
-//! A block cut into boxes, each one finite element of an order of two or more.
+//! Grid of box-shaped finite elements of any order in a block.
 //!
-//! Elements of order 2 are the quadratic bricks of 27 nodes. Orders above 1 do not lock: a bending element needs a strain
-//! that varies over it, and a nearly incompressible one more degrees of freedom than constraints.
+//! Elements of order 2 are the quadratic bricks of 27 nodes. Orders above 1 do not lock: bending needs a strain that
+//! varies over the element, and near incompressibility more degrees of freedom than constraints.
 
 use crate::basis::{Rule, element_points, gauss, lagrange, lagrange_slopes};
 
-/// One direction of a grid.
+/// Axis of a grid.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Borders of the elements, m, ascending.
     pub borders_m: Vec<f64>,
-    /// All nodes, m; `order` to an element and one more.
+    /// Positions of all nodes, m; `order` per element and one more.
     pub nodes_m: Vec<f64>,
 }
 
 impl Axis {
-    /// Elements between these borders. Not real-time.
+    /// Places the nodes of elements between borders, m. Not real-time.
     #[must_use]
     pub fn new(borders_m: Vec<f64>, order: usize) -> Self {
         let points = element_points(order);
@@ -28,13 +28,13 @@ impl Axis {
         Self { borders_m, nodes_m }
     }
 
-    /// Number of elements.
+    /// Returns the number of elements.
     #[must_use]
     pub fn elements(&self) -> usize {
         self.borders_m.len() - 1
     }
 
-    /// The element a coordinate lies in (the nearest, outside), and where: -1 at its lower border, 1 at its upper.
+    /// Finds the element of a coordinate (the nearest, outside) and the local coordinate: -1 at the lower border, 1 at the upper.
     #[must_use]
     pub fn locate(&self, coordinate_m: f64) -> (usize, f64) {
         let last = self.elements() - 1;
@@ -44,7 +44,7 @@ impl Axis {
     }
 }
 
-/// Borders from `near` to `far` whose distances grow from `near` by a constant ratio.
+/// Returns borders from `near` to `far` whose distances grow from `near` by a constant ratio.
 #[must_use]
 pub fn graded(near: f64, far: f64, elements: usize, ratio: f64) -> Vec<f64> {
     let mut step = 1.0;
@@ -62,16 +62,16 @@ pub fn graded(near: f64, far: f64, elements: usize, ratio: f64) -> Vec<f64> {
     borders
 }
 
-/// A block of elements. Nodes are numbered x first, then y, then z.
+/// Block of elements. Nodes are numbered x first, then y, then z.
 #[derive(Clone, Debug)]
 pub struct Grid {
     /// Order of the elements.
     pub order: usize,
-    /// The three directions.
+    /// Axes x, y, z.
     pub axes: [Axis; 3],
 }
 
-/// What the material is: Lamé's constants, Pa.
+/// Lamé's constants of a material, Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lame {
     /// First constant.
@@ -81,7 +81,7 @@ pub struct Lame {
 }
 
 impl Lame {
-    /// From Young's modulus and Poisson's ratio (below 0.5).
+    /// Converts from Young's modulus and Poisson's ratio (below 0.5).
     #[must_use]
     pub fn new(youngs_modulus_pa: f64, poisson_ratio: f64) -> Self {
         Self {
@@ -92,56 +92,56 @@ impl Lame {
     }
 }
 
-/// A point of a grid: nodes around it and their shares.
+/// Interpolation at a point of a grid: nodes around the point with their weights.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// Nodes, by number.
+    /// Indices of the nodes.
     pub nodes: Vec<usize>,
-    /// Their shape functions.
+    /// Shape functions of the nodes at the point.
     pub shares: Vec<f64>,
 }
 
 impl Grid {
-    /// Elements between borders along x, y and z, m. Not real-time.
+    /// Builds elements between borders along x, y and z, m. Not real-time.
     #[must_use]
     pub fn new(borders_m: [Vec<f64>; 3], order: usize) -> Self {
         Self { order, axes: borders_m.map(|borders| Axis::new(borders, order)) }
     }
 
-    /// Nodes along x, y and z.
+    /// Returns the number of nodes along x, y and z.
     #[must_use]
     pub fn nodes_along(&self) -> [usize; 3] {
         [0, 1, 2].map(|axis| self.axes[axis].nodes_m.len())
     }
 
-    /// Number of all nodes.
+    /// Returns the number of all nodes.
     #[must_use]
     pub fn node_count(&self) -> usize {
         self.nodes_along().iter().product()
     }
 
-    /// Number of the node at an index along each axis.
+    /// Returns the number of the node at an index along each axis.
     #[must_use]
     pub fn node(&self, index: [usize; 3]) -> usize {
         let [nx, ny, _] = self.nodes_along();
         (index[2] * ny + index[1]) * nx + index[0]
     }
 
-    /// Index along each axis of a node.
+    /// Returns the index of a node along each axis.
     #[must_use]
     pub fn index(&self, node: usize) -> [usize; 3] {
         let [nx, ny, _] = self.nodes_along();
         [node % nx, node / nx % ny, node / (nx * ny)]
     }
 
-    /// Where a node is, m.
+    /// Returns the position of a node, m.
     #[must_use]
     pub fn position_m(&self, node: usize) -> [f64; 3] {
         let index = self.index(node);
         [0, 1, 2].map(|axis| self.axes[axis].nodes_m[index[axis]])
     }
 
-    /// Nodes of an element, x first.
+    /// Returns the nodes of an element, x first.
     #[must_use]
     pub fn element_nodes(&self, element: [usize; 3]) -> Vec<usize> {
         let side = self.order + 1;
@@ -160,7 +160,7 @@ impl Grid {
         nodes
     }
 
-    /// Shape functions at a point of the block. Not real-time.
+    /// Evaluates the shape functions at a point of the block. Not real-time.
     #[must_use]
     pub fn sample(&self, position_m: [f64; 3]) -> Sample {
         let points = element_points(self.order);
@@ -184,7 +184,7 @@ impl Grid {
     }
 }
 
-/// Stiffness of single elements: integrals along each axis, made once.
+/// Stiffness of single elements from precomputed integrals along each axis.
 #[derive(Clone, Debug)]
 pub struct Elements {
     order: usize,
@@ -195,7 +195,7 @@ pub struct Elements {
 }
 
 impl Elements {
-    /// Integrals for an order. Not real-time.
+    /// Computes the integrals for an order. Not real-time.
     #[must_use]
     pub fn new(order: usize) -> Self {
         let side = order + 1;
@@ -217,7 +217,7 @@ impl Elements {
         Self { order, mass, mixed, slope }
     }
 
-    /// Stiffness of a box with sides `size_m`, N/m: a square matrix, three unknowns to a node, nodes x first; by columns.
+    /// Returns the stiffness of a box with sides `size_m`, N/m: square, by columns, three unknowns to a node, nodes x first.
     #[must_use]
     pub fn stiffness(&self, size_m: [f64; 3], lame: Lame) -> Vec<f64> {
         let side = self.order + 1;

@@ -1,15 +1,15 @@
-//! An elastic half-space under forces on its surface: the part of every contact that no mesh resolves.
+//! Elastic half-space under surface forces: the singular part of every contact, which no mesh resolves.
 //!
-//! Frame: `p` and `q` along the surface, `w` out of it; the solid is `w < 0`. Point forces are those of Boussinesq (along
-//! `w`) and Cerruti (along the surface); K. L. Johnson, *Contact Mechanics* (1985), sections 3.2 and 3.6. At the surface all
-//! are of degree -1 in the distance, so that an even load on a polygon is a closed form along its edges: in polar
-//! coordinates about the point that is asked for, `int k(angle) / r dA = contour integral of k r d(angle)`.
+//! Frame: `p` and `q` along the surface, `w` out of it; the solid is `w < 0`. Point forces are those of Boussinesq
+//! (along `w`) and Cerruti (along the surface); K. L. Johnson, *Contact Mechanics* (1985), sections 3.2 and 3.6. At the
+//! surface all are of degree -1 in the distance, so that a uniform load on a polygon has a closed form along its edges:
+//! in polar coordinates about the evaluation point, `int k(angle) / r dA = contour integral of k r d(angle)`.
 
 use crate::jet::Jet;
 use flotor_hal::math;
 use std::f64::consts::PI;
 
-/// What a half-space is made of.
+/// Material of a half-space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
     /// Young's modulus, Pa.
@@ -18,15 +18,15 @@ pub struct HalfSpace {
     pub poisson_ratio: f64,
 }
 
-/// Displacement (component, force) and its gradient (component, force) of three unit forces.
+/// Displacement of three unit forces, with its gradient.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
-    /// Displacement along `p`, `q`, `w` (first index) of a unit force along `p`, `q`, `w` (second), m/N; each with its
-    /// derivatives along `p`, `q`, `w`.
+    /// Displacement along `p`, `q`, `w` (first index) under a unit force along `p`, `q`, `w` (second), m/N; each with
+    /// its derivatives along `p`, `q`, `w`.
     pub displacement: [[Jet; 3]; 3],
 }
 
-/// Three by three, displacement first, force second.
+/// Three-by-three matrix; first index displacement, second force.
 pub type Block = [[f64; 3]; 3];
 
 impl HalfSpace {
@@ -34,7 +34,7 @@ impl HalfSpace {
         self.youngs_modulus_pa / (2.0 * (1.0 + self.poisson_ratio))
     }
 
-    /// Field of unit forces at the origin, at a point of the solid other than the origin.
+    /// Returns the field of unit forces at the origin, at any other point of the solid.
     #[must_use]
     pub fn field(&self, point_m: [f64; 3]) -> Field {
         let nu = self.poisson_ratio;
@@ -62,8 +62,8 @@ impl HalfSpace {
         Field { displacement: displacement.map(|row| row.map(|jet| jet * scale)) }
     }
 
-    /// Displacement of a point of the surface under a unit *pressure* (N/m2, along each direction) on a polygon, m per Pa.
-    /// `corners_m` run counterclockwise, relative to the point.
+    /// Returns the displacement of a surface point under a unit *pressure* (N/m2, along each direction) on a polygon, m
+    /// per Pa. `corners_m` run counterclockwise, relative to the point.
     #[must_use]
     pub fn polygon(&self, corners_m: &[[f64; 2]]) -> Block {
         let nu = self.poisson_ratio;
@@ -71,7 +71,7 @@ impl HalfSpace {
         for (i, from) in corners_m.iter().enumerate() {
             sums.add(*from, corners_m[(i + 1) % corners_m.len()]);
         }
-        // The direction to the point is against the one to the load: even kernels do not see it, odd ones change sign.
+        // `e` points from the point to the load, the kernels from load to point: even kernels are equal, odd ones change sign.
         let scale = 1.0 / (2.0 * PI * self.shear_pa());
         let odd = 0.5 * (1.0 - 2.0 * nu) * scale;
         let tangent = |i: usize, j: usize, even: f64| scale * ((1.0 - nu) * even + nu * sums.second[i + j]);
@@ -82,7 +82,7 @@ impl HalfSpace {
     }
 }
 
-/// `int k / r dA` for `k = 1`, `e_i` and `e_i e_j`, with `e` the direction from the point to the load.
+/// Sums of `int k / r dA` for `k = 1`, `e_i` and `e_i e_j`, with `e` the direction from the point to the load.
 #[derive(Default)]
 struct Edges {
     zeroth: f64,
@@ -92,8 +92,8 @@ struct Edges {
 }
 
 impl Edges {
-    /// Adds one edge. It lies at distance `D` along the normal `n`, and runs along `t` from `s0` to `s1`; the direction to a
-    /// point of it is `(D n + s t) / r`.
+    /// Adds one edge at distance `D` along the normal `n`, from `s0` to `s1` along `t`. The direction to a point of the
+    /// edge is `(D n + s t) / r`.
     fn add(&mut self, from: [f64; 2], to: [f64; 2]) {
         let along = [to[0] - from[0], to[1] - from[1]];
         let length = (along[0] * along[0] + along[1] * along[1]).sqrt();
@@ -104,7 +104,7 @@ impl Edges {
         let n = [t[1], -t[0]];
         let distance = from[0] * n[0] + from[1] * n[1];
         if distance.abs() < 1.0e-12 * length {
-            return; // seen from a point on its line an edge spans no area
+            return; // an edge on a line through the point spans no area
         }
         let (s0, s1) = (from[0] * t[0] + from[1] * t[1], to[0] * t[0] + to[1] * t[1]);
         let at = |s: f64| {
@@ -132,7 +132,7 @@ impl Edges {
     }
 }
 
-/// Inverse hyperbolic sine.
+/// Returns the inverse hyperbolic sine.
 pub(crate) fn arsinh(x: f64) -> f64 {
     let size = x.abs();
     math::ln_1p(size + size * size / (1.0 + (1.0 + size * size).sqrt())).copysign(x)

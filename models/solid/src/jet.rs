@@ -1,24 +1,24 @@
-//! A number with its derivatives along x, y and z: forces are exact derivatives of an energy, never differences.
+//! Number with its derivatives along x, y and z: forces are exact derivatives of an energy, never differences.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A value and its gradient. Real-time: bounded, no allocation.
+/// Value with its gradient. Real-time: bounded, no allocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Jet {
-    /// The value.
+    /// Value of the number.
     pub value: f64,
-    /// Its derivatives along x, y, z.
+    /// Derivatives along x, y, z.
     pub slope: [f64; 3],
 }
 
 impl Jet {
-    /// A number that does not change.
+    /// Creates a number with zero slope.
     #[must_use]
     pub const fn constant(value: f64) -> Self {
         Self { value, slope: [0.0; 3] }
     }
 
-    /// A coordinate.
+    /// Creates a coordinate: slope one along `axis`.
     #[must_use]
     pub fn variable(value: f64, axis: usize) -> Self {
         let mut slope = [0.0; 3];
@@ -26,33 +26,33 @@ impl Jet {
         Self { value, slope }
     }
 
-    /// A function of this number, given its value and derivative here.
+    /// Applies a function, given its value and derivative at this number.
     #[must_use]
     pub fn chain(self, value: f64, derivative: f64) -> Self {
         Self { value, slope: self.slope.map(|s| s * derivative) }
     }
 
-    /// Square root; of zero it is zero with slope zero, as for a length at the origin.
+    /// Returns the square root; slope zero at zero, as for a length at the origin.
     #[must_use]
     pub fn sqrt(self) -> Self {
         let root = self.value.sqrt();
         self.chain(root, if root > 0.0 { 0.5 / root } else { 0.0 })
     }
 
-    /// Reciprocal.
+    /// Returns the reciprocal.
     #[must_use]
     pub fn recip(self) -> Self {
         let inverse = 1.0 / self.value;
         self.chain(inverse, -inverse * inverse)
     }
 
-    /// The larger of it and a number; slope zero where they are equal.
+    /// Returns the larger of this number and a constant; slope zero where both are equal.
     #[must_use]
     pub fn at_least(self, least: f64) -> Self {
         if self.value > least { self } else { Self::constant(least) }
     }
 
-    /// Its size.
+    /// Returns the absolute value.
     #[must_use]
     pub fn abs(self) -> Self {
         if self.value < 0.0 { -self } else { self }

@@ -1,4 +1,4 @@
-//! From parameters to a law: which bodies and tools go together, what has to be solved, what the cache has.
+//! Preparation of a law from parameters: valid combinations of body and tool, solving, caching.
 
 use crate::atlas::Atlas;
 use crate::body;
@@ -19,81 +19,81 @@ use crate::table::Table;
 use crate::tetrahedra::Tetrahedra;
 use flotor_hal::{Refusal, Settings};
 
-/// What is touched.
+/// Touched body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Body {
-    /// Top face about the origin, bottom clamped.
+    /// Block: top face about the origin, bottom clamped.
     Block(Size),
-    /// Free end about the origin, the end at `-length_m` along x clamped.
+    /// Beam: free end about the origin, the end at `-length_m` along x clamped.
     Beam {
         /// Length, width and height, m.
         size_m: [f64; 3],
     },
-    /// All below `z = 0`.
+    /// Half-space `z <= 0`.
     HalfSpace,
-    /// Round, its top about the origin, its bottom clamped.
+    /// Round cylinder: top about the origin, bottom clamped.
     Cylinder {
         /// Radius, m.
         radius_m: f64,
         /// Height, m.
         height_m: f64,
     },
-    /// A mesh; the origin is the middle of its touched face.
+    /// Mesh from a file; the origin is the middle of the touched face.
     File {
-        /// Of its text and of the names of its faces.
+        /// Hash of the file's text and of the names of its faces.
         digest: u64,
     },
 }
 
-/// What touches it.
+/// Tool that touches the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tool {
-    /// Without bond.
+    /// Sphere without bond.
     Sphere {
-        /// Its radius, m.
+        /// Radius of the sphere, m.
         radius_m: f64,
     },
-    /// Equal ones on one handle, without bond, in contact at once.
+    /// Equal spheres on one handle, without bond; several may be in contact at once.
     Spheres {
-        /// Radius of each, m.
+        /// Radius of each sphere, m.
         radius_m: f64,
-        /// Two to four.
+        /// Number of spheres, two to four.
         count: usize,
-        /// Between the centres of neighbours, m.
+        /// Distance between the centres of neighbours, m.
         spacing_m: f64,
     },
-    /// Bonded to the whole of a face.
+    /// Plate bonded to the whole of a face.
     Plate,
-    /// On part of the top face.
+    /// Flat punch on part of the top face.
     Punch {
-        /// Its outline.
+        /// Outline of the contact.
         outline: Outline,
-        /// How it holds the surface.
+        /// Bond to the surface.
         bond: Bond,
     },
 }
 
-/// A solid with its tool.
+/// Solid with its tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Description {
-    /// What is touched.
+    /// Touched body.
     pub body: Body,
-    /// What touches it.
+    /// Tool that touches the body.
     pub tool: Tool,
     /// Poisson's ratio.
     pub poisson_ratio: f64,
-    /// Of [`RESOLUTIONS`].
+    /// Index into [`RESOLUTIONS`], or [`LINEAR_TETRAHEDRA`].
     pub resolution: usize,
 }
 
-/// What a tick evaluates, for a Young's modulus of 1 Pa.
+/// Law evaluated in a tick, for a Young's modulus of 1 Pa.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
-    /// A punch or a plate.
+    /// Law of a punch or a plate.
     Bonded(Box<RigidPatch>),
-    /// A sphere.
+    /// Law of one sphere.
     Sphere(Box<Atlas>),
-    /// Several.
+    /// Law of several spheres.
     Spheres(Box<Spheres>),
 }
 
@@ -103,23 +103,23 @@ pub const RESOLUTIONS: [Resolution; 3] = [
     Resolution { fineness: Fineness { across: 4, high: 5, order: 3 }, rings: 6 },
     Resolution { fineness: Fineness { across: 4, high: 5, order: 4 }, rings: 8 },
 ];
-/// Not one of [`RESOLUTIONS`]: a plate on linear tetrahedra.
+/// Resolution beyond [`RESOLUTIONS`]: a plate on linear tetrahedra.
 pub const LINEAR_TETRAHEDRA: usize = 3;
 /// Bricks along a side of the square in the middle of a cylinder, by resolution.
 const CYLINDER_BRICKS: [usize; 3] = [4, 6, 8];
 /// Order of the elements under a plate, by resolution.
 const PLATE_ORDERS: [usize; 3] = [2, 3, 4];
 
-/// A law and the estimated error of its mesh, or why there is none.
+/// Prepared law and the estimated error of its mesh, or the reason of a failure.
 type Prepares = Result<(Law, f64), Refusal>;
-/// What the cache keeps.
+/// Cached numbers of a law.
 type Numbers = Result<Vec<f64>, Refusal>;
 
 impl Description {
-    /// Reads parameters (`value`: those in force, by id; `mesh_digest`: that of the mesh's text and names). Not real-time.
+    /// Reads the parameters. `value`: current value by id; `mesh_digest`: hash of the mesh's text and names. Not real-time.
     ///
     /// # Errors
-    /// A [`Refusal`] for a combination that has no meaning or is not there yet.
+    /// A [`Refusal`] for a combination that is invalid or not supported.
     pub fn new(
         settings: &Settings<'_>,
         value: impl Fn(&str) -> f64,
@@ -244,7 +244,7 @@ impl Description {
             Body::HalfSpace | Body::Beam { .. } => Ok(()),
             Body::Block(Size { half_x_m, half_y_m, .. }) => {
                 let least_m = half_x_m.min(half_y_m);
-                // Of four, the farthest centre is that far along an axis; of three, a little farther.
+                // With four spheres the farthest centre is that far along an axis; with three a little farther.
                 if 0.6 * spacing_m <= least_m {
                     return Ok(());
                 }
@@ -260,14 +260,14 @@ impl Description {
         }
     }
 
-    /// What the law depends on, in words, for the cache: the exact bits of every number.
+    /// Returns the key of the cache: all that the law depends on, with the exact bits of every number.
     fn words(&self) -> String {
         // Debug prints the shortest decimal that reads back as the same number.
         format!("{self:?}")
     }
 
-    /// The law, from the cache or solved, and the estimated error of its mesh; `mesh` is that of [`Body::File`]. Not real-time:
-    /// up to some seconds, for a large mesh a minute.
+    /// Loads the law from the cache or solves for it; returns also the estimated error of its mesh. `mesh`: that of
+    /// [`Body::File`]. Not real-time: up to some seconds, for a large mesh a minute.
     ///
     /// # Errors
     /// A [`Refusal`] if no solution exists for these numbers.
@@ -290,7 +290,7 @@ impl Description {
         Ok((law, mesh_error))
     }
 
-    /// The law of several spheres: of one, and how contacts influence each other, by what solves or remembers these.
+    /// Builds the law of several spheres; `one` prepares a single sphere, `remember` caches the influence between contacts.
     fn spheres(
         &self,
         one: &dyn Fn(&Self) -> Prepares,
@@ -319,7 +319,7 @@ impl Description {
         Ok((Law::Spheres(Box::new(spheres)), mesh_error))
     }
 
-    /// What carries a sphere.
+    /// Returns the kind of body under a sphere.
     fn footing(&self) -> Footing {
         match self.body {
             Body::Block(size) => Footing::Block(size),
@@ -345,7 +345,7 @@ impl Description {
         Some((Law::Bonded(Box::new(RigidPatch { stiffness })), mesh_error))
     }
 
-    /// The law, solved anew, and the estimated error of its mesh. Not real-time: up to some seconds.
+    /// Solves for the law without the cache; returns also the estimated error of its mesh. Not real-time: up to some seconds.
     ///
     /// # Errors
     /// A [`Refusal`] if no solution exists for these numbers, or a mesh is needed: see [`Self::solve_on`].
@@ -364,7 +364,7 @@ impl Description {
         }
     }
 
-    /// The law on a mesh. Not real-time.
+    /// Solves for the law on a mesh; returns also the estimated error of the mesh. Not real-time.
     ///
     /// # Errors
     /// A [`Refusal`] if no solution exists for these numbers, or the tool does not fit the touched face.
@@ -404,7 +404,7 @@ impl Description {
         Ok((Law::Bonded(Box::new(patch)), step.max(base.mesh_error(extent_m, &[[0.0; 2]]))))
     }
 
-    /// The law of a body made of boxes.
+    /// Solves for the law of a body without a mesh.
     fn solve_boxes(&self) -> Result<(Law, f64), NotPositive> {
         let resolution = RESOLUTIONS[self.resolution.min(2)];
         let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio: self.poisson_ratio };
@@ -428,7 +428,7 @@ impl Description {
         Ok((Law::Bonded(Box::new(patch)), mesh_error))
     }
 
-    /// Borders of the elements under a plate, and the axis that it is across.
+    /// Returns the borders of the elements under a plate, and the axis normal to the plate.
     pub(crate) fn plate_borders(body: Body) -> ([Vec<f64>; 3], usize) {
         let both = |near: f64, far: f64, half: usize| {
             let middle = 0.5 * (near + far);
@@ -444,14 +444,14 @@ impl Description {
                 let across = |half_m: f64| both(-half_m, half_m, 2);
                 ([across(size.half_x_m), across(size.half_y_m), both(-size.height_m, 0.0, 2)], 2)
             }
-            // Refused, or solved on a mesh, before.
+            // Unreachable for a plate: `check` rejects the half-space, and the others are solved on a mesh.
             Body::HalfSpace | Body::Cylinder { .. } | Body::File { .. } => {
                 ([both(-1.0, 0.0, 1), both(-1.0, 0.0, 1), both(-1.0, 0.0, 1)], 2)
             }
         }
     }
 
-    /// Ten by two by two cells of a beam, six tetrahedra each: 99 corners. The error is against cells of half the side.
+    /// Solves on ten by two by two cells of a beam, six tetrahedra each: 99 corners. Compares with cells of half the side.
     fn linear_plate(body: Body, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> {
         let even = |from: f64, to: f64, count: usize| -> Vec<f64> {
             (0..=count).map(|i| from + (to - from) * i as f64 / count as f64).collect()
@@ -463,7 +463,7 @@ impl Description {
             Body::Block(Size { half_x_m: x, half_y_m: y, height_m: z }) => {
                 ([(-x, x), (-y, y), (-z, 0.0)], [4, 4, 4], 2)
             }
-            // Refused before.
+            // Unreachable: `check` rejects other bodies.
             _ => ([(-1.0, 0.0); 3], [1, 1, 1], 2),
         };
         let solve = |finer: usize| {
@@ -488,7 +488,7 @@ impl Description {
         Ok((own, error))
     }
 
-    /// Two orders of elements on one grid: the better one, and the largest relative difference of a stiffness.
+    /// Solves with two element orders on one grid; returns the better result, and the largest relative difference of a stiffness.
     fn plate(&self, body: Body) -> Result<(RigidPatch, f64), NotPositive> {
         let lame = Lame::new(1.0, self.poisson_ratio);
         if self.resolution == LINEAR_TETRAHEDRA {
@@ -510,11 +510,11 @@ fn sphere(prepared: Prepared) -> (Law, f64) {
     (Law::Sphere(Box::new(prepared.atlas)), prepared.mesh_error)
 }
 
-/// What [`Description::read`] reads.
+/// Serialises a law for [`Description::read`].
 fn to_numbers(law: &Law, mesh_error: f64) -> Vec<f64> {
     match law {
         Law::Sphere(atlas) => Prepared { atlas: (**atlas).clone(), mesh_error }.to_numbers(),
-        // Kept as the law of one.
+        // Cached as the law of a single sphere.
         Law::Spheres(spheres) => Prepared { atlas: spheres.atlas.clone(), mesh_error }.to_numbers(),
         Law::Bonded(patch) => {
             let mut numbers = vec![mesh_error];

@@ -1,22 +1,22 @@
-//! An elastic solid, touched with a sphere, a punch or a plate.
+//! Elastic solid, touched with a sphere, a punch or a plate.
 //!
-//! Linear elasticity, small strains, with the exact rotation of the tool. All that is slow is solved before the loop and kept
-//! in a cache; a tick evaluates one energy and its gradient.
+//! Linear elasticity, small strains, with the exact rotation of the tool. Everything slow is solved before the loop and
+//! cached; a tick evaluates one energy and its gradient.
 //!
 //! - [`basis`], [`grid`], [`dissection`], [`dense`]: finite elements of any order on a block, and their sparse Cholesky
 //!   factorisation with one order of sums.
-//! - [`half_space`]: the field of forces on an elastic half-space, which carries the pole of every contact.
-//! - [`remainder`], [`table`]: what a block does that a half-space would not, by finite elements.
-//! - [`gmsh`], [`cylinder`], [`mesh`], [`cells`], [`facet`]: bodies of any shape, their elements and their surface; [`body`]: what such a
-//!   body does that a half-space would not; [`recovery`]: how good its mesh is.
+//! - [`half_space`]: field of forces on an elastic half-space, the singular part of every contact.
+//! - [`remainder`], [`table`]: difference between a block and a half-space, by finite elements.
+//! - [`gmsh`], [`cylinder`], [`mesh`], [`cells`], [`facet`]: bodies of any shape, their elements and surface; [`body`]:
+//! difference between such a body and a half-space; [`recovery`]: error estimate of a mesh.
 //! - [`sphere`]: contact of a sphere in contact space. [`punch`], [`plate`]: rigid patches bonded to a surface.
 //! - [`prepare`], [`law`], [`cache`]: from a description to a law.
 //! - [`atlas`], [`several`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.
-//! - [`drawing`], [`skin`]: what it looks like, for people.
-//! - [`tetrahedra`]: linear elements, to compare with.
+//! - [`drawing`], [`skin`]: pictures of the deformed solid.
+//! - [`tetrahedra`]: linear elements, for comparison.
 //! - `plugin`: parameters and the contract.
 
-// Indices name the components of vectors and tensors, in several at once.
+// Loop indices name components of vectors and tensors, in several arrays at once.
 #![allow(clippy::needless_range_loop)]
 
 pub mod atlas;

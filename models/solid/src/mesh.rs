@@ -1,4 +1,4 @@
-//! Bodies of any shape: elements, the surface they leave, and which part of it is fixed and which is touched.
+//! Bodies of any shape: elements, their outer surface, and its fixed and touched parts.
 
 use crate::cells::{Geometry, Kind};
 use crate::dissection::Assembly;
@@ -6,105 +6,105 @@ use crate::grid::Lame;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-/// An element of a mesh.
+/// Element of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Element {
-    /// Its shape.
+    /// Kind of the element.
     pub kind: Kind,
-    /// Its nodes, in the order of [`Kind`].
+    /// Nodes, in the order of [`Kind`].
     pub nodes: Vec<usize>,
-    /// Its number in the file.
+    /// Number of the element in the file.
     pub tag: usize,
 }
 
-/// A face of an element that no other element shares.
+/// Face of an element that no other element shares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Facet {
-    /// Three or four.
+    /// Number of corners, three or four.
     pub corners: usize,
     /// Corners, counterclockwise seen from outside, then the middles of the edges.
     pub nodes: Vec<usize>,
 }
 
-/// What a mesh is made of, before anything is checked.
+/// Unchecked contents of a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts {
-    /// Where the nodes are, m.
+    /// Positions of the nodes, m.
     pub nodes_m: Vec<[f64; 3]>,
-    /// Elements of volume.
+    /// Volume elements.
     pub elements: Vec<Element>,
-    /// Corners of the faces that have a name, by name.
+    /// Corners of the named faces, by name.
     pub surfaces: BTreeMap<String, Vec<Vec<usize>>>,
     /// Corners of all faces in the file.
     pub faces: Vec<Vec<usize>>,
 }
 
-/// A body: the origin is the middle of the touched face.
+/// Checked body; the origin is the middle of the touched face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
-    /// Where the nodes are, m.
+    /// Positions of the nodes, m.
     pub nodes_m: Vec<[f64; 3]>,
-    /// The elements.
+    /// Volume elements.
     pub elements: Vec<Element>,
-    /// Nodes that do not move.
+    /// Flag of each node that does not move.
     pub fixed: Vec<bool>,
-    /// The surface that is touched.
+    /// Touched part of the surface.
     pub touched: Vec<Facet>,
-    /// The rest of the surface, less what is fixed.
+    /// Part of the surface that is neither touched nor fixed.
     pub free: Vec<Facet>,
 }
 
-/// Why a mesh is no body.
+/// Defect of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshError {
-    /// No element has a volume. `open_m`: an end of the surface, if it is not closed.
+    /// No element has a volume.
     NoVolume {
-        /// Middle of an edge that only one face has, m.
+        /// Middle of an edge that an odd number of faces share, m; `None` if the surface is closed.
         open_m: Option<[f64; 3]>,
     },
-    /// An element is turned inside out, or folded.
+    /// An element is inverted or folded.
     Inverted {
-        /// Its number in the file.
+        /// Number of the element in the file.
         tag: usize,
-        /// Volume of its reference element's unit at the worst point, m3.
+        /// Smallest Jacobian determinant of the element, m3.
         jacobian_m3: f64,
     },
     /// Three elements share a face, or a face of four corners meets two of three.
     Overlap {
-        /// One of the elements.
+        /// Number of one of the elements.
         tag: usize,
     },
-    /// Two nodes are at one place: the body has a crack.
+    /// Two nodes are at the same position: the body has a crack.
     Twins {
-        /// Where, m.
+        /// Position, m.
         at_m: [f64; 3],
     },
     /// No surface has this name.
     NoSurface {
-        /// `fixed` or `touched`.
+        /// Role of the surface, `fixed` or `touched`.
         role: &'static str,
-        /// The name.
+        /// Requested name.
         name: String,
-        /// Those there are.
+        /// Names in the file.
         names: Vec<String>,
     },
-    /// A named face is not on the surface that the elements leave: elements are missing or too many there.
+    /// A named face is not on the outer surface: elements are missing or superfluous there.
     NotOnSurface {
-        /// The name of the surface.
+        /// Name of the surface.
         name: String,
-        /// Where, m.
+        /// Middle of the face, m.
         at_m: [f64; 3],
     },
-    /// A part of the body hangs on nothing.
+    /// A part of the body is not connected to the fixed surface.
     Loose {
-        /// One of its elements.
+        /// Number of one of its elements.
         tag: usize,
     },
     /// The fixed and the touched surface share nodes.
     Shared,
     /// Coordinates are not metres, or not numbers.
     Extent {
-        /// The longest side, m.
+        /// Longest side, m.
         extent_m: f64,
     },
 }
@@ -183,7 +183,7 @@ fn sorted(corners: &[usize]) -> Vec<usize> {
     key
 }
 
-/// Middle of an edge that an odd number of faces have.
+/// Returns the middle of an edge that an odd number of faces share.
 fn open_edge(nodes_m: &[[f64; 3]], faces: &[Vec<usize>]) -> Option<[f64; 3]> {
     let mut edges: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
     for face in faces {
@@ -195,7 +195,7 @@ fn open_edge(nodes_m: &[[f64; 3]], faces: &[Vec<usize>]) -> Option<[f64; 3]> {
 }
 
 impl Mesh {
-    /// A body of these parts, its surfaces by name. Not real-time.
+    /// Builds and checks a body; the names select the fixed and the touched surface. Not real-time.
     ///
     /// # Errors
     /// A [`MeshError`] that names the place and the remedy.
@@ -265,7 +265,7 @@ fn check_places(nodes_m: &[[f64; 3]], elements: &[Element]) -> Result<(), MeshEr
     {
         return Err(MeshError::Extent { extent_m });
     }
-    // Sorted along x, twins are neighbours within a billionth of the body.
+    // After sorting along x, nodes at one position are neighbours within a billionth of the body's size.
     let near = 1.0e-9 * extent_m;
     let mut order: Vec<usize> = used.into_iter().collect();
     order.sort_by(|&a, &b| nodes_m[a][0].total_cmp(&nodes_m[b][0]));
@@ -279,7 +279,7 @@ fn check_places(nodes_m: &[[f64; 3]], elements: &[Element]) -> Result<(), MeshEr
     Ok(())
 }
 
-/// Positive volume at the points of integration and at the corners.
+/// Checks that the volume is positive at the quadrature points and at the corners.
 fn check_element(nodes_m: &[[f64; 3]], element: &Element) -> Result<(), MeshError> {
     let places: Vec<[f64; 3]> = element.nodes.iter().map(|&node| nodes_m[node]).collect();
     let geometry = Geometry { kind: element.kind, nodes_m: &places };
@@ -290,7 +290,7 @@ fn check_element(nodes_m: &[[f64; 3]], element: &Element) -> Result<(), MeshErro
     if worst > 0.0 { Ok(()) } else { Err(MeshError::Inverted { tag: element.tag, jacobian_m3: worst }) }
 }
 
-/// Faces that one element has, by their sorted corners.
+/// Returns the faces that only one element has, by their sorted corners.
 fn border(elements: &[Element]) -> Result<BTreeMap<Vec<usize>, Facet>, MeshError> {
     let mut all: BTreeMap<Vec<usize>, (usize, Facet)> = BTreeMap::new();
     let mut tags: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
@@ -310,7 +310,7 @@ fn border(elements: &[Element]) -> Result<BTreeMap<Vec<usize>, Facet>, MeshError
     }
     let single: BTreeMap<Vec<usize>, Facet> =
         all.into_iter().filter(|(_, (count, _))| *count == 1).map(|(key, (_, facet))| (key, facet)).collect();
-    // A square that two triangles cover from the other side.
+    // Detect a square that two triangles cover from the other side.
     for (key, facet) in single.iter().filter(|(_, facet)| facet.corners == 4) {
         for left_out in 0..4 {
             let mut triangle = key.clone();
@@ -323,7 +323,7 @@ fn border(elements: &[Element]) -> Result<BTreeMap<Vec<usize>, Facet>, MeshError
     Ok(single)
 }
 
-/// Every element hangs on something fixed, over the nodes it shares.
+/// Checks that every element is connected to a fixed node.
 fn check_held(elements: &[Element], fixed: &[bool]) -> Result<(), MeshError> {
     let mut around: Vec<Vec<usize>> = vec![Vec::new(); fixed.len()];
     for (index, element) in elements.iter().enumerate() {
@@ -346,12 +346,12 @@ fn check_held(elements: &[Element], fixed: &[bool]) -> Result<(), MeshError> {
         .map_or(Ok(()), |index| Err(MeshError::Loose { tag: elements[index].tag }))
 }
 
-/// The stiffness of a mesh of one material.
+/// Stiffness of a mesh of one material.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshStiffness<'a> {
-    /// The body.
+    /// Body.
     pub mesh: &'a Mesh,
-    /// The material.
+    /// Material.
     pub lame: Lame,
 }
 
@@ -374,7 +374,7 @@ impl Assembly for MeshStiffness<'_> {
         Geometry { kind: *kind, nodes_m: &places }.stiffness(self.lame)
     }
 
-    /// Across the longest side of the box about the elements' middles.
+    /// Cuts across the longest side of the bounding box of the elements' middles.
     fn halves(&self, mut elements: Vec<usize>) -> [Vec<usize>; 2] {
         let at = |element: usize, axis: usize| {
             middle(&self.mesh.nodes_m, &self.mesh.elements[element].nodes)[axis]

@@ -1,12 +1,12 @@
-//! A rigid plate bonded to a face of a body of finite elements.
+//! Rigid plate bonded to a face of a body of finite elements.
 
 use crate::dense::NotPositive;
 use crate::dissection::{Assembly, GridStiffness, Stiffness, subtract_forces};
 use crate::grid::{Grid, Lame};
 use crate::rigid::{MODES, RigidPatch};
 
-/// Stiffness of the face at the upper end of an axis, with the face at its lower end clamped, and the displacement of all nodes
-/// under each of its modes; `X` from the face's centre. Not real-time.
+/// Solves for a plate on the upper face of an axis, with the face at the lower end clamped; returns also the
+/// displacement of all nodes under each mode. `X` is relative to the face's centre. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
@@ -29,19 +29,19 @@ pub fn plate(grid: &Grid, lame: Lame, axis: usize) -> Result<(RigidPatch, Vec<f6
     plate_on(&GridStiffness::new(grid, lame), hold)
 }
 
-/// What holds a node.
+/// Support of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hold {
-    /// Nothing.
+    /// No support.
     Free,
-    /// It does not move.
+    /// Zero displacement.
     Fixed,
-    /// The plate; where the node is from the plate's centre, m.
+    /// Bond to the plate; position of the node from the plate's centre, m.
     Plate([f64; 3]),
 }
 
-/// Stiffness of a plate that is bonded to some nodes of any body, and the displacement of all nodes under each of its modes.
-/// Not real-time.
+/// Solves for a plate bonded to some nodes of any body; returns also the displacement of all nodes under each mode. Not
+/// real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
@@ -78,7 +78,7 @@ pub fn plate_on(
     Ok((RigidPatch { stiffness: symmetric(&matrix) }, displacement))
 }
 
-/// The symmetric part: reciprocity holds for the exact matrix.
+/// Returns the symmetric part of a stiffness: reciprocity holds for the exact matrix.
 #[must_use]
 pub fn symmetric(matrix: &[[f64; MODES]; MODES]) -> [[f64; MODES]; MODES] {
     let mut result = *matrix;

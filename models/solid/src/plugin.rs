@@ -1,4 +1,4 @@
-//! The solid as a plugin: parameters, the law they name, and one handle's friction.
+//! Plugin of the solid: parameters, the selected law, and the friction of one handle.
 
 use crate::drawing::Drawing;
 use crate::friction::Friction;
@@ -13,7 +13,7 @@ use flotor_hal::{
 };
 use std::path::Path;
 
-/// Farther from home than this along an axis there is no handle, m: the answer is that at the edge, and says so.
+/// Workspace limit along each axis, m; beyond it the wrench is that at the edge, with status `Clamped`.
 const REACH_M: f64 = 10.0;
 
 const BODIES: Choices = choices!["block", "beam", "cylinder", "half-space", "file"];
@@ -22,10 +22,10 @@ const COUNTS: Choices = choices!["1", "2", "3", "4"];
 const BONDS: Choices = choices!["bonded", "frictionless"];
 const RESOLUTIONS: Choices = choices!["quick", "standard", "fine", "linear-tetrahedra"];
 
-/// By how much the squared length of an orientation may differ from one: as in the spring.
+/// Tolerance of an orientation's squared length; equals that of the spring.
 const UNIT_NORM_TOLERANCE: f64 = 1.0e-6;
 
-/// Index of the one live parameter.
+/// Index of the only live parameter.
 const YOUNGS_MODULUS: usize = 4;
 
 const SCHEMA: &[Parameter] = &[
@@ -101,24 +101,24 @@ const DETAILS: &[Detail] = &[
     Detail::number("mesh_error", "1", "Estimated relative error of the stiffness that comes from the mesh"),
 ];
 
-/// An elastic solid and the tool that touches it.
+/// Elastic solid with the tool that touches it.
 pub struct Solid {
     law: Law,
     mesh_error: f64,
     youngs_modulus_pa: f64,
-    /// One for each sphere.
+    /// Friction of each sphere.
     friction: [Friction; MOST],
     depth_m: f64,
     contacts: f64,
     parameters: [f64; SCHEMA.len()],
     description: Description,
     mesh: Option<Mesh>,
-    /// Made for the first picture.
+    /// Created for the first picture.
     drawing: Option<Drawing>,
     nothing: Shape,
 }
 
-/// Values in force: sizes of a beam have defaults of their own.
+/// Returns the current parameter values; a beam has its own default sizes.
 fn resolve(settings: &Settings<'_>) -> [f64; SCHEMA.len()] {
     let mut values = [0.0; SCHEMA.len()];
     let beam = BODIES.as_slice()[settings.choice_or_default("body")].as_str() == "beam";
@@ -134,13 +134,13 @@ fn resolve(settings: &Settings<'_>) -> [f64; SCHEMA.len()] {
     values
 }
 
-/// Reads the mesh of `body = "file"`; also its digest. Nothing for other bodies. Not real-time.
+/// Maximum size of a mesh file, bytes: beyond any body that can be solved for.
+const MOST_MESH_BYTES: u64 = 1 << 30;
+
+/// Reads the mesh of `body = "file"` with its hash; `None` for other bodies. Not real-time.
 ///
 /// # Errors
 /// A [`Refusal`] that names the file, the place and the remedy.
-/// Longest file of a mesh, bytes: beyond any body that can be solved for.
-const MOST_MESH_BYTES: u64 = 1 << 30;
-
 fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     let file = settings.text("file");
     let faces = ["fixed_face", "touched_face"].map(|id| settings.text(id));
@@ -160,7 +160,7 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
         .map_err(|error| Refusal::resource(format!("{path}: cannot read the mesh: {error}")))?;
     let [fixed, touched] = [faces[0].unwrap_or("fixed"), faces[1].unwrap_or("touched")];
     let wrong = |problem: &dyn std::fmt::Display| Refusal::resource(format!("{path}: {problem}"));
-    // A binary file has another problem than its encoding, which its second line names.
+    // Accept a binary file here: the reader reports its format from the second line.
     let text =
         text_from_bytes(bytes.clone()).unwrap_or_else(|_| String::from_utf8_lossy(&bytes).into_owned());
     let parts = gmsh::read(&text).map_err(|problem| wrong(&problem))?;
@@ -169,7 +169,7 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     Ok(Some((mesh, cache::digest(&named))))
 }
 
-/// The status of several spheres: that they are too deep goes before that they did not settle, and that before a place nearby.
+/// Returns the status of several spheres: too deep has priority over unconverged, and that over a nearby position.
 fn worse(status: StepStatus, answer: &several::Answer, is_too_deep: bool) -> StepStatus {
     if status != StepStatus::Ok {
         status
@@ -229,7 +229,7 @@ impl ForceModel for Solid {
 
     fn step(&mut self, input: &Input) -> Output {
         let norm_error = input.pose.orientation().length_squared() - 1.0;
-        // NaN is no length either.
+        // NaN fails the test too.
         if !(input.pose.is_finite() && norm_error.abs() < UNIT_NORM_TOLERANCE) {
             self.forget_details();
             return Output::new(Wrench::ZERO, f64::NAN, StepStatus::InvalidInput);
@@ -301,8 +301,8 @@ impl ForceModel for Solid {
 }
 
 impl ShapeModel for Solid {
-    /// The deformed surface with the pressure of the contact (under a plate, the displacement), and the tool. The first picture of a
-    /// punch or a plate takes up to a second.
+    /// Draws the deformed surface with the pressure of the contact (under a plate, the displacement), and the tool. The
+    /// first picture of a punch or a plate takes up to a second.
     fn shape(&mut self, input: &Input) -> &Shape {
         let pose = if input.pose.is_finite() { input.pose } else { Pose::HOME };
         let mesh = self.mesh.as_ref();
@@ -333,7 +333,7 @@ impl ShapeModel for Solid {
 }
 
 impl VariantModel for Solid {
-    /// Only friction remembers.
+    /// Reports path-dependent memory with friction, else none.
     fn variant_info(&self) -> VariantInfo {
         let memory = if self.friction[0].is_smooth() { Memory::Stateless } else { Memory::PathDependent };
         VariantInfo::new(Demand::ALL, memory)

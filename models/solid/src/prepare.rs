@@ -1,4 +1,4 @@
-//! From a description of a solid and a tool to its law: everything slow, before the loop.
+//! Slow preparation of a law from a solid and a tool, before the loop.
 
 use crate::atlas::{Atlas, Ground};
 use crate::body::{Body, outline_m};
@@ -10,34 +10,34 @@ use crate::sphere::{Contact, Patch, Problem};
 use crate::spline::{Curve, End, Volume};
 use crate::table::Table;
 
-/// Depths beyond this share of the radius have no answer: the force of a linear solid falls, and the contact snaps through.
+/// Largest depth, in radii, for which the law is valid: beyond it a linear solid's force falls and the contact snaps through.
 const DEEPEST: f64 = 1.2;
-/// Contacts are solved a little deeper, so that the law ends smoothly.
+/// Largest solved depth, in radii; a little deeper, so that the law ends smoothly.
 const DEEPEST_SOLVED: f64 = 1.25;
-/// Depths, evenly spread over the root of depth over radius.
+/// Number of depths, evenly spaced in the root of depth over radius.
 const LEVELS: usize = 14;
-/// The same for the half-space, which is solved once.
+/// Number of depths on the half-space, which is solved once.
 const PROFILE_LEVELS: usize = 30;
 /// Cells of the half-space's patch from the middle to the rim.
 const PROFILE_RINGS: i32 = 10;
 /// Distances of the points of the remainder's table from an edge, in halves of a side.
 const TABLE_SHARES: [f64; 9] = [1.0, 0.8, 0.62, 0.47, 0.34, 0.23, 0.145, 0.08, 0.03];
-/// Places of the sphere along half a side, from the middle to where the ratio ends.
+/// Positions of the sphere along half a side, from the middle to the end of the ratio's range.
 const PLACES: [f64; 9] = [0.0, 0.25, 0.44, 0.59, 0.7, 0.785, 0.86, 0.93, 1.0];
-/// Least distance from the clamped bottom at which the law of a side is solved, in radii: nearer, the elements do not resolve
-/// what the bottom takes from a half-space's compliance.
+/// Least distance from the clamped bottom at which the law of a side is solved, in radii: nearer, the elements do not
+/// resolve the bottom's effect on a half-space's compliance.
 const CLAMPED_MARGIN: f64 = 0.75;
-/// Least distance of two places, in halves of a side.
+/// Least distance between two positions, in halves of a side.
 const LEAST_GAP: f64 = 0.05;
 
-/// Distances of the points of a mesh's table and of the places of the sphere from the middle of a face, in halves of a side.
+/// Distances from the middle of a face for a mesh's table and for the positions of the sphere, in halves of a side.
 const FACE_TABLE: [f64; 6] = [0.0, 0.3, 0.55, 0.75, 0.9, 1.0];
 const FACE_PLACES: [f64; 5] = [0.0, 0.35, 0.65, 0.85, 1.0];
-/// How their ratios end.
+/// End conditions of the ratios on a mesh's face and on a cylinder.
 const FACE_ENDS: [[End; 2]; 3] = [[End::Parabola; 2]; 3];
 const CYLINDER_ENDS: [[End; 2]; 3] = [[End::Level, End::Parabola], [End::Parabola; 2], [End::Parabola; 2]];
 
-/// How finely a sphere's law is prepared.
+/// Fineness of the preparation of a sphere's law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Resolution {
     /// Elements of the remainder.
@@ -46,21 +46,21 @@ pub struct Resolution {
     pub rings: i32,
 }
 
-/// A sphere's law, and how good it is.
+/// Prepared law of a sphere with its error estimate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prepared {
-    /// The law, for a Young's modulus of 1 Pa.
+    /// Law for a Young's modulus of 1 Pa.
     pub atlas: Atlas,
-    /// Estimated relative error of the stiffness that comes from the elements: two grids compared.
+    /// Estimated relative error of the stiffness due to the elements, from a comparison of two grids.
     pub mesh_error: f64,
 }
 
-/// Side of a cell such that the contact fills about four fifths of the patch, m: Hertz's radius, less at large depth.
+/// Returns the cell size at which the contact fills about four fifths of the patch, m: Hertz's radius, less at large depth.
 fn cell_m(radius_m: f64, depth_m: f64, rings: i32) -> f64 {
     1.25 * (radius_m * depth_m).sqrt() / (1.0 + 0.12 * depth_m / radius_m) / f64::from(rings)
 }
 
-/// Contacts with a half-space at depths of these roots, in radii of a sphere of radius one.
+/// Solves contacts with a half-space for roots of depth, in radii of a sphere of radius one.
 fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Vec<Contact> {
     let patch = Patch::new(solid, rings);
     let mut contacts: Vec<Contact> = Vec::with_capacity(roots.len());
@@ -79,12 +79,12 @@ fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Vec<Contact> {
     contacts
 }
 
-/// Roots of depth over radius at which contacts are solved.
+/// Returns the roots of depth over radius at which contacts are solved.
 fn roots() -> Vec<f64> {
     (1..=LEVELS).map(|level| DEEPEST_SOLVED.sqrt() * level as f64 / LEVELS as f64).collect()
 }
 
-/// Ratios of a body's energy to that of a half-space at one place, for growing depth; `on_face` tells where the face is.
+/// Returns the ratios of a body's energy to a half-space's at one place, by growing depth; `on_face` tests for the face.
 fn column(
     patch: &Patch,
     table: &Table,
@@ -107,13 +107,13 @@ fn column(
         let contact = patch.solve(&problem, start.as_ref());
         let ratio = contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
         let is_contact = contact.residual < 1.0e-4 && ratio.is_finite() && ratio > 0.0;
-        // Near a corner the least contact already has another ratio than one; where nothing is below it, it has none.
+        // Near a corner the shallowest contact already has a ratio other than one; off the face it has none.
         let before = ratios.last().copied().unwrap_or(if is_contact { ratio } else { 1.0 });
         if is_contact && (ratio / before - 1.0).abs() < 0.3 {
             ratios.push(ratio);
             (start, solved) = (Some(contact), ratio);
         } else {
-            // It has snapped through: on as it went, by a half at most.
+            // After a snap-through the ratio is extrapolated, by a half at most.
             let earlier = ratios.len().checked_sub(2).map_or(before, |i| ratios[i]);
             ratios.push((2.0 * before - earlier).clamp(0.5 * solved, 1.5 * solved));
         }
@@ -121,12 +121,12 @@ fn column(
     ratios
 }
 
-/// Hertz's energy of a sphere of radius one at a root of depth, for a modulus of one.
+/// Returns Hertz's energy of a sphere of radius one at a root of depth, for a modulus of one.
 fn hertz(poisson_ratio: f64, root: f64) -> f64 {
     8.0 / 15.0 / (1.0 - poisson_ratio * poisson_ratio) * flotor_hal::math::powi(root, 5)
 }
 
-/// Energy over Hertz's. The cells' own error is that of the smallest depth, where Hertz is exact, and divided out.
+/// Returns the energy relative to Hertz's. The cells' own error, known at the smallest depth where Hertz is exact, is divided out.
 fn profile(solid: &HalfSpace) -> Curve {
     let top = DEEPEST_SOLVED.sqrt();
     let mut roots = vec![0.01];
@@ -142,7 +142,7 @@ fn profile(solid: &HalfSpace) -> Curve {
     Curve::new(roots, values, [End::Parabola; 2])
 }
 
-/// How the ratios of a face end: level in the middle of the block, where it is a mirror image of itself.
+/// Returns the end conditions of a face's ratios: zero slope on a mirror plane of the block.
 fn ends(face: Face) -> [[End; 2]; 3] {
     let along_q = if face == Face::Top { [End::Level, End::Parabola] } else { [End::Parabola; 2] };
     [[End::Level, End::Parabola], along_q, [End::Parabola; 2]]
@@ -158,14 +158,14 @@ fn atlas(solid: &HalfSpace, radius_m: f64, profile: Curve, ground: Ground) -> At
     }
 }
 
-/// A sphere on a half-space. Not real-time.
+/// Prepares the law of a sphere on a half-space. Not real-time.
 #[must_use]
 pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Prepared {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
     Prepared { atlas: atlas(&solid, radius_m, profile(&solid), Ground::HalfSpace), mesh_error: 0.0 }
 }
 
-/// A sphere on a block. Not real-time: some seconds.
+/// Prepares the law of a sphere on a block. Not real-time: some seconds.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
@@ -188,10 +188,10 @@ pub fn sphere_on_block(
     Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), ground), mesh_error })
 }
 
-/// Where contacts on a block are compared, in halves of a side from the middle.
+/// Positions at which contacts on a block are compared, in halves of a side from the middle.
 const BEYOND_PLACES: [f64; 4] = [0.0, 0.4, 0.75, 0.97];
 
-/// How a vertical force on the top of a block moves the top elsewhere, up, beyond what a half-space does: the numbers of
+/// Solves for the vertical compliance between places of a block's top beyond that of a half-space: the numbers of
 /// [`crate::several::Beyond`], for a modulus of 1 Pa. Not real-time: up to some seconds.
 ///
 /// # Errors
@@ -216,32 +216,32 @@ pub fn beyond_half_space(
     Ok(numbers)
 }
 
-/// Radius of a block's edges for a sphere, m.
+/// Returns the radius of a block's edges for a sphere, m.
 fn rounding_m(size: Size, radius_m: f64) -> f64 {
     let least_m = (2.0 * size.half_x_m).min(2.0 * size.half_y_m).min(size.height_m);
     (0.02 * least_m).min(0.25 * radius_m)
 }
 
-/// What carries a sphere.
+/// Kind of body under a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Footing {
-    /// All below `z = 0`.
+    /// Half-space `z <= 0`.
     HalfSpace,
-    /// A block.
+    /// Block.
     Block(Size),
-    /// A round cylinder: radius and height, m.
+    /// Round cylinder: radius and height, m.
     Cylinder([f64; 2]),
-    /// The touched face of a mesh.
+    /// Touched face of a mesh.
     Face,
 }
 
-/// The half of a cylinder's diameter and height, as the size of the block about it.
+/// Returns the size of the block around a cylinder.
 fn around([radius_m, height_m]: [f64; 2]) -> Size {
     Size { half_x_m: radius_m, half_y_m: radius_m, height_m }
 }
 
-/// A sphere on the touched face of a mesh: that of a cylinder ([`Footing::Cylinder`]), or any plane one. Not real-time: some
-/// seconds.
+/// Prepares the law of a sphere on a mesh: top of a cylinder ([`Footing::Cylinder`]), or any plane face. Not real-time:
+/// some seconds.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
@@ -268,7 +268,7 @@ pub fn sphere_on_mesh(
         let rounding_m = rounding_m(around(size), radius_m);
         let line = table_nodes(rim_m);
         let line: Vec<f64> = line.iter().skip(1).rev().map(|x| -x).chain(line.iter().copied()).collect();
-        // A little inside the polygon that the elements make of the rim.
+        // Move points a little inside the polygon that the elements make of the rim.
         let nearest = |at: [f64; 2]| {
             let most = 0.999 * rim_m / (at[0] * at[0] + at[1] * at[1]).sqrt().max(0.999 * rim_m);
             at.map(|c| c * most)
@@ -303,13 +303,13 @@ pub fn sphere_on_mesh(
         }
         Ground::Face { outline_m, ratio: Box::new(Volume::new([x, y, levels], &values, FACE_ENDS)) }
     };
-    // In the middle, and at a quarter of the side from an edge.
+    // Evaluate in the middle, and at a quarter of the side from an edge.
     let mesh_error = body.mesh_error(radius_m, &[[0.0; 2], [0.75 * outline_m[0][1], 0.0]]);
     Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), ground), mesh_error })
 }
 
 impl Prepared {
-    /// All that was solved, for the cache. Not real-time.
+    /// Returns all solved numbers, for the cache. Not real-time.
     #[must_use]
     pub fn to_numbers(&self) -> Vec<f64> {
         let mut numbers = vec![self.mesh_error];
@@ -328,7 +328,7 @@ impl Prepared {
         numbers
     }
 
-    /// The same law from these numbers, bit for bit; `None` if they are not those of such a law. Not real-time.
+    /// Restores a law from its numbers, bit for bit; `None` if they do not describe such a law. Not real-time.
     #[must_use]
     pub fn from_numbers(
         mut numbers: &[f64],
@@ -376,12 +376,12 @@ struct Builder<'a> {
     resolution: Resolution,
 }
 
-/// Distances from the middle of a side, in the table of remainders.
+/// Returns the table coordinates along half a side, as distances from the middle.
 fn table_nodes(half_m: f64) -> Vec<f64> {
     TABLE_SHARES.iter().map(|share| half_m * (1.0 - share)).collect()
 }
 
-/// The same from bottom to top.
+/// Returns the table coordinates from bottom to top.
 fn table_heights(height_m: f64) -> Vec<f64> {
     let half_m = 0.5 * height_m;
     let up = table_nodes(half_m);
@@ -395,8 +395,8 @@ impl Builder<'_> {
         [self.size.half_x_m, self.size.half_y_m, 0.5 * self.size.height_m][axis]
     }
 
-    /// Where along an axis the sphere's law is solved, m: from the middle to twice the rounding before the edge, or from
-    /// [`CLAMPED_MARGIN`] above the clamped bottom to the top.
+    /// Returns the positions along an axis at which the sphere's law is solved, m: from the middle to twice the
+    /// rounding before the edge, or from [`CLAMPED_MARGIN`] above the clamped bottom to the top.
     fn places(&self, axis: usize) -> Vec<f64> {
         let half_m = self.half_along(axis);
         let up: Vec<f64> = PLACES.iter().map(|share| share * (half_m - 2.0 * self.rounding_m)).collect();
@@ -418,7 +418,7 @@ impl Builder<'_> {
         Table::new(self.remainder, face, [&nodes(p), &nodes(q)])
     }
 
-    /// Ratio of the block's energy to that of a half-space over place and root of depth over radius.
+    /// Computes the ratio of the block's energy to that of a half-space, by position and root of depth over radius.
     fn ratios(&self, face: Face) -> Volume {
         let [p, q, _] = face.axes();
         let table = self.table(face);
@@ -456,8 +456,8 @@ impl Builder<'_> {
         Volume::new([a, b, levels], &values, ends(face))
     }
 
-    /// Change of the stiffness under the sphere between these elements and coarser ones, in the middle and at a quarter of
-    /// the side from an edge: twice the share of the remainder, by a contact of half the sphere's radius.
+    /// Estimates the change of the stiffness under the sphere against coarser elements, in the middle and at a quarter
+    /// of the side from an edge: twice the contribution of the remainder, for a contact of half the sphere's radius.
     fn mesh_error(&self) -> Result<f64, NotPositive> {
         let Fineness { across, high, order } = self.resolution.fineness;
         let coarse = Fineness { across: across.div_ceil(2).max(1), high: high.div_ceil(2).max(1), order };

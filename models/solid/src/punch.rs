@@ -1,8 +1,8 @@
-//! A flat rigid punch on a half-space or a block: even tractions on cells of the contact, refined to its rim.
+//! Flat rigid punch on a half-space or a block: uniform tractions on cells of the contact, refined towards the rim.
 //!
-//! The traction under a rigid punch grows without bound at its rim, like one over the root of the distance; cells that
-//! shrink with the square of it follow that. The displacement of the cells' centres is that of the half-space under even
-//! tractions, in closed form, and of the block's remainder, which is smooth.
+//! The traction under a rigid punch is singular at its rim, like one over the root of the distance; the cells shrink
+//! with the square of the distance to resolve that. The displacement at the cells' centres is that of the half-space
+//! under uniform tractions, in closed form, plus that of the block's remainder, which is smooth.
 
 use crate::dense::{self, NotPositive};
 use crate::half_space::{Block, HalfSpace};
@@ -14,28 +14,28 @@ use std::f64::consts::PI;
 /// Outline of a punch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outline {
-    /// A disc.
+    /// Disc.
     Round {
-        /// Its radius, m.
+        /// Radius of the disc, m.
         radius_m: f64,
     },
-    /// A square, sides along the axes.
+    /// Square with sides along the axes.
     Square {
-        /// Half of its side, m.
+        /// Half of the side, m.
         half_m: f64,
     },
 }
 
-/// How the punch holds the surface.
+/// Bond between punch and surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bond {
-    /// All displacements are those of the punch.
+    /// The surface follows the punch in all directions.
     Bonded,
-    /// Only the displacement along the normal is; it does not lift off.
+    /// The surface follows the punch along the normal only; the punch does not lift off.
     Frictionless,
 }
 
-/// One cell: a polygon, counterclockwise, m.
+/// Polygonal cell, counterclockwise, m.
 struct Cell {
     corners: Vec<[f64; 2]>,
     centre: [f64; 2],
@@ -57,13 +57,13 @@ impl Cell {
     }
 }
 
-/// Positions from 0 to 1 that crowd at 1 like the square of the distance.
+/// Returns positions from 0 to 1 that cluster quadratically at 1.
 fn crowded(count: usize) -> Vec<f64> {
     (0..=count).map(|i| flotor_hal::math::sin(0.5 * PI * i as f64 / count as f64)).collect()
 }
 
 impl Outline {
-    /// Radius, or half of the side, m.
+    /// Returns the radius, or half of the side, m.
     #[must_use]
     pub fn extent_m(self) -> f64 {
         match self {
@@ -72,7 +72,7 @@ impl Outline {
         }
     }
 
-    /// Some points of the rim, m.
+    /// Returns 16 points of the rim, m.
     #[must_use]
     pub fn rim(self) -> Vec<[f64; 2]> {
         (0..16)
@@ -89,7 +89,7 @@ impl Outline {
             .collect()
     }
 
-    /// Cells of a punch of size one, scaled; `fineness` of them from the middle to the rim.
+    /// Divides the contact into cells; `fineness`: their number from the middle to the rim.
     fn cells(self, fineness: usize) -> Vec<Cell> {
         let line = crowded(fineness);
         match self {
@@ -113,7 +113,7 @@ impl Outline {
             Self::Round { radius_m } => {
                 let sectors = 4 * fineness;
                 let step = 2.0 * PI / sectors as f64;
-                // Of a polygon with the area of the disc.
+                // Give the polygon the area of the disc.
                 let scale = radius_m * (step / flotor_hal::math::sin(step)).sqrt();
                 let corner = |radius: f64, sector: usize| {
                     let (sine, cosine) = flotor_hal::math::sin_cos(step * sector as f64);
@@ -137,11 +137,11 @@ impl Outline {
     }
 }
 
-/// Fineness of the two solutions that are extrapolated.
+/// Fineness of the two extrapolated solutions.
 const FINENESS: [usize; 2] = [6, 9];
 
-/// Stiffness of a punch at the origin of the surface `z = 0`: two solutions of [`punch`], extrapolated with the second order
-/// they show. Also the size of that step relative to the stiffness, an estimate of the error from above. Not real-time.
+/// Extrapolates two solutions of [`punch`] at second order. Returns the stiffness at the origin of the surface `z = 0`,
+/// and the relative size of that step, an upper estimate of the error. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
@@ -168,7 +168,7 @@ pub fn extrapolated(
     Ok((RigidPatch { stiffness }, error))
 }
 
-/// What a punch does to the surface under each of its modes.
+/// Loads on the surface under each mode of a punch.
 pub struct Loads {
     /// Corners of the cells, counterclockwise, m.
     pub cells_m: Vec<Vec<[f64; 2]>>,
@@ -176,7 +176,7 @@ pub struct Loads {
     pub forces: Vec<[[f64; MODES]; 3]>,
 }
 
-/// Stiffness of a punch at the origin of the surface `z = 0`. Not real-time.
+/// Solves for the stiffness of a punch at the origin of the surface `z = 0`. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
@@ -190,7 +190,7 @@ pub fn punch(
     Ok(punch_loads(solid, remainder, outline, bond, fineness)?.0)
 }
 
-/// The same, and its loads. Not real-time.
+/// Solves for the stiffness of a punch like [`punch`], and returns its loads too. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.

@@ -1,15 +1,15 @@
-//! How good a mesh is: stresses smoothed over the nodes against those of the elements.
+//! Error estimate of a mesh: stresses smoothed over the nodes against those of the elements.
 //!
-//! Zienkiewicz and Zhu, *Int. J. Numer. Meth. Engng* 24 (1987) 337-357: elements disagree about the stress at a node they
-//! share, and the energy of the difference between their stress and its mean estimates the energy of the error.
+//! Zienkiewicz and Zhu, *Int. J. Numer. Meth. Engng* 24 (1987) 337-357: elements have different stresses at a shared
+//! node, and the energy of the difference between their stress and its mean estimates the energy of the error.
 
 use crate::cells::{Geometry, Kind};
 use crate::mesh::MeshStiffness;
 
 type Stress = [[f64; 3]; 3];
 
-/// Twice the energy of the error of each column of displacements, J: the error of a stiffness, where displacements of size one
-/// are prescribed, or of a compliance under forces of size one. Not real-time.
+/// Returns twice the error energy of each column of displacements, J: the error of a stiffness under unit
+/// displacements, or of a compliance under unit forces. Not real-time.
 #[must_use]
 pub fn twice_error_j(body: &MeshStiffness<'_>, displacement: &[f64], columns: usize) -> Vec<f64> {
     let MeshStiffness { mesh, lame } = body;
@@ -69,7 +69,7 @@ pub fn twice_error_j(body: &MeshStiffness<'_>, displacement: &[f64], columns: us
     errors
 }
 
-/// Where the nodes are in the reference element.
+/// Returns the positions of all nodes in the reference element.
 fn node_places(kind: Kind) -> Vec<[f64; 3]> {
     let corners = kind.corner_places();
     let middles =

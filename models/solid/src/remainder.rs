@@ -1,10 +1,10 @@
-//! What a block does that a half-space would not.
+//! Remainder: difference between the response of a block and that of a half-space.
 //!
-//! A force on a face of a block displaces it as it would a half-space behind that face, plus a *remainder* that undoes the
-//! half-space's stress on the other free faces and its displacement of the clamped one. The half-space has the pole at the
-//! force; the remainder is smooth as far as the nearest edge is away, so that a coarse grid of elements resolves it wherever
-//! the force is. The block has two planes of mirror symmetry, and every load is a sum of four that are even or odd in each:
-//! four problems on a quarter of the block.
+//! A force on a face of a block displaces it as it would a half-space behind that face, plus a *remainder* that cancels
+//! the half-space's stress on the other free faces and its displacement of the clamped one. The half-space contains the
+//! singularity at the force. The remainder varies over the distance to the nearest edge, so that a coarse grid of
+//! elements resolves it for a force at any place. The block has two planes of mirror symmetry, and every load is a sum
+//! of four that are even or odd in each: four problems on a quarter of the block.
 
 use crate::basis::{element_points, gauss, lagrange};
 use crate::dense::NotPositive;
@@ -12,30 +12,30 @@ use crate::dissection::{GridStiffness, Stiffness, subtract_forces};
 use crate::grid::{Grid, Lame, Sample, graded};
 use crate::half_space::{Block, HalfSpace};
 
-/// A block: top face at `z = 0` about the origin, bottom clamped. Lengths in m.
+/// Dimensions of a block: top face at `z = 0` about the origin, bottom clamped. Lengths in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
-    /// Half the side along x.
+    /// Half the side along x, m.
     pub half_x_m: f64,
-    /// Half the side along y.
+    /// Half the side along y, m.
     pub half_y_m: f64,
-    /// Height.
+    /// Height, m.
     pub height_m: f64,
 }
 
-/// A face that is touched, or by mirror symmetry its opposite.
+/// Touched face, or by mirror symmetry its opposite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Face {
-    /// `z = 0`; coordinates x, y.
+    /// Plane `z = 0`; coordinates x, y.
     Top,
-    /// `x = half_x`; coordinates y, z.
+    /// Plane `x = half_x`; coordinates y, z.
     SideX,
-    /// `y = half_y`; coordinates x, z.
+    /// Plane `y = half_y`; coordinates x, z.
     SideY,
 }
 
 impl Face {
-    /// Which axes of the block are `p`, `q` along the face and `w` out of it.
+    /// Returns the axes of the block that are `p`, `q` along the face and `w` out of it.
     #[must_use]
     pub fn axes(self) -> [usize; 3] {
         match self {
@@ -45,7 +45,7 @@ impl Face {
         }
     }
 
-    /// Where the face is along its normal, m.
+    /// Returns the position of the face along its normal, m.
     #[must_use]
     pub fn plane_m(self, size: Size) -> f64 {
         match self {
@@ -55,7 +55,7 @@ impl Face {
         }
     }
 
-    /// A point of the face in the frame of the block, m.
+    /// Converts a point of the face to the frame of the block, m.
     #[must_use]
     pub fn point_m(self, size: Size, at_m: [f64; 2]) -> [f64; 3] {
         let [p, q, w] = self.axes();
@@ -78,37 +78,37 @@ pub struct Fineness {
     pub order: usize,
 }
 
-/// The four mirror images of a quarter, as signs of x and y; also the four parities.
+/// Signs of x and y for the four mirror images of a quarter; also the four parities.
 const MIRRORS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
-/// Forces whose fields are solved for at once.
+/// Number of forces solved for at once.
 const BATCH: usize = 8;
-/// Distances of successive elements grow by this from the edges inwards.
+/// Growth of successive elements from the edges inwards.
 const GRADING: f64 = 1.35;
 
-/// The problems of a block, factored.
+/// Factored problems of a block.
 #[derive(Debug)]
 pub struct Remainder {
     size: Size,
     solid: HalfSpace,
     lame: Lame,
     grid: Grid,
-    /// One for each parity, in the order of [`MIRRORS`].
+    /// Stiffness of each parity, in the order of [`MIRRORS`].
     stiffness: Vec<Stiffness>,
     quadrature: Vec<BoundaryPoint>,
 }
 
-/// A point of integration of the quarter's free faces.
+/// Quadrature point of the quarter's free faces.
 #[derive(Debug)]
 struct BoundaryPoint {
     position_m: [f64; 3],
     /// Axis of the outward normal (0, 1: a side; 2: the top).
     normal: usize,
-    /// Area, and the shape functions that are not zero there.
+    /// Area with the shape functions that are not zero at the point.
     area_m2: f64,
     shape: Sample,
 }
 
-/// Sign of parity `parity` under mirror `mirror`.
+/// Returns the sign of a parity under a mirror.
 fn character(parity: usize, mirror: usize) -> f64 {
     let mut sign = 1.0;
     for axis in 0..2 {
@@ -149,8 +149,8 @@ impl Remainder {
         Ok(Self { size, solid, lame, grid, stiffness, quadrature })
     }
 
-    /// Remainder of forces at points of a face at other points of it, m/N, both as `p, q` in the quarter of positive x and y:
-    /// for each source, for each target, for each mirror image of the target. Not real-time.
+    /// Returns the remainder at `targets_m` of unit forces at `sources_m`, m/N, both points `p, q` of a face in the
+    /// quarter of positive x and y. Indices: source, target, mirror image of the target. Not real-time.
     #[must_use]
     pub fn responses(
         &self,
@@ -210,7 +210,7 @@ impl Remainder {
         }
     }
 
-    /// Adds the forces of the tractions that undo those of the half-space on the free faces, for each parity.
+    /// Adds, for each parity, the nodal forces of the tractions that cancel those of the half-space on the free faces.
     fn add_tractions(&self, face: Face, sources_m: &[[f64; 2]], forces: &mut [Vec<f64>]) {
         let columns = 3 * sources_m.len();
         let mut tractions = vec![[0.0; 3]; columns];
@@ -242,8 +242,8 @@ impl Remainder {
         }
     }
 
-    /// Traction that undoes the half-space's at a mirror image of a point, Pa/N, one for each force; false where there is
-    /// none: on the face of the force.
+    /// Computes the tractions that cancel those of the half-space at a mirror image of a point, Pa/N, one per force.
+    /// Returns false on the face of the force, where there is none.
     fn traction(
         &self,
         face: Face,
@@ -274,7 +274,7 @@ impl Remainder {
         true
     }
 
-    /// Displacement that undoes the half-space's at the clamped nodes, m/N, zero elsewhere.
+    /// Returns the displacement that cancels the half-space's at the clamped nodes, m/N; zero elsewhere.
     fn prescribed(&self, face: Face, sources_m: &[[f64; 2]], parity: usize) -> Vec<f64> {
         let [p, q, w] = face.axes();
         let columns = 3 * sources_m.len();
@@ -301,8 +301,8 @@ impl Remainder {
     }
 }
 
-/// Which displacements of a node are prescribed: all at the bottom; on a mirror plane, those across it for an even load and
-/// those along it for an odd one.
+/// Returns the prescribed components of a node: all at the bottom; on a mirror plane, those across it for an even load
+/// and those along it for an odd one.
 fn fixed(grid: &Grid, node: usize, parity: usize) -> [bool; 3] {
     let index = grid.index(node);
     let mut fixed = [index[2] == 0; 3];
@@ -317,12 +317,12 @@ fn fixed(grid: &Grid, node: usize, parity: usize) -> [bool; 3] {
     fixed
 }
 
-/// Points of integration on top and sides of the quarter: each element's face in four, for the peaks of near forces.
+/// Returns the quadrature points on top and sides of the quarter: four parts per element face, for peaks of near forces.
 fn boundary(grid: &Grid) -> Vec<BoundaryPoint> {
     let rule = gauss(grid.order + 2);
     let side = grid.order + 1;
     let points = element_points(grid.order);
-    // Positions and weights over an element, -1..1, in two halves, with the shape functions.
+    // Points and weights over an element, -1..1, in two halves, with the shape functions.
     let line: Vec<(f64, f64, Vec<f64>)> = [-0.5, 0.5]
         .iter()
         .flat_map(|middle| {

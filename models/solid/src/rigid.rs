@@ -1,4 +1,4 @@
-//! A rigid patch of a surface: what a bonded plate or punch feels, from one quadratic energy.
+//! Rigid patch of a surface: wrench of a bonded plate or punch, from one quadratic energy.
 //!
 //! Every point of the patch is moved by `u = t + (R - I) X`, `X` from the patch's centre: twelve numbers, linear in the
 //! displacement, with the exact rotation `R`. The energy is `1/2 v.K v` in those twelve; force and torque are its
@@ -6,24 +6,24 @@
 
 use flotor_hal::{DMat3, DQuat, DVec3, Demand, Wrench};
 
-/// Number of the numbers: three of `t`, nine of `R - I`.
+/// Number of modes: three of `t`, nine of `R - I`.
 pub const MODES: usize = 12;
 
 /// Stiffness of a patch: translation along x, y, z first, then `R - I`, entry `(i, j)` at `3 + 3 i + j`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigidPatch {
-    /// Symmetric and positive semidefinite, N/m, N and N m.
+    /// Symmetric positive semidefinite matrix, N/m, N and N m.
     pub stiffness: [[f64; MODES]; MODES],
 }
 
 impl RigidPatch {
-    /// Index of entry `(i, j)` of `R - I`.
+    /// Returns the index of entry `(i, j)` of `R - I`.
     #[must_use]
     pub const fn entry(i: usize, j: usize) -> usize {
         3 + 3 * i + j
     }
 
-    /// The twelve numbers of a pose. Real-time: bounded, no allocation.
+    /// Returns the twelve mode amplitudes of a pose. Real-time: bounded, no allocation.
     #[must_use]
     pub fn modes(position_m: DVec3, orientation: DQuat) -> [f64; MODES] {
         let rotation = DMat3::from_quat(orientation);
@@ -37,14 +37,14 @@ impl RigidPatch {
         modes
     }
 
-    /// Returns the wrench on the hand, and the stored energy, J, with zeros in the place of what is not demanded. Real-time:
-    /// bounded, no allocation.
+    /// Returns the wrench on the hand, and the stored energy, J; zero where not requested. Real-time: bounded, no
+    /// allocation.
     #[must_use]
     pub fn answer(&self, position_m: DVec3, orientation: DQuat, demand: Demand) -> (Wrench, f64) {
         let modes = Self::modes(position_m, orientation);
         let mut slope = [0.0; MODES];
         let is_force_alone = !(demand.contains(Demand::TORQUE) || demand.contains(Demand::ENERGY));
-        // Force is the slope of three of the twelve numbers; torque and energy need all.
+        // The force needs only three rows; torque and energy need all.
         let rows = if is_force_alone { 3 } else { MODES };
         let mut energy_j = 0.0;
         for ((target, row), mode) in slope.iter_mut().zip(&self.stiffness).zip(&modes).take(rows) {

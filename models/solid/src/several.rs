@@ -1,24 +1,24 @@
 //! Several equal spheres on one handle, each in contact with the same solid.
 //!
-//! Every sphere alone has the energy `E` of [`crate::atlas`]. A contact also pushes the surface down under the others: by
-//! `C F` for a vertical force `F`, with the compliance `C` of a half-space between two points of its surface, `(1 - nu^2) /
-//! (pi E r)`, and what the body adds to it. With the depressions `w` of the surface under each sphere by all others,
+//! Every sphere alone has the energy `E` of [`crate::atlas`]. A contact also lowers the surface under the others: by `C
+//! F` for a vertical force `F`, with the compliance `C` of a half-space between two points of its surface, `(1 - nu^2)
+//! / (pi E r)`, plus the body's addition. With the depressions `w` of the surface under each sphere by all others,
 //!
 //! ```text
 //! F_i = -dE_i/dz (c_i + w_i z),   w_i = sum_j C_ij F_j,   W = sum_i E_i(c_i + w_i z) + 1/2 sum_ij C_ij F_i F_j
 //! ```
 //!
-//! `W` is stationary in the forces, so its gradient at the centres is that of `E` at the lowered places and that of `C`: the
-//! force has a potential, whatever spheres come into contact. The forces are one active set over all contacts: without contact
-//! `E` and its force are zero. The secant method in at most sixty steps solves for them, from the same start in every tick, so
-//! that the answer has no memory of the path.
+//! `W` is stationary in the forces, so its gradient at the centres is that of `E` at the lowered places and that of
+//! `C`: the force has a potential for any set of spheres in contact. The forces are one active set over all contacts:
+//! without contact `E` and its force are zero. The secant method solves for them in at most sixty steps, from the same
+//! start in every tick, so that the result is independent of the path.
 //!
-//! At an edge, and deeper than a solid of small strains answers, the vertical force of `E` falls as a sphere goes down, and several
-//! answers would exist. The law that is lowered is therefore that of the top face alone, `T` ([`Atlas::top`]), whose force grows with
-//! the depth: `W = sum_i (E_i - T_i)(c_i) + T_i(c_i + w_i z) + 1/2 sum_ij C_ij F_i F_j` with `F_i = -dT_i/dz`. On the top, `E` is `T`.
+//! At an edge, and deeper than a solid of small strains is valid, the vertical force of `E` falls as a sphere goes down, and several
+//! solutions would exist. The lowered law is therefore that of the top face alone, `T` ([`Atlas::top`]), whose force grows with the
+//! depth: `W = sum_i (E_i - T_i)(c_i) + T_i(c_i + w_i z) + 1/2 sum_ij C_ij F_i F_j` with `F_i = -dT_i/dz`. On the top, `E` is `T`.
 //!
-//! `C` counts each contact as a point: for contacts of radius `a` at a distance of `r` that is an error of `0.2 (a / r)^2` of
-//! the interaction, at most 5 % of it for spheres that nearly touch each other.
+//! `C` treats each contact as a point: for contacts of radius `a` at a distance of `r` the interaction has an error of
+//! `0.2 (a / r)^2`, at most 5 % for spheres that nearly touch each other.
 
 use crate::atlas::{self, Atlas, ease_at};
 use crate::jet::Jet;
@@ -26,37 +26,37 @@ use crate::spline::{Curve, End, take, whole};
 use flotor_hal::{DQuat, DVec3, Wrench};
 use std::f64::consts::PI;
 
-/// Most spheres on a handle.
+/// Maximum number of spheres on a handle.
 pub const MOST: usize = 4;
-/// Steps until a solve gives up.
+/// Maximum number of iterations of a solve.
 const STEPS: usize = 60;
-/// A solve ends when no force changes by more of the largest one.
+/// Largest relative change of a force at convergence, relative to the largest force.
 const TOLERANCE: f64 = 1.0e-12;
-/// Depressions nearer to each other have no secant between them, m.
+/// Least distance between two depressions for a secant, m.
 const SECANT_M: f64 = 1.0e-12;
-/// Two energies that differ by less of them are the same.
+/// Relative difference below which two energies count as equal.
 const ROUNDING: f64 = 1.0e-12;
 
-/// Compliance between places of the top face, beyond that of a half-space, for a modulus of 1 Pa: cubic splines through values
-/// between the nodes of a grid.
+/// Compliance between places of the top face beyond that of a half-space, for a modulus of 1 Pa: cubic splines through
+/// values between the nodes of a grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Beyond {
-    /// For each node of an axis, the spline that is one there and zero at the other nodes.
+    /// Spline of each node of an axis: one at this node, zero at the others.
     shapes: [Vec<Curve>; 2],
     /// First and last node of each axis, m.
     ends_m: [[f64; 2]; 2],
-    /// Between each two nodes of the grid (x first), m/N.
+    /// Compliance between each two nodes of the grid (x first), m/N.
     values: Vec<f64>,
 }
 
-/// Nodes of the grid along an axis, at most.
+/// Maximum number of grid nodes along an axis.
 const MOST_NODES: usize = 7;
 
-/// Weights of a place, and their derivatives along x and y.
+/// Weights of the nodes at a place, with their derivatives along x and y.
 type Weights = [[f64; 3]; MOST_NODES * MOST_NODES];
 
 impl Beyond {
-    /// From values between each two nodes of a grid (x first). At most seven nodes along an axis, at least three. Not real-time.
+    /// Interpolates values between each two nodes of a grid (x first); three to seven nodes along an axis. Not real-time.
     #[must_use]
     pub fn new(nodes_m: [&[f64]; 2], values: Vec<f64>) -> Option<Self> {
         let count = nodes_m[0].len() * nodes_m[1].len();
@@ -73,7 +73,7 @@ impl Beyond {
         Some(Self { shapes, ends_m, values })
     }
 
-    /// From what [`crate::prepare::beyond_half_space`] found; `None` if the numbers are not those of such a grid. Not real-time.
+    /// Restores the numbers of [`crate::prepare::beyond_half_space`]; `None` if they do not describe such a grid. Not real-time.
     #[must_use]
     pub fn from_numbers(mut numbers: &[f64]) -> Option<Self> {
         let counts = [whole(take(&mut numbers, 1)?[0])?, whole(take(&mut numbers, 1)?[0])?];
@@ -81,7 +81,7 @@ impl Beyond {
         Self::new([x, y], numbers.to_vec())
     }
 
-    /// Weights of the nodes for a place; beyond the grid it counts as one at its edge.
+    /// Returns the weights of the nodes at a place, which is limited to the grid.
     fn weights(&self, place_m: DVec3) -> Weights {
         let along = [0, 1].map(|axis| {
             let [low, high] = self.ends_m[axis];
@@ -105,7 +105,7 @@ impl Beyond {
         all
     }
 
-    /// Displacement of each node for a unit force at a place of these weights.
+    /// Returns the displacement of each node under a unit force at a place with these weights.
     fn spread(&self, weights: &Weights) -> [f64; MOST_NODES * MOST_NODES] {
         let count = self.shapes[0].len() * self.shapes[1].len();
         let mut moved = [0.0; MOST_NODES * MOST_NODES];
@@ -116,41 +116,41 @@ impl Beyond {
     }
 }
 
-/// The law of several spheres.
+/// Force law of several spheres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spheres {
-    /// That of one.
+    /// Law of a single sphere.
     pub atlas: Atlas,
     poisson_ratio: f64,
-    /// Centres from the handle, in its frame, m.
+    /// Centres relative to the handle, in its frame, m.
     offsets_m: Vec<DVec3>,
-    /// What a block adds to the compliance of a half-space, for a modulus of 1 Pa (m/N). `None` on a half-space.
+    /// Addition of a block to the compliance of a half-space, for a modulus of 1 Pa (m/N). `None` on a half-space.
     pub beyond: Option<Beyond>,
 }
 
-/// What several spheres feel, for a modulus of 1 Pa.
+/// Result of a tick with several spheres, for a modulus of 1 Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// On the hand.
+    /// Wrench on the hand.
     pub wrench: Wrench,
     /// Stored energy, J.
     pub energy_j: f64,
-    /// Where the centres are, m; as many as [`Spheres::count`].
+    /// Positions of the centres, m; the first [`Spheres::count`] are valid.
     pub centres_m: [DVec3; MOST],
     /// Force on each sphere, N.
     pub forces_n: [DVec3; MOST],
-    /// How far the face is inside each sphere, with what the others push it down; not positive without contact.
+    /// Depth of the face inside each sphere, including the depression by the others; not positive without contact.
     pub depths_m: [f64; MOST],
-    /// How far the others push the surface down under each sphere, m.
+    /// Depression of the surface under each sphere by the others, m.
     pub sunk_m: [f64; MOST],
-    /// True where the law of some sphere is that of a place nearby.
+    /// True where the law of some sphere is that of a nearby position.
     pub is_beyond: bool,
-    /// False if the forces did not settle.
+    /// True if the forces converged.
     pub is_settled: bool,
 }
 
 impl Spheres {
-    /// Two to four spheres at the corners of a regular polygon about the handle, across z: two along x. Not real-time.
+    /// Places two to four spheres at the corners of a regular polygon about the handle, across z: two along x. Not real-time.
     #[must_use]
     pub fn new(
         atlas: Atlas,
@@ -173,14 +173,14 @@ impl Spheres {
         Self { atlas, poisson_ratio, offsets_m, beyond }
     }
 
-    /// Number of spheres.
+    /// Returns the number of spheres.
     #[must_use]
     pub fn count(&self) -> usize {
         self.offsets_m.len()
     }
 
-    /// What the hand feels with the handle at a pose (finite), the home of which has all spheres touching. Real-time: bounded,
-    /// no allocation.
+    /// Evaluates the law at a pose (finite) of the handle; at its home all spheres touch. Real-time: bounded, no
+    /// allocation.
     #[must_use]
     pub fn answer(&self, position_m: DVec3, orientation: DQuat) -> Answer {
         let count = self.count();
@@ -205,7 +205,7 @@ impl Spheres {
             let (pressed, sunk_m) = settled[i];
             let centre_m = centres_m[i].to_array();
             let (alone, top) = (self.atlas.answer(centre_m), self.atlas.top(centre_m));
-            // What another face has of it.
+            // Contribution of other faces to the energy.
             let mut edge = alone.energy - top.energy;
             if edge.value.abs() <= ROUNDING * alone.energy.value {
                 edge = Jet::default();
@@ -229,13 +229,13 @@ impl Spheres {
         answer
     }
 
-    /// Compliance between each two spheres, m/N, and its derivatives along the place of the first.
+    /// Returns the compliance between each two spheres, m/N, and its derivatives by the place of the first.
     fn compliance(&self, centres_m: &[DVec3; MOST]) -> ([[f64; MOST]; MOST], [[DVec3; MOST]; MOST]) {
         let count = self.count();
         let (mut values, mut slopes) = ([[0.0; MOST]; MOST], [[DVec3::ZERO; MOST]; MOST]);
         for i in 0..count {
             for j in (0..count).filter(|&j| j != i) {
-                // The tool is rigid: this distance is the same at every pose, and the derivative acts inside of it alone.
+                // The tool is rigid: this distance is the same at every pose, and its derivative is zero.
                 let distance_m = (self.offsets_m[i] - self.offsets_m[j]).length();
                 values[i][j] = (1.0 - self.poisson_ratio * self.poisson_ratio) / (PI * distance_m);
             }
@@ -253,7 +253,7 @@ impl Spheres {
                 slopes[i][j] = DVec3::new(sums[1], sums[2], 0.0);
             }
         }
-        // The table is symmetric up to rounding; the energy needs it to be so.
+        // The table is symmetric up to rounding; the energy requires exact symmetry.
         for i in 0..count {
             for j in 0..i {
                 values[i][j] = values[j][i];
@@ -262,7 +262,7 @@ impl Spheres {
         (values, slopes)
     }
 
-    /// The answers of single spheres on the top alone, over the surface that the others have pushed down, and how far; whether they settled.
+    /// Solves for the forces on the top alone: returns each sphere's result with the depression under it, and convergence.
     fn settle(
         &self,
         centres_m: &[DVec3; MOST],
@@ -276,7 +276,7 @@ impl Spheres {
         for i in 0..count {
             let (answer, _) = now[i];
             up_n[i] = -answer.energy.slope[2];
-            // That of Hertz's law, to start with.
+            // Start with the stiffness of Hertz's law.
             stiffness[i] = if answer.depth_m > 0.0 { (1.5 * up_n[i] / answer.depth_m).max(0.0) } else { 0.0 };
         }
         for step in 0..STEPS {
@@ -295,7 +295,7 @@ impl Spheres {
                 let hertz =
                     if now[i].0.depth_m > 0.0 { (1.5 * found_n / now[i].0.depth_m).abs() } else { 0.0 };
                 if step >= STEPS / 2 {
-                    // At a bend of the law secants may go round in circles; half of Hertz's stiffness comes closer at every step.
+                    // At a kink of the law secants may cycle; half of Hertz's stiffness converges at every step.
                     stiffness[i] = 0.5 * hertz;
                 } else if moved_m.abs() > SECANT_M {
                     let secant = (-before.energy.slope[2] - found_n) / moved_m;
@@ -318,7 +318,7 @@ impl Spheres {
     }
 }
 
-/// Solves a small system with a dominant diagonal.
+/// Solves a small system with a dominant diagonal by elimination.
 fn eliminate(mut matrix: [[f64; MOST]; MOST], mut right: [f64; MOST], count: usize) -> [f64; MOST] {
     for column in 0..count {
         let pivot = matrix[column];

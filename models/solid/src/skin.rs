@@ -1,6 +1,6 @@
-//! The surface of a body at rest, as triangles for people to look at: fine where the tool is.
+//! Surface of the undeformed body as triangles for pictures, fine near the tool.
 //!
-//! Each face has corners of its own, so that edges stay sharp when light falls on them. Not real-time.
+//! Each face has its own corners, so that edges are rendered sharp. Not real-time.
 
 use crate::half_space::arsinh;
 use crate::mesh::{Facet, Mesh};
@@ -9,32 +9,32 @@ use flotor_hal::{DVec3, math};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Corners and triangles, counter-clockwise seen from outside.
+/// Triangle mesh, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Skin {
-    /// Where the corners are at rest, m.
+    /// Undeformed positions of the corners, m.
     pub places_m: Vec<DVec3>,
-    /// The triangles.
+    /// Corner indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Where a skin is fine.
+/// Region in which a surface is fine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Focus {
-    /// Where, m.
+    /// Centre, m.
     pub at_m: DVec3,
-    /// Over which distance, m.
+    /// Width of the region, m.
     pub width_m: f64,
 }
 
 /// Rings and sectors of a disc.
 const RINGS: usize = 32;
 const SECTORS: usize = 48;
-/// Levels of the side of a cylinder.
+/// Number of levels of a cylinder's side.
 const LEVELS: usize = 12;
 
 impl Focus {
-    /// `count` steps from `low` to `high`, about `width` over ten wide at a place, growing away from it.
+    /// Returns borders of `count` steps from `low` to `high`, about `width / 10` wide at the focus, growing away from it.
     fn steps(self, axis: usize, low: f64, high: f64, count: usize) -> Vec<f64> {
         let at = self.at_m.to_array()[axis].clamp(low, high);
         let stretch = |x: f64| arsinh((x - at) / self.width_m);
@@ -48,7 +48,7 @@ impl Focus {
 }
 
 impl Skin {
-    /// Top and sides of a block, its top about the origin; so many steps along x, y, z.
+    /// Triangulates top and sides of a block, its top about the origin; `steps`: number along x, y, z.
     #[must_use]
     pub fn block(half_m: [f64; 2], height_m: f64, focus: Focus, steps: [usize; 3]) -> Self {
         let [half_x, half_y] = half_m;
@@ -58,7 +58,7 @@ impl Skin {
         Self::boxed(&x, &y, &z, &[Face::Top, Face::Left, Face::Right, Face::Front, Face::Back])
     }
 
-    /// Faces of the box between the first and the last of some steps, cut at all of them.
+    /// Triangulates faces of the box between the first and last coordinates, cut at all of them.
     #[must_use]
     pub fn boxed(x: &[f64], y: &[f64], z: &[f64], faces: &[Face]) -> Self {
         let mut skin = Self::default();
@@ -76,7 +76,7 @@ impl Skin {
         skin
     }
 
-    /// Quads between rows and columns: along a row, then across rows, is a left turn seen from outside.
+    /// Adds a lattice of quads; the direction along a row, then across rows, turns left seen from outside.
     fn lattice(&mut self, rows: &[f64], columns: &[f64], place: impl Fn(f64, f64) -> DVec3) {
         let first = self.places_m.len();
         self.places_m.extend(
@@ -87,7 +87,7 @@ impl Skin {
         self.quads(first, rows.len(), columns.len(), columns.len() - 1);
     }
 
-    /// Triangles between rows of `columns` corners each, `steps` quads in a row: as many as corners if a row is closed.
+    /// Adds triangles between rows of `columns` corners each, `steps` quads in a row: as many as corners if a row is closed.
     #[allow(clippy::cast_possible_truncation)] // some thousand corners
     fn quads(&mut self, first: usize, rows: usize, columns: usize, steps: usize) {
         for row in 0..rows.saturating_sub(1) {
@@ -104,10 +104,10 @@ impl Skin {
         }
     }
 
-    /// A disc about the origin: straight lines from the focus to even steps of the rim, cut at shares that grow.
+    /// Triangulates a disc about the origin: lines from the focus to even steps of the rim, cut at growing distances.
     #[must_use]
     pub fn disc(radius_m: f64, focus: Focus) -> Self {
-        /// How near the rim the middle may come, in radii.
+        /// Largest distance of the focus from the centre, in radii.
         const MOST: f64 = 0.97;
         let middle_m = focus.at_m.truncate().clamp_length_max(MOST * radius_m);
         let width = focus.width_m / radius_m;
@@ -125,7 +125,7 @@ impl Skin {
         skin
     }
 
-    /// Top and side of a round cylinder, its top about the origin.
+    /// Triangulates top and side of a round cylinder, its top about the origin.
     #[must_use]
     pub fn cylinder(radius_m: f64, height_m: f64, focus: Focus) -> Self {
         let mut skin = Self::disc(radius_m, focus);
@@ -139,7 +139,7 @@ impl Skin {
         skin
     }
 
-    /// The surface of a mesh at its nodes, and which node each corner is; touched and free faces meet in a sharp edge.
+    /// Triangulates the surface of a mesh; returns also the node of each corner. Touched and free faces meet in a sharp edge.
     #[must_use]
     pub fn of_mesh(mesh: &Mesh) -> (Self, Vec<usize>) {
         let (mut skin, mut nodes) = (Self::default(), Vec::new());
@@ -160,24 +160,24 @@ impl Skin {
     }
 }
 
-/// A face of a box.
+/// Face of a box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Face {
-    /// Across z, up.
+    /// Upper face across z.
     Top,
-    /// Across z, down.
+    /// Lower face across z.
     Bottom,
-    /// Across x, positive.
+    /// Face across x, positive side.
     Right,
-    /// Across x, negative.
+    /// Face across x, negative side.
     Left,
-    /// Across y, positive.
+    /// Face across y, positive side.
     Back,
-    /// Across y, negative.
+    /// Face across y, negative side.
     Front,
 }
 
-/// Triangles between corners and middles of edges.
+/// Splits a facet into triangles between its corners and the middles of its edges.
 fn pieces(facet: &Facet) -> Vec<[usize; 3]> {
     let (count, node) = (facet.corners, |k: usize| facet.nodes[k]);
     let middle = |k: usize| node(count + k);

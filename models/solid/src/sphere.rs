@@ -1,40 +1,40 @@
-//! A frictionless rigid sphere against a deformed face: contact on a patch of cells that comes along with the sphere.
+//! Contact solver of a frictionless rigid sphere on a deformed face, on a patch of cells that follows the sphere.
 //!
-//! Each cell carries a pressure along the normal of the sphere *at the displaced cell*, and no cell comes inside:
-//! `|X + u(X) - c| >= R`, `p >= 0`, one of them with equality. The displacement is that of a half-space under even loads on
-//! square cells, a table that scales with one over the cell, plus the remainder of the block. A solve alternates between
-//! the pressures for given normals (an active set and a Cholesky factorisation) and the normals for given pressures.
+//! Each cell carries a pressure along the normal of the sphere *at the displaced cell*, and no cell penetrates: `|X + u(X) - c|
+//! >= R`, `p >= 0`, one of them with equality. The displacement is that of a half-space under uniform loads on square cells, a
+//! table that scales with one over the cell, plus the remainder of the block. A solve alternates between the pressures for
+//! given normals (an active set and a Cholesky factorisation) and the normals for given pressures.
 
 use crate::dense;
 use crate::half_space::{Block, HalfSpace};
 
-/// Cells of a patch, and the half-space between any two of them.
+/// Cells of a patch with the half-space's compliance between any two of them.
 #[derive(Clone, Debug)]
 pub struct Patch {
-    /// Cells from the middle to the rim.
+    /// Number of cells from the middle to the rim.
     rings: i32,
-    /// Cells, in units of a cell.
+    /// Positions of the cells, in units of a cell.
     cells: Vec<[i32; 2]>,
-    /// Displacement for a unit force on a cell of side one, by offset of the target from the source.
+    /// Displacement under a unit force on a cell of side one, by offset of the target from the source.
     kernel: Vec<Block>,
 }
 
-/// One contact problem. Lengths in m, the unit of force that of the half-space's modulus.
+/// Contact problem. Lengths in m; the unit of force follows from the half-space's modulus.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
-    /// Radius of the sphere.
+    /// Radius of the sphere, m.
     pub radius_m: f64,
-    /// How far the undisplaced face is inside the sphere.
+    /// Depth of the undisplaced face inside the sphere, m.
     pub depth_m: f64,
-    /// Side of a cell.
+    /// Side of a cell, m.
     pub cell_m: f64,
-    /// Which cells lie on the face; all, if empty.
+    /// Flags of the cells on the face; empty: all are.
     pub on_face: &'a [bool],
-    /// Remainder between the cells: for each target, for each source; none, if empty.
+    /// Remainder between the cells, by target, then source; empty: none.
     pub smooth: &'a [Block],
 }
 
-/// What a solve found; the start of the next.
+/// Result of a solve, and start of the next one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
     /// Stored energy, J.
@@ -43,15 +43,15 @@ pub struct Contact {
     pub force_n: [f64; 3],
     /// Distance of the farthest cell in contact from the middle, in cells.
     pub reach: f64,
-    /// Largest change of a normal in the last step: zero in the limit.
+    /// Largest change of a normal in the last step; zero when converged.
     pub residual: f64,
     normals: Vec<[f64; 3]>,
     active: Vec<bool>,
 }
 
-/// Steps until a solve gives up.
+/// Maximum number of iterations.
 const MOST_STEPS: usize = 300;
-/// A solve ends when no normal turns by more, rad.
+/// Largest rotation of a normal at convergence, rad.
 const TOLERANCE: f64 = 1.0e-8;
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -63,7 +63,7 @@ fn times(block: &Block, v: [f64; 3]) -> [f64; 3] {
 }
 
 impl Patch {
-    /// A disc of cells. Not real-time.
+    /// Builds a disc of cells. Not real-time.
     #[must_use]
     pub fn new(solid: &HalfSpace, rings: i32) -> Self {
         let side = -rings..=rings;
@@ -77,7 +77,7 @@ impl Patch {
             .clone()
             .flat_map(|j| span.clone().map(move |i| [f64::from(i), f64::from(j)]))
             .map(|[i, j]| {
-                // Corners of the source, seen from the target.
+                // Corners of the source relative to the target.
                 let corner = |x: f64, y: f64| [x - i, y - j];
                 solid.polygon(&[corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)])
             })
@@ -85,19 +85,19 @@ impl Patch {
         Self { rings, cells, kernel }
     }
 
-    /// Cells from the middle to the rim.
+    /// Returns the number of cells from the middle to the rim.
     #[must_use]
     pub fn rings(&self) -> i32 {
         self.rings
     }
 
-    /// Number of cells.
+    /// Returns the number of cells.
     #[must_use]
     pub fn count(&self) -> usize {
         self.cells.len()
     }
 
-    /// Where the cells are relative to the middle, m.
+    /// Returns the positions of the cells relative to the middle, m.
     #[must_use]
     pub fn points_m(&self, cell_m: f64) -> Vec<[f64; 2]> {
         self.cells.iter().map(|cell| cell.map(|c| f64::from(c) * cell_m)).collect()
@@ -110,8 +110,8 @@ impl Patch {
         &self.kernel[j * (4 * self.rings as usize + 1) + i]
     }
 
-    /// Solves a contact. Starts from another one near by; without, from the shape of an undeformed contact, which a sphere
-    /// that is deeper than about half its radius does not come back from. Not real-time.
+    /// Solves a contact, starting from a nearby one. Without a start it begins with the undeformed contact, and does
+    /// not converge for a sphere deeper than about half its radius. Not real-time.
     #[must_use]
     pub fn solve(&self, problem: &Problem<'_>, start: Option<&Contact>) -> Contact {
         let count = self.cells.len();
@@ -201,7 +201,7 @@ impl Patch {
     }
 }
 
-/// Forces of the active cells that put each onto the sphere along its normal; cells that would pull are let off.
+/// Returns the forces that put each active cell onto the sphere along its normal; cells that would pull are deactivated.
 fn pressures(
     compliance: &[Block],
     count: usize,

@@ -1,17 +1,17 @@
-//! Smooth functions through tables: twice continuously differentiable cubics in one and three variables.
+//! Splines through tables: twice continuously differentiable cubics in one and three variables.
 
 use crate::jet::Jet;
 
-/// Slope of a spline at an end.
+/// End condition of a spline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// Zero: a mirror plane.
+    /// Zero slope, as on a mirror plane.
     Level,
-    /// That of the parabola through the last three nodes.
+    /// Slope of the parabola through the last three nodes.
     Parabola,
 }
 
-/// Slopes at the nodes of the spline through values: continuous second derivatives. At least three nodes. Not real-time.
+/// Returns the nodal slopes of the spline through values: continuous second derivatives. At least three nodes. Not real-time.
 #[must_use]
 pub fn slopes(nodes: &[f64], values: &[f64], ends: [End; 2]) -> Vec<f64> {
     let last = nodes.len() - 1;
@@ -45,12 +45,12 @@ pub fn slopes(nodes: &[f64], values: &[f64], ends: [End; 2]) -> Vec<f64> {
     right
 }
 
-/// The cell of a coordinate inside the nodes. Real-time: bounded, no allocation.
+/// Returns the cell of a coordinate inside the nodes. Real-time: bounded, no allocation.
 fn cell(nodes: &[f64], at: f64) -> usize {
     nodes[1..nodes.len() - 1].iter().take_while(|&&node| node <= at).count()
 }
 
-/// Hermite's four functions and their derivatives: value at the lower and upper node, slope at the lower and upper.
+/// Returns Hermite's four functions and their derivatives: value at the lower and upper node, slope at the lower and upper.
 fn hermite(nodes: &[f64], index: usize, at: f64) -> ([f64; 4], [f64; 4]) {
     let width = nodes[index + 1] - nodes[index];
     let s = (at - nodes[index]) / width;
@@ -61,7 +61,7 @@ fn hermite(nodes: &[f64], index: usize, at: f64) -> ([f64; 4], [f64; 4]) {
     )
 }
 
-/// A spline in one variable.
+/// Spline in one variable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     nodes: Vec<f64>,
@@ -70,21 +70,21 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Through values. Not real-time.
+    /// Interpolates values at nodes. Not real-time.
     #[must_use]
     pub fn new(nodes: Vec<f64>, values: Vec<f64>, ends: [End; 2]) -> Self {
         let slopes = slopes(&nodes, &values, ends);
         Self { nodes, values, slopes }
     }
 
-    /// Count, nodes and values: what [`Self::from_numbers`] reads. Not real-time.
+    /// Appends count, nodes and values, for [`Self::from_numbers`]. Not real-time.
     pub fn write_numbers(&self, numbers: &mut Vec<f64>) {
         numbers.push(self.nodes.len() as f64);
         numbers.extend(&self.nodes);
         numbers.extend(&self.values);
     }
 
-    /// Takes count, nodes and values off the front; `None` if they are not there. Not real-time.
+    /// Removes count, nodes and values from the front; `None` if incomplete. Not real-time.
     #[must_use]
     pub fn from_numbers(numbers: &mut &[f64], ends: [End; 2]) -> Option<Self> {
         let count = whole(take(numbers, 1)?[0])?;
@@ -92,7 +92,7 @@ impl Curve {
         Some(Self::new(nodes, take(numbers, count)?.to_vec(), ends))
     }
 
-    /// Value and derivative at a coordinate between the first and last node. Real-time: bounded, no allocation.
+    /// Returns value and derivative at a coordinate between the first and last node. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, coordinate: f64) -> (f64, f64) {
         let i = cell(&self.nodes, coordinate);
@@ -102,7 +102,7 @@ impl Curve {
         (sum(h), sum(d))
     }
 
-    /// Second derivative at a coordinate between the first and last node. Real-time: bounded, no allocation.
+    /// Returns the second derivative at a coordinate between the first and last node. Real-time: bounded, no allocation.
     #[must_use]
     pub fn curvature(&self, coordinate: f64) -> f64 {
         let i = cell(&self.nodes, coordinate);
@@ -114,29 +114,29 @@ impl Curve {
     }
 }
 
-/// The first of some numbers, which are taken off.
+/// Removes `count` numbers from the front and returns them; `None` if there are fewer.
 pub(crate) fn take<'a>(numbers: &mut &'a [f64], count: usize) -> Option<&'a [f64]> {
     let (front, rest) = numbers.split_at_checked(count)?;
     *numbers = rest;
     Some(front)
 }
 
-/// A number of nodes of a spline.
+/// Converts to a number of nodes; `None` unless whole and from 3 to 1000.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 3 to 1000
 pub(crate) fn whole(number: f64) -> Option<usize> {
     (number.fract() == 0.0 && (3.0..=1000.0).contains(&number)).then_some(number as usize)
 }
 
-/// A spline in three variables: at each node the value and its seven mixed first derivatives.
+/// Spline in three variables: value and seven mixed first derivatives at each node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
     nodes: [Vec<f64>; 3],
-    /// Bit `k` of the inner index: derivative along axis `k`. The first axis runs first.
+    /// Values by node, first axis first; bit `k` of the inner index: derivative along axis `k`.
     data: Vec<[f64; 8]>,
 }
 
 impl Volume {
-    /// Through values, first axis first. Not real-time.
+    /// Interpolates values at nodes, first axis first. Not real-time.
     #[must_use]
     pub fn new(nodes: [Vec<f64>; 3], values: &[f64], ends: [[End; 2]; 3]) -> Self {
         let counts = [0, 1, 2].map(|axis| nodes[axis].len());
@@ -157,7 +157,7 @@ impl Volume {
                     }
                     let at = |i: usize| start + i * strides[axis];
                     let line: Vec<f64> = (0..counts[axis]).map(|i| data[at(i)][known]).collect();
-                    // A derivative along another axis is level where the value is.
+                    // A derivative along another axis has the same end condition as the value.
                     for (i, slope) in slopes(&nodes[axis], &line, ends[axis]).into_iter().enumerate() {
                         data[at(i)][known | 1 << axis] = slope;
                     }
@@ -167,14 +167,14 @@ impl Volume {
         Self { nodes, data }
     }
 
-    /// Counts, nodes and values: what [`Self::from_numbers`] reads. Not real-time.
+    /// Appends counts, nodes and values, for [`Self::from_numbers`]. Not real-time.
     pub fn write_numbers(&self, numbers: &mut Vec<f64>) {
         numbers.extend(self.nodes.iter().map(|nodes| nodes.len() as f64));
         self.nodes.iter().for_each(|nodes| numbers.extend(nodes));
         numbers.extend(self.data.iter().map(|data| data[0]));
     }
 
-    /// Takes counts, nodes and values off the front; `None` if they are not there. Not real-time.
+    /// Removes counts, nodes and values from the front; `None` if incomplete. Not real-time.
     #[must_use]
     pub fn from_numbers(numbers: &mut &[f64], ends: [[End; 2]; 3]) -> Option<Self> {
         let mut counts = [0; 3];
@@ -190,14 +190,14 @@ impl Volume {
         Some(Self::new(nodes, values, ends))
     }
 
-    /// First and last node of an axis.
+    /// Returns the first and last node of an axis.
     #[must_use]
     pub fn range(&self, axis: usize) -> (f64, f64) {
         let nodes = &self.nodes[axis];
         (nodes[0], nodes[nodes.len() - 1])
     }
 
-    /// Value at coordinates between first and last nodes. Real-time: bounded, no allocation.
+    /// Returns the value at coordinates between first and last nodes. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, coordinates: [Jet; 3]) -> Jet {
         let cells = [0, 1, 2].map(|axis| cell(&self.nodes[axis], coordinates[axis].value));

@@ -1,4 +1,4 @@
-//! The remainder of a face, for any two points of it: values at a grid of points, and cubics through them.
+//! Remainder of a face between any two points: values at a grid of points with cubic interpolation.
 
 use crate::half_space::Block;
 use crate::remainder::{Face, Remainder};
@@ -6,20 +6,20 @@ use crate::remainder::{Face, Remainder};
 /// Remainder of a face between all pairs of a grid of points.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// Coordinates along `p` and `q`, m, ascending.
+    /// Grid coordinates along `p` and `q`, m, ascending.
     nodes_m: [Vec<f64>; 2],
-    /// For each source, for each target: displacement at the target of a unit force at the source, m/N. `p` runs first.
+    /// Displacement at a target under a unit force at a source, m/N; by source, then target, `p` first.
     blocks: Vec<Block>,
 }
 
-/// Nodes around a coordinate, and their shares: a cubic, or as many nodes as there are.
+/// Interpolation nodes around a coordinate with their weights: a cubic, or as many nodes as there are.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
     first: usize,
     shares: [f64; 4],
 }
 
-/// The cubic through the four nodes around a coordinate; constant outside the first and last.
+/// Returns the cubic through the four nodes around a coordinate; constant outside the first and last.
 #[must_use]
 pub fn window(nodes: &[f64], coordinate: f64) -> Window {
     let count = nodes.len().min(4);
@@ -36,15 +36,15 @@ pub fn window(nodes: &[f64], coordinate: f64) -> Window {
     Window { first, shares }
 }
 
-/// Both signs of non-negative coordinates, ascending.
+/// Returns both signs of non-negative coordinates, ascending.
 fn mirrored(half: &[f64]) -> Vec<f64> {
     let negative = half.iter().rev().filter(|&&x| x > 0.0).map(|x| -x);
     negative.chain(half.iter().copied()).collect()
 }
 
 impl Table {
-    /// Solves for all points. `half_m` are coordinates in the quarter of positive x and y: along `p` from zero on, along `q`
-    /// from zero on (top) or all of them (a side). Not real-time.
+    /// Solves for all pairs of points. `half_m`: coordinates in the quarter of positive x and y; along `p` from zero
+    /// on, along `q` from zero on (top) or all of them (a side). Not real-time.
     #[must_use]
     pub fn new(remainder: &Remainder, face: Face, half_m: [&[f64]; 2]) -> Self {
         let quarter: Vec<[f64; 2]> =
@@ -53,7 +53,7 @@ impl Table {
         let nodes_m =
             [mirrored(half_m[0]), if face == Face::Top { mirrored(half_m[1]) } else { half_m[1].to_vec() }];
         let count = [nodes_m[0].len(), nodes_m[1].len()];
-        // Where a signed coordinate is found in the quarter.
+        // Returns index in the quarter and sign of a signed coordinate.
         let fold = |k: usize, index: usize| {
             let zeros = count[k] - half_m[k].len();
             if index >= zeros { (index - zeros, 1.0) } else { (half_m[k].len() - 1 - index, -1.0) }
@@ -66,7 +66,7 @@ impl Table {
             for target in 0..total {
                 let (tp, side_p) = fold(0, target % count[0]);
                 let (tq, side_q) = fold(1, target / count[0]);
-                // Both mirrored so that the source lies in the quarter; the target may then lie in another.
+                // Mirror both so that the source lies in the quarter; the target may then lie in another.
                 let (x, y) = match face {
                     Face::Top => (flip_p * side_p, flip_q * side_q),
                     Face::SideX => (1.0, flip_p * side_p),
@@ -87,8 +87,8 @@ impl Table {
         table
     }
 
-    /// Of the answers at all points of a grid (`p` first) to forces at all of them: for each source, for each target. Not
-    /// real-time.
+    /// Builds a table from the answers at all points of a grid (`p` first) to forces at all of them: by source, then
+    /// target. Not real-time.
     #[must_use]
     pub fn of(nodes_m: [Vec<f64>; 2], answers: &[Vec<Block>]) -> Self {
         let mut table = Self { nodes_m, blocks: answers.concat() };
@@ -99,7 +99,7 @@ impl Table {
     fn make_reciprocal(&mut self) {
         let total = self.nodes_m[0].len() * self.nodes_m[1].len();
         let blocks = &mut self.blocks;
-        // Betti: what the one does at the other is what the other does at the one. Elements and quadrature break it by little.
+        // Betti's reciprocity: the mutual displacements are equal. Elements and quadrature violate it slightly; take the mean.
         for source in 0..total {
             for target in 0..=source {
                 let (one, two) = (blocks[source * total + target], blocks[target * total + source]);
@@ -114,14 +114,14 @@ impl Table {
         }
     }
 
-    /// Remainder between all pairs of these points, m/N: for each target, for each source. Not real-time.
+    /// Interpolates the remainder between all pairs of points, m/N, by target, then source. Not real-time.
     #[must_use]
     pub fn among(&self, points_m: &[[f64; 2]]) -> Vec<Block> {
         let count = self.nodes_m[0].len();
         let total = count * self.nodes_m[1].len();
         let windows: Vec<[Window; 2]> =
             points_m.iter().map(|at| [0, 1].map(|k| window(&self.nodes_m[k], at[k]))).collect();
-        // Only nodes that some point needs.
+        // Collect only nodes that some point needs.
         let mut used = vec![usize::MAX; total];
         let mut nodes = Vec::new();
         let mut shares: Vec<Vec<(usize, f64)>> = Vec::with_capacity(points_m.len());
@@ -139,7 +139,7 @@ impl Table {
             }
             shares.push(own);
         }
-        // First the sources, then the targets.
+        // Interpolate over the sources first, then over the targets.
         let mut half = vec![[[0.0; 3]; 3]; nodes.len() * points_m.len()];
         for (node, &target) in nodes.iter().enumerate() {
             for (point, own) in shares.iter().enumerate() {

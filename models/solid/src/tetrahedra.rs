@@ -1,9 +1,9 @@
-//! Linear tetrahedra, as most deformable models have them: only to compare with. Bending locks in them.
+//! Linear tetrahedra, common in deformable models: for comparison only, because they lock in bending.
 
 use crate::dissection::{Assembly, GridStiffness};
 use crate::grid::{Grid, Lame};
 
-/// A grid of order one whose cells are six tetrahedra each, about one diagonal.
+/// Grid of order one whose cells are six tetrahedra each, about one diagonal.
 #[derive(Clone, Debug)]
 pub struct Tetrahedra<'a> {
     cells: GridStiffness<'a>,
@@ -11,12 +11,12 @@ pub struct Tetrahedra<'a> {
     lame: Lame,
 }
 
-/// Corners of a cell along the edges from the first corner to the last, in six orders of the axes; bit `k` is the axis.
+/// Corners of a cell along the edges from the first to the last, for six permutations of the axes; bit `k` is the axis.
 const PATHS: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
 
 impl<'a> Tetrahedra<'a> {
-    /// On a grid of order one. Not real-time.
+    /// Divides a grid of order one. Not real-time.
     #[must_use]
     pub fn new(grid: &'a Grid, lame: Lame) -> Self {
         Self { cells: GridStiffness::new(grid, lame), grid, lame }

@@ -1,12 +1,12 @@
-//! Many independent poses at once: the fast path for sweeps and tables.
+//! Vectorised evaluation of many independent poses, for sweeps and tables.
 //!
-//! Poses come one after the other; a vector register wants the same component of several. So as many poses as two
-//! registers have lanes are read, half a pose a register, and turned over inside the registers, four by four, into one
-//! register a component; the law runs over them; and the answers are turned back and written, in one pass and with nothing
-//! in memory between. The law is the very code the servo runs, over [`Wide`] instead of `f64`: the
+//! Poses are stored one after the other; a vector register needs the same component of several poses. So as many poses
+//! as two registers have lanes are read, half a pose per register, and transposed inside the registers, four by four,
+//! into one register per component; the law runs over these; and the outputs are transposed back and written, in one
+//! pass without intermediate memory. The law is the very code of the servo, over [`Wide`] instead of `f64`: the
 //! results, and the status of every pose, are those of single steps, *bit for bit*.
 //!
-//! The instruction set is found when the [`Batch`] is made (AVX-512, AVX2, NEON, or one number at a time).
+//! The instruction set is detected when the [`Batch`] is created (AVX-512, AVX2, NEON, or scalar).
 
 use flotor_hal::{Input, Output, StepStatus, Wrench};
 use pulp::{Arch, Simd, WithSimd, bytemuck};
@@ -19,12 +19,12 @@ use flotor_lanes::{Pair, Real, Vector, Wide};
 /// Lanes of two of the widest registers, a multiple of those of the others.
 const MOST_LANES: usize = 16;
 
-/// What a lane says about its answer, as the numbers that lanes hold.
+/// Status of a lane's answer, as numbers in lanes.
 const ANSWERED: f64 = 0.0;
 const CLAMPED: f64 = 1.0;
 const UNANSWERED: f64 = 2.0;
 
-/// Evaluates laws at many poses.
+/// Evaluator of laws at many poses, with a given instruction set.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch {
     instructions: Arch,
@@ -37,20 +37,20 @@ impl Default for Batch {
 }
 
 impl Batch {
-    /// With the best instruction set of this machine. Not real-time.
+    /// Uses the best instruction set of this machine. Not real-time.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// With a given instruction set, to compare them.
+    /// Uses a given instruction set, for comparisons.
     #[must_use]
     pub fn on(instructions: Arch) -> Self {
         Self { instructions }
     }
 
-    /// One answer per input, as by single steps; surplus of either slice is left alone. Real-time per pose:
-    /// bounded, no allocation.
+    /// Computes one output per input, equal to single steps; surplus elements of either slice stay unchanged. Real-time
+    /// per pose: bounded, no allocation.
     pub fn respond<L: Law>(&self, law: &L, inputs: &[Input], outputs: &mut [Output]) {
         let count = inputs.len().min(outputs.len());
         let whole = count - count % MOST_LANES;
@@ -81,7 +81,7 @@ impl<L: Law> WithSimd for Rows<'_, L> {
         let Self { law, inputs, outputs } = self;
         let lanes = 2 * S::F64_LANES;
         for (inputs, outputs) in inputs.chunks_exact(lanes).zip(outputs.chunks_exact_mut(lanes)) {
-            // The widest demand serves all; narrower ones get their share of it.
+            // Compute the widest demand for all lanes; `amend` reduces the others.
             let first = &inputs[0];
             let is_common =
                 inputs.iter().fold(true, |is_common, input| is_common & (input.demand == first.demand));
@@ -94,7 +94,7 @@ impl<L: Law> WithSimd for Rows<'_, L> {
             };
             put(simd, &Answer { energy_j, ..answer }, outputs);
             if !is_common || Pair::<Wide<S>>::any(verdict.above(ANSWERED)) {
-                // Turned back like the answers: lanes need not be in the order of the poses.
+                // Transposed back like the answers: lanes need not be in the sequence of the poses.
                 let (first, second) = ([verdict.0.lanes(); 4], [verdict.1.lanes(); 4]);
                 let turned = [simd.interleave_shfl_f64s(first), simd.interleave_shfl_f64s(second)];
                 amend(inputs, outputs, bytemuck::cast_slice(&turned));
@@ -103,13 +103,13 @@ impl<L: Law> WithSimd for Rows<'_, L> {
     }
 }
 
-/// What all of them together demand.
+/// Returns the union of the demands of all inputs.
 #[cold]
 fn widest(inputs: &[Input]) -> Demand {
     inputs.iter().map(contract::demand).max().unwrap_or(Demand::Force)
 }
 
-/// Poses, one in each lane of two registers.
+/// Loads poses, one into each lane of two registers.
 #[inline(always)]
 fn coordinates<S: Simd>(simd: S, inputs: &[Input]) -> Coordinates<Pair<Wide<S>>> {
     let (first, second) = inputs.split_at(S::F64_LANES);
@@ -122,7 +122,7 @@ fn coordinates<S: Simd>(simd: S, inputs: &[Input]) -> Coordinates<Pair<Wide<S>>>
     }
 }
 
-/// Position x, y, z and orientation x, y, z, w of a register of poses.
+/// Loads position x, y, z and orientation x, y, z, w of a register of poses.
 #[inline(always)]
 fn components<S: Simd>(simd: S, inputs: &[Input]) -> [S::f64s; 7] {
     let mut halves = [[simd.splat_f64s(0.0); 4]; 2];
@@ -131,7 +131,7 @@ fn components<S: Simd>(simd: S, inputs: &[Input]) -> [S::f64s; 7] {
     let orientations: &mut [[f64; 4]] = bytemuck::cast_slice_mut(orientations);
     for ((position, orientation), input) in positions.iter_mut().zip(orientations).zip(inputs) {
         let ([x, y, z], [next, ..]) = (input.pose.position_m, input.pose.orientation_xyzw);
-        // Four neighbours in memory are one load.
+        // One load of four adjacent numbers; the fourth is unused.
         *position = [x, y, z, next];
         *orientation = input.pose.orientation_xyzw;
     }
@@ -141,7 +141,7 @@ fn components<S: Simd>(simd: S, inputs: &[Input]) -> [S::f64s; 7] {
     [x, y, z, qx, qy, qz, qw]
 }
 
-/// What each lane says about its answer.
+/// Returns the status of each lane's answer.
 #[inline(always)]
 fn verdict<R: Real>(answer: &Answer<R>) -> R {
     let like = answer.energy_j;
@@ -149,7 +149,7 @@ fn verdict<R: Real>(answer: &Answer<R>) -> R {
     R::select(answer.answered, trust, like.like(UNANSWERED))
 }
 
-/// Writes answers, one from each lane of two registers, all of them as good ones.
+/// Writes outputs, one from each lane of two registers, all with status `Ok`.
 #[inline(always)]
 fn put<S: Simd>(simd: S, answer: &Answer<Pair<Wide<S>>>, outputs: &mut [Output]) {
     let Answer { force_n: force, torque_nm: torque, energy_j, .. } = answer;
@@ -160,7 +160,7 @@ fn put<S: Simd>(simd: S, answer: &Answer<Pair<Wide<S>>>, outputs: &mut [Output])
     put_register(simd, numbers, second);
 }
 
-/// The same from one register: force, torque, energy.
+/// Writes outputs from one register: force, torque, energy.
 #[inline(always)]
 fn put_register<S: Simd>(simd: S, numbers: [Wide<S>; 7], outputs: &mut [Output]) {
     let [fx, fy, fz, tx, ty, tz, energy_j] = numbers;
@@ -176,7 +176,7 @@ fn put_register<S: Simd>(simd: S, numbers: [Wide<S>; 7], outputs: &mut [Output])
     }
 }
 
-/// Says where an answer is less than good or none at all, and takes away what an input has not demanded.
+/// Sets the status of clamped and unanswered outputs, and removes parts that an input has not demanded.
 #[cold]
 fn amend(inputs: &[Input], outputs: &mut [Output], verdicts: &[[f64; 4]]) {
     for ((input, output), [verdict, ..]) in inputs.iter().zip(outputs).zip(verdicts) {

@@ -1,4 +1,4 @@
-//! The linear beam-column: how an axially loaded rod resists rotation of its ends.
+//! Linear beam-column: resistance of an axially loaded rod to rotation of its ends.
 //!
 //! Both ends of the rod are turned, by `psi_U` above and `psi_L` below, relative to the straight line between
 //! them (the chord). The thesis writes `M_U = a psi_U + b psi_L` and `M_L = -(a psi_L + b psi_U)`. Two shapes
@@ -6,8 +6,8 @@
 //! - **sway**, both ends turned alike: an S shape, stiffness `a + b`, in equilibrium with a transverse force;
 //! - **bow**, ends turned against each other: a C shape, stiffness `a - b`, in pure bending.
 //!
-//! Axial compression softens both, to zero (the rod buckles in a C) and beyond. How far is told by the
-//! *stability functions* of column theory ([`flotor_lanes::stability`]), quotients of the entire functions of [`flotor_lanes::entire`] in
+//! Axial compression softens both, to zero (the rod buckles in a C) and beyond, as given by the *stability functions*
+//! of column theory ([`flotor_lanes::stability`]), quotients of the entire functions of [`flotor_lanes::entire`] in
 //! `z = (q L)² / 4`, with the thesis's buckling factor `q` (equation 19).
 
 use crate::rigidity::Rigidities;
@@ -16,15 +16,15 @@ use flotor_lanes::entire::EntireFunctions;
 use flotor_lanes::saturation::saturate_above;
 use flotor_lanes::stability::StabilityFunctions;
 
-/// Argument from which on a law of the linear column is not trusted, rounded down: `G0` is 0.3, and its torque 3 to 5 % wrong
-/// (spring 3).
+/// Argument above which a law of the linear column is not trusted, rounded down: `G0` is 0.3, and its torque 3 to 5 %
+/// wrong (spring 3).
 pub const TRUSTED_ARGUMENT: f64 = 5.552;
 
 /// Largest excess of the saturated argument of a closed form: `G0` stays above 0.175 and the bow stiffness above -5.1 times that
 /// of the unloaded rod, short of the pole at 9.87.
 const REACH: f64 = 1.5;
 
-/// The closed form's rod, its constants prepared.
+/// Prepared constants of the closed form's rod.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
     /// `2 alpha`
@@ -38,7 +38,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// Prepares the rod. Real-time: bounded, no allocation.
+    /// Prepares the constants. Real-time: bounded, no allocation.
     #[must_use]
     pub fn new(rigidities: &Rigidities) -> Self {
         Self {
@@ -49,15 +49,15 @@ impl Column {
         }
     }
 
-    /// End stiffnesses under an axial force, at a length. Real-time: bounded, no allocation.
+    /// Returns the end stiffnesses under an axial force, at a length. Real-time: bounded, no allocation.
     ///
-    /// `reference_m` is the length that `alpha` and `beta` are counted per:
+    /// `reference_m` is the length to which `alpha` and `beta` refer:
     /// - the current length itself gives the thesis's law (equations 19, 48, 49, 71, 72, 76 in one), which takes
     ///   the rigidities of the unloaded rod although the rod has become `length_m` long;
     /// - the free length gives the law per *current* length: the coils that filled `L0` now fill `L`, so `alpha`
     ///   and `beta` shrink by `L / L0` (Haringx). It is the exact linearisation of the exact rod.
     ///
-    /// With `l` for it and `Lam = L + l P / beta`:
+    /// With `l` for `reference_m` and `Lam = L + l P / beta`:
     ///
     /// ```text
     /// z = P Lam l / (4 alpha)      a - b = (2 alpha / l) C0 / G0
@@ -69,8 +69,8 @@ impl Column {
         self.ends_with(axial_force_n, length_m, reference_m, |argument| argument)
     }
 
-    /// The same with the argument saturated short of the pole, from [`TRUSTED_ARGUMENT`] on: bounded wherever `Lam` is positive.
-    /// Real-time: bounded, no allocation.
+    /// Returns the end stiffnesses with the argument saturated short of the pole, from [`TRUSTED_ARGUMENT`] on: bounded
+    /// wherever `Lam` is positive. Real-time: bounded, no allocation.
     #[inline(always)]
     #[must_use]
     pub fn bounded_ends<R: Real>(&self, axial_force_n: R, length_m: R, reference_m: R) -> EndStiffness<R> {
@@ -122,7 +122,7 @@ pub struct EndStiffness<R = f64> {
     pub bow_nm_per_rad: R,
     /// `(a + b) / L` (N/rad): transverse force per sum of the end angles.
     pub sway_n_per_rad: R,
-    /// `Lam` (m); where it is not positive, the rod has no shear stiffness left, and the above means nothing.
+    /// `Lam` (m); where it is not positive, the rod has no shear stiffness, and the stiffnesses are meaningless.
     pub sheared_m: R,
     /// The argument `z = (q L)² / 4` of the load, not saturated; `pi²` is the first pole of the bow.
     pub argument: R,

@@ -22,20 +22,20 @@ use flotor_lanes::angle::SquaredAngle;
 use flotor_lanes::saturation::{Saturated, saturate_above};
 use flotor_lanes::stability::StabilityFunctions;
 
-/// Argument `z` from which on it saturates below the pole at 9.87, where the column buckles. Here
-/// `G0 = 0.062` and the bow stiffness is -16 times that of the unloaded rod.
+/// Argument `z` at which its saturation begins, below the pole at 9.87, where the column buckles. Here `G0 = 0.062` and
+/// the bow stiffness is -16 times that of the unloaded rod.
 pub const KNEE: f64 = 8.75;
 
-/// How much further `z` can get: to 9.25 at most (`G0 = 0.033`, bow stiffness -30 times).
+/// Largest excess of the saturated `z`, which stays below 9.25 (`G0 = 0.033`, bow stiffness -30 times).
 pub const REACH: f64 = 0.5;
 
-/// The argument kept short of the pole.
+/// Saturates the argument short of the pole.
 #[inline(always)]
 pub(crate) fn saturated_argument<R: Real>(z: R) -> Saturated<R> {
     saturate_above(z, KNEE, REACH)
 }
 
-/// Bending of one spring, its constants prepared.
+/// Prepared constants of the bending of one spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bending {
     /// `2 alpha / L0`: bow stiffness without load.
@@ -56,7 +56,7 @@ impl Bending {
         Self::with_quartic(spring, Quartic::new(spring))
     }
 
-    /// The bending of a spring of other stiffness but equal proportions. Real-time: bounded, no allocation.
+    /// Returns the bending of a spring of other stiffness but equal proportions. Real-time: bounded, no allocation.
     pub(crate) fn restiffened(&self, spring: &Spring) -> Self {
         Self::with_quartic(spring, self.quartic.with_gamma(spring.rigidities().gamma_n))
     }
@@ -75,14 +75,14 @@ impl Bending {
         }
     }
 
-    /// `Lam` (m). Where it is not positive, possible only for `G > E`, the rod has no shear stiffness left and there is no
-    /// bending. Real-time: bounded, no allocation.
+    /// Returns `Lam` (m). Where `Lam` is not positive, possible only for `G > E`, the rod has no shear stiffness and
+    /// there is no bending. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(crate) fn sheared_length_m<R: Real>(&self, length_m: R, shortening_m: R) -> R {
         length_m + shortening_m * self.shear_compliance
     }
 
-    /// Energy and derivatives at a chord length and shortening, and at the three squared angles. Real-time:
+    /// Returns energy and derivatives at a chord length and shortening, and at the three squared angles. Real-time:
     /// bounded, no allocation.
     #[inline(always)]
     pub(crate) fn at<R: Real>(
@@ -91,7 +91,7 @@ impl Bending {
         shortening_m: R,
         angles: &[SquaredAngle<R>; 3],
     ) -> BendingEnergy<R> {
-        // First what needs no more than the length: it is done while the argument is on its way.
+        // Terms of the length alone first: they are computed during the latency of the argument.
         let form = self.quartic.form_at(length_m);
         let sheared_length_m = self.sheared_length_m(length_m, shortening_m);
         let sheared_slope = length_m.like(1.0 - self.shear_compliance);
@@ -131,18 +131,18 @@ impl Bending {
     }
 }
 
-/// The energy and its partial derivatives.
+/// Energy of bending and its partial derivatives.
 #[derive(Clone, Copy)]
 pub(crate) struct BendingEnergy<R: Real> {
     pub(crate) energy_j: R,
-    /// By the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
+    /// Derivatives by the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
     pub(crate) by_squares: [R; 3],
-    /// By the length of the chord.
+    /// Derivative by the length of the chord.
     pub(crate) by_length: R,
-    /// `kt`, see the module.
+    /// Writhe `kt`, see the module.
     pub(crate) writhe: R,
-    /// Its derivative by the length of the chord.
+    /// Derivative of the writhe by the length of the chord.
     pub(crate) writhe_slope: R,
-    /// Where the argument was kept short of the pole.
+    /// Lanes in which the argument was saturated short of the pole.
     pub(crate) saturated: R::Mask,
 }

@@ -1,11 +1,11 @@
 //! The shape of the spring between its plates, for drawing.
 //!
-//! The thesis draws the coil around the bent axis of its beam-column (equations 37 and 61), with an end slope
-//! that does not meet the plates it is drawn between. Here the axis is the same linear beam-column in the form
-//! per current length (as in [`crate::energy`]), in space instead of in two planes, and exact at its ends: the
-//! first section lies in the lower plate and the last one in the upper plate, in position and orientation, at
-//! every pose. Between them it is the exact rod's shape to first order in the angles, see [`crate::shape`]
-//! (where the bending energy levels off short of buckling, so does the shape).
+//! The thesis draws the coil around the bent axis of its beam-column (equations 37 and 61), with an end slope that does
+//! not match the drawn plates. Here the axis is the same linear beam-column in the form per current length (as in
+//! [`crate::energy`]), in space instead of in two planes, and exact at its ends: the first section lies in the lower
+//! plate and the last one in the upper plate, in position and orientation, at every pose. Between the plates the axis
+//! is the exact rod's shape to first order in the angles, see [`crate::shape`] (where the bending energy saturates
+//! short of buckling, so does the shape).
 
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::math;
@@ -19,7 +19,7 @@ use flotor_lanes::entire::EntireFunctions;
 /// The coil wound around the centerline, for drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Helix {
-    /// From the centerline to the centre of the wire (m), `D / 2`.
+    /// Distance from the centerline to the centre of the wire (m), `D / 2`.
     pub coil_radius_m: f64,
     /// Radius of the wire (m), `d / 2`.
     pub wire_radius_m: f64,
@@ -28,7 +28,7 @@ pub struct Helix {
 }
 
 impl Helix {
-    /// The coil of a spring.
+    /// Returns the coil of a spring.
     #[must_use]
     pub fn new(geometry: &Geometry) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl Helix {
 pub struct Section {
     /// Centre, in the model frame (m).
     pub center_m: DVec3,
-    /// Rotation from rest; the z axis turned by it is the normal of the section.
+    /// Rotation from rest; its z axis is the normal of the section.
     pub orientation: DQuat,
 }
 
@@ -54,7 +54,7 @@ pub struct Centerline {
     lower_plate_m: DVec3,
     chord_m: DVec3,
     direction: DVec3,
-    /// Shortest turn from upright to the chord.
+    /// Shortest rotation from upright to the chord.
     upright_to_chord: DQuat,
     /// Half sum and half difference of the lean of the end normals (rad), vectors across the chord.
     sway_rad: DVec3,
@@ -64,8 +64,8 @@ pub struct Centerline {
 }
 
 impl Centerline {
-    /// The axis at a pose; `None` where the pose has no answer (see [`EnergyForm::respond`]) or a plate faces
-    /// straight along the chord the wrong way. Not real-time.
+    /// Computes the axis at a pose; `None` if the pose has no answer (see [`EnergyForm::respond`]) or a plate faces
+    /// exactly against the chord. Not real-time.
     ///
     /// [`EnergyForm::respond`]: crate::energy::EnergyForm::respond
     #[must_use]
@@ -77,9 +77,9 @@ impl Centerline {
         let lower_lean = lean(direction, DVec3::Z)?;
         let upper_lean = lean(direction, orientation * DVec3::Z)?;
         let upright_to_chord = quaternion(direction.cross(lower_lean)).conjugate();
-        // What is left of the upper plate's rotation is about the axis.
+        // The remaining rotation of the upper plate is about the axis.
         let rest = (quaternion(direction.cross(upper_lean)) * upright_to_chord).conjugate() * orientation;
-        // Short of the pole, and of tension so strong that all bending is at the ends.
+        // Limit the argument short of the pole, and of tension so strong that all bending is at the ends.
         let argument = Shape::argument(spring.rigidities(), free_length_m, chord.length_m)?;
         let argument = saturated_argument(argument).value.max(EntireFunctions::MIN_ARGUMENT);
         Some(Self {
@@ -94,8 +94,8 @@ impl Centerline {
         })
     }
 
-    /// The section that carries the fraction `s` of the coils, 0 at the lower plate and 1 at the upper; other
-    /// values are moved to the nearer end. Not real-time.
+    /// Returns the section at the fraction `s` of the coils, 0 at the lower plate and 1 at the upper; other values are
+    /// clamped. Not real-time.
     #[must_use]
     pub fn section(&self, s: f64) -> Section {
         #[allow(clippy::manual_clamp)] // clamp would let NaN through
@@ -114,7 +114,7 @@ impl Centerline {
     }
 }
 
-/// Vector across `from` that leads along the great circle to `to` (rad); `None` for opposite directions.
+/// Returns the rotation along the great circle from `from` to `to`, as a vector across `from` (rad); `None` for opposite directions.
 fn lean(from: DVec3, to: DVec3) -> Option<DVec3> {
     let (cosine, across) = (from.dot(to), to - from.dot(to) * from);
     let sine = across.length();

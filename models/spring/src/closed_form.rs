@@ -6,11 +6,10 @@
 //! buckling point that is not there. [`ClosedForm`] evaluates the same law through entire functions: one smooth
 //! expression for compression, rest and elongation.
 //!
-//! [`Form::Printed`] keeps what the source does, right or wrong: rigidities per unloaded length and the sum
-//! `M_U + M_L` as the torque on the hand. It is there for comparison; it creates energy on closed paths.
-//! [`Form::CurrentLength`] corrects these two and is the exact linearisation of the rod in each plane. Both
-//! keep the two successive rotations, so neither is conservative in space: that is what
-//! [`energy`](crate::energy) is for.
+//! [`Form::Printed`] reproduces the source, errors included: rigidities per unloaded length and the sum `M_U + M_L` as
+//! the torque on the hand. It is for comparison only: it generates energy on closed paths. [`Form::CurrentLength`]
+//! corrects both errors and is the exact linearisation of the rod in each plane. Both forms have the two successive
+//! rotations, so neither is conservative in space; [`energy`](crate::energy) is.
 //!
 //! In the source's letters X, Z are horizontal and Y is vertical; here x = X, y = Z, z = Y. Its tilt angles
 //! enter as `psi_Uz = psi_Lz - ry` and `psi_Ux = psi_Lx + rx` with the right-handed rotation vector (rx, ry, rz).
@@ -23,12 +22,12 @@ use crate::rigidity::Spring;
 use flotor_lanes::arctangent;
 use flotor_lanes::{Pair, Real, Vector};
 
-/// Which closed form.
+/// Kind of closed form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Form {
-    /// As printed (variant `closed-form`).
+    /// Printed form (variant `closed-form`).
     Printed,
-    /// Rigidities scaled by `L / L0`, torque `M_U` (variant `current-length`).
+    /// Printed form corrected: rigidities scaled by `L / L0`, torque `M_U` (variant `current-length`).
     CurrentLength,
 }
 
@@ -44,7 +43,7 @@ pub struct ClosedForm {
 }
 
 impl ClosedForm {
-    /// Prepares the law, in double. Real-time: bounded, no allocation.
+    /// Prepares the law, in double precision. Real-time: bounded, no allocation.
     #[must_use]
     pub fn new(spring: &Spring, form: Form) -> Self {
         let rigidities = spring.rigidities();
@@ -59,17 +58,17 @@ impl ClosedForm {
         }
     }
 
-    /// The same law with its numbers stored otherwise. Single costs up to 1e-5 N in the workspace of the thesis.
-    /// Real-time: bounded, no allocation.
+    /// Sets the storage precision. Single precision costs up to 1e-5 N in the workspace of the thesis. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn with_precision(self, precision: Precision) -> Self {
         Self { precision, ..self }
     }
 
-    /// Wrench on the hand at a pose; this law has no energy. Real-time: bounded, no allocation.
+    /// Returns the wrench on the hand at a pose; this law has no energy. Real-time: bounded, no allocation.
     ///
     /// Total over all poses:
-    /// - past the solid length the law goes on, it knows no coil contact;
+    /// - past the solid length the law continues, without coil contact;
     /// - upper plate not above the lower one: the formulas are continued, [`Validity::Clamped`](crate::validity::Validity);
     /// - near buckling (`G0` below 0.3) and past it: the argument is saturated short of the pole, so that the wrench stays
     ///   bounded, [`Validity::Clamped`](crate::validity::Validity);
@@ -129,7 +128,7 @@ impl ClosedForm {
         } else {
             Vector::new(zero, zero, zero)
         };
-        // Overflow is no answer. One sum instead of six tests: it is finite only if every term is.
+        // Overflow gives no answer. One sum instead of six tests: the sum is finite only if every term is.
         let sum = (force_n.x + force_n.y + force_n.z) + (torque_nm.x + torque_nm.y + torque_nm.z);
         Answer {
             force_n,
@@ -153,12 +152,12 @@ impl Law for ClosedForm {
     }
 }
 
-/// The two vertical planes x, z and y, z: in each the chord's projection and the ends of the rod.
+/// Chord projection and end angles in the two vertical planes x, z and y, z.
 #[derive(Clone, Copy)]
 struct Planes<R> {
     /// Sine of the chord's inclination `psi_L`.
     sine: Pair<R>,
-    /// Cosine of it.
+    /// Cosine of `psi_L`.
     cosine: Pair<R>,
     /// `psi_U - psi_L` (rad): minus the tilt of the upper plate towards the positive side.
     tilt_rad: Pair<R>,
@@ -171,7 +170,7 @@ impl<R: Real> Planes<R> {
     fn new<S: Storage>(sideways_m: Pair<R>, height_m: R, tilt_rad: Pair<R>) -> Self {
         let height_m = Pair(height_m, height_m);
         let square = sideways_m * sideways_m + height_m * height_m;
-        // A chord square to the plane has no inclination in it: call it upright.
+        // A chord perpendicular to a plane has no inclination in that plane: treat the chord as upright.
         let nowhere = square.below(f64::MIN_POSITIVE);
         let (square, height_m) = if Pair::<R>::any(nowhere) {
             let unit = height_m.like(1.0);
@@ -186,8 +185,8 @@ impl<R: Real> Planes<R> {
         let per_length = base_m * inverse;
         let tangent = sideways_m * (length_m * inverse);
         let to_vertical_rad = tangent * 2.0 * arctangent::quotient(tangent * tangent);
-        // Below the lower plate, from the vertical down: angles stay within a right one, and nothing jumps where the chord
-        // hangs straight.
+        // Below the lower plate, measured from the vertical down: angles stay below 90 degrees, without a jump where
+        // the chord hangs straight.
         let inclination_rad = S::store(to_vertical_rad);
         Self {
             sine: S::store(sideways_m * per_length),
@@ -198,7 +197,7 @@ impl<R: Real> Planes<R> {
     }
 }
 
-/// Components across and along the chord to horizontal and vertical.
+/// Rotates components across and along the chord to horizontal and vertical.
 #[inline(always)]
 fn turn<R: Real>(across: R, along: R, sine: R, cosine: R) -> (R, R) {
     (across * cosine + along * sine, along * cosine - across * sine)

@@ -1,7 +1,7 @@
-//! Coils that touch: a spring cannot be shorter than its coils are thick.
+//! Contact of the coils: a spring cannot be shorter than its solid length.
 //!
-//! For the law `energy`, which knows the spring by its length alone: `W += (k/2) <n d - L>²`, a stiff spring along the
-//! chord from where `n` coils of the thickness `d` lie on each other. The rod has contact along its bulge as well, in
+//! For the law `energy`, which depends on the length alone: `W += (k/2) <n d - L>²`, a stiff spring along the chord
+//! from the length at which all `n` coils of the thickness `d` touch. The rod has contact along its bulge as well, in
 //! [`crate::rod`].
 
 use crate::pose::Pose;
@@ -13,12 +13,12 @@ use crate::rod::contact::STIFFNESS_N_PER_M;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxialContact {
     free_length_m: f64,
-    /// What it can be shortened by until all coils touch, `L0 - n d`.
+    /// Shortening at which all coils touch (m), `L0 - n d`.
     gap_m: f64,
 }
 
 impl AxialContact {
-    /// Real-time: bounded, no allocation.
+    /// Prepares the contact of a spring. Real-time: bounded, no allocation.
     #[must_use]
     pub fn new(spring: &Spring) -> Self {
         let geometry = spring.geometry();
@@ -28,7 +28,7 @@ impl AxialContact {
         }
     }
 
-    /// The response at a pose, with contact. Real-time: bounded, no allocation.
+    /// Returns the response at a pose with the contact force added. Real-time: bounded, no allocation.
     #[must_use]
     pub fn added_to(&self, response: &Response, pose: &Pose) -> Response {
         let Ok(chord) = pose.chord(self.free_length_m) else { return *response };

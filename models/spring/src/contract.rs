@@ -1,4 +1,4 @@
-//! Between the contract's types and those of the laws.
+//! Conversions between the types of the plugin contract and of the laws.
 
 use flotor_hal::{Input, Output, StepStatus, Wrench};
 use pulp::NullaryFnOnce;
@@ -7,13 +7,13 @@ use crate::pose::Pose;
 use crate::response::{Demand, Law, Response};
 use crate::validity::Validity;
 
-/// The pose of a step.
+/// Returns the pose of a step's input.
 #[inline]
 pub(crate) fn pose(input: &Input) -> Pose {
     Pose { position_m: input.pose.position(), orientation: input.pose.orientation() }
 }
 
-/// The demand of a step.
+/// Returns the demand of a step's input.
 #[inline]
 pub(crate) fn demand(input: &Input) -> Demand {
     if input.demand.contains(flotor_hal::Demand::ENERGY) {
@@ -25,14 +25,14 @@ pub(crate) fn demand(input: &Input) -> Demand {
     }
 }
 
-/// A step of a law that answers from the pose alone. Real-time: bounded, no allocation.
+/// Evaluates one step of a stateless law. Real-time: bounded, no allocation.
 #[inline]
 #[must_use]
 pub fn step<L: Law>(law: &L, input: &Input) -> Output {
     with_all_instructions(Step { law, input })
 }
 
-/// Computes with the instructions of the machine that it runs on. The bits are the same.
+/// Runs a computation with the best instruction set of this machine. The result is the same to the bit.
 #[inline]
 pub(crate) fn with_all_instructions<C: NullaryFnOnce>(computation: C) -> C::Output {
     #[cfg(target_arch = "x86_64")]
@@ -42,7 +42,7 @@ pub(crate) fn with_all_instructions<C: NullaryFnOnce>(computation: C) -> C::Outp
     computation.call()
 }
 
-/// A step, to be compiled for the instructions of the machine it runs on.
+/// Step to be compiled for several instruction sets.
 struct Step<'a, L> {
     law: &'a L,
     input: &'a Input,
@@ -57,7 +57,7 @@ impl<L: Law> NullaryFnOnce for Step<'_, L> {
     }
 }
 
-/// The answer of a step.
+/// Converts a response to the output of a step.
 #[inline(always)] // as `Step::call`
 pub(crate) fn output(response: &Response) -> Output {
     let status = match response.validity {

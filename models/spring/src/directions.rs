@@ -1,4 +1,4 @@
-//! The directions of a pose as seen by the exact rod: sway, bow, twist and nearness to buckling, and the wrench of a function of them.
+//! Directions of a pose for the exact rod: sway, bow, twist and nearness to buckling, and gradients of functions of these.
 //!
 //! With the lower normal `k`, the upper normal `t` and the chord's direction `e`, the half sum and the half difference of the
 //! angles of the ends against the chord have the sines
@@ -20,11 +20,11 @@ pub(crate) const BUCKLING_ARGUMENT: f64 = PI * PI;
 /// Argument from which on the magnification stays as it is, short of where `G0` is computed to rounding.
 pub(crate) const DEEP_ARGUMENT: f64 = 7.5;
 
-/// Cosine of an angle from which on [`Directions::upright`] falls, 66 degrees, and at which it is zero, 78 degrees.
+/// Cosines of the angles at which [`Directions::upright`] begins to fall, 66 degrees, and is zero, 78 degrees.
 const UPRIGHT: f64 = 0.4;
 const LYING: f64 = 0.2;
 
-/// A rise from 0 to 1 as a quantity goes from one bound to another, and its derivative by the quantity.
+/// Smooth step from 0 to 1 between two bounds of a quantity, with its derivative by the quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Passage {
     pub(crate) value: f64,
@@ -35,7 +35,7 @@ impl Passage {
     pub(crate) const NOT_BEGUN: Self = Self { value: 0.0, slope: 0.0 };
     pub(crate) const DONE: Self = Self { value: 1.0, slope: 0.0 };
 
-    /// `6 t⁵ - 15 t⁴ + 10 t³`: first and second derivatives vanish at both ends.
+    /// Evaluates `6 t⁵ - 15 t⁴ + 10 t³`: first and second derivatives vanish at both ends.
     pub(crate) fn at(quantity: f64, from: f64, to: f64) -> Self {
         let passed = ((quantity - from) / (to - from)).clamp(0.0, 1.0);
         let rest = passed * (1.0 - passed);
@@ -46,7 +46,7 @@ impl Passage {
     }
 }
 
-/// The argument of a chord, in two constants of the spring.
+/// Constants of a spring for the argument of a chord.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Load {
     /// `gamma / beta`
@@ -56,7 +56,7 @@ pub(crate) struct Load {
 }
 
 impl Load {
-    /// `z`
+    /// Returns `z`.
     #[inline(always)]
     pub(crate) fn argument(&self, chord: &Chord) -> f64 {
         self.unit_per_m2 * chord.shortening_m * (chord.length_m + self.ratio * chord.shortening_m)
@@ -69,13 +69,13 @@ impl Load {
     }
 }
 
-/// `m`
+/// Returns `m`.
 #[inline(always)]
 pub(crate) fn magnification(argument: f64) -> f64 {
     1.0 + BUCKLING_ARGUMENT / (BUCKLING_ARGUMENT - argument.min(DEEP_ARGUMENT))
 }
 
-/// `t`, the upper plate's normal.
+/// Returns `t`, the upper plate's normal.
 #[inline(always)]
 pub(crate) fn upper_normal(q: DQuat) -> DVec3 {
     DVec3::new(
@@ -116,19 +116,19 @@ pub(crate) struct Slopes {
     pub(crate) by_length_per_m: f64,
 }
 
-/// A function of the pose with its derivatives.
+/// Derivatives of a function of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gradient {
-    /// By the position of the upper plate.
+    /// Derivatives by the position of the upper plate.
     pub(crate) by_position_per_m: DVec3,
-    /// By a small rotation of it about each axis.
+    /// Derivatives by a small rotation of the upper plate about each axis.
     pub(crate) by_rotation_per_rad: DVec3,
 }
 
 impl Gradient {
     pub(crate) const ZERO: Self = Self { by_position_per_m: DVec3::ZERO, by_rotation_per_rad: DVec3::ZERO };
 
-    /// The gradient times a number, plus another times a number.
+    /// Returns `self * factor + other * by`.
     #[inline(always)]
     pub(crate) fn combined(self, factor: f64, other: Self, by: f64) -> Self {
         Self {
@@ -160,22 +160,22 @@ impl Directions {
         }
     }
 
-    /// `2 - 2 cos w`, the square of the twist for small ones.
+    /// Returns `2 - 2 cos w`, the square of a small twist.
     pub(crate) fn twist_square(&self) -> f64 {
         2.0 * (1.0 - self.twist[0])
     }
 
-    /// Cosines of the angles between any two of chord and normals, and of the twist.
+    /// Returns the cosines of the angles between any two of chord and normals, and of the twist.
     fn cosines(&self) -> [f64; 4] {
         [self.chord.z, self.upper.z, self.chord.dot(self.upper), self.twist[0]]
     }
 
-    /// Whether no two directions stand so far apart that the rod has no share.
+    /// Returns true if all angles are below those at which the rod's weight becomes zero.
     pub(crate) fn is_upright(&self) -> bool {
         self.cosines().into_iter().all(|cosine| cosine > LYING)
     }
 
-    /// A factor that falls from 1 to 0 as any two directions, or the plate by its twist, go from 66 to 78 degrees apart.
+    /// Returns a factor, with its gradient, that falls from 1 to 0 between angles or a twist of 66 and 78 degrees.
     pub(crate) fn upright(&self) -> (f64, Gradient) {
         let cosines = self.cosines();
         if cosines.iter().all(|cosine| *cosine >= UPRIGHT) {
@@ -196,7 +196,7 @@ impl Directions {
         (product(passages.len()), self.turned(by_chord, by_upper, -twist * self.twist[1], 0.0))
     }
 
-    /// The gradient of a function by the pose.
+    /// Returns the gradient of a function by the pose.
     #[inline(always)]
     pub(crate) fn gradient(&self, slopes: &Slopes) -> Gradient {
         let Slopes { by_sway, by_bow, by_twist, mut by_argument, by_magnification, by_length_per_m } =
@@ -210,8 +210,8 @@ impl Directions {
         self.turned(by_sway, 0.5 * (by_bow - by_sway), by_twist, by_length)
     }
 
-    /// The chord turns as its end moves across, the upper normal as it is turned, and the twist changes by the rotation's component along
-    /// (t + k)/(1 + k.t).
+    /// Converts derivatives to a gradient: the chord turns as its end moves across, the upper normal as the plate is
+    /// turned, and the twist changes by the rotation's component along (t + k)/(1 + k.t).
     #[inline(always)]
     fn turned(&self, by_chord: DVec3, by_upper: DVec3, by_twist: f64, by_length_per_m: f64) -> Gradient {
         let (chord, upper) = (self.chord, self.upper);

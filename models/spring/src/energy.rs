@@ -1,9 +1,9 @@
 //! Variant `energy`: the spring as one stored energy, in three dimensions.
 //!
-//! The thesis computes forces in two planes and turns them one after the other; what comes out depends on the
-//! order of the axes and pumps energy into the hand. Here the spring is a single function of the pose, the
-//! energy `W`, and force and torque are its exact derivatives. So no closed path gains or loses work, turning
-//! everything about the axis turns the answer, and there is one law for all directions.
+//! The thesis computes forces in two planes and turns them one after the other; the result depends on the order of the
+//! axes and feeds energy into the hand. Here the spring is a single function of the pose, the energy `W`, and force and
+//! torque are its exact derivatives. So no closed path gains or loses work, turning everything about the axis turns the
+//! wrench, and there is one law for all directions.
 //!
 //! Directions: `k` the lower plate's normal, `t` the upper plate's, `e` the chord between the plate centres, of
 //! length `L`; `th` are the angles between them, `w` is the twist of the upper plate, the rotation left over
@@ -24,8 +24,8 @@
 //! well.
 //!
 //! Near buckling (`G0` towards zero, see [`flotor_lanes::entire`]) the bow stiffness runs to minus infinity. Short of
-//! the pole its argument levels off, see [`KNEE`](crate::bending::KNEE): the spring goes on from there as one
-//! that is about to buckle and never does. `W` stays a smooth function of the pose.
+//! the pole its argument saturates, see [`KNEE`](crate::bending::KNEE): from there on the spring behaves like one about
+//! to buckle that never does. `W` stays a smooth function of the pose.
 //!
 //! Derivation: the end stiffnesses are those of Haringx; the invariant form and the fourth order are this
 //! project's, in the book's chapter "The spring".
@@ -59,8 +59,8 @@ impl EnergyForm {
         Self::with_bending(spring, Bending::new(spring))
     }
 
-    /// The law of `to`, made from this law, which must be that of `from`. The same as [`Self::new`], but where only
-    /// the stiffness has changed and not the proportions, in nanoseconds. Real-time: bounded, no allocation.
+    /// Returns the law of `to`, derived from this law of `from`. Equal to [`Self::new`], but takes only nanoseconds
+    /// where the stiffness has changed and not the proportions. Real-time: bounded, no allocation.
     #[must_use]
     pub fn retuned(&self, from: &Spring, to: &Spring) -> Self {
         if to.is_proportional_to(from) {
@@ -80,17 +80,17 @@ impl EnergyForm {
         }
     }
 
-    /// Wrench on the hand and stored energy at a pose. Real-time: bounded, no allocation.
+    /// Returns the wrench on the hand and the stored energy at a pose. Real-time: bounded, no allocation.
     ///
     /// Total over all poses:
-    /// - past the solid length the law goes on, it knows no coil contact;
+    /// - past the solid length the law continues, without coil contact;
     /// - beyond [`KNEE`](crate::bending::KNEE) (close to buckling and past it), or where an angle between normals
     ///   and chord or the twist exceeds 60 degrees, up to an upper plate below the lower one: still the
     ///   derivative of the same smooth `W`, but `W` is a continuation, [`Validity::Clamped`](crate::validity::Validity::Clamped);
     /// - upper plate upside down to within 2.6 degrees, plates closer than a thousandth or farther than a
     ///   million free lengths, for a wire with `G > E` also any length at which the rod has no shear stiffness
     ///   left: no wrench, [`Validity::OutOfDomain`](crate::validity::Validity::OutOfDomain);
-    /// - NaN, infinity or a quaternion that is not of unit length: no wrench, [`Validity::InvalidInput`](crate::validity::Validity::InvalidInput).
+    /// - NaN, infinity or a quaternion not of unit length: no wrench, [`Validity::InvalidInput`](crate::validity::Validity::InvalidInput).
     #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         self.respond_at(pose, demand)
@@ -100,7 +100,7 @@ impl EnergyForm {
 impl Law for EnergyForm {
     const HAS_ENERGY: bool = true;
 
-    /// `F = -dW/dr`, `M = -dW/d(rotation)`, `W`.
+    /// Returns `F = -dW/dr`, `M = -dW/d(rotation)`, `W`.
     #[inline(always)]
     fn answer<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R> {
         let Span { vector_m, length_m, shortening_m, usable } = at.span(self.free_length_m);
@@ -108,7 +108,7 @@ impl Law for EnergyForm {
         let directions = Directions::new(vector_m, length_m, inverse_length, at.orientation);
         let sheared_length_m = self.bending.sheared_length_m(length_m, shortening_m);
         let answered = usable & directions.overturn.above(LEAST_OVERTURN) & sheared_length_m.above(0.0);
-        // Told here, and not at the end: one pose alone need not be carried on for it.
+        // Early exit: a single pose without an answer needs no further computation.
         if !R::any(answered) {
             return Answer::none(length_m, answered);
         }
@@ -161,7 +161,7 @@ impl Law for EnergyForm {
     }
 }
 
-/// Unit vectors of a pose and how far they are apart.
+/// Unit vectors of a pose and measures of the angles between them.
 struct Directions<R> {
     chord: Vector<R>,
     upper: Vector<R>,
@@ -209,7 +209,7 @@ impl<R: Real> Directions<R> {
         }
     }
 
-    /// Where no angle is beyond what its measure is trusted for, and the argument was not saturated.
+    /// Returns the lanes in which all angles are within the trusted range of their measures and the argument is not saturated.
     #[inline(always)]
     fn trusted(&self, saturated: R::Mask) -> R::Mask {
         let [lower, upper, plates] = self.versines;

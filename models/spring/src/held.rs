@@ -1,4 +1,4 @@
-//! A law for a spring whose plates are held, with what a real coil adds to it.
+//! Laws for a spring with clamped plates, with optional effects of a real coil.
 
 use crate::contact::AxialContact;
 use crate::energy::EnergyForm;
@@ -6,36 +6,35 @@ use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::wire::Wire;
 
-/// A law for a spring whose lower plate is held, asked from tick to tick.
+/// Law for a spring with a clamped lower plate, evaluated from tick to tick.
 pub trait HeldSpring {
-    /// Answer at a pose relative to the lower plate. Real-time: bounded, no allocation.
+    /// Returns the response at a pose relative to the lower plate. Real-time: bounded, no allocation.
     fn respond(&mut self, pose: &Pose, demand: Demand) -> Response;
 
-    /// Answer at a pose in the shape of the last answer, while that is on its way: the derivatives of the energy of this shape. A
-    /// formula has no shape of its own. Real-time: bounded, no allocation.
+    /// Returns the response at a pose with the shape of the last response, while the shape is in motion: the
+    /// derivatives of the energy at this shape. A closed formula has no shape state. Real-time: bounded, no allocation.
     fn stay(&mut self, pose: &Pose, demand: Demand) -> Response {
         self.respond(pose, demand)
     }
 
-    /// How much of the slope of its energy the law leaves open, as the tilt of a plate that makes such a slope (rad).
-    /// Zero for a formula; for a law that solves, what its solver calls equal.
+    /// Returns the uncertainty of the energy's slope, as the tilt of a plate that causes such a slope (rad). Zero for a
+    /// formula; the tolerance of the solver for an iterative law.
     fn noise_rad(&self) -> f64 {
         0.0
     }
 
-    /// What the last answer cost, in evaluations of an energy. Real-time: bounded, no allocation.
+    /// Returns the cost of the last response, in evaluations of an energy. Real-time: bounded, no allocation.
     fn cost(&self) -> u32 {
         1
     }
 
-    /// Marks the last answer as one that [`Self::go_back`] returns to. Real-time: bounded, no allocation.
+    /// Saves the state of the last response for [`Self::go_back`]. Real-time: bounded, no allocation.
     fn mark(&mut self) {}
 
-    /// As it was when it answered what was marked: what it tried since then is forgotten. Real-time: bounded, no
-    /// allocation.
+    /// Restores the state saved by [`Self::mark`] and discards later trials. Real-time: bounded, no allocation.
     fn go_back(&mut self) {}
 
-    /// Without load: forgets the past. Real-time: bounded, no allocation.
+    /// Resets to the unloaded state and clears the history. Real-time: bounded, no allocation.
     fn unload(&mut self) {}
 }
 
@@ -45,19 +44,19 @@ impl HeldSpring for EnergyForm {
     }
 }
 
-/// A law and what it leaves out of the coil, where that is wanted.
+/// Law with optional effects of a real coil.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held<L> {
-    /// The law.
+    /// Law without the effects.
     pub law: L,
-    /// Touching coils, for a law that does not know them itself.
+    /// Contact of the coils, for a law without contact of its own.
     pub contact: Option<AxialContact>,
-    /// What the wire adds.
+    /// Twist and off-axis ends of the wire.
     pub wire: Option<Wire>,
 }
 
 impl<L> Held<L> {
-    /// Whether the law is left as it is.
+    /// Returns true if the law has no additional effects.
     pub(crate) fn is_plain(&self) -> bool {
         self.contact.is_none() && self.wire.is_none()
     }

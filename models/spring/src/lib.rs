@@ -1,23 +1,23 @@
 //! A helical spring with end plates in three dimensions, as a force model.
 //!
-//! One idea a module, from the wire to the wrench:
+//! One topic per module, from the wire to the wrench:
 //! - [`rigidity`]: wire and coil become the rigidities of an equivalent rod; [`preset`]: springs with names.
-//! - [`pose`]: where the upper plate is; [`response`], [`validity`]: what a law answers.
+//! - [`pose`]: pose of the upper plate; [`response`], [`validity`]: response of a law.
 //! - [`flotor_lanes`]: formulas written once, for one pose and for several side by side, angles and saturation among them;
 //!   [`batch`] runs them over many.
-//! - [`beam_column`]: how a compressed rod resists rotations of its ends, without branches or poles of its own.
+//! - [`beam_column`]: resistance of a compressed rod to rotations of its ends, without branches or poles of its own.
 //! - [`thesis`]: the thesis's printed code with every branch, window and jump, for comparison.
-//! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`precision`]
-//!   says in which format its numbers are stored.
+//! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`precision`] defines
+//!   the storage format of its numbers.
 //! - [`energy`]: the conservative law in three dimensions, the default. Its bending part is in [`bending`], to
 //!   fourth order in the angles by [`shape`] and [`quartic`]; `remainder` adds what is beyond, fitted to the rod.
-//! - [`rod`]: the exact rod, past buckling too, with a memory of where it was.
-//! - [`rod_blend`]: from the law `energy` to the rod where the tolerance needs it, as one energy; `rod_share` says where, in the
-//!   measures of `directions`.
-//! - [`held`]: a law with what a real coil adds to it: [`contact`] of its coils, and the twist and the off-axis ends of
-//!   its [`wire`].
+//! - [`rod`]: the exact rod, past buckling too, with a history.
+//! - [`rod_blend`]: blending from the law `energy` to the rod where the tolerance requires it, as one energy;
+//!   `rod_share` computes the weight of the rod, in the measures of `directions`.
+//! - [`held`]: a law with effects of a real coil: [`contact`] of its coils, and the twist and the off-axis ends of its
+//!   [`wire`].
 //! - [`seat`]: a lower plate that may roll up on its rim and lift off.
-//! - [`centerline`]: the shape, for people to look at.
+//! - [`centerline`]: the shape, for visualisation.
 //!
 //! Derivations and sources are in the book, chapter "The spring".
 

@@ -1,10 +1,10 @@
-//! The pace of a spring that moves by itself: per second, not per tick.
+//! Timing of a spring that moves by itself: in steps per second, not per tick.
 //!
-//! A rod that snaps and a base that rolls or falls over are on their way for several steps of their law
-//! ([`Validity::NotConverged`]). A step goes a bounded way, so it needs a duration: a millisecond. Until the next is due, a
-//! faster loop feels the shape of the last one, which is conservative; a slower loop makes several steps in a tick, at most
-//! [`MOST_STEPS`]. So a motion takes the same time at every rate, and at 1 kHz each tick is one step. A tick without a duration
-//! (`dt_ns = 0`: the first of a loop, poses of a table) is one step.
+//! A rod that snaps and a base that rolls or falls over move for several steps of their law
+//! ([`Validity::NotConverged`]). The distance of a step is bounded, so a step needs a duration: a millisecond. Until
+//! the next step is due, a faster loop renders the shape of the last step, which is conservative; a slower loop makes
+//! several steps in a tick, at most [`MOST_STEPS`]. So a motion takes the same time at every rate, and at 1 kHz each
+//! tick is one step. A tick without a duration (`dt_ns = 0`: the first of a loop, poses of a table) is one step.
 
 use flotor_hal::Input;
 
@@ -13,29 +13,29 @@ use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::validity::Validity;
 
-/// How a law answers that may be on its way.
+/// Request to a law that may be in motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Advance {
-    /// It goes a step.
+    /// One step of the motion.
     Step,
-    /// Its shape stays.
+    /// Unchanged shape.
     Stay,
 }
 
 /// Duration of a step, ns.
 const STEP_NS: u64 = 1_000_000;
-/// Steps in a tick at most: those of the slowest loop, 100 Hz. What a longer pause leaves out is not caught up.
+/// Maximum number of steps in a tick: those of the slowest loop, 100 Hz. Steps missed in a longer pause are dropped.
 const MOST_STEPS: u64 = 10;
 
-/// The time of a motion.
+/// Timing of a motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pace {
-    /// Time since the last step was due, ns, of a law on its way; negative where that was made up to half a tick early.
+    /// Time since the last step was due, ns; negative if that step was made up to half a tick early; `None` at rest.
     since_ns: Option<i64>,
 }
 
 impl Pace {
-    /// Returns the answer of a tick by as many steps of a law as are due. Real-time: bounded by the law, no allocation.
+    /// Returns the response of a tick after as many steps of a law as are due. Real-time: bounded by the law, no allocation.
     #[inline]
     pub(crate) fn respond(
         &mut self,
@@ -58,7 +58,7 @@ impl Pace {
     fn go_on(&mut self, since_ns: i64, dt_ns: u64, mut law: impl FnMut(Advance) -> Response) -> Response {
         let dt_ns = if dt_ns == 0 { STEP_NS } else { dt_ns.min(MOST_STEPS * STEP_NS) };
         let mut since_ns = since_ns.saturating_add_unsigned(dt_ns);
-        // To the nearest tick: the period of a loop need not divide a millisecond.
+        // Round to the nearest tick: the period of a loop need not divide a millisecond.
         let early_ns = (dt_ns.min(STEP_NS) / 2).cast_signed();
         let mut response = None;
         while since_ns + early_ns >= STEP_NS.cast_signed() {

@@ -1,13 +1,13 @@
-//! What the spring can be told, and how a set of values becomes a checked [`Spring`].
+//! Parameter schema of the spring, and resolution of a set of values to a checked [`Spring`].
 //!
-//! A preset gives every value; what is set explicitly replaces it. One constant rules the stiffness (`mode`, the
-//! thesis's modes 0 to 3): the others are derived from it, and setting a derived one is refused, because the
-//! answer to "which of the two did you mean" is not ours to give.
+//! A preset gives every value; explicit values replace those of the preset. One constant determines the stiffness
+//! (`mode`, the thesis's modes 0 to 3): the others are derived from it, and an explicit value of a derived constant is
+//! rejected as ambiguous.
 //!
-//! The numbers are live: a running loop may change them between two ticks, one at a time, and each change must fit
-//! the others. Such a change is a step of the force at the pose where the hand happens to be. The model does not
-//! smooth it, because only the host knows what the device bears: its envelope limits the rate of the wrench, so
-//! that no step larger than the slew limit reaches the hand.
+//! The numbers are live: a running loop may change them between two ticks, one at a time, and each change must be
+//! consistent with the other values. Such a change is a step of the force at the current pose of the hand. The model
+//! does not smooth the step, because only the host knows the limits of the device: its envelope limits the rate of the
+//! wrench, so that no step larger than the slew limit reaches the hand.
 
 use crate::precision::Precision;
 use crate::preset::Preset;
@@ -17,14 +17,14 @@ use crate::rod_blend::TOLERANCE_N;
 use crate::seat::Friction;
 use flotor_hal::{Choices, OutOfRange, Parameter, Refusal, Settings, choices};
 
-/// Which law answers.
+/// Law of the spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Variant {
     /// The thesis's printed code, with its branches and jumps.
     Thesis,
     /// The thesis's printed law, regularised.
     ClosedForm,
-    /// The same with rigidities per current length, and the upper moment only.
+    /// The regularised law with rigidities per current length, and the upper moment only.
     CurrentLength,
     /// The conservative law in three dimensions.
     Energy,
@@ -37,25 +37,25 @@ impl Variant {
         [Self::Thesis, Self::ClosedForm, Self::CurrentLength, Self::Energy, Self::Rod];
 }
 
-/// Whether the lower plate may leave its seat.
+/// Support of the lower plate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SeatChoice {
-    /// It is held.
+    /// Clamped.
     Fixed,
-    /// It merely stands there.
+    /// Free to roll up and to lift off.
     Free,
 }
 
-/// Whether something that may be left out is part of the law.
+/// Switch of an optional part of the law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Switch {
-    /// Left out.
+    /// Excluded from the law.
     Off,
-    /// Part of it.
+    /// Included in the law.
     On,
 }
 
-/// Which constant rules the stiffness.
+/// Constant that determines the stiffness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Gamma,
@@ -90,8 +90,8 @@ const MM: f64 = 1.0e-3;
 const MPA: f64 = 1.0e6;
 const N_MM2: f64 = 1.0e-6;
 
-/// The schema. Defaults are those of preset `thesis-1`; another preset brings its own. What kind of spring it is
-/// is fixed, its numbers are live.
+/// Parameter schema. Defaults are those of preset `thesis-1`; other presets have their own. The kind of spring is
+/// fixed, its numbers are live.
 pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice("preset", PRESETS, 0, "Spring of the thesis, or a slender one that buckles"),
     Parameter::choice(
@@ -167,7 +167,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         .live(),
 ];
 
-/// What a set of values means.
+/// Resolved parameter values of a spring.
 #[derive(Clone, Copy)]
 pub(crate) struct Choice {
     pub(crate) spring: Spring,
@@ -217,8 +217,8 @@ impl Choice {
             youngs_modulus_pa: value("youngs_modulus_mpa", material.youngs_modulus_pa, MPA),
             shear_modulus_pa: value("shear_modulus_mpa", material.shear_modulus_pa, MPA),
         };
-        // A constant that rules without being set is the preset's: switching the mode alone changes no stiffness,
-        // except to `physical`, whose wire is stiffer or softer than the stated gamma (PHYSICS D1).
+        // A determining constant without an explicit value is the preset's: switching the mode alone changes no
+        // stiffness, except to `physical`, whose wire is stiffer or softer than the stated gamma (PHYSICS D1).
         let preset_rigidities = *preset.spring().rigidities();
         let stiffness = match mode {
             Mode::Gamma => Stiffness::Gamma(value("gamma_n", preset_rigidities.gamma_n, 1.0)),
@@ -249,7 +249,7 @@ impl Choice {
         })
     }
 
-    /// Preset `thesis-1` with another law, as no other setting would give.
+    /// Returns preset `thesis-1` with another law and defaults for all other parameters.
     #[cfg(test)]
     pub(crate) fn default_with(variant: Variant) -> Self {
         let preset = Preset::Thesis1;
@@ -270,16 +270,16 @@ impl Choice {
         }
     }
 
-    /// The same with one live number changed, as a person would set it. Real-time: bounded, no allocation.
+    /// Returns a copy with one live number changed, in the unit of its parameter. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// The range that fits the other values; NaN to NaN for a number that follows from others in this mode, or has no effect.
+    /// The range consistent with the other values; NaN to NaN for a number that follows from others in this mode, or has no effect.
     pub(crate) fn with(&self, index: usize, value: f64) -> Result<Self, OutOfRange> {
         let is_friction = SCHEMA.get(index).map(Parameter::id) == Some("seat_friction");
         if SCHEMA.get(index).map(Parameter::id) == Some("tolerance_n") && self.rod_blend == Switch::On {
             return Ok(Self { tolerance_n: value, ..*self });
         }
-        // Under a seat that is held it would change nothing: it is refused below.
+        // With a clamped plate the friction has no effect: it is rejected below.
         if is_friction && self.seat == SeatChoice::Free {
             return Ok(Self { friction: Friction { coefficient: value }, ..*self });
         }
@@ -303,7 +303,7 @@ impl Choice {
         Ok(Self { spring, stiffness, ..*self })
     }
 
-    /// The range of a number that fits the other values in force, for the refusal of one that does not.
+    /// Returns the range of a number that is consistent with the other current values, for an error.
     fn fitting_range(&self, index: usize, value: f64) -> OutOfRange {
         let (geometry, material) = (self.spring.geometry(), self.spring.material());
         let Some(parameter) = SCHEMA.get(index) else {
@@ -331,7 +331,7 @@ impl Choice {
         OutOfRange { min: min.max(parameter.min()), max: max.min(parameter.max()), value }
     }
 
-    /// The value in force of the parameter at `index` of the schema, as a person would set it.
+    /// Returns the current value of the parameter at `index` of the schema, in its unit.
     pub(crate) fn in_force(&self, index: usize) -> f64 {
         let (geometry, material, rigidities) =
             (self.spring.geometry(), self.spring.material(), self.spring.rigidities());
@@ -361,7 +361,7 @@ impl Choice {
     }
 }
 
-/// The precision set; single is refused where a law has none.
+/// Returns the precision set; rejects single precision for a law without it.
 fn precision(settings: &Settings<'_>, variant: Variant) -> Result<Precision, Refusal> {
     match (settings.choice_or_default("precision"), variant) {
         (1, Variant::Thesis | Variant::ClosedForm) => Ok(Precision::Single),
@@ -372,7 +372,7 @@ fn precision(settings: &Settings<'_>, variant: Variant) -> Result<Precision, Ref
     }
 }
 
-/// The accuracy set; only the rod has two.
+/// Returns the accuracy set; only the rod has two.
 fn accuracy(settings: &Settings<'_>, variant: Variant) -> Result<Accuracy, Refusal> {
     match (settings.choice_or_default("accuracy"), variant) {
         (1, Variant::Rod) => Ok(Accuracy::Tight),
@@ -383,7 +383,7 @@ fn accuracy(settings: &Settings<'_>, variant: Variant) -> Result<Accuracy, Refus
     }
 }
 
-/// The seat set; a plate that leaves it by least energy needs a law that has one.
+/// Returns the seat set; a free plate minimises an energy, so it needs a law with a stored energy.
 fn seat(settings: &Settings<'_>, variant: Variant) -> Result<SeatChoice, Refusal> {
     match (settings.choice_or_default("seat"), variant) {
         (1, Variant::Energy | Variant::Rod) => Ok(SeatChoice::Free),
@@ -394,7 +394,7 @@ fn seat(settings: &Settings<'_>, variant: Variant) -> Result<SeatChoice, Refusal
     }
 }
 
-/// Whether the law `energy` blends into the rod, which is its default. No other law does.
+/// Returns the switch for blending into the rod: on by default for the law `energy`, rejected for other laws.
 fn rod_blend(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusal> {
     let wanted = settings.choice_or_default("hand_over") == 1;
     match variant {
@@ -408,7 +408,7 @@ fn rod_blend(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusa
     }
 }
 
-/// Whether a property of real coils is counted; it is an energy, added to a law that has one.
+/// Returns the switch of a property of real coils; the property adds an energy, so it needs a law with a stored energy.
 fn coil(id: &'static str, settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusal> {
     match (settings.choice_or_default(id), variant) {
         (1, Variant::Energy | Variant::Rod) => Ok(Switch::On),
@@ -419,7 +419,7 @@ fn coil(id: &'static str, settings: &Settings<'_>, variant: Variant) -> Result<S
     }
 }
 
-/// The mode set, else that of the preset.
+/// Returns the mode set, or else that of the preset.
 fn mode(settings: &Settings<'_>, preset: Stiffness) -> Mode {
     let set = settings.number("mode").and_then(|_| Mode::ALL.get(settings.choice_or_default("mode")));
     set.copied().unwrap_or_else(|| Mode::of(preset))

@@ -14,7 +14,7 @@ use flotor_hal::{
     WorkspaceBoundsModel, choices, export_model,
 };
 
-/// The spring: what it is, and the law that answers.
+/// Force model of the spring: parameters, prepared law and timing.
 pub struct SpringModel {
     choice: Choice,
     law: Prepared,
@@ -29,7 +29,7 @@ impl SpringModel {
 }
 
 impl ForceModel for SpringModel {
-    // For all variants together; `VariantModel` says it for the one chosen.
+    // Covers all variants; `VariantModel` declares the chosen one.
     const INFO: ModelInfo =
         ModelInfo::new("spring", "Helical spring", "A helical spring with end plates in three dimensions")
             .serving(Demand::ALL)
@@ -129,7 +129,7 @@ impl CenterlineModel for SpringModel {
 }
 
 impl WorkspaceBoundsModel for SpringModel {
-    /// Down to where all coils touch: no law without contact knows of that.
+    /// Returns a lower bound at the solid length, for a law without coil contact.
     fn workspace_bounds(&self) -> WorkspaceBounds {
         if self.choice.coil_contact == Switch::On {
             return WorkspaceBounds::UNBOUNDED;

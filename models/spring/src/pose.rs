@@ -1,4 +1,4 @@
-//! Where the upper plate is, and the geometry every law starts with.
+//! Pose of the upper plate, and the geometry common to all laws.
 //!
 //! Model frame: right-handed, z up, origin at the centre of the upper plate of the unloaded spring; the lower
 //! plate is fixed at z = -L0. A rotation turns the upper plate from its rest orientation.
@@ -14,15 +14,15 @@ use flotor_lanes::{Real, Vector};
 /// sense. Far below any solid length.
 const SHORTEST_CHORD: f64 = 1e-3;
 
-/// Longest distance of the plates in free lengths. No spring gets there; it keeps every product of the laws far
+/// Longest distance of the plates in free lengths. No spring gets there; the limit keeps every product of the laws far
 /// from overflow.
 const LONGEST_CHORD: f64 = 1e6;
 
-/// How far the squared norm of the orientation may be from one. Rounding makes 1e-15; more is not a rotation.
+/// Tolerance of the squared norm of the orientation. Rounding causes 1e-15; a larger error is not a rotation.
 const UNIT_NORM_TOLERANCE: f64 = 1e-6;
 
-/// What is smaller is zero, in metres and as a part of a quaternion: no length or angle, but a number whose powers are too
-/// small for full precision, and a hundred times slower. A stiffness of 1e10 N/m would make 1e-40 N of it.
+/// Threshold below which a coordinate is set to zero, in m and as a quaternion component: powers of smaller numbers are
+/// too small for full precision, and a hundred times slower. A stiffness of 1e10 N/m turns this length into 1e-40 N.
 pub(crate) const DUST: f64 = 1e-50;
 
 /// Pose of the upper plate in the model frame.
@@ -38,13 +38,13 @@ impl Pose {
     /// The pose without load.
     pub const HOME: Self = Self { position_m: DVec3::ZERO, orientation: DQuat::IDENTITY };
 
-    /// Pose from a rotation vector (rad; axis times angle). Real-time: bounded, no allocation.
+    /// Builds a pose from a rotation vector (rad; axis times angle). Real-time: bounded, no allocation.
     #[must_use]
     pub fn from_rotation_vector(position_m: DVec3, rotation_rad: DVec3) -> Self {
         Self { position_m, orientation: quaternion(rotation_rad) }
     }
 
-    /// Rotation vector of the orientation (rad), of length 0 to pi. Real-time: bounded, no allocation.
+    /// Returns the rotation vector of the orientation (rad), of length 0 to pi. Real-time: bounded, no allocation.
     ///
     /// Accurate to rounding at every angle: neither the arc cosine near zero nor the arc sine near pi is used.
     #[inline]
@@ -54,7 +54,7 @@ impl Pose {
         DVec3::new(x, y, z)
     }
 
-    /// Vector from the lower to the upper plate.
+    /// Returns the straight line from the lower to the upper plate.
     ///
     /// # Errors
     /// [`Validity::InvalidInput`] or [`Validity::OutOfDomain`] if no law can be evaluated here.
@@ -66,20 +66,20 @@ impl Pose {
         if usable { Ok(Chord { vector_m, length_m, shortening_m }) } else { Err(self.why_unanswered()) }
     }
 
-    /// The numbers of the pose, for formulas that serve one pose and many.
+    /// Returns the numbers of the pose, for formulas over one pose or many.
     #[inline]
     pub(crate) fn coordinates(&self) -> Coordinates<f64> {
         let DVec3 { x, y, z } = self.position_m;
         Coordinates { position_m: Vector { x, y, z }, orientation: self.orientation.to_array() }
     }
 
-    /// Why there is no answer at this pose: it is no pose at all, or outside the domain of the law.
+    /// Returns the reason for a missing answer: an invalid pose, or a pose outside the domain of the law.
     #[cold]
     pub(crate) fn why_unanswered(&self) -> Validity {
         if self.is_valid() { Validity::OutOfDomain } else { Validity::InvalidInput }
     }
 
-    /// Whether it is a pose: finite, with an orientation of unit length. Real-time: bounded, no allocation.
+    /// Returns true if the pose is valid: finite, with an orientation of unit length. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_valid(&self) -> bool {
@@ -88,7 +88,7 @@ impl Pose {
     }
 }
 
-/// The seven numbers of a pose, or of one in each lane.
+/// Seven numbers of a pose, or of one pose per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Coordinates<R> {
     /// Centre of the upper plate relative to home (m).
@@ -98,7 +98,7 @@ pub struct Coordinates<R> {
 }
 
 impl<R: Real> Coordinates<R> {
-    /// The pose with zero for coordinates that are nothing, see [`DUST`]. Real-time: bounded, no allocation, no branch.
+    /// Returns the pose with negligible coordinates set to zero, see [`DUST`]. Real-time: bounded, no allocation, no branch.
     #[inline(always)]
     pub(crate) fn without_dust(&self) -> Self {
         let Vector { x, y, z } = self.position_m;
@@ -109,7 +109,7 @@ impl<R: Real> Coordinates<R> {
         }
     }
 
-    /// The straight line between the plate centres. Real-time: bounded, no allocation, no branch.
+    /// Returns the straight line between the plate centres. Real-time: bounded, no allocation, no branch.
     #[inline(always)]
     pub(crate) fn span(&self, free_length_m: f64) -> Span<R> {
         let Vector { x, y, z } = self.position_m;
@@ -120,7 +120,7 @@ impl<R: Real> Coordinates<R> {
         let length_squared = aside + height_m * height_m;
         let norm_error = (qx * qx + qy * qy) + (qz * qz + qw * qw) - 1.0;
         let free_squared = free_length_m * free_length_m;
-        // NaN fails each of them.
+        // NaN fails each comparison.
         let usable = length_squared.above(SHORTEST_CHORD * SHORTEST_CHORD * free_squared)
             & length_squared.below(LONGEST_CHORD * LONGEST_CHORD * free_squared)
             & norm_error.abs().below(UNIT_NORM_TOLERANCE);
@@ -135,7 +135,7 @@ impl<R: Real> Coordinates<R> {
         }
     }
 
-    /// Rotation vector (rad), of length 0 to pi. Real-time: bounded, no allocation, no branch.
+    /// Returns the rotation vector (rad), of length 0 to pi. Real-time: bounded, no allocation, no branch.
     ///
     /// `2 atan(|v| / w) v / |v|` for the quaternion `(v, w)`, by the tangent of half that arc, `|v| / (1 + w)`: no
     /// square root, and nothing to divide by zero at rest.
@@ -144,7 +144,7 @@ impl<R: Real> Coordinates<R> {
         let [x, y, z, w] = self.orientation;
         let axis = Vector { x, y, z };
         let sine_squared = axis.dot(axis);
-        // The norm, from its square by the tangent at one: the error is the square of what rounding left.
+        // The norm, from its square by the tangent at one: the error is of second order in the rounding error.
         let norm = (sine_squared + w * w) * 0.5 + 0.5;
         let inverse = (norm + w.abs()).inverse();
         let scale = arctangent::quotient(sine_squared * (inverse * inverse)) * (inverse * 4.0);
@@ -155,13 +155,13 @@ impl<R: Real> Coordinates<R> {
 /// Straight line between the plate centres, or one in each lane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Span<R: Real> {
-    /// From the lower to the upper plate (m).
+    /// Vector from the lower to the upper plate (m).
     pub(crate) vector_m: Vector<R>,
     /// Distance of the plate centres (m), `L`.
     pub(crate) length_m: R,
     /// `L0 - L` (m), positive in compression.
     pub(crate) shortening_m: R,
-    /// Whether a law can be evaluated here. Where not, the numbers mean nothing and may be NaN.
+    /// Lanes in which a law can be evaluated; in others the numbers are meaningless and may be NaN.
     pub(crate) usable: R::Mask,
 }
 
@@ -170,7 +170,7 @@ fn or_zero<R: Real>(number: R) -> R {
     R::select(number.abs().below(DUST), number.like(0.0), number)
 }
 
-/// Unit quaternion of a rotation vector.
+/// Returns the unit quaternion of a rotation vector.
 pub(crate) fn quaternion(rotation_rad: DVec3) -> DQuat {
     let angle = rotation_rad.length();
     let (sine, cosine) = math::sin_cos(0.5 * angle);
@@ -182,7 +182,7 @@ pub(crate) fn quaternion(rotation_rad: DVec3) -> DQuat {
 /// Straight line between the plate centres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chord {
-    /// From the lower to the upper plate (m).
+    /// Vector from the lower to the upper plate (m).
     pub(crate) vector_m: DVec3,
     /// Distance of the plate centres (m), `L`.
     pub(crate) length_m: f64,

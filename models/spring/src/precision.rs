@@ -1,12 +1,12 @@
-//! In which format numbers are kept between operations.
+//! Storage format of numbers between operations.
 //!
 //! The thesis's C source declares every variable `float` and calls the double functions of the math library: an
-//! expression is evaluated in double and rounded to binary32 where it is *stored*. `Binary32` repeats that, to
-//! measure what it costs; `Binary64` is for everything else.
+//! expression is evaluated in double and rounded to binary32 where it is *stored*. `Binary32` reproduces this rounding,
+//! to measure its effect; `Binary64` is for everything else.
 
 use flotor_lanes::Real;
 
-/// What a scene asks for.
+/// Precision selected by a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Precision {
     /// Double throughout.
@@ -16,9 +16,9 @@ pub enum Precision {
     Single,
 }
 
-/// A format numbers are stored in.
+/// Storage format of numbers.
 pub(crate) trait Storage {
-    /// The number after a round trip through memory. Real-time: bounded, no allocation.
+    /// Returns the number after a round trip through memory. Real-time: bounded, no allocation.
     fn store<R: Real>(number: R) -> R;
 }
 
@@ -42,8 +42,8 @@ impl Storage for Binary32 {
     }
 }
 
-/// To the nearest `f32` and back; beyond its range infinite.
-#[allow(clippy::cast_possible_truncation)] // the loss is the point
+/// Rounds to the nearest `f32`; infinite beyond the range of `f32`.
+#[allow(clippy::cast_possible_truncation)] // the rounding is intended
 #[inline(always)]
 fn through_single(number: f64) -> f64 {
     f64::from(number as f32)

@@ -1,4 +1,4 @@
-//! The law a model was set to, its constants prepared, on the seat it was set on.
+//! Prepared law of a model, with its seat.
 
 use flotor_hal::{Demand as Served, Input, Memory, Output, VariantInfo};
 
@@ -22,11 +22,11 @@ use crate::thesis::Thesis;
 use crate::validity::Validity;
 use crate::wire::Wire;
 
-/// Ticks a shape is waited for before it is drawn. A model that is drawn is asked far less often than one that is
-/// felt, so the rod has a longer way between two poses.
+/// Maximum number of ticks for a shape to converge before it is drawn. A drawn model is evaluated far less often than a
+/// rendered one, so the rod moves farther between two poses.
 const MOST_TICKS_TO_DRAW: u32 = 500;
 
-/// One of the laws. A seat that may be left needs a law whose energy it can minimise.
+/// Prepared law. A free seat needs a law with an energy to minimise.
 #[allow(clippy::large_enum_variant)] // one per model, made once: a box would add a load to every tick
 pub(crate) enum Prepared {
     Thesis(Thesis),
@@ -39,18 +39,18 @@ pub(crate) enum Prepared {
     FreeRod(Held<Rod>, Seat),
 }
 
-/// What is known about an answer beside the wrench; `None` where a law has no notion of it.
+/// Diagnostics of a response beside the wrench; `None` for quantities that a law does not have.
 pub(crate) struct Insight {
     pub(crate) branch: Option<Branch>,
     pub(crate) is_stable: Option<bool>,
-    /// Roll of the base about the y axis (rad); `None` for a spring that hangs in the air.
+    /// Roll of the base about the y axis (rad); `None` for a lifted spring.
     pub(crate) seat_roll_rad: Option<f64>,
-    /// Share of the exact rod in a law that blends into it, 0 to 1.
+    /// Weight of the exact rod in a law that blends into it, 0 to 1.
     pub(crate) rod_share: Option<f64>,
 }
 
 impl Prepared {
-    /// Not real-time: the rod allocates.
+    /// Prepares the law. Not real-time: the rod allocates.
     pub(crate) fn new(choice: &Choice) -> Self {
         let Choice { spring, stiffness, precision, variant, seat, friction, rod_blend, coil_contact, .. } =
             choice;
@@ -60,7 +60,7 @@ impl Prepared {
                 Self::ClosedForm(ClosedForm::new(spring, Form::Printed).with_precision(*precision))
             }
             (Variant::CurrentLength, _) => Self::ClosedForm(ClosedForm::new(spring, Form::CurrentLength)),
-            // Where coils touch, the rod knows where along the bulge.
+            // For touching coils use the rod, which resolves the contact along the bulge.
             (Variant::Energy, SeatChoice::Fixed) if *rod_blend == Switch::On => match coil_contact {
                 Switch::Off => Self::RodBlend(held_blend(choice)),
                 Switch::On => Self::Rod(exact_rod(choice)),
@@ -83,7 +83,7 @@ impl Prepared {
         }
     }
 
-    /// Takes over a change of parameters. Real-time: bounded, no allocation.
+    /// Applies a change of parameters. Real-time: bounded, no allocation.
     pub(crate) fn retune(&mut self, from: &Choice, to: &Choice) {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) => *self = Self::new(to),
@@ -105,7 +105,7 @@ impl Prepared {
         }
     }
 
-    /// Forgets the past. Real-time: bounded, no allocation.
+    /// Clears the history. Real-time: bounded, no allocation.
     pub(crate) fn reset(&mut self) {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => {}
@@ -123,7 +123,7 @@ impl Prepared {
         }
     }
 
-    /// The answer of a step. Real-time: bounded, no allocation.
+    /// Returns the output of a step. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn step(&mut self, input: &Input, pace: &mut Pace) -> Output {
         match self {
@@ -136,7 +136,7 @@ impl Prepared {
         }
     }
 
-    /// The answer at a pose. Real-time: bounded, no allocation.
+    /// Returns the response at a pose. Real-time: bounded, no allocation.
     fn respond(&mut self, advance: Advance, pose: &Pose, demand: Demand) -> Response {
         match self {
             Self::Thesis(law) => law.respond(pose, demand),
@@ -150,8 +150,8 @@ impl Prepared {
         }
     }
 
-    /// Answers to all inputs side by side, where the law can do that; `false` where it goes pose by pose.
-    /// Real-time per pose: bounded, no allocation.
+    /// Evaluates all inputs as a batch; returns `false` for a law that is evaluated pose by pose. Real-time per pose:
+    /// bounded, no allocation.
     pub(crate) fn respond_side_by_side(
         &mut self,
         batch: &Batch,
@@ -171,7 +171,7 @@ impl Prepared {
         true
     }
 
-    /// What it serves and whether it remembers.
+    /// Returns the demands served and the path dependence.
     pub(crate) fn info(&self) -> VariantInfo {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) => VariantInfo::new(Served::WRENCH, Memory::Stateless),
@@ -185,7 +185,7 @@ impl Prepared {
         }
     }
 
-    /// About the last answer. Real-time: bounded, no allocation.
+    /// Returns diagnostics of the last response. Real-time: bounded, no allocation.
     pub(crate) fn insight(&self) -> Insight {
         let (state, seat) = match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => (None, None),
@@ -210,8 +210,8 @@ impl Prepared {
         }
     }
 
-    /// The sections from plate to plate at a pose, evenly in arc length; `false` where there is no shape. Not
-    /// real-time; moves a law that remembers to the pose.
+    /// Fills in the sections from plate to plate at a pose, evenly in arc length; returns `false` if there is no shape.
+    /// Not real-time; moves a path-dependent law to the pose.
     pub(crate) fn draw(&mut self, spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
         match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => draw_law(spring, pose, sections),
@@ -264,19 +264,19 @@ fn energy(choice: &Choice) -> Held<EnergyForm> {
     Held { law: EnergyForm::new(&choice.spring), contact, wire: wire(choice) }
 }
 
-/// Its coils touch along the bulge, inside the law.
+/// Prepares the rod; its law includes coil contact along the bulge.
 fn rod(choice: &Choice) -> Held<Rod> {
     let law = Rod::with_coils(&choice.spring, choice.accuracy, coils(choice));
     Held { law, contact: None, wire: wire(choice) }
 }
 
-/// Each equilibrium to rounding, with the servo's polynomials.
+/// Prepares a rod with each equilibrium to rounding, with the servo's polynomials.
 fn exact_rod(choice: &Choice) -> Held<Rod> {
     let law = Rod::to_rounding(&choice.spring, coils(choice));
     Held { law, contact: None, wire: wire(choice) }
 }
 
-/// For a base that asks for the least energy: the servo's rod is too coarse to be minimised.
+/// Prepares the rod for a free base: the servo's rod is too coarse for a minimisation of its energy.
 fn rod_to_tip(choice: &Choice) -> Held<Rod> {
     match choice.accuracy {
         Accuracy::Servo => exact_rod(choice),
@@ -295,7 +295,7 @@ fn coils(choice: &Choice) -> Coils {
     }
 }
 
-/// Answers again, in order, where the law alone is not the answer.
+/// Recomputes outputs, in sequence, at poses that may need remainder or rod.
 fn blend_some(law: &mut RodBlend, pace: &mut Pace, inputs: &[Input], outputs: &mut [Output]) {
     for (input, output) in inputs.iter().zip(outputs) {
         match law.examine(&contract::pose(input)) {
@@ -342,7 +342,7 @@ fn retune_rod(held: &mut Held<Rod>, to: &Choice) {
     held.wire = held.wire.map(|_| Wire::new(&to.spring));
 }
 
-/// Repeats a tick until it has an answer that stays; `false` if the pose has none.
+/// Repeats a tick until the response has converged; returns `false` if the pose has no answer.
 fn arrive(mut tick: impl FnMut() -> Response) -> bool {
     let mut validity = tick().validity;
     for _ in 0..MOST_TICKS_TO_DRAW {
@@ -362,7 +362,7 @@ fn draw_rod(rod: &mut Rod, pose: &Pose, sections: &mut [Section]) -> bool {
     arrived
 }
 
-/// The shape of the law that has the say, of `energy` as long as it has one.
+/// Draws the shape of the rod where the rod acts alone, and that of `energy` elsewhere.
 fn draw_blend(held: &mut Held<RodBlend>, spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
     arrive(|| held.law.respond(pose, Demand::Force))
         && match held.law.rod_alone() {

@@ -1,4 +1,4 @@
-//! The springs everybody can name: the three of the thesis and one that really buckles.
+//! Named springs: the three of the thesis and one that really buckles.
 //!
 //! The thesis (table 2) gives each spring its wire, coil and free length *and* a compression rigidity `gamma`.
 //! The two do not agree for springs 1-3 (spring 1's constants are those of a free length of 30 mm, springs 2 and 3
@@ -26,7 +26,7 @@ impl Preset {
     /// All presets, in the order of the tables.
     pub const ALL: [Self; 4] = [Self::Thesis1, Self::Thesis2, Self::Thesis3, Self::Slender];
 
-    /// Name of the preset in scenes and on the command line.
+    /// Returns the name of the preset in scenes and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -37,13 +37,13 @@ impl Preset {
         }
     }
 
-    /// The preset of that name.
+    /// Returns the preset of a name; `None` if unknown.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|preset| preset.name() == name)
     }
 
-    /// The parameters, to be changed one by one before [`Spring::new`] checks them.
+    /// Returns the parameters, which can be changed one by one before [`Spring::new`] checks them.
     #[must_use]
     pub fn parameters(self) -> (Geometry, Material, Stiffness) {
         let millimetres = |free_length, wire_diameter, coil_diameter, active_coils| Geometry {
@@ -61,7 +61,7 @@ impl Preset {
         (geometry, SPRING_STEEL, stiffness)
     }
 
-    /// The spring itself.
+    /// Returns the spring of the preset.
     #[must_use]
     pub fn spring(self) -> Spring {
         let (geometry, material, stiffness) = self.parameters();

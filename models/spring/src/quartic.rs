@@ -34,7 +34,7 @@
 //! out: it is the softening of a twisted column (Greenhill), about 1e-3 of the stiffness for a twist of a tenth of
 //! a radian and more close to buckling.
 //!
-//! The series means nothing once the magnified angles are of order one; there the term fades out.
+//! The series is invalid once the magnified angles are of order one; there the term fades out.
 
 use std::f64::consts::PI;
 
@@ -49,21 +49,21 @@ use flotor_lanes::entire::EntireFunctions;
 use flotor_lanes::saturation::{Saturated, saturate_above, saturate_below};
 use flotor_lanes::{Real, polynomial};
 
-/// Length of the fit: relative error below 2e-4 of the coefficients of short springs, 1e-2 of the slender one.
+/// Number of terms of the fit: relative error below 2e-4 of the coefficients of short springs, 1e-2 of the slender one.
 const TERMS: usize = 12;
 
-/// Relative lengths the fit covers unless the argument ends it sooner: from below the solid length of common
+/// Range of relative lengths of the fit, unless the argument limits it further: from below the solid length of common
 /// springs to nearly twice the free length.
 const SHORTEST: f64 = 0.2;
 const LONGEST: f64 = 1.8;
 
-/// Relative length at either end within which the coefficients level off, if there is room for it.
+/// Relative length at either end within which the coefficients saturate, if the range is wide enough.
 const MARGIN: f64 = 0.05;
 
 /// Squared magnified angle (rad²) at which the term has faded to one half.
 const FADING_SQUARE: f64 = 1.0;
 
-/// First buckling of the column.
+/// Argument of the first buckling of the column.
 const POLE: f64 = PI * PI;
 
 /// Five-point Gauss-Legendre rule on -1..1 (Abramowitz and Stegun, table 25.4): nodes and weights.
@@ -78,26 +78,26 @@ const GAUSS: [(f64, f64); 5] = [
 /// Panels of the rule on half the rod: resolves the end layers of a rod in tension (`z = -60`) to 1e-6.
 const PANELS: u32 = 4;
 
-/// The term and its partial derivatives.
+/// Energy of fourth order and its partial derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct QuarticEnergy<R = f64> {
     pub(crate) energy_j: R,
-    /// By the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
+    /// Derivatives by the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
     pub(crate) by_squares: [R; 3],
-    /// By the length of the chord.
+    /// Derivative by the length of the chord.
     pub(crate) by_length: R,
 }
 
-/// The four coefficients at one length.
+/// Coefficients of the form at one length.
 #[derive(Clone, Copy)]
 pub(crate) struct QuarticForm<R> {
     /// `(c0, c1, c2, c3)`
     coefficients: [R; 4],
-    /// Their derivatives by the length.
+    /// Derivatives of the coefficients by the length.
     by_length: [R; 4],
 }
 
-/// The four coefficients of one spring as functions of the length.
+/// Coefficients of one spring as functions of the length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Quartic {
     /// Powers of the length mapped to -1..1, for `(c0, c1, c2, c3)`, each per newton of `gamma`.
@@ -109,7 +109,7 @@ pub(crate) struct Quartic {
     mapping_per_m: f64,
 }
 
-/// A length at which the fit ends, and where the saturation before it begins.
+/// Saturation of the length before an end of the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Limit {
     knee_m: f64,
@@ -142,13 +142,13 @@ impl Quartic {
         }
     }
 
-    /// The same for a spring of other stiffness but equal proportions, see [`Spring::is_proportional_to`].
-    /// Real-time: bounded, no allocation; nanoseconds.
+    /// Returns the coefficients of a spring of other stiffness but equal proportions, see
+    /// [`Spring::is_proportional_to`]. Real-time: bounded, no allocation; nanoseconds.
     pub(crate) fn with_gamma(self, gamma_n: f64) -> Self {
         Self { gamma_n, ..self }
     }
 
-    /// The term of the form at a length, its argument `z` (saturated, with `dz/dL`) and the squared angles. Real-time:
+    /// Evaluates the energy of a form at the argument `z` (saturated, with `dz/dL`) and the squared angles. Real-time:
     /// bounded, no allocation.
     #[inline(always)]
     pub(crate) fn at<R: Real>(
@@ -176,7 +176,7 @@ impl Quartic {
         let (sway2, both, mixed2, bow2) = (sway * sway, sway * bow, mixed * mixed, bow * bow);
         let value = (c0 * sway2 + c1 * both) + (c2 * mixed2 + c3 * bow2);
         let value_slope = (c0_slope * sway2 + c1_slope * both) + (c2_slope * mixed2 + c3_slope * bow2);
-        // Fades with the square of the magnified amplitude: the error it makes is of order eight.
+        // Fades with the square of the magnified amplitude: the error of the fading is of order eight.
         let amplitude = (sway + bow) * (1.0 / FADING_SQUARE);
         let fading = (amplitude * amplitude + 1.0).inverse();
         let weight = fading * self.gamma_n;
@@ -194,7 +194,7 @@ impl Quartic {
         }
     }
 
-    /// The coefficients at a length. Real-time: bounded, no allocation.
+    /// Returns the coefficients at a length. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(crate) fn form_at<R: Real>(&self, length_m: R) -> QuarticForm<R> {
         let Self { shortest, longest, .. } = *self;
@@ -203,7 +203,7 @@ impl Quartic {
         let slope = slope * below.slope * self.mapping_per_m;
         let mapped = (value - self.middle_m) * self.mapping_per_m;
         let [p0, p1, p2, p3] = &self.powers;
-        // One after the other: side by side they take more registers than there are, and 13 ns of a tick more.
+        // One after the other: interleaved, they exceed the registers and take 13 ns more per tick.
         let ([c0, c0_slope], [c1, c1_slope]) = (polynomial(mapped, p0), polynomial(mapped, p1));
         let ([c2, c2_slope], [c3, c3_slope]) = (polynomial(mapped, p2), polynomial(mapped, p3));
         QuarticForm {
@@ -213,7 +213,7 @@ impl Quartic {
     }
 }
 
-/// Relative length at which the argument is `z`, the longer one of two; `None` if it is never reached.
+/// Returns the relative length at which the argument is `z`, the longer one of two; `None` if there is none.
 fn relative_length(rigidities: &Rigidities, free_length_m: f64, z: f64) -> Option<f64> {
     // z = load p (1 - excess p) with p = 1 - L / L0, solved for the smaller p without cancellation.
     let load = rigidities.gamma_n * free_length_m * free_length_m / (4.0 * rigidities.alpha_n_m2);
@@ -222,8 +222,8 @@ fn relative_length(rigidities: &Rigidities, free_length_m: f64, z: f64) -> Optio
     (discriminant >= 0.0).then(|| 1.0 - 2.0 * z / (load + discriminant.sqrt()))
 }
 
-/// Relative length half way to the one at which a rod of `G > E` has no shear stiffness left; others have it
-/// at all lengths.
+/// Returns the relative length half way to the loss of shear stiffness of a rod with `G > E`; infinity for other rods,
+/// which have shear stiffness at all lengths.
 fn longest_with_shape(rigidities: &Rigidities) -> f64 {
     let excess = 1.0 - rigidities.gamma_n / rigidities.beta_n;
     if excess < 0.0 { 1.0 - 0.5 / excess } else { f64::INFINITY }
@@ -240,7 +240,7 @@ struct Means {
     bow4: f64,
     sway_bow2: f64,
     sway2_bow2: f64,
-    /// Of `(sway bow' - bow sway')²`.
+    /// Mean of `(sway bow' - bow sway')²`.
     sweep2: f64,
 }
 
@@ -251,7 +251,7 @@ impl Means {
         for panel in 0..PANELS {
             for (node, weight) in GAUSS {
                 let u = half_panel * (f64::from(2 * panel + 1) + node);
-                // Both halves of the rod count the same.
+                // Both halves of the rod have equal means.
                 means.add(shape, u, 2.0 * half_panel * weight);
             }
         }
@@ -275,7 +275,7 @@ impl Means {
     }
 }
 
-/// `(c0, c1, c2, c3)` at a relative length, with the pole taken out; zero where there is no shape.
+/// Returns `(c0, c1, c2, c3)` at a relative length, with the pole removed; zero without a shape.
 fn coefficients(rigidities: &Rigidities, free_length_m: f64, relative: f64) -> DVec4 {
     let Rigidities { alpha_n_m2: alpha, beta_n: beta, gamma_n: gamma, .. } = *rigidities;
     let length_m = relative * free_length_m;

@@ -1,18 +1,18 @@
-//! Energy beyond the fourth order, from the exact rod: the part that the law `energy` lacks where the chord sways far.
+//! Energy beyond the fourth order, from the exact rod: correction of the law `energy` for large sway of the chord.
 //!
-//! The law is right to fourth order in the angles of bending ([`crate::quartic`]). At 30 degrees of sway the orders beyond make
-//! millinewtons, at 50 degrees a tenth of a newton. In the measures of [`crate::directions`], with `u = S² - 0.06`,
+//! The law is right to fourth order in the angles of bending ([`crate::quartic`]). At 30 degrees of sway the higher orders
+//! contribute millinewtons, at 50 degrees a tenth of a newton. In the measures of [`crate::directions`], with `u = S² - 0.06`,
 //!
 //! ```text
 //! W = alpha/L0 u³ (c0 + c1 u + c2 u² + (c3 m² D² + c4 (m S.D)²)/S² + (c5 (2 - 2 cos w) + c6 m sin w k.(S x D))/S⁴)        u > 0
 //! ```
 //!
-//! and nothing below: the cube leaves force and stiffness continuous, and the middle of the workspace as it is. The coefficients are
-//! polynomials in the length of the chord, interpolated at Chebyshev nodes. At each node the rod is solved at a few poses, and the
-//! difference of the energies says the coefficients: `c0` to `c2` from three sways of level plates, `c3` to `c6` from one sway with the upper plate
-//! tilted across, tilted along (both ways), twisted, and both.
+//! and zero below: the cube makes force and stiffness continuous, and leaves the middle of the workspace unchanged. The
+//! coefficients are polynomials in the length of the chord, interpolated at Chebyshev nodes. At each node the rod is solved at a
+//! few poses, and the difference of the energies gives the coefficients: `c0` to `c2` from three sways of level plates, `c3` to
+//! `c6` from one sway with the upper plate tilted across, tilted along (both ways), twisted, and both.
 //!
-//! Depends on the proportions of the spring alone, but for the factor `alpha/L0`.
+//! Apart from the factor `alpha/L0` the remainder depends on the proportions of the spring only.
 
 use std::array::from_fn;
 
@@ -29,29 +29,29 @@ use crate::rigidity::Spring;
 use crate::rod::Rod;
 use flotor_lanes::chebyshev::interpolated;
 
-/// `S²` from which on there is a remainder: 14 degrees.
+/// `S²` above which there is a remainder: 14 degrees.
 pub(crate) const ONSET: f64 = 0.06;
 
-/// Nodes in the length of the coefficients of sway alone, and of the others.
+/// Numbers of nodes over the length, for the coefficients of sway alone and for the others.
 const SWAY_TERMS: usize = 6;
 const OTHER_TERMS: usize = 4;
 
 /// Angles between chord and axis at which the rod is solved: with level plates, and with a plate that is turned.
 const SWAYS_RAD: [f64; 3] = [0.5, 0.75, 0.97];
 const TURNED_SWAY_RAD: f64 = 0.85;
-/// The turn, about each axis: 7 degrees, the device's range.
+/// Rotation of the turned plate about each axis: 7 degrees, the device's range.
 const TURN_RAD: f64 = 0.122;
 
-/// Relative lengths of the first and the last node at most, and by how much more the coefficients still change.
+/// Limits of the relative lengths of the first and the last node, and the margin in which the coefficients saturate.
 const SHORTEST: f64 = 0.35;
 const LONGEST: f64 = 1.7;
 const MARGIN: f64 = 0.05;
-/// Argument at the first node at most, short of buckling at 9.87.
+/// Largest argument at the first node, short of buckling at 9.87.
 const LAST_ARGUMENT: f64 = 6.0;
 /// Largest `gamma L0²/(4 alpha)` of a spring with a remainder: a slender rod under tension sways in layers at its ends.
 const MOST_LOAD: f64 = 30.0;
 
-/// The remainder of one spring.
+/// Coefficients of the remainder of one spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Remainder {
     /// Powers of the length mapped to -1..1, for `c0` to `c2` and `c3` to `c6`.
@@ -66,7 +66,7 @@ pub(crate) struct Remainder {
     unit_j: f64,
 }
 
-/// The remainder at a pose.
+/// Energy of the remainder at a pose, with its gradient.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RemainderEnergy {
     pub(crate) energy_j: f64,
@@ -101,8 +101,8 @@ impl Terms {
 }
 
 impl Remainder {
-    /// Finds the coefficients from the rod; `None` for a spring that is too slender, or whose rod has no shape at one of the poses. Real-time:
-    /// bounded, no allocation; 38 searches of the rod.
+    /// Computes the coefficients from the rod; `None` for a spring that is too slender, or whose rod has no shape at
+    /// one of the poses. Real-time: bounded, no allocation; 38 searches of the rod.
     pub(crate) fn new(spring: &Spring, energy: &EnergyForm, rod: &mut Rod) -> Option<Self> {
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
         let ratio = rigidities.gamma_n / rigidities.beta_n;
@@ -166,12 +166,12 @@ impl Remainder {
         .then_some(remainder)
     }
 
-    /// Takes the stiffness of another spring of equal proportions, see [`Spring::is_proportional_to`]. Real-time: bounded, no allocation.
+    /// Sets the stiffness of another spring of equal proportions, see [`Spring::is_proportional_to`]. Real-time: bounded, no allocation.
     pub(crate) fn restiffen(&mut self, spring: &Spring) {
         self.unit_j = spring.rigidities().alpha_n_m2 / spring.geometry().free_length_m;
     }
 
-    /// The remainder at a pose, `None` where there is none. Real-time: bounded, no allocation.
+    /// Returns the remainder at a pose; `None` where it is zero. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(crate) fn at(&self, at: &Directions, upright: (f64, Gradient)) -> Option<RemainderEnergy> {
         let Terms { u, inverse, others } = Terms::of(at);
@@ -223,7 +223,7 @@ impl Remainder {
     }
 }
 
-/// Relative length of the first node: that of [`LAST_ARGUMENT`], or [`SHORTEST`].
+/// Returns the relative length of the first node: that of [`LAST_ARGUMENT`], or [`SHORTEST`].
 fn shortest(total: f64, excess: f64) -> f64 {
     // z = total p (1 - excess p), solved for the smaller p without cancellation.
     let discriminant = total * (total - 4.0 * excess * LAST_ARGUMENT);
@@ -233,7 +233,7 @@ fn shortest(total: f64, excess: f64) -> f64 {
     (1.0 - 2.0 * LAST_ARGUMENT / (total + discriminant.sqrt())).max(SHORTEST)
 }
 
-/// Coefficients of the parabola through three points.
+/// Returns the coefficients of the parabola through three points.
 fn through([[a, at_a], [b, at_b], [c, at_c]]: [[f64; 2]; 3]) -> DVec4 {
     let (first, second) = ((at_b - at_a) / (b - a), (at_c - at_b) / (c - b));
     let curvature = (second - first) / (c - a);

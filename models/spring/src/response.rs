@@ -1,4 +1,4 @@
-//! What a law is asked for and what it answers.
+//! Demand on a law, and its response.
 
 use flotor_hal::glam::DVec3;
 
@@ -6,7 +6,7 @@ use crate::pose::{Coordinates, Pose};
 use crate::validity::Validity;
 use flotor_lanes::{Real, Vector};
 
-/// Outputs the caller needs; each level includes those before it. What is not demanded is not computed.
+/// Outputs the caller needs; each level includes those before it. Outputs not demanded are not computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Demand {
     /// Force alone; the torque of the response is zero.
@@ -17,8 +17,8 @@ pub enum Demand {
     WrenchAndEnergy,
 }
 
-/// Answer of a law: what the spring exerts **on the hand**, at the centre of the upper plate, components in the
-/// model frame.
+/// Response of a law: wrench of the spring **on the hand**, at the centre of the upper plate, components in the model
+/// frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response {
     /// Force (N).
@@ -27,35 +27,35 @@ pub struct Response {
     pub torque_nm: DVec3,
     /// Stored energy (J), zero at rest; `None` if not demanded, not available from this law, or without an answer.
     pub energy_j: Option<f64>,
-    /// How far the above can be trusted.
+    /// Validity of the response.
     pub validity: Validity,
 }
 
 impl Response {
-    /// No wrench and the reason.
+    /// Returns a response without a wrench, with the reason.
     pub(crate) fn none(validity: Validity) -> Self {
         Self { force_n: DVec3::ZERO, torque_nm: DVec3::ZERO, energy_j: None, validity }
     }
 
-    /// The response itself if it is finite, otherwise no wrench: overflow beside a pole is no answer.
+    /// Returns the response if finite, otherwise no wrench: overflow beside a pole is no answer.
     pub(crate) fn if_finite(self) -> Self {
-        // One sum instead of six tests: it is finite only if every term is.
+        // One sum instead of six tests: the sum is finite only if every term is.
         let sum = self.force_n.element_sum() + self.torque_nm.element_sum() + self.energy_j.unwrap_or(0.0);
         if sum.is_finite() { self } else { Self::none(Validity::OutOfDomain) }
     }
 }
 
-/// A law that answers from the pose alone, written once for one pose and for several side by side.
+/// Stateless law of the pose, written once for one pose and for several in lanes.
 pub trait Law {
-    /// Whether it has a stored energy.
+    /// True if the law has a stored energy.
     const HAS_ENERGY: bool;
 
-    /// The answer at a pose, or at one in each lane. Real-time: bounded, no allocation.
+    /// Returns the answer at a pose, or at one pose per lane. Real-time: bounded, no allocation.
     ///
-    /// Where a lane is not answered its numbers mean nothing. What is not demanded is not computed and zero.
+    /// The numbers of a lane without an answer are meaningless. Outputs not demanded are not computed and zero.
     fn answer<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R>;
 
-    /// The response at one pose. Real-time: bounded, no allocation.
+    /// Returns the response at one pose. Real-time: bounded, no allocation.
     #[inline(always)] // into the instructions of a step, see `contract`
     fn respond_at(&self, pose: &Pose, demand: Demand) -> Response {
         let Answer { force_n, torque_nm, energy_j, answered, trusted } =
@@ -84,12 +84,12 @@ pub struct Answer<R: Real> {
     pub energy_j: R,
     /// Lanes that have an answer.
     pub answered: R::Mask,
-    /// Of these, the lanes within the range of the law.
+    /// Answered lanes within the range of the law.
     pub trusted: R::Mask,
 }
 
 impl<R: Real> Answer<R> {
-    /// No answer in any lane: those of `answered`, none of which is true.
+    /// Returns zeros for all lanes; `answered` must be false in every lane.
     #[inline(always)]
     pub(crate) fn none(like: R, answered: R::Mask) -> Self {
         let zero = like.like(0.0);

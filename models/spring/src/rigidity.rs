@@ -1,4 +1,4 @@
-//! What the spring is made of, and how stiff that makes it.
+//! Geometry and material of a spring, and the rigidities derived from both.
 //!
 //! A helical spring of many coils behaves like an elastic rod along its axis. Four *rigidities* describe the
 //! rod, each per unit of reference length: bending `alpha`, shear `beta`, compression `gamma` and torsion
@@ -22,7 +22,7 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Length at which all coils touch (m), `n d`. The laws of this crate go on below it: they know no contact.
+    /// Returns the length at which all coils touch (m), `n d`. Laws without contact continue below this length.
     #[must_use]
     pub fn solid_length_m(&self) -> f64 {
         self.active_coils * self.wire_diameter_m
@@ -39,18 +39,18 @@ pub struct Material {
 }
 
 impl Material {
-    /// Poisson's ratio of an isotropic wire, `E / (2 G) - 1`.
+    /// Returns Poisson's ratio of an isotropic wire, `E / (2 G) - 1`.
     #[must_use]
     pub fn poisson_ratio(&self) -> f64 {
         self.youngs_modulus_pa / (2.0 * self.shear_modulus_pa) - 1.0
     }
 }
 
-/// Positive moduli put the ratio above -1, at which a solid has no resistance to a change of volume: within a hundredth of
-/// that it is none.
+/// Smallest valid Poisson's ratio. Positive moduli give a ratio above -1, at which a solid has no resistance to a
+/// change of volume: within a hundredth of -1 there is practically none.
 pub(crate) const LEAST_POISSON_RATIO: f64 = -0.99;
 
-/// Which constant is given; the others follow. The thesis calls these the modes 0 to 3 of `change`.
+/// Given constant of the stiffness; the others follow. The thesis calls these the modes 0 to 3 of `change`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stiffness {
     /// Mode 0: compression rigidity `gamma` (N).
@@ -77,7 +77,7 @@ pub struct Rigidities {
 }
 
 impl Rigidities {
-    /// Derives all four from `stiffness` without checking anything; [`Spring::new`] is the checked way.
+    /// Derives all four from `stiffness` without checks; [`Spring::new`] checks.
     ///
     /// Modes 0-2 use `beta = gamma E / G` and `alpha = gamma D² / (4 G / E + 2)`, mode 3 equations 7-9. Torsion
     /// is not in the thesis: a coil of wire turned about the spring axis bends, so `tau` has the form of `beta`,
@@ -107,7 +107,7 @@ impl Rigidities {
     }
 }
 
-/// A spring whose numbers have been checked. Immutable: change a parameter by making a new one.
+/// Spring with checked parameters. Immutable: to change a parameter, create a new `Spring`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spring {
     geometry: Geometry,
@@ -119,7 +119,7 @@ impl Spring {
     /// Checks the parameters and derives the rigidities. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// The first parameter found wrong, see [`ParameterError`].
+    /// The first invalid parameter, see [`ParameterError`].
     pub fn new(geometry: Geometry, material: Material, stiffness: Stiffness) -> Result<Self, ParameterError> {
         positive(Quantity::FreeLength, geometry.free_length_m)?;
         positive(Quantity::WireDiameter, geometry.wire_diameter_m)?;
@@ -147,35 +147,35 @@ impl Spring {
         Ok(spring)
     }
 
-    /// For parameters known to be good: the presets, which a test compares with [`Spring::new`].
+    /// Builds a spring from parameters known to be valid: the presets, which a test compares with [`Spring::new`].
     pub(crate) fn unchecked(geometry: Geometry, material: Material, stiffness: Stiffness) -> Self {
         Self { geometry, material, rigidities: Rigidities::derive(stiffness, &geometry, &material) }
     }
 
-    /// Shape of the unloaded spring.
+    /// Returns the shape of the unloaded spring.
     #[must_use]
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
     }
 
-    /// Elastic constants of the wire.
+    /// Returns the elastic constants of the wire.
     #[must_use]
     pub fn material(&self) -> &Material {
         &self.material
     }
 
-    /// Rigidities of the equivalent rod.
+    /// Returns the rigidities of the equivalent rod.
     #[must_use]
     pub fn rigidities(&self) -> &Rigidities {
         &self.rigidities
     }
 
-    /// Rigidities of a spring of the same proportions with `gamma` of one newton: ratios of coil and material alone.
+    /// Returns the rigidities of a spring of the same proportions with `gamma` of one newton: ratios of coil and material alone.
     pub(crate) fn rigidities_per_gamma(&self) -> Rigidities {
         Rigidities::derive(Stiffness::Gamma(1.0), &self.geometry, &self.material)
     }
 
-    /// Whether the rigidities of the two springs differ by one common factor, and their free lengths not at all.
+    /// Returns true if the rigidities of both springs differ by one common factor, and their free lengths are equal.
     /// Wire and number of coils scale all rigidities alike, free length, coil and material do not.
     #[must_use]
     pub fn is_proportional_to(&self, other: &Self) -> bool {
@@ -184,13 +184,13 @@ impl Spring {
             && self.geometry.coil_diameter_m == other.geometry.coil_diameter_m
     }
 
-    /// Stiffness along the axis at rest (N/m), `gamma / L0` (Hooke's `k`).
+    /// Returns the axial stiffness at rest (N/m), `gamma / L0` (Hooke's `k`).
     #[must_use]
     pub fn axial_stiffness_n_per_m(&self) -> f64 {
         self.rigidities.gamma_n / self.geometry.free_length_m
     }
 
-    /// Stiffness sideways at rest (N/m), the plates held level: a beam that shears (Timoshenko).
+    /// Returns the lateral stiffness at rest (N/m) between level plates: a beam that shears (Timoshenko).
     #[must_use]
     pub fn lateral_stiffness_n_per_m(&self) -> f64 {
         let length_m = self.geometry.free_length_m;
@@ -200,7 +200,7 @@ impl Spring {
 }
 
 /// # Errors
-/// The value is not a positive, finite number.
+/// If the value is not a positive, finite number.
 fn positive(quantity: Quantity, value: f64) -> Result<(), ParameterError> {
     if !value.is_finite() {
         Err(ParameterError::NotFinite { quantity })
@@ -212,7 +212,7 @@ fn positive(quantity: Quantity, value: f64) -> Result<(), ParameterError> {
 }
 
 /// # Errors
-/// The parts of the spring do not fit into each other.
+/// If the coil is not wider than the wire, or the coils touch at rest.
 fn check_shape(geometry: &Geometry) -> Result<(), ParameterError> {
     let Geometry { free_length_m, wire_diameter_m, coil_diameter_m, .. } = *geometry;
     if coil_diameter_m <= wire_diameter_m {
@@ -225,7 +225,7 @@ fn check_shape(geometry: &Geometry) -> Result<(), ParameterError> {
     Ok(())
 }
 
-/// A number of the spring, named in errors.
+/// Quantity of the spring, named in errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// `L0`
@@ -267,19 +267,19 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// Why a set of parameters is no spring.
+/// Reason why a set of parameters is invalid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParameterError {
-    /// NaN or infinite, as given or as derived.
+    /// Given or derived quantity that is NaN or infinite.
     NotFinite {
-        /// The number in question.
+        /// Invalid quantity.
         quantity: Quantity,
     },
-    /// Zero or negative, as given or as derived.
+    /// Given or derived quantity that is zero or negative.
     NotPositive {
-        /// The number in question.
+        /// Invalid quantity.
         quantity: Quantity,
-        /// Its value in SI units.
+        /// Value in SI units.
         value: f64,
     },
     /// The wire would fill the coil: `D <= d`.
@@ -300,7 +300,7 @@ pub enum ParameterError {
     ImpossiblePoissonRatio {
         /// `E / (2 G) - 1`.
         poisson_ratio: f64,
-        /// The two moduli.
+        /// Both moduli.
         material: Material,
     },
 }

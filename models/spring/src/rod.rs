@@ -1,26 +1,26 @@
 //! Variant `rod`: the spring as a geometrically exact rod, in space and past buckling.
 //!
-//! Between its plates the spring is an elastic line whose sections can turn by any angle: it bends, twists,
-//! shears and shortens, with one rigidity for each (Haringx's rod; Reissner and Simo's in space). Nothing is
-//! linearised, so there are several equilibria where a real spring has several, and the one that is felt is
-//! the one that is stable. [`Rod`] finds it by energy: among all shapes that meet the plates, a minimum of
-//! the stored energy.
+//! Between its plates the spring is an elastic line whose sections can turn by any angle: it bends, twists, shears and
+//! shortens, with one rigidity for each (Haringx's rod; Reissner and Simo's in space). Nothing is linearised, so there
+//! are several equilibria where a real spring has several, and only a stable one is felt. [`Rod`] finds a stable
+//! equilibrium by energy: a minimum of the stored energy among all shapes that meet the plates.
 //!
-//! One idea a module:
+//! One topic per module:
 //! - `plate`: the upper plate in coordinates free of trigonometry; `section`: the energy of a section in
 //!   them.
-//! - `functional`: the energy as a function of the coefficients of the polynomials of the shape ([`flotor_lanes::basis`]), with all
-//!   that is quadratic eliminated; its derivatives by the pose are force and torque.
-//! - `contact`: coils that touch.
-//! - `curve`: where the sections are, for drawing.
-//! - `predictor`, `equilibrium`: follow the minimum in time, and count unstable directions by [`flotor_lanes::matrix`]; `start`: where to begin without a past.
-//! - `descent`: the equilibrium of a pose without a past, fast, from the straight `column`; `search_energy`: the energy
-//!   it asks for.
+//! - `functional`: the energy as a function of the coefficients of the polynomials of the shape
+//!   ([`flotor_lanes::basis`]), with all quadratic parts eliminated; its derivatives by the pose are force and torque.
+//! - `contact`: contact of the coils.
+//! - `curve`: positions of the sections, for drawing.
+//! - `predictor`, `equilibrium`: follow the minimum in time, and count unstable directions ([`flotor_lanes::matrix`]); `start`: first
+//!   shape.
+//! - `descent`: fast search for the equilibrium of a pose without a history, from the straight `column`;
+//!   `search_energy`: the energy of this search.
 //!
-//! Shear, stretch and twist follow in closed form from the directions of the sections, two numbers each. So
-//! ten polynomials leave an error below a micronewton before buckling, twenty-eight leave rounding, and the
-//! matrix that Newton's method needs anyway tells a stable equilibrium from an unstable one. The answer
-//! depends on the past only where the rod has a choice.
+//! Shear, stretch and twist follow in closed form from the directions of the sections, two numbers each. So ten
+//! polynomials leave an error below a micronewton before buckling, twenty-eight leave rounding, and the matrix of
+//! Newton's method also distinguishes a stable equilibrium from an unstable one. The answer depends on the history only
+//! where there are several stable equilibria.
 //!
 //! Sources: Haringx, *On highly compressible helical springs and rubber rods* (1948); Simo, *A finite strain
 //! beam formulation* (1985); the elimination and the coordinates are this project's, in the book's chapter
@@ -55,7 +55,7 @@ mod search_energy;
 mod section;
 mod start;
 
-/// How accurate the rod is, and how much a tick costs.
+/// Accuracy of the rod, and cost of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Accuracy {
     /// For the servo: force to a micronewton before buckling and to a millinewton past it, in about a
@@ -66,47 +66,47 @@ pub enum Accuracy {
     Tight,
 }
 
-/// Whether coils that meet press on each other.
+/// Contact between the coils.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Coils {
-    /// They pass through each other.
+    /// Coils pass through each other.
     Pass,
-    /// They touch.
+    /// Coils touch and press on each other.
     Touch,
 }
 
-/// Which equilibrium the rod is in.
+/// Branch of the rod's equilibria, by the distance of the plates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Branch {
-    /// The plates are farther apart than where a straight rod buckles.
+    /// Distance of the plates above that at which a straight rod buckles.
     Unbuckled,
-    /// Closer than that: a stable shape bulges.
+    /// Smaller distance: a stable shape bulges.
     Buckled,
 }
 
-/// What the rod knows about itself after a tick.
+/// State of the rod's equilibrium after a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct State {
-    /// Which equilibrium it is in or moves to.
+    /// Branch at the current pose.
     pub branch: Branch,
-    /// Directions in which the energy of the shape falls, the Morse index; counted where the matrix was last
-    /// renewed.
+    /// Number of directions in which the energy of the shape falls, the Morse index; counted at the last renewal of the
+    /// matrix.
     pub unstable_directions: usize,
 }
 
 impl State {
-    /// Whether the shape is a minimum of the energy.
+    /// Returns true if the shape is a minimum of the energy.
     #[must_use]
     pub fn is_stable(&self) -> bool {
         self.unstable_directions == 0
     }
 }
 
-/// For the servo: a force to a nanonewton, in one evaluation of the energy on a smooth path.
+/// Effort for the servo: a force to a nanonewton, in one evaluation of the energy on a smooth path.
 const SERVO: Effort =
     Effort { most_steps: 6, most_matrices: 3, matrix_life: 32, tolerance: 1e-11, renewal: 1e-6 };
 
-/// Each equilibrium to rounding, so that nothing of the past is left in an answer.
+/// Effort for equilibria to rounding, so that an answer does not depend on the history.
 const TO_ROUNDING: Effort = Effort {
     most_steps: 10,
     most_matrices: 6,
@@ -117,7 +117,7 @@ const TO_ROUNDING: Effort = Effort {
 };
 
 impl Effort {
-    /// Where coils touch they meet at one place after the other in a tick, and each changes the matrix.
+    /// Raises the limits for touching coils: they meet at one place after the other in a tick, and each place changes the matrix.
     fn with(self, coils: Coils) -> Self {
         match coils {
             Coils::Pass => self,
@@ -133,19 +133,19 @@ pub struct Rod {
     coils: Coils,
     constants: Constants,
     branch: Branch,
-    /// Answer of the last tick that had one.
+    /// Response of the last tick that had an answer.
     last: Response,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 enum Solver {
-    /// The servo's polynomials, summed at whole fours of stations: four are added at a time, so two more cost less.
+    /// The servo's polynomials, with a multiple of four stations: four are summed at a time, so two more stations cost less.
     Blend(Box<Equilibrium<BUBBLES, COEFFICIENTS, STATIONS>>, Box<Descent>),
     Servo(Box<Equilibrium<10, 20, 14>>),
     Tight(Box<Equilibrium<28, 56, 30>>),
 }
 
-/// Does the same with either setting's solver.
+/// Evaluates an expression with the equilibrium of any solver.
 macro_rules! either {
     ($solver:expr, $equilibrium:ident => $body:expr) => {
         match $solver {
@@ -157,13 +157,13 @@ macro_rules! either {
 }
 
 impl Rod {
-    /// The rod at rest. Not real-time: allocates.
+    /// Builds the rod at rest. Not real-time: allocates.
     #[must_use]
     pub fn new(spring: &Spring, accuracy: Accuracy) -> Self {
         Self::with_coils(spring, accuracy, Coils::Pass)
     }
 
-    /// The rod at rest, with coils that touch or not. Not real-time: allocates.
+    /// Builds the rod at rest, with or without contact of its coils. Not real-time: allocates.
     #[must_use]
     pub fn with_coils(spring: &Spring, accuracy: Accuracy, coils: Coils) -> Self {
         let ratios = Ratios::new(spring, coils);
@@ -183,20 +183,20 @@ impl Rod {
         Self::solved_by(solver, spring, coils)
     }
 
-    /// The rod at rest with the servo's polynomials and each equilibrium to rounding, so that nothing of the past is left
-    /// in an answer: for laws that minimise its energy ([`crate::seat`]). Not real-time: allocates.
+    /// Builds the rod at rest with the servo's polynomials and each equilibrium to rounding, so that an answer does not
+    /// depend on the history: for laws that minimise its energy ([`crate::seat`]). Not real-time: allocates.
     #[must_use]
     pub fn to_rounding(spring: &Spring, coils: Coils) -> Self {
         let equilibrium = Equilibrium::new(Ratios::new(spring, coils), TO_ROUNDING.with(coils));
         Self::solved_by(Solver::Servo(Box::new(equilibrium)), spring, coils)
     }
 
-    /// The rod at rest for a law that mixes its energy with another ([`crate::rod_blend`]) and finds it anew at each pose: each
-    /// equilibrium to rounding where it is followed, to 1e-10 of the angles where it is found. Not real-time:
+    /// Builds the rod at rest for a law that blends its energy with another ([`crate::rod_blend`]) and finds the
+    /// equilibrium anew at each pose: to rounding while followed, to 1e-10 of the angles when found. Not real-time:
     /// allocates.
     #[must_use]
     pub(crate) fn for_a_blend(spring: &Spring) -> Self {
-        // A base that loses the ground has to search twice in a tick.
+        // A base that lifts off needs two searches in a tick.
         let effort = Effort { most_matrices: 5, ..TO_ROUNDING };
         let equilibrium = Equilibrium::new(Ratios::new(spring, Coils::Pass), effort);
         Self::solved_by(Solver::Blend(Box::new(equilibrium), Box::new(Descent::new())), spring, Coils::Pass)
@@ -212,47 +212,46 @@ impl Rod {
         }
     }
 
-    /// Forgets the past: at rest. Real-time: bounded, no allocation.
+    /// Resets to the rest state without history. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         either!(&mut self.solver, equilibrium => equilibrium.reset());
         self.branch = Branch::Unbuckled;
         self.last = Response::none(Validity::NotConverged);
     }
 
-    /// Takes other parameters at a tick boundary and keeps the shape. Real-time: bounded, no allocation.
+    /// Changes the parameters at a tick boundary, with the shape unchanged. Real-time: bounded, no allocation.
     pub fn set_spring(&mut self, spring: &Spring) {
         self.constants = Constants::new(spring);
         either!(&mut self.solver, equilibrium => equilibrium.set_ratios(Ratios::new(spring, self.coils)));
     }
 
-    /// What is known about the equilibrium of the last tick. Real-time: bounded, no allocation.
+    /// Returns the state of the last tick's equilibrium. Real-time: bounded, no allocation.
     #[must_use]
     pub fn state(&self) -> State {
         let unstable_directions = either!(&self.solver, equilibrium => equilibrium.unstable_directions());
         State { branch: self.branch, unstable_directions }
     }
 
-    /// What the last tick cost. Real-time: bounded, no allocation.
+    /// Returns the cost of the last tick. Real-time: bounded, no allocation.
     #[must_use]
     pub fn work(&self) -> Work {
         either!(&self.solver, equilibrium => equilibrium.work())
     }
 
-    /// The sections of the rod as it is after the last tick, from plate to plate, evenly in arc length of the
-    /// unloaded spring. Not real-time: an integration.
+    /// Fills in the sections of the rod after the last tick, from plate to plate, evenly in arc length of the unloaded
+    /// spring. Not real-time: an integration.
     pub fn sections(&self, sections: &mut [Section]) {
         let free_length_m = self.constants.free_length_m;
         either!(&self.solver, equilibrium => equilibrium.curve().draw(free_length_m, sections));
     }
 
-    /// Wrench on the hand and stored energy at the pose of this tick.
+    /// Returns the wrench on the hand and the stored energy at the pose of this tick.
     ///
     /// Total over all poses and histories:
     /// - in stable equilibrium: [`Validity::Ok`];
-    /// - on the way to one (after a jump of the pose, or where the last equilibrium ceased to be stable):
-    ///   [`Validity::NotConverged`], with the wrench of the shape on its way, a bounded way per tick. Call
-    ///   again, at the same pose or another. Where not even that is a finite number, the last wrench that
-    ///   was;
+    /// - moving to an equilibrium (after a jump of the pose, or where the last equilibrium ceased to be stable):
+    ///   [`Validity::NotConverged`], with the wrench of the present shape, which moves a bounded distance per tick.
+    ///   Call again, at the same pose or another. If even this wrench is not finite, the last finite one;
     /// - upper plate upside down to within 2.6 degrees, plates closer than a thousandth or farther than a
     ///   million free lengths: no wrench, [`Validity::OutOfDomain`];
     /// - NaN, infinity or a quaternion that is not of unit length: no wrench, [`Validity::InvalidInput`].
@@ -266,9 +265,9 @@ impl Rod {
         )
     }
 
-    /// The same without a past: the equilibrium that is found from the shape of the linear beam-column, a function of
-    /// the pose alone. Where the search does not end, [`Validity::NotConverged`], and [`Self::step`] goes on with it.
-    /// `spring` is the rod's own. Real-time: bounded, no allocation; some ten times a step.
+    /// Finds the equilibrium without a history, from the shape of the linear beam-column: a function of the pose alone.
+    /// If the search does not converge, [`Validity::NotConverged`], and [`Self::step`] continues it. `spring` is the
+    /// rod's own. Real-time: bounded, no allocation; some ten times a step.
     pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, demand: Demand) -> Response {
         self.last = Response::none(Validity::NotConverged);
         self.answer(
@@ -285,8 +284,8 @@ impl Rod {
         )
     }
 
-    /// The stored energy of the equilibrium that is found from the pose alone; `None` where the search does not end, or for a rod that
-    /// is not for a blend. The rod stays as it is. Real-time: bounded, no allocation.
+    /// Returns the stored energy of the equilibrium found from the pose alone; `None` if the search does not converge,
+    /// or for a rod that is not for a blend. The rod is unchanged. Real-time: bounded, no allocation.
     pub(crate) fn energy_at(&mut self, pose: &Pose) -> Option<f64> {
         let plate = Plate::new(pose, self.constants.free_length_m)?;
         let Solver::Blend(equilibrium, descent) = &mut self.solver else { return None };
@@ -353,7 +352,7 @@ impl HeldSpring for Rod {
     }
 }
 
-/// The spring in SI units.
+/// Constants of the spring, SI units unless dimensionless.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Constants {
     free_length_m: f64,
@@ -382,7 +381,7 @@ impl Constants {
         }
     }
 
-    /// Haringx's condition for clamped plates: `(gamma L0²/alpha) p (1 - (1 - gamma/beta) p) = 4 pi²`.
+    /// Returns the branch by Haringx's condition for clamped plates: `(gamma L0²/alpha) p (1 - (1 - gamma/beta) p) = 4 pi²`.
     fn branch(&self, shortening_m: f64) -> Branch {
         let compression = shortening_m / self.free_length_m;
         let load = self.slenderness * compression * (1.0 - self.shear * compression);

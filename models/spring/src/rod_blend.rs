@@ -1,21 +1,21 @@
-//! The law `energy` with its remainder where that is good enough, the exact rod where it is not, as one energy.
+//! Blending of the law `energy` with its remainder and the exact rod, as one energy: the rod where the law is not accurate enough.
 //!
-//! Where each is, `rod_share` says, by the pose alone: by a bound of the error against the tolerance, and by
-//! how near the rod is to buckling. In between the energies are mixed, and not the forces,
+//! The weight `s` of the rod, from `rod_share`, depends on the pose alone: on a bound of the error against the
+//! tolerance, and on the nearness of the rod to buckling. The energies are blended, not the forces,
 //!
 //! ```text
 //! W = (1 - s) W_law + s W_rod        F = -dW/dr = (1 - s) F_law + s F_rod - (W_rod - W_law) ds/dr
 //! ```
 //!
-//! So the spring stays conservative, and force and stiffness continuous. The last term is a force of its own: it is as
-//! small as the difference of the energies, so `s` has to reach 1 before that is large. Past buckling the spring is the
-//! rod, where `energy` saturates.
+//! So the spring stays conservative, and force and stiffness continuous. The last term is a force of the blending
+//! itself: it is as small as the difference of the energies, so `s` has to reach 1 before this difference is large.
+//! Past buckling, where `energy` saturates, the spring is the rod.
 //!
-//! **A function of the pose, as far as a spring is one.** Short of buckling there is one equilibrium, and it is found
-//! anew at each pose, from the straight column. Past it there are several: a bulge may point anywhere, and
-//! where it points depends on how the hand came there. A choice by the pose alone would make torque jump as a plate is
-//! rocked through the level, so from there the rod is followed from tick to tick, until the plates are far enough apart
-//! again. A spring too short to buckle (`ShareOfRod::has_buckling`) has no such poses and no memory.
+//! **Path dependence.** Short of buckling there is one equilibrium, which is found anew at each pose, from the straight
+//! column. Past buckling there are several: a bulge may point anywhere, and its direction depends on the path of the
+//! hand. A choice by the pose alone would make the torque jump as a plate is rocked through the level, so past buckling
+//! the rod is followed from tick to tick, until the plates are far enough apart again. A spring too short to buckle
+//! (`ShareOfRod::has_buckling`) has no such poses and no history.
 
 use flotor_hal::glam::DVec3;
 use pulp::NullaryFnOnce;
@@ -33,11 +33,11 @@ use crate::rod::{Rod, State};
 use crate::rod_share::{Law, ShareOfRod};
 use crate::validity::Validity;
 
-/// Tolerance of the force by default (N): the error that a loop of 1 kHz itself makes with an exact model by holding a force for a period,
-/// 5.4 mN rms (`flotor bench`, column *hold*).
+/// Default tolerance of the force (N): the zero-order-hold error of a 1 kHz loop with an exact model, 5.4 mN rms
+/// (`flotor bench`, column *hold*).
 pub const TOLERANCE_N: f64 = 0.005;
 
-/// Both laws of one spring.
+/// Law `energy` and exact rod of one spring, blended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RodBlend {
     energy: EnergyForm,
@@ -48,27 +48,27 @@ pub struct RodBlend {
     tolerance_n: f64,
     share: f64,
     follows: Follows,
-    /// The last two as they were marked.
+    /// Saved `share` and `follows`.
     marked: (f64, Follows),
 }
 
-/// Whether the rod goes on from its last tick.
+/// Origin of the rod's equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Follows {
-    /// It is found from the pose.
+    /// Found anew from the pose.
     Pose,
-    /// It buckled, or a search did not end: it goes on from where it is, until it has no share any more.
+    /// Followed from the last tick, after buckling or an unfinished search, until the rod's weight is zero.
     LastTick,
 }
 
 impl RodBlend {
-    /// Prepares both for the tolerance by default. Not real-time: the rod allocates.
+    /// Prepares both laws for the default tolerance. Not real-time: the rod allocates.
     #[must_use]
     pub fn new(spring: &Spring) -> Self {
         Self::within(spring, TOLERANCE_N)
     }
 
-    /// Prepares both for a tolerance of the force. Not real-time: the rod allocates.
+    /// Prepares both laws for a tolerance of the force. Not real-time: the rod allocates.
     #[must_use]
     pub fn within(spring: &Spring, tolerance_n: f64) -> Self {
         let (energy, mut rod) = (EnergyForm::new(spring), Rod::for_a_blend(spring));
@@ -86,13 +86,13 @@ impl RodBlend {
         }
     }
 
-    /// Takes other parameters at a tick boundary. Real-time: bounded, no allocation; other proportions take a new remainder, and so 38
-    /// searches of the rod.
+    /// Changes the parameters at a tick boundary. Real-time: bounded, no allocation; other proportions need a new
+    /// remainder, and so 38 searches of the rod.
     pub fn set_spring(&mut self, spring: &Spring) {
         self.set(spring, self.tolerance_n);
     }
 
-    /// Takes other parameters and another tolerance at a tick boundary, as [`Self::set_spring`].
+    /// Changes parameters and tolerance at a tick boundary, as [`Self::set_spring`] does.
     pub(crate) fn set(&mut self, spring: &Spring, tolerance_n: f64) {
         self.tolerance_n = tolerance_n;
         self.energy = self.energy.retuned(&self.spring, spring);
@@ -106,48 +106,48 @@ impl RodBlend {
         self.spring = *spring;
     }
 
-    /// Forgets the past. Real-time: bounded, no allocation.
+    /// Clears the history. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.rod.reset();
         self.leave();
     }
 
-    /// Whether an answer may depend on earlier poses: the spring can buckle.
+    /// Returns true if a response may depend on earlier poses: the spring can buckle.
     #[must_use]
     pub fn remembers(&self) -> bool {
         self.shares.has_buckling()
     }
 
-    /// The rod's share in the last answer, 0 to 1.
+    /// Returns the weight of the rod in the last response, 0 to 1.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.share
     }
 
-    /// About the rod, where it has a share.
+    /// Returns the state of the rod; `None` if its weight is zero.
     #[must_use]
     pub fn rod_state(&self) -> Option<State> {
         (self.share > 0.0).then(|| self.rod.state())
     }
 
-    /// The rod, where it is alone.
+    /// Returns the rod if its weight is 1.
     pub(crate) fn rod_alone(&mut self) -> Option<&mut Rod> {
         (self.share >= 1.0).then_some(&mut self.rod)
     }
 
-    /// The law that answers wherever neither remainder nor rod is needed.
+    /// Returns the law for poses that need neither remainder nor rod.
     pub(crate) fn energy(&self) -> &EnergyForm {
         &self.energy
     }
 
-    /// The directions of a pose at which the answer may be more than that of [`Self::energy`]; `None` elsewhere. Real-time: bounded, no
-    /// allocation.
+    /// Returns the directions of a pose that may need remainder or rod; `None` where [`Self::energy`] is sufficient.
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn examine(&self, pose: &Pose) -> Option<Directions> {
         self.shares.examine(pose)
     }
 
-    /// Forgets the rod's shape where it has no share.
+    /// Sets the rod's weight to zero; its shape is found anew later.
     #[inline]
     pub(crate) fn leave(&mut self) {
         self.share = 0.0;
@@ -165,7 +165,7 @@ impl RodBlend {
         }
     }
 
-    /// The rod's answer, by the pose alone as long as that says which of its equilibria is meant.
+    /// Returns the rod's response: by the pose alone while the pose determines the equilibrium, else followed from the last tick.
     fn ask_rod(&mut self, pose: &Pose, is_buckled: bool, demand: Demand) -> Response {
         let response = match self.follows {
             Follows::Pose => self.rod.find(&self.spring, pose, demand),
@@ -177,7 +177,7 @@ impl RodBlend {
         response
     }
 
-    /// The answer at a pose that [`Self::examine`] has the directions of. Real-time: bounded, no allocation.
+    /// Returns the response at a pose with the directions from [`Self::examine`]. Real-time: bounded, no allocation.
     pub(crate) fn respond_examined(
         &mut self,
         advance: Advance,
@@ -216,7 +216,7 @@ impl RodBlend {
     }
 }
 
-/// The parts of a whole response that are demanded.
+/// Returns the demanded parts of a full response.
 fn demanded(response: Response, demand: Demand) -> Response {
     Response {
         torque_nm: if demand >= Demand::Wrench { response.torque_nm } else { DVec3::ZERO },
@@ -242,7 +242,7 @@ impl Corrected<'_> {
     }
 }
 
-/// An answer of a corrected law, to be compiled for the instructions of the machine it runs on.
+/// Response of a corrected law, compiled for several instruction sets.
 struct Answering<'a> {
     law: Corrected<'a>,
     demand: Demand,
@@ -273,7 +273,7 @@ impl NullaryFnOnce for Answering<'_> {
     }
 }
 
-/// The shares beside a law with this remainder.
+/// Returns the weight function of the rod beside a law with this remainder.
 fn shares(spring: &Spring, tolerance_n: f64, remainder: Option<&Remainder>) -> ShareOfRod {
     ShareOfRod::new(spring, tolerance_n, if remainder.is_some() { Law::Corrected } else { Law::Plain })
 }

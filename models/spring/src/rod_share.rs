@@ -1,24 +1,24 @@
-//! The share of the exact rod in the default law, a smooth function of the pose.
+//! Weight of the exact rod in the default law, a smooth function of the pose.
 //!
-//! A bound of the error that the law of [`crate::energy`] with its [`crate::remainder`] makes in the force, relative to `alpha/L0²`, is
-//! a sum in the measures of [`crate::directions`], with `s = S²`, `b = m² D²`, `w = 2 - 2 cos(twist)` and the relative length `l` of the chord,
+//! The error in the force of [`crate::energy`] with its [`crate::remainder`], relative to `alpha/L0²`, is bounded by a sum in the measures
+//! of [`crate::directions`], with `s = S²`, `b = m² D²`, `w = 2 - 2 cos(twist)` and the relative length `l` of the chord,
 //!
 //! ```text
 //! (1 + (load/22)⁴) (c0 x²/(x² + 0.01) + c1 w² + c2 b⁴ + c3 m⁸ s⁴ + c4 s¹² + c5 (s/l²)⁴)
 //! x = s + 10 b + 10 w        load = gamma L0²/(4 alpha)
 //! ```
 //!
-//! The first term is a plateau, the error of the fit of the remainder; the others rise steeply where the fit ends: far twist, bow and sway
-//! near buckling, far sway, and a chord far below the free length. The coefficients come from a linear program and a search: over 60 000
-//! poses of the presets in the device's workspace, and 40 000 of the presets and of 600 springs of random proportions turned by up to
-//! 30 degrees, the bound is at least the error, small in the device's workspace, and so steep that the force of the blending, which
-//! follows the slope of the share, stays within the tolerance. From eight tenths of the tolerance on the rod has a share, and at six
-//! tolerances it is alone; likewise as `G0` of [`flotor_lanes::entire`] falls from 1 at rest to 0 at buckling, because past buckling only the
-//! rod has a bulge.
+//! The first term is a plateau, the error of the fit of the remainder; the others rise steeply where the fit ends: far twist, bow
+//! and sway near buckling, far sway, and a chord far below the free length. The coefficients come from a linear program and a
+//! search: over 60 000 poses of the presets in the device's workspace, and 40 000 of the presets and of 600 springs of random
+//! proportions turned by up to 30 degrees, the bound is at least the error, small in the device's workspace, and so steep that
+//! the force of the blending, which follows the slope of the weight, stays within the tolerance. The weight rises from 0 at a
+//! bound of eight tenths of the tolerance to 1 at six tolerances; likewise as `G0` of [`flotor_lanes::entire`] falls from 1 at
+//! rest to 0 at buckling, because past buckling only the rod has a bulge.
 //!
-//! Where any two of chord and normals stand more than 66 degrees apart, or the plate is twisted as much, the share falls
-//! again, to zero at 78 degrees: a rod whose plates stand beside one another, or past one another, has several shapes, and
-//! none that a coil could take.
+//! Where any two of chord and normals are more than 66 degrees apart, or the plate is twisted as much, the weight falls
+//! again, to zero at 78 degrees: a rod whose plates stand beside one another, or past one another, has several shapes,
+//! and none that a coil could take.
 
 use crate::directions::{
     BUCKLING_ARGUMENT, DEEP_ARGUMENT, Directions, Gradient, Load, Passage, Slopes, upper_normal,
@@ -28,43 +28,44 @@ use crate::remainder::ONSET;
 use crate::rigidity::Spring;
 use flotor_lanes::entire::EntireFunctions;
 
-/// Bound of the error in tolerances from which on the rod has a share, and from which on it is alone. In between the share follows the
-/// fourth root of the bound, nearly its logarithm: so the share rises over as long a way as the bound.
+/// Bounds of the error, in tolerances, at which the rod's weight leaves 0 and reaches 1. In between the weight follows
+/// the fourth root of the bound, nearly its logarithm: so the weight rises over the same distance as the bound.
 const FIRST_ERROR: f64 = 0.8;
 const LAST_ERROR: f64 = 6.0;
 
-/// `G0` below which the rod has a share, and below which it is alone; and the argument of the first, rounded down.
+/// `G0` below which the rod's weight rises, and below which it is 1; and the argument of the former, rounded down.
 const FIRST: f64 = 0.26;
 const LAST: f64 = 0.17;
 const FIRST_ARGUMENT: f64 = 6.006;
 
-/// The middle of the workspace, where the energy alone is the answer: largest argument, shortest relative chord, and, for the tolerance by
-/// default, largest `D²` and `w`, 7 degrees each.
+/// Middle of the workspace, where the law `energy` alone is sufficient: largest argument, shortest relative chord, and,
+/// for the default tolerance, largest `D²` and `w`, 7 degrees each.
 const MIDDLE_ARGUMENT: f64 = 4.0;
 const MIDDLE_MAGNIFICATION: f64 = 1.0 + BUCKLING_ARGUMENT / (BUCKLING_ARGUMENT - MIDDLE_ARGUMENT);
 const MIDDLE_LENGTH: f64 = 0.6;
 const MIDDLE_TILT: f64 = 0.0037;
 const MIDDLE_TWIST: f64 = 0.015;
-/// Halvings of the search for the middle, which runs inside a tick: its lower end is the answer, so a coarse one costs a check at few poses.
+/// Bisection steps of the search for the middle, which runs inside a tick: the result is the lower end, so a coarse one only costs a check
+/// at few poses.
 const MIDDLE_HALVINGS: u32 = 12;
 
-/// The share at a pose and its derivatives.
+/// Weight of the rod at a pose, with its derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Share {
     pub(crate) value: f64,
     pub(crate) gradient: Gradient,
-    /// Whether a straight rod of the chord's length has buckled.
+    /// True if a straight rod of the chord's length has buckled.
     pub(crate) is_buckled: bool,
 }
 
-/// The law beside the rod: the energy with its remainder, or alone.
+/// Law beside the rod: the energy with its remainder, or alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Law {
     Corrected,
     Plain,
 }
 
-/// What the error of a law depends on.
+/// Measures of a pose that determine the error of a law.
 #[derive(Clone, Copy, Debug)]
 struct Measures {
     /// `S²`
@@ -73,7 +74,7 @@ struct Measures {
     bow: f64,
     /// `2 - 2 cos(twist)`
     twist: f64,
-    /// Of the chord, relative.
+    /// Relative length of the chord.
     length: f64,
     /// `m`
     magnification: f64,
@@ -101,20 +102,20 @@ impl Measures {
         }
     }
 
-    /// `x`
+    /// Returns `x`.
     fn deviation(&self) -> f64 {
         self.sway + DEVIATION_WEIGHT * (self.bow + self.twist)
     }
 }
 
-/// The coefficients of the module documentation, in its order.
+/// Coefficients of the module documentation, in its sequence.
 const PLATEAU: f64 = 5.8e-3;
 const TWISTED: f64 = 7.0;
 const BOWED: f64 = 2100.0;
 const SWAYED_NEAR_BUCKLING: f64 = 8.9e-6;
 const SWAYED: f64 = 0.2;
 const SHORT: f64 = 6.0e-5;
-/// Without the remainder the bound is `(1 + (load/(4 pi²))²) (c6 (s + b)² + c7 w (s + b + 0.1))`: its coefficients.
+/// Coefficients of the bound without the remainder, `(1 + (load/(4 pi²))²) (c6 (s + b)² + c7 w (s + b + 0.1))`.
 const PLAIN_BENT: f64 = 4.5;
 const PLAIN_TWISTED: f64 = 4.2;
 /// `x²` at which the plateau has half of its height, and the weight of bow and twist in `x`.
@@ -124,17 +125,17 @@ const DEVIATION_WEIGHT: f64 = 10.0;
 const SLENDER_LOAD: f64 = 22.0;
 
 impl Law {
-    /// What the bound is multiplied by for a spring of this load, relative to `alpha/L0²`.
+    /// Returns the factor of the bound for a spring of this load, relative to `alpha/L0²`.
     fn slenderness(self, load: f64) -> f64 {
         let part = match self {
             Self::Corrected => (load / SLENDER_LOAD) * (load / SLENDER_LOAD),
-            // The sway of a slender rod takes length from it, and so load.
+            // The sway of a slender rod reduces its length, and so its load.
             Self::Plain => load / (4.0 * BUCKLING_ARGUMENT),
         };
         1.0 + part * part
     }
 
-    /// The bound of the error of a stout spring.
+    /// Returns the bound of the error of a stout spring.
     fn bound(self, at: &Measures) -> f64 {
         let Measures { sway: s, bow: b, twist: w, length, magnification: m } = *at;
         match self {
@@ -158,7 +159,7 @@ impl Law {
         }
     }
 
-    /// The derivatives of [`Self::bound`].
+    /// Returns the derivatives of [`Self::bound`].
     fn slopes(self, at: &Measures) -> BoundSlopes {
         let Measures { sway: s, bow: b, twist: w, length, magnification: m } = *at;
         match self {
@@ -197,14 +198,14 @@ impl Law {
     }
 }
 
-/// The shares of one spring.
+/// Weight function of the rod for one spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ShareOfRod {
     free_length_m: f64,
     load: Load,
     has_buckling: bool,
     law: Law,
-    /// The bound of a stout spring in units of this is that of the spring in tolerances.
+    /// Factor from the bound of a stout spring to that of this spring in tolerances.
     per_tolerance: f64,
     middle: Middle,
 }
@@ -221,7 +222,7 @@ struct Middle {
 }
 
 impl ShareOfRod {
-    /// The shares for a tolerance of the force.
+    /// Prepares the weight function for a tolerance of the force.
     pub(crate) fn new(spring: &Spring, tolerance_n: f64, law: Law) -> Self {
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
         let load = Load {
@@ -238,13 +239,13 @@ impl ShareOfRod {
         Self { free_length_m, load, has_buckling, law, per_tolerance, middle }
     }
 
-    /// Whether the straight rod buckles at any length.
+    /// Returns true if the straight rod buckles at any length.
     pub(crate) fn has_buckling(&self) -> bool {
         self.has_buckling
     }
 
-    /// The directions of a pose outside of the middle of the workspace; `None` in the middle, where the energy alone is the answer, and where no
-    /// rod has a shape. Real-time: bounded, no allocation.
+    /// Returns the directions of a pose outside the middle of the workspace; `None` in the middle, where the law
+    /// `energy` is sufficient, and where no rod has a shape. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn examine(&self, pose: &Pose) -> Option<Directions> {
         let chord = pose.chord(self.free_length_m).ok()?;
@@ -264,7 +265,7 @@ impl ShareOfRod {
         Some(Directions::new(&self.load, &chord, q)).filter(Directions::is_upright)
     }
 
-    /// The share at a pose. Real-time: bounded, no allocation.
+    /// Returns the weight at a pose. Real-time: bounded, no allocation.
     pub(crate) fn share(&self, at: &Directions, upright: (f64, Gradient)) -> Share {
         let measures = Measures::of(at, self.free_length_m);
         let bound = self.law.bound(&measures) * self.per_tolerance;
@@ -274,7 +275,7 @@ impl ShareOfRod {
         }
         let by_error = by_error(bound);
         let (by_argument, argument_slope) = nearness(at.argument);
-        // 1 minus the product of what each leaves to the law.
+        // 1 minus the product of the weights that error and argument leave to the law.
         let left = [1.0 - by_error.value, 1.0 - by_argument];
         let wanted = 1.0 - left[0] * left[1];
         let m = at.magnification;
@@ -299,7 +300,7 @@ impl ShareOfRod {
 }
 
 impl Middle {
-    /// The largest middle in which neither remainder nor rod has a part: bounds grow with each measure, so the corner decides.
+    /// Returns the largest middle without remainder and rod: bounds grow with each measure, so the corner decides.
     fn new(law: Law, per_tolerance: f64) -> Self {
         let scaled = |factor: f64| Self {
             sway: factor * ONSET,
@@ -333,7 +334,7 @@ impl Middle {
     }
 }
 
-/// The share by the error alone, and its derivative by the bound in tolerances.
+/// Returns the weight by the error alone, with its derivative by the bound in tolerances.
 fn by_error(bound: f64) -> Passage {
     if bound <= FIRST_ERROR {
         return Passage::NOT_BEGUN;
@@ -343,7 +344,7 @@ fn by_error(bound: f64) -> Passage {
     Passage { value, slope: slope * root / (4.0 * bound) }
 }
 
-/// The share by the argument alone, and its derivative by it.
+/// Returns the weight by the argument alone, with its derivative by the argument.
 fn nearness(argument: f64) -> (f64, f64) {
     if argument <= FIRST_ARGUMENT {
         return (0.0, 0.0);

@@ -1,8 +1,8 @@
-//! A spring that merely stands on its seat: the lower plate rolls up on its rim and lifts off.
+//! Free seat of a spring: the lower plate rolls up on its rim, slides, and lifts off.
 //!
-//! The laws hold the lower plate. A real spring merely stands on it: it cannot be pulled, and its base tips over the rim as
-//! soon as the moment at the base exceeds the axial force times the radius of the seat. The base takes the tilt of least
-//! stored energy,
+//! The laws clamp the lower plate. A real spring stands freely: it cannot be pulled, and its base tips over the rim as
+//! soon as the moment at the base exceeds the axial force times the radius of the seat. The base takes the tilt of
+//! least stored energy,
 //!
 //! ```text
 //! W_free(pose) = min over tilts of W(pose relative to the tilted base),
@@ -21,13 +21,13 @@
 //! leaves the ground where a hanging rim would: the part of the coefficient of friction beyond `D/L0` acts by the depth of the hanging
 //! rim, so that lift-off is continuous.
 //!
-//! If a spring is pressed past buckling, its base may lose contact with the ground or roll on without end. If the spring would
-//! need more energy to stand straight than it has, it falls over: wrench and energy fade together, by an equal part in each step,
-//! and the spring carries nothing until it is lifted. That dissipates energy, too.
+//! If a spring is pressed past buckling, its base may lose contact with the ground or roll on without end. If the
+//! spring would need more energy to stand straight than it has, it falls over: wrench and energy fade together, by an
+//! equal part in each step, and the spring carries nothing until it is lifted. The lost energy is dissipated.
 //!
-//! A tick in which the base slides ends where rolling and sliding agree: the tilt of least energy at a pull that friction just
-//! holds. The two take turns. If a tick begins with the base pulled off the ground, the base gives way only as far along the
-//! straight line to the place where it would hang as is needed to stand again; so the force has no step there.
+//! A tick in which the base slides ends where rolling and sliding agree: the tilt of least energy at a pull equal to the friction
+//! limit, found by rolling and sliding in turns. If a tick begins with the base pulled off the ground, the base gives way along
+//! the straight line to its hanging place, only as far as it needs to stand again; so the force has no step there.
 //!
 //! `base` has the pose of the base and the load on it; `tilt` finds the tilt of least energy; `friction` has the friction limit.
 //!
@@ -51,36 +51,35 @@ mod base;
 mod friction;
 mod tilt;
 
-/// What the evaluations of a tick may cost, in evaluations of an energy, if each costs no more than the one before.
+/// Maximum cost of a tick, in evaluations of an energy, if each evaluation costs no more than the one before.
 const MOST_COST: u32 = 60;
-/// Evaluations of the law per tick at most.
+/// Maximum number of evaluations of the law per tick.
 const MOST_EVALUATIONS: u32 = 24;
-/// Change of the tilt that counts as none (rad), of a law that leaves nothing open.
+/// Convergence tolerance of the tilt (rad), for a law without a tolerance of its own.
 const TOLERANCE_RAD: f64 = 1e-11;
-/// Change of the stored energy that counts as none, of the stiffness by the tilt.
+/// Tolerance of the stored energy, relative to the stiffness by the tilt.
 const ENERGY_TOLERANCE: f64 = 1e-13;
-/// Part of a step that is left of one that went too far.
+/// Backtracking factor.
 const SHORTER: f64 = 0.25;
 /// Largest change of the tilt between evaluations (rad).
 const LONGEST_STEP_RAD: f64 = 0.05;
-/// Least that is left of it where shorter and shorter steps were tried in vain.
+/// Lower limit of this change after repeated backtracking (rad).
 const LEAST_STRIDE_RAD: f64 = 1e-5;
-/// Longest way of the tilt in a tick that ends in no equilibrium (rad).
+/// Largest change of the tilt in a tick that reaches no equilibrium (rad).
 const LONGEST_WAY_RAD: f64 = 0.1;
-/// Largest tilt (rad) of a base that stands: slender springs roll as far as 0.78 and stay there, and beyond 1.1 no law knows
-/// a coil. A base that goes on falls over.
+/// Largest tilt (rad) of a standing base: slender springs roll as far as 0.78 and stay there, and beyond 1.1 no law
+/// describes a coil. A base that tilts further falls over.
 const LARGEST_TILT_RAD: f64 = 0.9;
-/// Share of its wrench that a spring which falls over loses in a step.
+/// Fraction of the wrench that a falling spring loses in a step.
 const FALL_PER_STEP: f64 = 1.0 / 32.0;
-/// Change of the tilt (rad) that is left of one that has rolled as far as it will, for the series of slides to be summed.
+/// Tilt change below which rolling counts as converged, enabling series extrapolation (rad).
 const SETTLED_RAD: f64 = 3e-7;
-/// Largest ratio of successive excesses of the pull whose series is summed.
+/// Largest ratio of successive excesses of the pull for a series extrapolation.
 const MOST_RATIO: f64 = 0.9;
-/// Change of the tilt (rad) below which it is clear whether the base slides: one that has not rolled as far as it will is
-/// pulled harder.
+/// Tilt change (rad) below which sliding is decided: a base that has not rolled far enough is pulled harder.
 const ROLLED_RAD: f64 = 3e-4;
 
-/// The base of one spring, free to tip, slide and lift.
+/// Base of one spring, free to tip, slide and lift.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seat {
     lengths: Lengths,
@@ -88,13 +87,13 @@ pub struct Seat {
     quadratic: Quadratic,
     grip: Grip,
     lifted: bool,
-    /// Share of its wrench that is left as it falls over: 1 while it stands, 0 where it lies.
+    /// Remaining fraction of the wrench in a fall: 1 for a standing spring, 0 for a fallen one.
     hold: f64,
-    /// Longest change of the tilt between evaluations (rad): shorter in the ticks after one that tried in vain.
+    /// Largest change of the tilt between evaluations (rad): reduced after a tick of failed steps.
     stride_rad: f64,
 }
 
-/// Where a base stood in a tick, what was felt there, and the slope of the energy without its tip.
+/// Place of a base that stood in a tick, with its response, and the slope of the energy without its tip.
 struct Stood {
     at: Standing,
     response: Response,
@@ -102,14 +101,14 @@ struct Stood {
     slope: Option<DVec2>,
 }
 
-/// A slide that is tried, from where the pull exceeded the friction limit by so much (N): that way, so far (m); or as far as
-/// rolling and sliding in turns would lead.
+/// Trial slide, with the excess of the pull over the friction limit at its start (N), direction and distance (m); no
+/// direction for the extrapolation of rolling and sliding in turns.
 struct Slide {
     excess_n: f64,
     along: Option<(DVec3, f64)>,
 }
 
-/// A base that lost the ground where it stood. It may stand where it would have hung, or on the way there, with less energy.
+/// Base that lost contact with the ground. It may stand at its hanging place, or between both places, with less energy.
 struct Lost {
     at: Standing,
     stored_j: f64,
@@ -117,7 +116,7 @@ struct Lost {
     trial: Trial,
 }
 
-/// What the evaluations of a tick cost so far, in evaluations of an energy.
+/// Cost of the evaluations of a tick so far, in evaluations of an energy.
 #[derive(Default)]
 struct Cost {
     whole: u32,
@@ -130,22 +129,22 @@ impl Cost {
         self.last = last;
     }
 
-    /// Whether one more evaluation like the last would cost too much.
+    /// Returns true if one more evaluation like the last would cost too much.
     fn is_spent(&self) -> bool {
         self.whole + self.last > MOST_COST
     }
 }
 
-/// The place that is tried next for a base that lost the ground.
+/// Place tried next for a base that lost contact.
 #[derive(Clone, Copy)]
 enum Trial {
     Hanging,
     OnTheWay,
-    /// Where it would have hung, whatever the answer.
+    /// Hanging place, with any response.
     Last,
 }
 
-/// Part of the way on which nothing is missing any more, from what is missing at both ends.
+/// Returns the fraction of a distance at which no force is missing, from the missing forces at both ends.
 fn part_of_the_way(here_n: [f64; 2], there_n: [f64; 2]) -> f64 {
     let part =
         |here_n: f64, there_n: f64| if here_n > 0.0 { here_n / (here_n - there_n).max(here_n) } else { 0.0 };
@@ -153,7 +152,7 @@ fn part_of_the_way(here_n: [f64; 2], there_n: [f64; 2]) -> f64 {
 }
 
 impl Seat {
-    /// Seated. Real-time: bounded, no allocation.
+    /// Builds a seated base. Real-time: bounded, no allocation.
     #[must_use]
     pub fn new(spring: &Spring, friction: Friction) -> Self {
         let free_length_m = spring.geometry().free_length_m;
@@ -168,54 +167,53 @@ impl Seat {
         }
     }
 
-    /// Takes other parameters at a tick boundary and keeps the tilt. Real-time: bounded, no allocation.
+    /// Changes the parameters at a tick boundary, with the tilt unchanged. Real-time: bounded, no allocation.
     pub fn set_spring(&mut self, spring: &Spring, friction: Friction) {
         let Self { at, lifted, hold, .. } = *self;
         *self = Self { at, lifted, hold, ..Self::new(spring, friction) };
     }
 
-    /// Seated again, where it was at first. Real-time: bounded, no allocation.
+    /// Resets the base to its initial seat. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.stand(Standing::SEATED);
         (self.lifted, self.hold, self.stride_rad) = (false, 1.0, LONGEST_STEP_RAD);
     }
 
-    /// Stands at a place, with nothing known of the spring there.
+    /// Places the base, and clears the observed stiffnesses.
     fn stand(&mut self, at: Standing) {
         self.at = at;
         self.quadratic = Quadratic::at_rest(self.quadratic.stiffness_nm_per_rad);
         self.grip.restart();
     }
 
-    /// Tilt of the base (rad), a vector towards the rim point it stands on; zero while seated.
+    /// Returns the tilt of the base (rad), a vector towards the rim point of contact; zero while seated.
     #[must_use]
     pub fn tilt_rad(&self) -> DVec2 {
         self.at.tilt_rad
     }
 
-    /// Where the base has slid to (m).
+    /// Returns the slide of the base from its initial seat (m).
     #[must_use]
     pub fn slide_m(&self) -> DVec2 {
         self.at.slide_m
     }
 
-    /// Whether the spring hangs in the air, without load.
+    /// Returns true if the spring hangs in the air, without load.
     #[must_use]
     pub fn is_lifted(&self) -> bool {
         self.lifted
     }
 
-    /// Whether the spring has fallen over, or falls.
+    /// Returns true if the spring has fallen over, or is falling.
     #[must_use]
     pub fn has_fallen(&self) -> bool {
         self.hold < 1.0
     }
 
-    /// Wrench on the hand of the spring on its seat, at the pose of this tick.
+    /// Returns the wrench on the hand of the spring on its seat, at the pose of this tick.
     ///
-    /// Total where the law is; [`Validity::NotConverged`] while the base is on its way, by a bounded tilt per
-    /// tick. Real-time: bounded, no allocation; two to three evaluations of the law while the base moves, one
-    /// while seated.
+    /// Total where the law is; [`Validity::NotConverged`] while the base is moving, by a bounded tilt per tick.
+    /// Real-time: bounded, no allocation; two to three evaluations of the law while the base moves, one while seated.
     pub fn step<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {
             return Response::none(Validity::InvalidInput);
@@ -234,7 +232,7 @@ impl Seat {
             return self.fall(spring, pose, demand);
         }
         let (noise_rad, started_rad) = (spring.noise_rad(), self.at.tilt_rad);
-        // The last place of the base in this tick at which it stood, and what was felt there.
+        // Last place in this tick at which the base stood, with its response.
         let mut last: Option<Stood> = None;
         let mut slid: Option<Slide> = None;
         let mut slid_from: Option<(Standing, f64)> = None;
@@ -253,12 +251,12 @@ impl Seat {
             cost.add(spring.cost());
             let has_settled = matches!(response.validity, Validity::Ok | Validity::Clamped);
             if !has_settled && last.is_none() && lost.is_none() {
-                // It snaps between its plates: the base waits for it.
+                // The spring snaps between its plates: the base waits.
                 return only(response, demand);
             }
             let stored_j = response.energy_j.unwrap_or_default();
             if let Some(stood) = &last {
-                // Too far: it would snap, lose the ground, or gain energy.
+                // Too far: the spring would snap, lose contact, or gain energy.
                 let most_j = stood.stored_j + ENERGY_TOLERANCE * self.quadratic.stiffness_nm_per_rad;
                 if !has_settled || response.force_n.z <= 0.0 || stored_j > most_j {
                     if let (true, Some(before), Some(tip_nm)) = (has_settled, stood.slope, tip_nm) {
@@ -270,8 +268,8 @@ impl Seat {
                         );
                     }
                     failures += 1;
-                    // Shorter; where that was no help, the other way as well: near where the base tips over no model of
-                    // the energy says which way is down.
+                    // Backtrack; on alternate failures try the opposite direction: near where the base tips over no
+                    // model of the energy gives the downhill direction.
                     let part = match (slid.take(), failures) {
                         (Some(_), _) | (None, 1) => SHORTER,
                         (None, even) if even % 2 == 0 => -1.0,
@@ -289,7 +287,7 @@ impl Seat {
                         spring.go_back();
                         return self.fall(spring, pose, demand);
                     }
-                    // It merely touches the ground.
+                    // The base touches the ground without load.
                     Trial::Hanging if !may_stand => return without_load(demand),
                     Trial::Hanging if !cost.is_spent() => {
                         let there_n = self.missing_n(&base, pose, &response, height_m);
@@ -305,7 +303,7 @@ impl Seat {
                     Trial::Hanging | Trial::OnTheWay | Trial::Last => {}
                 }
             } else if response.force_n.z <= 0.0 {
-                // Nothing holds it there any more: it gives way towards where it would have hung.
+                // The base has lost contact: it gives way towards its hanging place.
                 let missing_n = self.missing_n(&base, pose, &response, height_m);
                 lost = Some(Lost { at: self.at, stored_j, missing_n, trial: Trial::Hanging });
                 spring.mark();
@@ -313,8 +311,8 @@ impl Seat {
                 self.stand(hanging);
                 continue;
             }
-            // What lifting costs to first order; the rest of the energy has no tip. Off the tip any other number would
-            // do, as long as it stays the same: the rest is then a smooth function, and its curvature can be observed.
+            // Cost of lifting to first order; the rest of the energy has no tip. Off the tip any other constant would
+            // do: the rest is then a smooth function, and its curvature can be observed.
             if base.angle_rad == 0.0 || tip_nm.is_none() {
                 tip_nm = Some(self.lengths.rim_radius_m * response.force_n.z);
                 last = last.map(|stood| Stood { slope: None, ..stood });
@@ -328,7 +326,7 @@ impl Seat {
             let mut step = (goal - self.at.tilt_rad).clamp_length_max(self.stride_rad);
             let whole_slope = slope + tip_nm * base.direction;
             if base.angle_rad > 0.0 && step.dot(whole_slope) > 0.0 {
-                // Where the curvature is no cup the model's best is not downhill.
+                // With an indefinite curvature the model's minimum is not downhill.
                 step = (whole_slope / -self.quadratic.stiffness_nm_per_rad).clamp_length_max(self.stride_rad);
             }
             let pull_n = base.pull_n(pose, &response);
@@ -340,7 +338,7 @@ impl Seat {
                     self.grip.observe(before_n - excess_n, distance_m, way);
                 }
                 if excess_n < -tolerance_n {
-                    // Friction holds it short of here: by the straight line between the two.
+                    // Friction stops the base before this place: interpolate linearly.
                     let part = before_n / (before_n - excess_n);
                     self.at = stood.at.toward(&self.at, part);
                     spring.go_back();
@@ -352,7 +350,7 @@ impl Seat {
             let at = self.at;
             has_rolled |= step.length() <= ROLLED_RAD;
             let slides = has_rolled && excess_n > tolerance_n;
-            // After a slide the slope is another one at the same tilt: nothing to observe.
+            // A slide changes the slope at the same tilt: no curvature to observe.
             last = Some(Stood { at, response, stored_j, slope: (!slides).then_some(slope) });
             spring.mark();
             if slides {
@@ -361,7 +359,7 @@ impl Seat {
                     slid_from = Some((at, excess_n));
                 }
                 slid = Some(match (from, slid_from) {
-                    // As it rolls on it is pulled again, in the same ratio each time: the rest of the series at once.
+                    // Rolling raises the pull again, in the same ratio each time: extrapolate the series.
                     (Some((from, before_n)), Some(_)) if excess_n < MOST_RATIO * before_n => {
                         self.at = from.toward(&at, before_n / (before_n - excess_n));
                         Slide { excess_n, along: None }
@@ -385,14 +383,14 @@ impl Seat {
             failures = 0;
             self.at.tilt_rad += step;
         }
-        // On its way: it stays where it last stood.
+        // Not converged: the base stays where it last stood.
         let Some(Stood { at, response, .. }) = last else { return Response::none(Validity::NotConverged) };
         spring.go_back();
         self.at = at;
         only(Response { validity: Validity::NotConverged, ..response }, demand)
     }
 
-    /// Wrench on the hand of a spring that is on its way, with its base and its shape where they are: the derivatives of one energy.
+    /// Returns the wrench on the hand of a moving spring, with base and shape unchanged: the derivatives of one energy.
     /// Real-time: bounded, no allocation.
     pub(crate) fn stay<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
         let (_, height_m) = Standing::hanging(pose, &self.lengths, LARGEST_TILT_RAD);
@@ -409,8 +407,8 @@ impl Seat {
         only(response, demand)
     }
 
-    /// Gives way where it stood, a share a tick: its energy and its wrench are that share of the law's, so what it loses
-    /// nobody gets.
+    /// Fades wrench and energy of a falling spring in place, by an equal part per tick: both are a fraction of the
+    /// law's, so the lost energy is dissipated.
     #[cold]
     fn fall<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
         self.hold = (self.hold - FALL_PER_STEP).max(0.0);
@@ -430,18 +428,18 @@ impl Seat {
         only(response, demand)
     }
 
-    /// What a base lacks to stand: a force onto the ground, and friction (N). Nothing where negative.
+    /// Returns the forces that a base lacks to stand: onto the ground, and of friction (N); negative if sufficient.
     fn missing_n(&self, base: &Base, pose: &Pose, response: &Response, height_m: f64) -> [f64; 2] {
         let pressed_n = response.force_n.z;
         [-pressed_n, base.pull_n(pose, response).length() - self.grip.holds_n(pressed_n, height_m)]
     }
 
-    /// The base as it is now.
+    /// Returns the base at its present place.
     fn base(&self) -> Base {
         Base::new(&self.at, &self.lengths)
     }
 
-    /// Slides and turns the base the way it is pulled.
+    /// Slides and turns the base in the direction of the pull.
     fn slide(&mut self, pull_n: DVec3, excess_n: f64) -> Slide {
         let way = pull_n / pull_n.length();
         let distance_m = self.grip.slide_m(excess_n, way);
@@ -450,7 +448,7 @@ impl Seat {
         Slide { excess_n, along: Some((way, distance_m)) }
     }
 
-    /// The sections of the spring where its base is now: `draw` gives those of the held spring at a pose. Not
+    /// Draws the sections of the spring on its present base; `draw` gives those of the clamped spring at a pose. Not
     /// real-time.
     pub(crate) fn draw(
         &self,
@@ -460,11 +458,11 @@ impl Seat {
     ) -> bool {
         let rise_m = self.lengths.rise_m();
         let (rotation, origin_m, relative) = if self.lifted {
-            // It hangs from the upper plate, unloaded.
+            // A lifted spring hangs from the upper plate, unloaded.
             (pose.orientation, pose.position_m, Pose::HOME)
         } else {
             let base = self.base();
-            // One that has fallen lies there, unloaded.
+            // A fallen spring lies on its base, unloaded.
             let relative = if self.hold > 0.0 { base.relative(pose) } else { Pose::HOME };
             (base.rotation, base.rotation * rise_m + base.center_m - rise_m, relative)
         };
@@ -479,13 +477,13 @@ impl Seat {
     }
 }
 
-/// The wrench of a spring that carries nothing.
+/// Returns the response of a spring without load.
 fn without_load(demand: Demand) -> Response {
     let energy_j = (demand >= Demand::WrenchAndEnergy).then_some(0.0);
     Response { energy_j, ..Response::none(Validity::Ok) }
 }
 
-/// What was demanded of a complete response.
+/// Returns the demanded parts of a complete response.
 fn only(response: Response, demand: Demand) -> Response {
     match demand {
         Demand::Force => Response { torque_nm: DVec3::ZERO, energy_j: None, ..response },

@@ -1,8 +1,8 @@
-//! How the linear beam-column bends: the shape behind the end stiffnesses.
+//! Shape of the bent linear beam-column, from which the end stiffnesses follow.
 //!
-//! Seen from the chord, the normals of the two end sections lean by `theta_L` and `theta_U`. Their half sum `S`
-//! bends the rod to an S, their half difference `D` to a C. At `u = position along the chord / L - 1/2`, with
-//! the entire functions of [`flotor_lanes::entire`], `s = 1 + P/beta'` and rigidities per current length (primed):
+//! Relative to the chord, the normals of the two end sections lean by `theta_L` and `theta_U`. Their half sum `S` bends
+//! the rod to an S, their half difference `D` to a C. At `u = position along the chord / L - 1/2`, with the entire
+//! functions of [`flotor_lanes::entire`], `s = 1 + P/beta'` and rigidities per current length (primed):
 //!
 //! ```text
 //! theta = S (A C0(4 z u²) + B u² G0(z u²)²) + D 2 u G0(4 z u²) / G0(z)
@@ -40,7 +40,7 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// Argument `z` that belongs to a length: `P s L² / (4 alpha')`. Not positive shear softening has none.
+    /// Returns the argument `z` of a length, `P s L² / (4 alpha')`; `None` without shear stiffness (`s <= 0`).
     pub(crate) fn argument(rigidities: &Rigidities, free_length_m: f64, length_m: f64) -> Option<f64> {
         let shortening_m = free_length_m - length_m;
         let sheared_m = length_m + rigidities.gamma_n / rigidities.beta_n * shortening_m;
@@ -48,8 +48,8 @@ impl Shape {
             .then(|| rigidities.gamma_n * shortening_m * sheared_m / (4.0 * rigidities.alpha_n_m2))
     }
 
-    /// Shapes at the argument given, which may have been moved away from a pole: they are those of a rod with
-    /// the bending rigidity that belongs to it, and meet their end conditions all the same.
+    /// Computes the shapes at a given argument, which may have been moved away from a pole: they are those of a rod
+    /// with the corresponding bending rigidity, and still meet their end conditions.
     pub(crate) fn new(rigidities: &Rigidities, free_length_m: f64, length_m: f64, z: f64) -> Option<Self> {
         let true_z = Self::argument(rigidities, free_length_m, length_m)?;
         // Rigidities per current length, and s = 1 + P / beta.
@@ -68,7 +68,7 @@ impl Shape {
         Some(Self { z, g0, softening, cosine, parabola, shear })
     }
 
-    /// Lean of the section at `u`, from -1/2 to 1/2: of the sway (`S`) and of the bow (`D`).
+    /// Returns the lean of the section at `u`, from -1/2 to 1/2: of the sway (`S`) and of the bow (`D`).
     pub(crate) fn lean(&self, u: f64) -> [Lean; 2] {
         // `theta` of the module documentation and its derivative by `u`.
         let square = u * u;
@@ -81,7 +81,7 @@ impl Shape {
         [sway, Lean { value: 2.0 * u * outer.g0 / self.g0, slope: 2.0 * outer.c0 / self.g0 }]
     }
 
-    /// Offset from the chord at `u`, in chord lengths per radian: of the sway and of the bow.
+    /// Returns the offset from the chord at `u`, in chord lengths per radian: of the sway and of the bow.
     pub(crate) fn offset(&self, u: f64) -> [f64; 2] {
         // `y / L` of the module documentation.
         let at = |position: f64| EntireFunctions::at(self.z * position * position);

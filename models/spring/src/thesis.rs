@@ -14,13 +14,13 @@
 //! **Yaw.** The source sets `force[5] = -spring_limit[1] * yaw` with a gain from a control panel. The thesis prints
 //! no value of it, so it is zero here.
 //!
-//! **Made total.** The printed code returns what it cannot compute. Here every output that would be NaN or infinite
-//! is zero with [`Validity::OutOfDomain`]:
+//! **Made total.** The printed code may return NaN or infinity. Here every such output is zero with
+//! [`Validity::OutOfDomain`]:
 //! - both moments (not the forces) where `L == L0` in the arithmetic used, at rest and sheared (0/0);
 //! - everything for `L > L0 (1 + E/G)`, where `q` is the root of a negative number;
 //! - everything at `L = 0` if `L_buckling < 0`, where no branch runs and the outputs are uninitialised.
 //!
-//! A pose that is none (NaN, infinity, no unit quaternion) gives zero with [`Validity::InvalidInput`].
+//! An invalid pose (NaN, infinity, no unit quaternion) gives zero with [`Validity::InvalidInput`].
 //!
 //! **Precision.** In C, `float` operands are combined in `float`, a `double` operand or a function of the math
 //! library makes the expression double, and an assignment rounds to `float`. `CFloat` reproduces these usual
@@ -40,7 +40,7 @@ use crate::validity::Validity;
 /// Half width of the window around the free length in which the limit of `H` is used (mm), appendix A.
 const WINDOW_MM: f64 = 1e-4;
 
-/// As appendix A declares it.
+/// Value of pi as appendix A declares it.
 #[allow(clippy::approx_constant)] // its digits are part of the printed law
 const PRINTED_PI: f64 = 3.14159265;
 
@@ -60,8 +60,8 @@ enum Constants {
 }
 
 impl Thesis {
-    /// Prepares the law. The printed code derives its constants from the one that rules in every tick; they are
-    /// the same every time. Real-time: bounded, no allocation.
+    /// Prepares the law. The printed code derives its constants from the given one in every tick, always with the same
+    /// result. Real-time: bounded, no allocation.
     #[must_use]
     pub fn new(spring: &Spring, stiffness: Stiffness, precision: Precision) -> Self {
         let (geometry, material) = (spring.geometry(), spring.material());
@@ -72,7 +72,7 @@ impl Thesis {
         Self { constants }
     }
 
-    /// Length at which the printed code declares the spring buckled (m); negative if never.
+    /// Returns the length at which the printed code declares the spring buckled (m); negative if never.
     #[must_use]
     pub fn buckling_length_m(&self) -> f64 {
         let length_mm = match &self.constants {
@@ -82,8 +82,8 @@ impl Thesis {
         length_mm / MM_PER_M
     }
 
-    /// Wrench on the hand at a pose; this law has no energy. Real-time: bounded, no allocation. Total, see the
-    /// module.
+    /// Returns the wrench on the hand at a pose; this law has no energy. Real-time: bounded, no allocation. Total, see
+    /// the module.
     #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {
@@ -98,7 +98,7 @@ impl Thesis {
     }
 }
 
-/// Where the handle is, in the thesis's millimetres.
+/// Pose of the handle, in the thesis's millimetres.
 struct Handle {
     position_mm: DVec3,
     rotation_rad: DVec3,
@@ -115,10 +115,10 @@ trait CFloat:
     + Mul<Output = Self>
     + Div<Output = Self>
 {
-    /// Assignment of a double.
+    /// Assigns a double.
     fn store(value: f64) -> Self;
 
-    /// Conversion to double, as beside a double operand.
+    /// Converts to double, as beside a double operand.
     fn wide(self) -> f64 {
         self.into()
     }
@@ -147,7 +147,7 @@ struct Printed<T> {
     buckling_length: T,
 }
 
-/// What it assigns: forces (N) and moments (N·mm).
+/// Outputs of the printed function: forces (N) and moments (N·mm).
 struct Outputs<T> {
     force_x: T,
     force_y: T,
@@ -175,7 +175,7 @@ struct Reaction<T> {
 }
 
 impl<T: CFloat> Printed<T> {
-    /// `switch (change)` and the buckling length.
+    /// Evaluates `switch (change)` and the buckling length.
     fn new(geometry: &Geometry, material: &Material, stiffness: Stiffness) -> Self {
         let millimetres = |metres: f64| T::store(metres * MM_PER_M);
         let megapascals = |pascals: f64| T::store(pascals / 1e6);
@@ -226,7 +226,7 @@ impl<T: CFloat> Printed<T> {
         Self { free_length, alpha, beta, gamma, buckling_length }
     }
 
-    /// `springControl()`; `None` where no branch runs.
+    /// Evaluates `springControl()`; `None` where no branch runs.
     #[inline]
     fn control(&self, at: &Handle, demand: Demand) -> Option<Outputs<T>> {
         let l0 = self.free_length;
@@ -311,7 +311,7 @@ impl<T: CFloat> Printed<T> {
         Reaction { p, hx, hz, m1z: moment(hx, z.upper), m1x: moment(hz, x.upper) }
     }
 
-    /// `H` as `L -> L0` and `P -> 0`, equation 76.
+    /// Returns `H` as `L -> L0` and `P -> 0`, equation 76.
     fn limit(&self, l: T, z: EndAngles<T>, x: EndAngles<T>) -> (T, T) {
         let Self { alpha, beta, .. } = *self;
         let bending = beta.wide() * (l.wide() * l.wide()) / (T::store(12.0) * alpha).wide();
@@ -323,7 +323,7 @@ impl<T: CFloat> Printed<T> {
 }
 
 impl<T: CFloat> Reaction<T> {
-    /// "Transformation of axes", and the sum of the moments.
+    /// Applies the printed "Transformation of axes", and sums the moments.
     #[inline]
     fn on_hand(&self, l: T, z: EndAngles<T>, x: EndAngles<T>, demand: Demand) -> Outputs<T> {
         let Self { p, hx, hz, m1z, m1x } = *self;
@@ -357,7 +357,7 @@ impl<T: CFloat> Outputs<T> {
 }
 
 impl Outputs<f64> {
-    /// In the model frame, what is not finite replaced by zero.
+    /// Converts to the model frame, with zero for numbers that are not finite.
     #[inline]
     fn response(self) -> Response {
         let force_n = DVec3::new(self.force_x, self.force_z, self.force_y);

@@ -1,9 +1,9 @@
-//! What a coiled wire does and no straight rod: it twists when it is compressed, and its ends pull beside the axis.
+//! Effects of a coiled wire that a straight rod lacks: twist under compression, and ends that pull beside the axis.
 //!
 //! The equivalent rod of [`crate::rigidity`] has the wire's stiffness along and about its axis and across it, but its
-//! axis is a straight line and its ends lie on it. A wire is clamped where it ends, at one point of the coil's
-//! circumference, and it climbs. So compressing it turns the upper plate, and the force goes through a point beside
-//! the plate's centre. Both are differences of a few per cent of the torques, and they are here as the energy
+//! axis is a straight line and its ends lie on it. A wire is clamped at its ends, at one point of the coil's
+//! circumference, and it climbs. So compression turns the upper plate, and the force goes through a point beside the
+//! plate's centre. Both effects are a few per cent of the torques, and are added here as the energy
 //!
 //! ```text
 //! W = q.(K_wire - K_rod) q / 2 + Q z² w / L0²         q = (r, 2 v)
@@ -13,11 +13,11 @@
 //! vector to second order), `z` and `w` the axial displacement and the rotation `2 v_z`.
 //!
 //! `K_wire` is the stiffness at rest of an elastic wire on a helix, clamped at both ends: its compliance is the
-//! integral along the wire of what each section yields, in bending and torsion, shear and tension, under the loads of
-//! the upper plate (Castigliano; Love, *A treatise on the mathematical theory of elasticity*, chapters 18 and 19).
-//! `Q` is the change of the compression-twist coupling as the coil flattens, of a uniform helix held at its number of
-//! turns: `M_z = Theta (s0 - s) (EI (s0 + s)/2 - GJ s) / l` for the sine `s` of the pitch angle, the length `l` of the
-//! wire and its winding angle `Theta`, with `s = s0 (1 + z/L0)`.
+//! integral along the wire of the compliance of each section, in bending and torsion, shear and tension, under the
+//! loads of the upper plate (Castigliano; Love, *A treatise on the mathematical theory of elasticity*, chapters 18 and
+//! 19). `Q` is the change of the compression-twist coupling as the coil flattens, of a uniform helix with a fixed
+//! number of turns: `M_z = Theta (s0 - s) (EI (s0 + s)/2 - GJ s) / l` for the sine `s` of the pitch angle, the length
+//! `l` of the wire and its winding angle `Theta`, with `s = s0 (1 + z/L0)`.
 //!
 //! The wire starts at the coil's radius on the x axis and winds to the right. Derivation: the book, chapter "The
 //! spring".
@@ -41,7 +41,7 @@ const NODES: usize = 24;
 /// Stiffness in displacement (m) and rotation (rad): rows of force (N) and torque (N·m).
 type Stiffness6 = [[f64; 6]; 6];
 
-/// What the wire of one spring adds to its rod.
+/// Correction of one spring's rod for its wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wire {
     /// `K_wire - K_rod`
@@ -70,7 +70,7 @@ impl Wire {
         Self { difference, flattening_n_per_m }
     }
 
-    /// The response of the rod at a pose, with what the wire adds. Real-time: bounded, no allocation.
+    /// Returns the response of the rod at a pose, corrected for the wire. Real-time: bounded, no allocation.
     #[must_use]
     pub fn added_to(&self, response: &Response, pose: &Pose, demand: Demand) -> Response {
         let q = pose.orientation;
@@ -98,7 +98,7 @@ impl Wire {
     }
 }
 
-/// The wire where it is cut.
+/// Cross-section of the wire.
 struct Section {
     bending_n_m2: f64,
     torsion_n_m2: f64,
@@ -129,8 +129,7 @@ impl Section {
     }
 }
 
-/// What the upper plate yields to a force and a torque at its centre: the energy is
-/// `F.ff F/2 + F.fm M + M.mm M/2`.
+/// Compliance of the upper plate to a force and a torque at its centre: the energy is `F.ff F/2 + F.fm M + M.mm M/2`.
 #[derive(Clone, Copy)]
 struct Compliance {
     ff: DMat3,
@@ -141,7 +140,7 @@ struct Compliance {
 impl Compliance {
     const NONE: Self = Self { ff: DMat3::ZERO, fm: DMat3::ZERO, mm: DMat3::ZERO };
 
-    /// Of the whole wire: equal coils, each shifted down by its place, and the rest of one at the top.
+    /// Returns the compliance of the whole wire: equal coils, each shifted down by its place, and the fraction of one at the top.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // hundreds of coils
     fn of_wire(geometry: &Geometry, material: &Material) -> Self {
         let section = Section::new(geometry, material);
@@ -155,7 +154,7 @@ impl Compliance {
         sum
     }
 
-    /// Of an arc that starts on the x axis and ends at the height of the plate.
+    /// Returns the compliance of an arc that starts on the x axis and ends at the height of the plate.
     fn of_arc(section: &Section, arc_rad: f64) -> Self {
         let mut sum = Self::NONE;
         for node in 0..NODES {
@@ -181,7 +180,7 @@ impl Compliance {
         sum
     }
 
-    /// The same, loaded at a point that is an arm away: its force has a moment here.
+    /// Returns the compliance for a load at a point that is an arm away, whose force has a moment here.
     fn seen_from(&self, arm_m: DVec3) -> Self {
         let DVec3 { x, y, z } = arm_m;
         // With the cross product matrix X of the arm: ff + fm X + (fm X)ᵀ + Xᵀ mm X, and fm + Xᵀ mm.
@@ -207,7 +206,7 @@ impl Compliance {
     }
 }
 
-/// The inverse of a compliance.
+/// Inverts a compliance.
 fn stiffness(compliance: &Compliance) -> Stiffness6 {
     let Compliance { ff, fm, mm } = compliance;
     let entry = |i: usize, j: usize| match (i / 3, j / 3) {
@@ -221,7 +220,7 @@ fn stiffness(compliance: &Compliance) -> Stiffness6 {
     std::array::from_fn(|i| factored.solve(&std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 })))
 }
 
-/// Of the straight rod: a beam that shears (Timoshenko), compressed and twisted beside.
+/// Returns the stiffness of the straight rod: a beam that shears (Timoshenko), compressed and twisted besides.
 fn rod_stiffness(rigidities: &Rigidities, length_m: f64) -> Stiffness6 {
     let Rigidities { alpha_n_m2: alpha, beta_n: beta, gamma_n: gamma, tau_n_m2: tau } = *rigidities;
     // Timoshenko beam: lateral 12 u / L², coupling 6 u / L, bending (4 + softness) u, u = alpha / (L (1 + softness)).

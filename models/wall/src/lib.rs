@@ -1,9 +1,9 @@
-//! A stiff wall: the textbook model of haptics, and the smallest real example of a force model.
+//! Stiff wall: the textbook model of haptics, and the smallest complete example of a force model.
 //!
-//! A *proxy* stays on the surface while the handle is inside; a spring draws the handle to it. Without friction the
-//! proxy is where the handle would be if it could not get in (the god-object of Zilles and Salisbury 1995, IROS,
-//! 146-151); with friction it sticks until the pull along the surface leaves Coulomb's cone, and then slides until it
-//! is back on it.
+//! A *proxy* stays on the surface while the handle is inside; a spring pulls the handle towards it. Without friction
+//! the proxy is the position that the handle would have if it could not penetrate (the god-object of Zilles and
+//! Salisbury 1995, IROS, 146-151). With friction the proxy sticks until the tangential force leaves Coulomb's cone,
+//! then slides back onto the cone.
 //!
 //! ```text
 //! F = F_n n + K t,    F_n = max(K d - B v_n, 0),    K |t| <= mu F_n

@@ -1,4 +1,4 @@
-//! The wall as a plugin: parameters, and one handle's history.
+//! Plugin of the wall: parameters, and the contact state of one handle.
 
 use crate::proxy::Proxy;
 use crate::shape::Shape;
@@ -9,24 +9,24 @@ use flotor_hal::{
     SoftRange, SoftRangeModel, StepStatus, Wrench, choices,
 };
 
-/// Farther from home than this there is no handle, m: the answer is that at the edge, and says so.
+/// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
 
-/// Half the side of the piece of a plane that is drawn, m: a plane has no end.
+/// Half the side of the drawn piece of a plane, m: a plane is infinite.
 const DRAWN_HALF_M: f64 = 0.03;
-/// Radius of the balls at the handle and at the proxy, which are points, m.
+/// Radius of the drawn balls at handle and proxy, m.
 const DRAWN_HANDLE_M: f64 = 1.5e-3;
 
 const SHAPES: Choices = choices!["plane", "sphere", "box"];
 
-/// A stiff wall, sphere or box; the handle is a point.
+/// Stiff wall, sphere or box; the handle is a point.
 pub struct Wall {
     shape: Shape,
     size_mm: f64,
     height_m: f64,
     surface: Surface,
     proxy: Proxy,
-    /// The proxy of an observer's pictures, which are no ticks.
+    /// Proxy of an observer's pictures, separate from the ticks.
     drawn_proxy: Proxy,
     drawn: hal::Shape,
 }
@@ -120,8 +120,8 @@ impl ForceModel for Wall {
 }
 
 impl ActiveRegionModel for Wall {
-    /// A ball acts inside only and knows nothing outside. Plane and cube have no bounded region: the one has no
-    /// bounds, the other remembers from which side the handle came.
+    /// A sphere acts inside only and has no state outside. Plane and cube have no bounded region: the plane is
+    /// infinite, the cube stores the side of the handle.
     fn active_region(&self) -> ActiveRegion {
         match self.shape {
             Shape::Sphere { radius_m } => {
@@ -133,7 +133,7 @@ impl ActiveRegionModel for Wall {
 }
 
 impl ShapeModel for Wall {
-    /// The solid, the handle, and, while the handle is inside, the proxy.
+    /// Draws the solid, the handle, and, while the handle is inside, the proxy.
     fn shape(&mut self, input: &Input) -> &hal::Shape {
         let (form, half_sides_m) = match self.shape {
             Shape::Plane => (Form::Plane, [DRAWN_HALF_M, DRAWN_HALF_M, 0.0]),
@@ -155,7 +155,7 @@ impl ShapeModel for Wall {
 }
 
 impl SoftRangeModel for Wall {
-    /// Dry metal on metal has 0.15, rubber on asphalt 1; around a wall without friction nothing above a half could be reached.
+    /// Dry metal on metal has 0.15, rubber on asphalt 1; the default limits around zero would end below a half.
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("friction", 0.0, 1.5, 0.01)];
 }
 

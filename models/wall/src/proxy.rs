@@ -1,41 +1,41 @@
-//! Contact, stick and slip: the proxy on the surface, and the pull between it and the handle.
+//! Contact, stick and slip: the proxy on the surface, and the spring between proxy and handle.
 
 use crate::shape::{Place, Shape};
 use crate::surface::Surface;
 use flotor_hal::DVec3;
 
-/// What is felt.
+/// Force on the handle, with the energy of the spring.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pull {
-    /// On the handle, N.
+    /// Force on the handle, N.
     pub force_n: DVec3,
-    /// In the spring, J.
+    /// Energy in the spring, J.
     pub energy_j: f64,
 }
 
-/// The proxy of one handle.
+/// Proxy of one handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proxy {
     contact: Option<Place>,
-    /// Where the handle was last outside, m.
+    /// Last position of the handle outside, m.
     outside_m: DVec3,
 }
 
 impl Default for Proxy {
-    /// Coming from above.
+    /// Creates a proxy of a handle that comes from above.
     fn default() -> Self {
         Self { contact: None, outside_m: DVec3::Z }
     }
 }
 
 impl Proxy {
-    /// Where it is on the surface; `None` while the handle is outside. Real-time: bounded, no allocation.
+    /// Returns the place of the proxy on the surface; `None` while the handle is outside. Real-time: bounded, no allocation.
     #[must_use]
     pub fn contact(&self) -> Option<Place> {
         self.contact
     }
 
-    /// Follows the handle to `handle_m` (finite), moving at `velocity_m_per_s`. Real-time: bounded, no allocation.
+    /// Moves the proxy with the handle at `handle_m` (finite), moving at `velocity_m_per_s`. Real-time: bounded, no allocation.
     pub fn follow(
         &mut self,
         shape: &Shape,

@@ -1,37 +1,37 @@
-//! The solids: convex, with their top at the origin and the rest below.
+//! Convex solids, with their top at the origin.
 
 use crate::surface::Surface;
 use flotor_hal::DVec3;
 use flotor_hal::math;
 
-/// A solid whose highest point is the origin.
+/// Solid whose highest point is the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// All below `z = 0`.
+    /// Half-space `z < 0`.
     Plane,
-    /// A ball.
+    /// Sphere.
     Sphere {
         /// Radius, m.
         radius_m: f64,
     },
-    /// A cube with edges along the axes.
+    /// Cube with edges along the axes.
     Cube {
         /// Half the length of an edge, m.
         half_m: f64,
     },
 }
 
-/// A place on a surface.
+/// Place on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// The point, m.
+    /// Position, m.
     pub point_m: DVec3,
     /// Outward unit normal.
     pub normal: DVec3,
 }
 
 impl Shape {
-    /// True inside the solid. Real-time: bounded, no allocation.
+    /// Returns true inside the solid. Real-time: bounded, no allocation.
     #[must_use]
     pub fn contains(&self, point_m: DVec3) -> bool {
         let from_centre_m = point_m - self.centre_m();
@@ -42,8 +42,8 @@ impl Shape {
         }
     }
 
-    /// Where a way from `outside_m` straight to `inside_m` touches first, or rather the place of that face nearest to
-    /// where it ends. Real-time: bounded, no allocation.
+    /// Finds the face that a straight path from `outside_m` to `inside_m` crosses first; returns the place on it
+    /// nearest to the end. Real-time: bounded, no allocation.
     #[must_use]
     pub fn entry(&self, outside_m: DVec3, inside_m: DVec3) -> Place {
         let normal = match *self {
@@ -53,15 +53,15 @@ impl Shape {
         self.nearest(inside_m, normal)
     }
 
-    /// The place on the surface nearest to a point inside. A cube keeps the face it was entered by, whose normal
-    /// `entered` is: the handle does not pop out at the back. Real-time: bounded, no allocation.
+    /// Returns the place on the surface nearest to a point inside. On a cube it is on the face of entry, with normal
+    /// `entered`: the handle does not leave at the back. Real-time: bounded, no allocation.
     #[must_use]
     pub fn nearest(&self, inside_m: DVec3, entered: DVec3) -> Place {
         let from_centre_m = inside_m - self.centre_m();
         match *self {
             Self::Plane => Place { point_m: inside_m.with_z(0.0), normal: DVec3::Z },
             Self::Sphere { radius_m } => {
-                // At the very centre all directions are alike; the one it came from is the steady choice.
+                // At the very centre all directions are equal; the direction of entry is a continuous choice.
                 let normal = from_centre_m.try_normalize().unwrap_or(entered);
                 Place { point_m: self.centre_m() + normal * radius_m, normal }
             }
@@ -72,9 +72,9 @@ impl Shape {
         }
     }
 
-    /// Slides a proxy on the surface towards the place nearest to the handle, as far as Coulomb's friction requires: until
-    /// the spring along the surface pulls with no more than `mu` times the felt normal force, `K |t| <= mu F_n`. What
-    /// the spring loses on the way is dissipated. Real-time: bounded, no allocation.
+    /// Slides a proxy on the surface towards the place nearest to the handle, as far as Coulomb's friction requires:
+    /// until the tangential spring force is at most `mu` times the normal force, `K |t| <= mu F_n`. The energy that the
+    /// spring loses is dissipated. Real-time: bounded, no allocation.
     #[must_use]
     pub fn slide(&self, proxy: &Place, surface: &Surface, handle_m: DVec3, velocity_m_per_s: DVec3) -> Place {
         let nearest = self.nearest(handle_m, proxy.normal);
@@ -97,15 +97,15 @@ impl Shape {
             Self::Sphere { radius_m } => {
                 let lag = proxy.normal - nearest.normal * proxy.normal.dot(nearest.normal);
                 let aside = lag.try_normalize().unwrap_or(DVec3::ZERO);
-                // K r sin(a) = mu F_n = mu (K (R - r cos(a)) - B (v_r cos(a) + v_t sin(a))) for the angle a between proxy
-                // and handle, seen from the centre; v_r away from the centre, v_t towards the proxy.
+                // Solve K r sin(a) = mu F_n = mu (K (R - r cos(a)) - B (v_r cos(a) + v_t sin(a))) for the angle a
+                // between proxy and handle, from the centre; v_r away from the centre, v_t towards the proxy.
                 let Surface { stiffness_n_per_m, damping_ns_per_m, friction } = *surface;
                 let spring_n = stiffness_n_per_m * (handle_m - self.centre_m()).length();
                 let damper_n = damping_ns_per_m * velocity_m_per_s;
                 let sine_n = spring_n + friction * damper_n.dot(aside);
                 let cosine_n = friction * (spring_n + damper_n.dot(nearest.normal));
                 let sine = friction * stiffness_n_per_m * radius_m / math::hypot(sine_n, cosine_n);
-                // Where even the place nearest to the handle would feel no normal force, the proxy slips up to there.
+                // Where even the nearest place has no normal force, the proxy slides there.
                 let angle_rad = (math::asin(sine.min(1.0)) - math::atan2(cosine_n, sine_n)).max(0.0);
                 let normal =
                     (nearest.normal * math::cos(angle_rad) + aside * math::sin(angle_rad)).normalize();
@@ -114,7 +114,7 @@ impl Shape {
         }
     }
 
-    /// Centre of the solid, m; of a plane, the origin.
+    /// Returns the centre of the solid, m; of a plane, the origin.
     #[must_use]
     pub fn centre_m(&self) -> DVec3 {
         match *self {
@@ -123,7 +123,7 @@ impl Shape {
         }
     }
 
-    /// Normal of the face of a cube a straight way crosses: of the slabs it enters, the last.
+    /// Returns the normal of the cube face that a straight path crosses: the last slab it enters.
     fn face_crossed(&self, outside_m: DVec3, inside_m: DVec3, half_m: f64) -> DVec3 {
         let (from, to) = (outside_m - self.centre_m(), inside_m - self.centre_m());
         let mut crossed = (DVec3::Z, f64::NEG_INFINITY);

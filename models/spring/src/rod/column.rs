@@ -1,4 +1,4 @@
-//! The straight column along the chord: where a search for the equilibrium starts, and the curvature it starts with.
+//! Straight column along the chord: initial shape and curvature of a search for the equilibrium.
 //!
 //! With the force `N` that compresses it to the chord's length, `sigma = 1 + softening N`, the energy of the column is
 //!
@@ -6,10 +6,10 @@
 //! W2 = 1/2 ∫ theta'² + N sigma/2 ∫ theta² + sigma²/(2 shear compliance) (∫ theta)²
 //! ```
 //!
-//! for small turns `theta` of its sections. In the bubbles of [`flotor_lanes::basis`] its matrix of second derivatives is
-//! tridiagonal, the even ones and the odd ones apart. Bent between the ends of the rod the column has become shorter than
-//! its arc by `1/2 ∫ theta²`, which takes compression from it; where that is much the column is bent anew with the force
-//! that is left. Close to buckling its bend would have no bound otherwise.
+//! for small turns `theta` of its sections. In the bubbles of [`flotor_lanes::basis`] its matrix of second derivatives
+//! is tridiagonal, for the even and the odd bubbles separately. The chord of the bent column is shorter than its arc by
+//! `1/2 ∫ theta²`, which reduces the compression; if the reduction is large, the column is bent again with the reduced
+//! force. Without this step its bend would be unbounded close to buckling.
 //!
 //! Source: Haringx, as in [`crate::bending`].
 
@@ -21,37 +21,37 @@ use super::plate::Plate;
 use super::search_energy::{FOURS, Four, Fours, dot, four};
 use flotor_lanes::{Real, Wide};
 
-/// Least curvature assumed, of that of a rod without load: close to buckling the angles themselves stiffen it.
+/// Lower limit of the curvature, relative to a rod without load: close to buckling the angles themselves stiffen the rod.
 const LEAST_CURVATURE: f64 = 0.2;
-/// Compression that the bend takes from the column, above which it is bent anew, in `alpha/L0²`: some hundredth part of
-/// what it buckles under.
+/// Reduction of the compression by the bend, in `alpha/L0²`, above which the column is bent again: a few hundredths of
+/// the buckling load.
 const SMALL_FORCE: f64 = 2.0;
-/// The matrix is factored from both ends to here.
+/// Row at which the factorisations from both ends of the matrix meet.
 const MIDDLE: usize = FOURS / 2;
 
 /// Integrals of products of bubbles, in the order of the coefficients.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Products {
-    /// Of each bubble with itself.
+    /// Integral of the square of each bubble.
     square: [Four; FOURS],
-    /// With the one two before it.
+    /// Integral of each bubble times the bubble two degrees lower.
     with_lower: [Four; FOURS],
 }
 
-/// The second derivatives of the energy of a column, factored.
+/// Factored matrix of second derivatives of a column's energy.
 pub(super) struct Column<S: Simd> {
     inverse_pivot: Fours<S>,
-    /// Of each four over the one before it, up to the middle; from there on of the one before it over each.
+    /// Elimination factors: of each row by the row before, up to the middle; from there on of the row before by each row.
     factor: Fours<S>,
     pub(super) is_buckled: bool,
 }
 
-/// The ends of the rod as seen from the chord, in `p`.
+/// Ends of the rod relative to the chord, in `p`.
 struct Ends {
-    /// Integrals of the straight line between them times the first two bubbles, of opposite sign.
+    /// Integrals of the straight line between the ends times the first two bubbles, of opposite sign.
     mean: DVec2,
     tilt: DVec2,
-    /// Of its square.
+    /// Integral of the square of this line.
     square: f64,
 }
 
@@ -108,8 +108,8 @@ impl Products {
         Self { square, with_lower }
     }
 
-    /// The column along the chord between the plates, and its shape, bent between the ends of the rod to first order in
-    /// their leans from the chord; no use where it has buckled. Real-time: bounded, no allocation.
+    /// Returns the column along the chord between the plates, and its shape, bent between the ends of the rod to first
+    /// order in their leans from the chord; unusable if buckled. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn column<S: Simd>(&self, simd: S, ratios: &Ratios, plate: &Plate) -> (Column<S>, Fours<S>) {
         let chord = plate.displacement + DVec3::Z;
@@ -128,7 +128,7 @@ impl Products {
         twice[0] = twice[0] + straight(simd, &ends);
         let shortening = 0.5 * scale * scale * (ends.square + dot(&shape, &twice));
         if shortening > SMALL_FORCE * compliance {
-            // A step of Newton's method for the force: the bend falls as the force that compresses it does.
+            // One Newton step for the force: the bend decreases with the compressing force.
             let fall = (1.0 + 2.0 * ratios.softening * force) * dot(&arch, &column.solve(&arch));
             force += shortening / (compliance + scale * scale * fall);
             (column, shape) = self.bent(simd, ratios, force, &ends);
@@ -139,7 +139,7 @@ impl Products {
         (column, shape)
     }
 
-    /// The column under a force, and its shape; the scale of its angles left out of its curvature.
+    /// Returns the column under a force, and its shape; the curvature excludes the scale of the angles.
     #[inline(always)]
     fn bent<S: Simd>(&self, simd: S, ratios: &Ratios, force: f64, ends: &Ends) -> (Column<S>, Fours<S>) {
         let Ratios { shear_compliance, softening, .. } = *ratios;
@@ -176,7 +176,7 @@ impl Products {
         (column, shape)
     }
 
-    /// Integrals of the bend, seen from the chord, times each bubble.
+    /// Returns the integrals of the bend relative to the chord, times each bubble.
     #[inline(always)]
     fn arch<S: Simd>(&self, simd: S, ends: &Ends, shape: &Fours<S>) -> Fours<S> {
         let mut arch = *shape;
@@ -193,7 +193,7 @@ impl Products {
     }
 }
 
-/// The part of the straight line between the ends in [`Products::arch`].
+/// Returns the part of the straight line between the ends in [`Products::arch`].
 #[inline(always)]
 fn straight<S: Simd>(simd: S, ends: &Ends) -> Wide<S> {
     four(simd, [-ends.mean.x, -ends.mean.y, -ends.tilt.x, -ends.tilt.y])

@@ -1,18 +1,18 @@
-//! Coils that touch, along the whole rod.
+//! Contact of the coils along the whole rod.
 //!
-//! Where the rod is compressed to the thickness of its coils, or bent so far that they meet on the inner side, they
-//! press on each other. The stretch at which a section's coils meet is `(n d + (D/2) kappa) / L0`; what the stretch
-//! `lambda` of the section falls short of it by is resisted with the stiffness `k`. The best stretch at an axial force `N`
-//! follows in closed form, as without contact, and what it adds to the energy of the rod is
+//! Where the rod is compressed to the thickness of its coils, or bent so far that the coils meet on the inner side,
+//! they press on each other. The coils of a section meet at the stretch `(n d + (D/2) kappa) / L0`; a smaller stretch
+//! `lambda` is resisted with the stiffness `k`. The best stretch at an axial force `N` follows in closed form, as
+//! without contact, and contact adds to the energy of the rod
 //!
 //! ```text
 //! (K/2) <e>²,     e = (n d + (D/2) kappa)/L0 - 1 - N/gamma,     1/K = 1/gamma + 1/k
 //! ```
 //!
-//! with `<e>` for `e` where it is positive and zero elsewhere. In [`super::functional`] it makes the relation of length
-//! and force piecewise linear: [`solve`] finds the force in a few steps, most often in none.
+//! with `<e>` for `e` where it is positive and zero elsewhere. In [`super::functional`] this term makes the relation of
+//! length and force piecewise linear: [`solve`] finds the force in a few steps, most often in none.
 //!
-//! The penalty and where it acts: the book, chapter "The spring".
+//! Derivation of the penalty: the book, chapter "The spring".
 
 use flotor_hal::glam::{DMat3, DVec3};
 
@@ -21,10 +21,10 @@ use crate::rigidity::Spring;
 
 /// Axial stiffness of touching coils (N/m): the stiffest wall the device can render, 25 N/mm.
 pub(crate) const STIFFNESS_N_PER_M: f64 = 25.0e3;
-/// Curvature (rad per free length) below which the rim a coil tips over is rounded off: a stack of flat rings has a
-/// threshold there, and the energy a tip.
+/// Curvature (rad per free length) below which `kappa` is rounded off: a stack of flat rings tips over its rim at a
+/// threshold, where the energy has a kink.
 const ROUNDING: f64 = 0.05;
-/// Steps of [`solve`]: each settles which sections touch, from the ends of the stretch inwards.
+/// Maximum number of steps of [`solve`]: each updates the set of touching sections, from the ends of the stretch inwards.
 const MOST_STEPS: u32 = 12;
 
 /// Contact of one spring, lengths in `L0`, forces in `alpha/L0²`.
@@ -41,7 +41,7 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
-    /// `unit_n` is `alpha/L0²`.
+    /// Prepares the contact; `unit_n` is `alpha/L0²`.
     pub(crate) fn new(spring: &Spring, unit_n: f64) -> Self {
         let geometry = spring.geometry();
         let compliance = unit_n / spring.rigidities().gamma_n;
@@ -55,7 +55,7 @@ impl Contact {
     }
 }
 
-/// Sections that touch, a bit each. Another set of them is another matrix.
+/// Set of touching sections, one bit each. A different set has a different matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Touching(u32);
 
@@ -67,28 +67,28 @@ impl Touching {
     }
 }
 
-/// How far sections are from meeting their coils' thickness, and how that changes.
+/// Excess `e` of a section, with its derivatives.
 struct Excess {
     /// `e`
     value: f64,
-    /// By `p` and by `p'`.
+    /// Derivatives by `p` and by `p'`.
     by_lean: [f64; 2],
     by_rate: [f64; 2],
-    /// Derivatives of the rounded `kappa` times the coil radius.
+    /// Second derivatives of the rounded `kappa` times the coil radius.
     bend: Bend,
 }
 
-/// `(D/2) kappa`, rounded off at zero, and its second derivatives.
+/// Second derivatives of `(D/2) kappa`, rounded off at zero.
 struct Bend {
     by_lean_twice: [[f64; 2]; 2],
     by_lean_and_rate: [[f64; 2]; 2],
     by_rate_twice: [[f64; 2]; 2],
 }
 
-/// The force that makes up for the missing length, and what follows from it.
+/// Force that makes up for the missing length, with compliance, energy and touching sections.
 pub(crate) struct Solution {
     pub(crate) force: DVec3,
-    /// How the missing length changes with the force.
+    /// Derivative of the missing length by the force.
     pub(crate) compliance: DMat3,
     /// `(K/2) <e>²`, summed.
     pub(crate) energy: f64,
@@ -127,7 +127,7 @@ pub(crate) fn solve<const Q: usize>(
         solution = Solution { compliance: compliance - released, energy, touching, ..solution };
         let rest = missing - compliance * solution.force - pressed;
         let step = solution.compliance.inverse() * rest;
-        // To rounding of the force: the next step would move it by nothing.
+        // Converged to rounding of the force.
         if touching == Touching::NONE
             || step.length_squared() <= 1e-30 * (1.0 + solution.force.length_squared())
         {
@@ -143,7 +143,7 @@ impl<const Q: usize> Sections<Q> {
         DVec3::new(self.normal[0][i], self.normal[1][i], self.normal[2][i])
     }
 
-    /// `e` of a section.
+    /// Returns `e` of a section.
     fn excess(&self, contact: &Contact, force: DVec3, i: usize) -> f64 {
         let square =
             self.lean_rate[0][i] * self.lean_rate[0][i] + self.lean_rate[1][i] * self.lean_rate[1][i];
@@ -153,7 +153,7 @@ impl<const Q: usize> Sections<Q> {
         contact.solid + contact.coil_radius * bend - 1.0 - contact.compliance * force.dot(self.normal_at(i))
     }
 
-    /// The same with its derivatives; `slope` are those of `n.d` by `p`.
+    /// Returns `e` of a section with its derivatives; `slope` has those of `n.d` by `p`.
     fn excess_slopes(&self, contact: &Contact, load: &Load, slope: [f64; 2], i: usize) -> Excess {
         let p = [self.lean[0][i], self.lean[1][i]];
         let rate = [self.lean_rate[0][i], self.lean_rate[1][i]];
@@ -162,7 +162,7 @@ impl<const Q: usize> Sections<Q> {
         // Derivatives of the rounded `kappa` by the lean `p` and its rate.
         let root = (w2 * square + ROUNDING * ROUNDING).sqrt();
         let r = contact.coil_radius;
-        // Of the square of kappa, w² p'².
+        // Derivatives of the square of kappa, w² p'².
         let square_by_lean = p.map(|p| -2.0 * w3 * square * p);
         let square_by_rate = rate.map(|rate| 2.0 * w2 * rate);
         let curved = |twice: f64, a: f64, b: f64| r * (0.5 * twice - 0.25 * a * b / (root * root)) / root;
@@ -210,7 +210,7 @@ impl<const Q: usize> Sections<Q> {
         }
     }
 
-    /// Adds its second derivatives, and those of the length that contact makes up for.
+    /// Adds the second derivatives of `(K/2) <e>²`, and those of the length that contact makes up for.
     pub(crate) fn add_contact_curvatures(
         &self,
         contact: &Contact,
@@ -250,7 +250,7 @@ impl<const Q: usize> Sections<Q> {
         }
     }
 
-    /// Stretch by which touching coils make a section longer than its force alone would.
+    /// Returns the stretch by which touching coils make a section longer than its force alone would.
     pub(crate) fn pressed(&self, contact: &Contact, load: &Load, i: usize) -> f64 {
         contact.stiffness * contact.compliance * self.excess(contact, load.force, i).max(0.0)
     }

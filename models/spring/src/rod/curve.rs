@@ -1,7 +1,7 @@
-//! Where the sections of the rod are: from their directions back to a curve in space.
+//! Positions of the rod's sections: integration of their directions to a curve in space.
 //!
-//! The directions are the polynomials of the shape; the rest of each section follows from what all sections share
-//! (lengths in `L0`): `psi' = Phi + w (p x p')`, the twist evenly distributed beside the winding, and
+//! The directions are the polynomials of the shape; the rest of each section follows from quantities common to all
+//! sections (lengths in `L0`): `psi' = Phi + w (p x p')`, the twist evenly distributed beside the winding, and
 //! `r' = d + n/beta + delta (n.d) d`, stretched and sheared by the force, and held apart where coils touch.
 
 use flotor_hal::glam::{DQuat, DVec2, DVec3};
@@ -13,11 +13,11 @@ use super::section::{Load, Sections};
 use crate::centerline::Section;
 use flotor_lanes::basis::{bubbles, gauss_legendre};
 
-/// Fewest panels over the whole rod, and nodes in each: together far more degrees than the polynomials have.
+/// Minimum number of panels over the whole rod, and nodes in each: together far more degrees than the polynomials have.
 const LEAST_PANELS: usize = 64;
 const NODES: usize = 4;
 
-/// The shape of a rod and what its sections share.
+/// Shape of a rod, with the quantities common to all sections.
 pub(crate) struct Curve<const K: usize> {
     lean: [[f64; K]; 2],
     end: DVec2,
@@ -30,7 +30,7 @@ pub(crate) struct Curve<const K: usize> {
     twist_rad: f64,
 }
 
-/// Direction of a section, and how the curve goes on from it.
+/// Direction of a section, with tangent and turn rate of the curve.
 struct Step {
     lean: DVec2,
     tangent: DVec3,
@@ -60,7 +60,7 @@ impl<const K: usize> Curve<K> {
         }
     }
 
-    /// Sections evenly in arc length, the first in the lower plate, the last in the upper. Not real-time.
+    /// Computes sections evenly in arc length, the first in the lower plate, the last in the upper. Not real-time.
     pub(crate) fn draw(&self, free_length_m: f64, sections: &mut [Section]) {
         let gaps = sections.len().saturating_sub(1).max(1);
         let panels = LEAST_PANELS.div_ceil(gaps);
@@ -86,7 +86,7 @@ impl<const K: usize> Curve<K> {
         }
     }
 
-    /// At scaled arc length `s`.
+    /// Returns direction and rates at scaled arc length `s`.
     fn step(&self, s: f64) -> Step {
         let (bubble, slope) = bubbles::<K>(2.0 * s - 1.0);
         let along = |field: &[f64; K], c: usize| -> f64 {

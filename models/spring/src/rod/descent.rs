@@ -1,10 +1,10 @@
-//! The equilibrium of a pose without a past and without a matrix of its own.
+//! Quasi-Newton search for the equilibrium of a pose without a history.
 //!
-//! Short of buckling the rod has one equilibrium, and the straight column along the chord is close to it
-//! ([`super::column`]). Its second derivatives are known. A quasi-Newton method starts from them and learns from the slopes
-//! what the angles add (BFGS): each step adds a matrix of rank two to the inverse of the curvature. It is kept as two
-//! vectors, so that all the products with a slope can be formed at once, where the two loops of L-BFGS form one after the
-//! other. Each step costs one energy ([`super::search_energy`]); seven to ten of them reach the equilibrium.
+//! Short of buckling the rod has one equilibrium, and the straight column along the chord is close to it ([`super::column`]). The
+//! second derivatives of the column are known. A quasi-Newton method (BFGS) starts from these and takes the effect of the angles
+//! from the slopes: each step adds a matrix of rank two to the inverse of the curvature. This matrix is stored as two vectors, so
+//! that all products with a slope can be formed at once, whereas the two loops of L-BFGS form one after the other. Each step
+//! costs one energy ([`super::search_energy`]); seven to ten of them reach the equilibrium.
 //!
 //! Source: Nocedal and Wright, *Numerical Optimization*, 6.1 (BFGS).
 
@@ -16,15 +16,15 @@ use super::functional::{Ratios, Shape};
 use super::plate::Plate;
 use super::search_energy::{COEFFICIENTS, FOURS, Four, Fours, SearchEnergy, dot, four, in_order, numbers};
 
-/// Energies per search at most. A search that needs more is one for Newton's method.
+/// Maximum number of energies per search; a longer search is left to Newton's method.
 const MOST_ENERGIES: usize = 24;
-/// The last step at most, and what it may leave. A step leaves about that part of itself that it is of the one before.
+/// Maximum size of the last step, and of the error after it: about the square of the step over the step before.
 const LAST_STEP: f64 = 1e-8;
 const LEFT: f64 = 1.5e-10;
 /// Longest step, as the root mean square slope of `p`.
 const LONGEST_STEP: f64 = 0.8;
 
-/// The energy, and what the steps of a search have shown of its curvature: kept from search to search for its memory alone.
+/// Energy, and the updates of a search; stored from search to search to reuse the memory only.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Descent {
     energy: SearchEnergy,
@@ -32,7 +32,7 @@ pub(crate) struct Descent {
     updates: [Update; MOST_ENERGIES],
 }
 
-/// What a step adds to the inverse of the curvature: `-weight (step otherᵀ + other stepᵀ)`.
+/// Update of the inverse of the curvature by a step: `-weight (step otherᵀ + other stepᵀ)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Update {
     step: [Four; FOURS],
@@ -40,14 +40,14 @@ struct Update {
     weight: f64,
 }
 
-/// An equilibrium.
+/// Equilibrium found, with the number of energies evaluated.
 pub(crate) struct Found<const N: usize> {
     pub(crate) shape: Shape<N>,
     pub(crate) reading: Reading,
     pub(crate) energies: u32,
 }
 
-/// A search, for the widest instructions of the machine.
+/// Search, compiled for several instruction sets.
 struct Search<'a> {
     descent: &'a mut Descent,
     ratios: &'a Ratios,
@@ -73,9 +73,9 @@ impl Descent {
         }
     }
 
-    /// The equilibrium between plates, a function of their pose; `None` where a rod may have buckled or the search does
-    /// not end. The same bits whatever the instructions: always four sums at a time, and no product is fused with a sum.
-    /// Real-time: bounded, no allocation.
+    /// Finds the equilibrium between plates, a function of their pose; `None` if a rod may have buckled or the search
+    /// does not converge. The bits are the same on every instruction set: always four sums at a time, and no product is
+    /// fused with a sum. Real-time: bounded, no allocation.
     pub(crate) fn find(&mut self, ratios: &Ratios, plate: &Plate) -> Option<Found<COEFFICIENTS>> {
         let search = Search { descent: self, ratios, plate };
         #[cfg(target_arch = "x86_64")]
@@ -118,7 +118,7 @@ impl Descent {
             let slope_there = self.slope(simd, ratios, &shape, plate);
             let down_there = self.inverse(simd, known, &column, &slope_there);
             let change = added(&slope_there, -1.0, &slope);
-            // What the inverse makes of the change; it should be the step.
+            // Inverse curvature times the change of the slope; should equal the step.
             let guess = added(&down_there, -1.0, &down);
             let curvature = dot(&step, &change);
             (slope, down) = (slope_there, down_there);
@@ -147,7 +147,7 @@ impl Descent {
         self.energy.slope(simd, &sections, &shared)
     }
 
-    /// The inverse curvature times a slope.
+    /// Returns the inverse curvature times a slope.
     #[inline(always)]
     fn inverse<S: Simd>(&self, simd: S, known: usize, column: &Column<S>, slope: &Fours<S>) -> Fours<S> {
         let mut result = column.solve(slope);
@@ -164,7 +164,7 @@ impl Descent {
     }
 }
 
-/// `sum + factor * vector`
+/// Returns `sum + factor * vector`.
 #[inline(always)]
 fn added<S: Simd>(sum: &Fours<S>, factor: f64, vector: &Fours<S>) -> Fours<S> {
     let mut result = *sum;

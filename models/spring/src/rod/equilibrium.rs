@@ -1,10 +1,9 @@
-//! Follows the stable equilibrium from tick to tick.
+//! Stable equilibrium of the rod, followed from tick to tick.
 //!
-//! Newton's method on the slope of the energy. Its matrix is kept for some ticks; what that costs in accuracy
-//! is estimated at every step, see [`Effort`]. Where the matrix has a negative eigenvalue the shape is no
-//! minimum: the rod has buckled, or its branch has ended. From there it slides down the energy in a damped
-//! flow, a bounded way per tick, so that the force changes fast but never jumps. An equilibrium is reported
-//! only where it is stable.
+//! Newton's method on the slope of the energy. Its matrix is reused for some ticks; the loss of accuracy is estimated
+//! at every step, see [`Effort`]. Where the matrix has a negative eigenvalue the shape is no minimum: the rod has
+//! buckled, or its branch has ended. From there the shape slides down the energy in a damped flow, a bounded distance
+//! per tick, so that the force changes fast but never jumps. Only a stable equilibrium is reported as one.
 //!
 //! Sources: Deuflhard, *Newton Methods for Nonlinear Problems* (2011), 2.1 (kept matrix) and 6.4
 //! (pseudo-transient continuation, the damped flow); Morse index by inertia, see [`flotor_lanes::matrix`].
@@ -23,101 +22,99 @@ use crate::response::Demand;
 use crate::rigidity::Spring;
 use flotor_lanes::matrix::{Factored, added, dot, length, product};
 
-/// Longest change of shape in a tick that ends in no equilibrium, as the root mean square slope of `p`; of one that does,
-/// beyond what the plates' motion predicts. A full bulge has about 3. Short of 0.1 by what the lean of a bulge adds to its
-/// torque in second order.
+/// Largest change of shape in a tick that reaches no equilibrium, as the root mean square slope of `p`; in one that
+/// does, largest change beyond the prediction from the plates' motion. A full bulge has about 3. Smaller than 0.1 by
+/// the second-order effect of a bulge's lean on its torque.
 const LONGEST_WAY: f64 = 0.097;
-/// Longest step where the way is not felt, but only its end.
+/// Largest step of a search of which only the result is felt.
 const LONGEST_UNFELT_STEP: f64 = 0.4;
-/// How often a search that is not felt may begin anew.
+/// Maximum number of searches of which only the result is felt.
 const MOST_SEARCHES: u32 = 3;
-/// Most of a bow that a search begins with, of that of the linear column.
+/// Largest initial bow of a search, relative to that of the linear column.
 const MOST_BOW: f64 = 2.0;
-/// Steps to the amplitude of that bow.
+/// Newton steps for the amplitude of the initial bow.
 const AMPLITUDE_STEPS: u32 = 8;
-/// What the searches of a tick may cost together, in evaluations of the energy, if each costs no more than the one before.
+/// Maximum total cost of the searches of a tick, in evaluations of the energy, if each costs no more than the one before.
 const MOST_COST: u32 = 160;
-/// Curvature that counts as none. Bending has 4; the softest stable directions have 1e-5; rounding makes
-/// 1e-14.
+/// Curvature that counts as zero. Bending has 4; the softest stable directions have 1e-5; rounding causes 1e-14.
 const NEUTRAL: f64 = 1.0e-9;
-/// Curvature taken for none that still allows an equilibrium to be called stable: below the softest of
-/// interest.
+/// Largest curvature counted as zero in an equilibrium that is reported as stable: below the softest of interest.
 const SETTLED: f64 = 1.0e-6;
-/// Least damping of the flow.
+/// Minimum damping of the flow.
 const LEAST_DAMPING: f64 = 1.0e-3;
-/// By how much the damping grows until the damped matrix is definite.
+/// Factor by which the damping grows until the damped matrix is definite.
 const DAMPING_FACTOR: f64 = 5.0;
-/// Times it may grow in a tick. Where that is not enough the next tick goes on from there.
+/// Maximum number of increases of the damping in a tick. If this is not enough, the next tick continues.
 const MOST_DAMPINGS: u32 = 3;
-/// How far a shape that rests on a saddle is pushed off it.
+/// Push of a shape off a saddle, as the root mean square slope of `p`.
 const PUSH: f64 = 0.02;
-/// A step that is not at least this much shorter than the one before was taken with a matrix too old.
+/// Largest ratio of a step to the step before; above, the matrix is too old.
 const CONTRACTION: f64 = 0.3;
 
-/// Part of a step that is left of one that went uphill.
+/// Backtracking factor of a step that went uphill.
 const SHORTER: f64 = 0.25;
-/// Steps below this are not asked whether they go uphill: rounding of the energy would answer.
+/// Smallest step that is checked for going uphill: below, rounding of the energy would decide.
 const LEAST_CHECKED_STEP: f64 = 1.0e-6;
-/// Error that a step leaves, of the step, where coils may meet within it.
+/// Error after a step, relative to the step, if coils may meet within the step.
 const KINK: f64 = 1.0e-3;
 
-/// How hard a tick tries.
+/// Limits and tolerances of the search in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Effort {
-    /// Newton steps per tick at most.
+    /// Maximum number of Newton steps per tick.
     pub(crate) most_steps: u32,
-    /// Matrices computed per tick at most: each costs as much as nine steps. A tick that would need one more leaves it
-    /// to the next.
+    /// Maximum number of matrices computed per tick: each costs as much as nine steps. A tick that needs one more
+    /// leaves it to the next.
     pub(crate) most_matrices: u32,
-    /// Steps a matrix is good for.
+    /// Number of steps for which a matrix is used.
     pub(crate) matrix_life: u32,
-    /// Accepted error of the shape after a step, estimated as the length of the step times the way from where
-    /// the matrix was computed (Deuflhard 2.1.1, with the Lipschitz constant of a rod, about one).
+    /// Accepted error of the shape after a step, estimated as the length of the step times the distance from the shape
+    /// at which the matrix was computed (Deuflhard 2.1.1, with the Lipschitz constant of a rod, about one).
     pub(crate) tolerance: f64,
-    /// A larger error of a step than this calls for a new matrix.
+    /// Error of a step above which the matrix is renewed.
     pub(crate) renewal: f64,
 }
 
-/// How far a search may go.
+/// Limits on the motion of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stride {
-    /// In one step.
+    /// Limit of one step.
     step: f64,
-    /// In all of them.
+    /// Limit of all steps together.
     way: f64,
 }
 
 impl Stride {
-    /// The shapes on the way are felt.
+    /// Limits of a search whose intermediate shapes are felt.
     const FELT: Self = Self { step: LONGEST_WAY, way: LONGEST_WAY };
-    /// Only the end is.
+    /// Limits of a search of which only the result is felt.
     const UNFELT: Self = Self { step: LONGEST_UNFELT_STEP, way: f64::INFINITY };
 }
 
-/// What the plates feel, in units of the bending rigidity and the free length.
+/// Energy and its derivatives by the plate, in units of the bending rigidity and the free length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reading {
     pub(crate) energy: f64,
     /// Derivative of the energy by the displacement of the upper plate.
     pub(crate) force: DVec3,
-    /// By its lean.
+    /// Derivative by the lean of the plate.
     pub(crate) by_lean: DVec2,
-    /// By its turn.
+    /// Derivative by the turn of the plate.
     pub(crate) torsion: f64,
 }
 
-/// How a tick ended.
+/// Outcome of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Outcome {
     /// In stable equilibrium.
     Settled(Reading),
-    /// On the way to one; what is felt now.
+    /// Moving to an equilibrium, with the present reading.
     Moving(Reading),
-    /// Without a number. The shape is as before.
+    /// No finite number; the shape is as before.
     Failed,
 }
 
-/// The rod between its plates, and its past.
+/// Rod between its plates, with its history.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     functional: Functional<K, N, Q>,
@@ -132,26 +129,26 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     work: Work,
 }
 
-/// What a tick cost: how often the rod's energy was evaluated, its matrix computed, and a matrix factored. One number
-/// in the place of time, which no test can hold.
+/// Cost of a tick: numbers of evaluations of the rod's energy, of matrices computed, and of factorisations.
+/// Reproducible in tests, unlike the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Energies and slopes.
+    /// Evaluations of energy and slope.
     pub evaluations: u32,
     /// Matrices of second derivatives.
     pub matrices: u32,
-    /// Factorings of a matrix.
+    /// Factorisations of a matrix.
     pub factorings: u32,
 }
 
 impl Work {
-    /// In evaluations of the energy: a matrix costs as much as nine, a factoring as three.
+    /// Returns the cost in evaluations of the energy: a matrix costs as much as nine, a factorisation as three.
     #[must_use]
     pub(crate) fn cost(&self) -> u32 {
         self.evaluations + 9 * self.matrices + 3 * self.factorings
     }
 
-    /// Both together.
+    /// Returns the sum of both costs.
     fn and(self, other: &Self) -> Self {
         Self {
             evaluations: self.evaluations + other.evaluations,
@@ -161,14 +158,14 @@ impl Work {
     }
 }
 
-/// A step, from where and from which energy.
+/// Step, with its initial shape and energy.
 struct Stepped<const N: usize> {
     from: Shape<N>,
     energy: f64,
     step: Shape<N>,
 }
 
-/// Factored second derivatives and where they were computed.
+/// Factored second derivatives, with the shape and the plate at which they were computed.
 #[derive(Clone, Debug, PartialEq)]
 struct KeptMatrix<const N: usize> {
     factored: Factored<N>,
@@ -178,13 +175,13 @@ struct KeptMatrix<const N: usize> {
     touching: Touching,
     /// Smallest eigenvalue.
     softest: f64,
-    /// Curvature taken for none.
+    /// Curvature counted as zero.
     neutral: f64,
     steps_left: u32,
 }
 
 impl<const N: usize> KeptMatrix<N> {
-    /// None yet: good for no step.
+    /// Returns a placeholder that is valid for no step.
     fn none() -> Self {
         let reaction = Reaction { force: [[0.0; N]; 3], by_lean: [[0.0; N]; 2], torsion: [0.0; N] };
         Self {
@@ -201,7 +198,7 @@ impl<const N: usize> KeptMatrix<N> {
 }
 
 impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
-    /// At rest.
+    /// Builds the rod at rest.
     pub(crate) fn new(ratios: Ratios, effort: Effort) -> Self {
         Self {
             functional: Functional::new(ratios),
@@ -217,7 +214,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         }
     }
 
-    /// Back to rest. Real-time: bounded, no allocation.
+    /// Resets to rest. Real-time: bounded, no allocation.
     pub(crate) fn reset(&mut self) {
         self.shape = [0.0; N];
         self.history = History::new(Plate::HOME, self.shape);
@@ -226,45 +223,45 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.unstable_directions = 0;
     }
 
-    /// Marks the shape of the last tick. Real-time: bounded, no allocation.
+    /// Saves the shape of the last tick for [`Self::go_back`]. Real-time: bounded, no allocation.
     pub(crate) fn mark(&mut self) {
         self.marked = (*self.history.plate(), self.shape);
     }
 
-    /// In the shape that was marked, with no other past. Real-time: bounded, no allocation.
+    /// Restores the saved shape, without any other history. Real-time: bounded, no allocation.
     pub(crate) fn go_back(&mut self) {
         let (plate, shape) = &self.marked;
         self.history.restart(plate, shape);
         (self.shape, self.damping) = (*shape, LEAST_DAMPING);
     }
 
-    /// Another rod in the same shape. Real-time: bounded, no allocation.
+    /// Changes the rod, with the shape unchanged. Real-time: bounded, no allocation.
     pub(crate) fn set_ratios(&mut self, ratios: Ratios) {
         self.functional.set_ratios(ratios);
         self.matrix.steps_left = 0;
     }
 
-    /// Morse index where the matrix was computed last: zero where the shape is stable.
+    /// Returns the Morse index at the last computation of the matrix: zero if the shape is stable.
     pub(crate) fn unstable_directions(&self) -> usize {
         self.unstable_directions
     }
 
-    /// Accepted error of a shape.
+    /// Returns the accepted error of a shape.
     pub(crate) fn tolerance(&self) -> f64 {
         self.effort.tolerance
     }
 
-    /// What the last tick cost.
+    /// Returns the cost of the last tick.
     pub(crate) fn work(&self) -> Work {
         self.work
     }
 
-    /// The curve of the rod as it is now. Real-time: bounded, no allocation.
+    /// Returns the present curve of the rod. Real-time: bounded, no allocation.
     pub(crate) fn curve(&self) -> Curve<K> {
         Curve::new(&self.functional, &self.shape, self.history.plate())
     }
 
-    /// One tick. Real-time: bounded, no allocation.
+    /// Runs one tick. Real-time: bounded, no allocation.
     pub(crate) fn advance(&mut self, plate: &Plate, demand: Demand) -> Outcome {
         let before = self.shape;
         self.work = Work::default();
@@ -274,11 +271,11 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         let mut outcome = self.search(plate, demand);
         if matches!(outcome, Outcome::Moving(_)) && (may_miss || distance(&self.shape, &before) > LONGEST_WAY)
         {
-            // The branch ends between the last tick and this one, or coils meet, and the prediction went across: from where
-            // it was.
+            // The branch ends between the last tick and this one, or coils meet, and the prediction went across: search
+            // from the last shape.
             self.shape = before;
             let work = std::mem::take(&mut self.work);
-            // Where there is no time for it, the next tick does it.
+            // If there is no time for this search, the next tick does it.
             let has_time = work.and(&work).cost() <= MOST_COST;
             outcome = if has_time { self.search(plate, demand) } else { self.moving(plate) };
             self.work = work.and(&self.work);
@@ -287,12 +284,12 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         outcome
     }
 
-    /// The rod it follows. Real-time: bounded, no allocation.
+    /// Returns the ratios of the rod. Real-time: bounded, no allocation.
     pub(crate) fn ratios(&self) -> &Ratios {
         &self.functional.ratios
     }
 
-    /// Goes on from an equilibrium that was found elsewhere. Real-time: bounded, no allocation.
+    /// Continues from an equilibrium of another search. Real-time: bounded, no allocation.
     pub(crate) fn settle(&mut self, plate: &Plate, found: &Found<N>) -> Outcome {
         self.work = Work { evaluations: found.energies, ..Work::default() };
         self.history.restart(plate, &found.shape);
@@ -301,9 +298,9 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         Outcome::Settled(found.reading)
     }
 
-    /// The equilibrium at a pose, whatever was before: from the straight column where that has not buckled, else from
-    /// the shape of the linear column. What happens on the way is not felt, so it may go faster. A shape that slides off a saddle,
-    /// or has used up its matrices, goes on in the next tick. Real-time: bounded, no allocation.
+    /// Finds the equilibrium at a pose without a history, from the shape of the linear column. Intermediate shapes are
+    /// not felt, so that steps may be larger. A shape that slides off a saddle, or has used up its matrices, continues
+    /// in the next tick. Real-time: bounded, no allocation.
     pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, plate: &Plate, demand: Demand) -> Outcome {
         self.reset();
         self.stride = Stride::UNFELT;
@@ -324,9 +321,9 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         outcome
     }
 
-    /// From a shape without a bow to that with the bow of the linear column: as much of it as has least energy. The linear
-    /// column does not know how far a bow goes close to buckling. The energy along it is taken for `a t + b t² + d t⁴`, because the
-    /// bulge of a straight rod has no preferred side; two evaluations say what the three are.
+    /// Scales the bow of the linear column to the amplitude of least energy: close to buckling the linear column does
+    /// not determine the amplitude. The energy along the bow is approximated by `a t + b t² + d t⁴`, because the bulge
+    /// of a straight rod has no preferred side; two evaluations give the three coefficients.
     fn bowed(&mut self, without: &Shape<N>, with: &Shape<N>, plate: &Plate) -> Shape<N> {
         let bow = added(with, -1.0, without);
         let (from, to) = (self.functional.value(without, plate), self.functional.value(with, plate));
@@ -346,7 +343,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         if part.is_finite() { added(without, part.clamp(0.0, MOST_BOW), &bow) } else { *with }
     }
 
-    /// Keeps what the next tick starts from.
+    /// Stores the history for the next tick.
     fn remember(&mut self, plate: &Plate, before: &Shape<N>, outcome: &Outcome) {
         match outcome {
             Outcome::Settled(_) => self.history.push(*plate, &self.shape),
@@ -359,7 +356,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         }
     }
 
-    /// Newton's method from the predicted shape.
+    /// Runs Newton's method from the predicted shape.
     #[inline]
     fn search(&mut self, plate: &Plate, demand: Demand) -> Outcome {
         let (mut last_size, mut way_left) = (f64::INFINITY, self.stride.way);
@@ -371,7 +368,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             if let Some(Stepped { from, energy, step }) = &mut last
                 && value.energy > *energy
             {
-                // Coils met on the way and the step went uphill.
+                // Coils met within the step, which went uphill: backtrack.
                 *step = step.map(|entry| entry * SHORTER);
                 self.shape = added(from, 1.0, step);
                 continue;
@@ -422,15 +419,15 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.moving(plate)
     }
 
-    /// What is felt of the shape as it is now, short of equilibrium: the derivatives of its own energy, so that the hand gets
-    /// what the rod loses.
+    /// Returns the reading of the present shape, short of equilibrium: the derivatives of its own energy, so that the
+    /// hand receives the energy that the rod loses.
     pub(crate) fn moving(&mut self, plate: &Plate) -> Outcome {
         let (reading, _) = self.functional.reading(&self.shape, plate);
         self.work.evaluations += 1;
         if reading.energy.is_finite() { Outcome::Moving(reading) } else { Outcome::Failed }
     }
 
-    /// Least factor between a step and the error it leaves: where coils touch, others may meet within the step.
+    /// Returns the least ratio of the error after a step to the step: where coils touch, others may meet within the step.
     fn kink(&self, value: &Value<N, Q>) -> f64 {
         if value.touching == Touching::NONE { 0.0 } else { KINK }
     }
@@ -460,8 +457,8 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.unstable_directions
     }
 
-    /// One step of the damped flow, from a shape that is no minimum: an implicit Euler step down the slope of
-    /// the energy, of duration `1 / damping`, of at most `longest`.
+    /// Makes one step of the damped flow, from a shape that is no minimum: an implicit Euler step down the slope of the
+    /// energy, of duration `1 / damping`, of at most `longest`.
     #[cold]
     fn slide(
         &mut self,
@@ -489,7 +486,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.damping = (damping / DAMPING_FACTOR).max(LEAST_DAMPING);
         let mut step = damped.step_down(&value.slope);
         if let Some((down, curvature)) = falling(&curvature.matrix, &damped, K, neutral(&value.slope)) {
-            // On a saddle, not on a slope: nothing else would start the motion.
+            // On a saddle, where the slope vanishes, only a push starts the motion.
             if length(&value.slope) < 0.5 * PUSH * -curvature {
                 let push = if dot(&down, &value.slope) > 0.0 { -PUSH } else { PUSH };
                 step = added(&step, push, &down);
@@ -505,16 +502,16 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
     }
 }
 
-/// Curvature that counts as none, off equilibrium: a direction without stiffness, such as the turning of a
-/// straight rod's bulge about its axis, there has one as large as the slope, of either sign.
+/// Returns the curvature that counts as zero off equilibrium: there a direction without stiffness, such as the turning
+/// of a straight rod's bulge about its axis, has one as large as the slope, of either sign.
 fn neutral<const N: usize>(slope: &Shape<N>) -> f64 {
     NEUTRAL + 4.0 * length(slope)
 }
 
-/// A direction of length one in which the energy curves down, and that curvature: by inverse iteration.
+/// Returns a unit direction in which the energy curves down, and that curvature, by inverse iteration.
 ///
-/// It starts from the direction a perfect rod bulges in, where nothing else decides: towards -x, which stands
-/// for the side to which the ends of a real coil are off its axis; then, where that is stable, towards -y.
+/// The iteration starts from the direction in which a perfect rod bulges if nothing else decides: towards -x, which
+/// stands for the side to which the ends of a real coil are off its axis; then, if that is stable, towards -y.
 fn falling<const N: usize>(
     matrix: &[[f64; N]; N],
     damped: &Factored<N>,
@@ -540,7 +537,7 @@ fn falling<const N: usize>(
     None
 }
 
-/// What the plates feel after a step, to second order in it: no further evaluation is needed.
+/// Returns the reading after a step, to second order in the step: no further evaluation is needed.
 #[inline]
 fn read<const N: usize, const Q: usize>(
     value: &Value<N, Q>,

@@ -1,4 +1,4 @@
-//! The energy of the rod at given plates, as a function of a few coefficients.
+//! Energy of the rod at given plates, as a function of a few coefficients.
 //!
 //! The shape of the rod is the direction of its sections, a polynomial in stereographic coordinates
 //! ([`flotor_lanes::basis`]). Stretch, shear and twist need no unknowns of their own: for given directions their
@@ -42,7 +42,7 @@ pub(crate) struct Ratios {
     pub(super) softening: f64,
     /// `tau / alpha`
     pub(super) torsion: f64,
-    /// Of coils that touch; `None` lets them pass through each other.
+    /// Contact of the coils; `None` lets them pass through each other.
     pub(super) contact: Option<Contact>,
 }
 
@@ -63,7 +63,7 @@ impl Ratios {
     }
 }
 
-/// The energy with `K` bubbles in each direction, summed at `Q` stations.
+/// Energy with `K` bubbles in each direction, summed at `Q` stations.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Functional<const K: usize, const N: usize, const Q: usize> {
     basis: Basis<K, Q>,
@@ -73,9 +73,9 @@ pub(crate) struct Functional<const K: usize, const N: usize, const Q: usize> {
 /// Energy of a shape between plates and its first derivatives.
 pub(crate) struct Value<const N: usize, const Q: usize> {
     pub(crate) energy: f64,
-    /// By the coefficients.
+    /// Derivatives by the coefficients.
     pub(crate) slope: Shape<N>,
-    /// By the lean of the upper plate.
+    /// Derivatives by the lean of the upper plate.
     pub(crate) by_lean: DVec2,
     /// The derivatives by the upper plate's displacement and by its turn are force and torsion.
     pub(crate) load: Load,
@@ -88,13 +88,13 @@ pub(crate) struct Value<const N: usize, const Q: usize> {
 
 /// Second derivatives of the energy.
 pub(crate) struct Curvature<const N: usize> {
-    /// By the coefficients twice.
+    /// Second derivatives by the coefficients.
     pub(crate) matrix: [[f64; N]; N],
-    /// How the derivatives by the plate change with the coefficients.
+    /// Derivatives of the reaction on the plate by the coefficients.
     pub(crate) reaction: Reaction<N>,
 }
 
-/// Change of what the plate feels with each coefficient, the plate being held.
+/// Derivatives of the reaction on the plate by each coefficient, at a fixed plate.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Reaction<const N: usize> {
     pub(crate) force: [[f64; N]; 3],
@@ -110,17 +110,17 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         Self { basis: Basis::new(), ratios }
     }
 
-    /// The polynomials of its shapes.
+    /// Returns the polynomials of the shapes.
     pub(crate) fn basis(&self) -> &Basis<K, Q> {
         &self.basis
     }
 
-    /// Another rod. Real-time: bounded, no allocation.
+    /// Changes the rod. Real-time: bounded, no allocation.
     pub(crate) fn set_ratios(&mut self, ratios: Ratios) {
         self.ratios = ratios;
     }
 
-    /// Upper estimate of how far the eigenvalues of the matrix fall when the plate and the shape move so far.
+    /// Returns an upper estimate of the fall of the matrix's eigenvalues as plate and shape move by these distances.
     ///
     /// The lowest eigenvalue of the straight rod falls from 4 to 0 over the compression `4 pi² alpha/(gamma
     /// L0²)` at which it buckles; twice that slope covers other shapes.
@@ -129,7 +129,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         2.0 * plate_moved / (PI * PI * axial_compliance) + 4.0 * shape_moved
     }
 
-    /// Energy, load and slope. Real-time: bounded, no allocation.
+    /// Returns energy, load and slope. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(crate) fn value(&self, shape: &Shape<N>, plate: &Plate) -> Value<N, Q> {
         let sections = self.sections(shape, plate);
@@ -175,7 +175,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         }
     }
 
-    /// Energy and what the plates feel, and the slope. Real-time: bounded, no allocation.
+    /// Returns energy and reaction on the plate, and the slope. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(crate) fn reading(&self, shape: &Shape<N>, plate: &Plate) -> (Reading, Shape<N>) {
         let Value { energy, slope, by_lean, load, .. } = self.value(shape, plate);
@@ -197,7 +197,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         Sections::new(lean, rate)
     }
 
-    /// Second derivatives at a shape. Real-time: bounded, no allocation.
+    /// Returns the second derivatives at a shape. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn curvature(&self, value: &Value<N, Q>) -> Curvature<N> {
         let mut local = value.sections.curvatures(&value.load, &self.basis.weight);
@@ -218,7 +218,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
                         strain[c * K + k] += dot(&self.basis.slope[k], &local.strain_by_rate[axis][c]);
                     }
                 }
-                // Twist is what the winding leaves over.
+                // The twist is the turn less the winding.
                 reaction.torsion[c * K + k] = -(dot(&self.basis.bubble[k], &local.winding_by_lean[c])
                     + dot(&self.basis.slope[k], &local.winding_by_rate[c]));
             }
@@ -254,7 +254,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         Curvature { matrix, reaction }
     }
 
-    /// Row of the local part of the matrix: component `c` of a field against all bubbles of both components.
+    /// Returns a row of the local part of the matrix: component `c` of a field against all bubbles of both components.
     #[inline]
     fn row(&self, local: &Curvatures<Q>, c: usize, field: &Along<Q>, rate: &Along<Q>) -> [f64; N] {
         let mut parts = [[0.0; K]; 2];
@@ -272,7 +272,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         joined(&parts[0], &parts[1])
     }
 
-    /// Sums over the stations of a field times each bubble and another times its slope.
+    /// Returns sums over the stations of a field times each bubble and another field times the bubble's slope.
     #[inline(always)]
     fn projected(&self, by_lean: &Along<Q>, by_rate: &Along<Q>) -> [f64; K] {
         let mut sums = [0.0; K];
@@ -284,7 +284,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     }
 }
 
-/// `sum += factor * vector`
+/// Adds `factor * vector` to `sum`.
 #[inline(always)]
 fn add_products<const M: usize>(sum: &mut [f64; M], vector: &[f64; M], factor: f64) {
     for i in 0..M {
@@ -292,7 +292,7 @@ fn add_products<const M: usize>(sum: &mut [f64; M], vector: &[f64; M], factor: f
     }
 }
 
-/// Both components one after the other.
+/// Joins both components one after the other.
 #[inline(always)]
 pub(super) fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K]) -> Shape<N> {
     let mut shape = [0.0; N];

@@ -1,9 +1,9 @@
-//! The upper plate in the coordinates of the rod.
+//! Upper plate in the coordinates of the rod.
 //!
-//! The direction `d` of a section is written in stereographic coordinates `p = tan(angle/2)` towards the
-//! horizontal direction it leans to, `d = (2 p, 1 - p²) / (1 + p²)`: no trigonometry, no singularity but the
-//! section turned upside down. What is left of its rotation is a turn `psi` about `d`: `R = (shortest turn
-//! from the vertical to d) (turn about the vertical by psi)`.
+//! The direction `d` of a section is written in stereographic coordinates `p = tan(angle/2)` towards the horizontal
+//! direction of its lean, `d = (2 p, 1 - p²) / (1 + p²)`: no trigonometry, no singularity except for a section turned
+//! upside down. The remaining rotation is a turn `psi` about `d`: `R = (shortest turn from the vertical to d) (turn
+//! about the vertical by psi)`.
 
 use flotor_hal::glam::{DVec2, DVec3};
 use flotor_hal::math;
@@ -13,7 +13,7 @@ use crate::pose::{DUST, Pose};
 /// Smallest `1 + d_z`: 177.4 degrees. There is no shortest turn to upside down.
 const LEAST_OVERTURN: f64 = 1e-3;
 
-/// The number itself, or zero where it is nothing. Real-time: bounded, no allocation.
+/// Returns the number, or zero if negligible, see [`DUST`]. Real-time: bounded, no allocation.
 #[inline]
 pub(crate) fn or_zero(number: f64) -> f64 {
     if number.abs() < DUST { 0.0 } else { number }
@@ -24,17 +24,17 @@ pub(crate) fn or_zero(number: f64) -> f64 {
 pub(crate) struct Plate {
     /// Centre relative to home.
     pub(crate) displacement: DVec3,
-    /// Stereographic coordinates of its normal.
+    /// Stereographic coordinates of the plate's normal.
     pub(crate) lean: DVec2,
-    /// Turn about its normal (rad), in -pi..pi.
+    /// Turn about the plate's normal (rad), in -pi..pi.
     pub(crate) turn_rad: f64,
 }
 
 impl Plate {
-    /// At home.
+    /// Plate at home.
     pub(crate) const HOME: Self = Self { displacement: DVec3::ZERO, lean: DVec2::ZERO, turn_rad: 0.0 };
 
-    /// `None` for a plate turned upside down.
+    /// Converts a pose; `None` for a plate turned upside down.
     #[inline]
     pub(crate) fn new(pose: &Pose, free_length_m: f64) -> Option<Self> {
         let q = pose.orientation;
@@ -51,8 +51,8 @@ impl Plate {
         })
     }
 
-    /// Minus the change of energy with a small rotation about each axis, from its derivatives by the lean and
-    /// by the turn.
+    /// Returns the torque, minus the derivative of the energy by a small rotation about each axis, from the derivatives
+    /// by the lean and by the turn.
     ///
     /// A rotation `w` changes the turn by `w_z + p.w` and the lean by `c (1 - p²)/2 + p (p.c) + w_z (z x p)`,
     /// `c = (w_y, -w_x)`.
@@ -63,7 +63,7 @@ impl Plate {
         DVec3::new(by_axis.y - by_turn * p.x, -by_axis.x - by_turn * p.y, -p.perp_dot(by_lean) - by_turn)
     }
 
-    /// Weighted sum of plates.
+    /// Returns the weighted sum of plates.
     #[inline]
     pub(crate) fn combination<const M: usize>(plates: &[Self; M], weights: &[f64; M]) -> Self {
         let mut sum = Self { displacement: DVec3::ZERO, lean: DVec2::ZERO, turn_rad: 0.0 };
@@ -75,7 +75,7 @@ impl Plate {
         sum
     }
 
-    /// How far apart two poses are, in free lengths and half radians.
+    /// Returns the distance of two poses, in free lengths and half radians.
     #[inline]
     pub(crate) fn distance(&self, other: &Self) -> f64 {
         let turn_rad = self.turn_rad - other.turn_rad;

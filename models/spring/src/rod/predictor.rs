@@ -1,14 +1,14 @@
-//! Where the shape will be, from where it was.
+//! Prediction of the shape from the shapes of the last ticks.
 //!
-//! A hand moves smoothly, so the next shape is close to the polynomial through the last ones, sampled at the
-//! tick. But a hand also stops, starts and is read through a noisy sensor, where a polynomial overshoots. The
-//! poses tell which it was: the order that would have predicted the *pose* best is used for the shape.
+//! A hand moves smoothly, so the next shape is close to the polynomial through the last ones, sampled at the tick. But
+//! a hand also stops, starts and is read through a noisy sensor, where a polynomial overshoots. The poses decide: the
+//! order that would have predicted the *pose* best is used for the shape.
 
 use super::functional::Shape;
 use super::plate::Plate;
 
-/// Highest order plus one. Each order brings the prediction of a smooth hand some thirty times closer; from here on it is
-/// as close as the shapes are solved.
+/// Highest order plus one. Each order makes the prediction of a smooth hand some thirty times more accurate; a higher
+/// order would exceed the accuracy of the shapes.
 const DEPTH: usize = 6;
 
 /// Weights of the last ticks, newest first: binomial coefficients with alternating signs.
@@ -21,7 +21,7 @@ const WEIGHTS: [[f64; DEPTH]; DEPTH] = [
     [6.0, -15.0, 20.0, -15.0, 6.0, -1.0],
 ];
 
-/// The last equilibria of successive ticks, newest first.
+/// Last equilibria of successive ticks, newest first.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct History<const N: usize> {
     plates: [Plate; DEPTH],
@@ -34,18 +34,18 @@ impl<const N: usize> History<N> {
         Self { plates: [plate; DEPTH], shapes: [shape; DEPTH], length: 1 }
     }
 
-    /// Forgets all but one equilibrium. Real-time: bounded, no allocation.
+    /// Resets the history to one equilibrium. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn restart(&mut self, plate: &Plate, shape: &Shape<N>) {
         (self.plates[0], self.shapes[0], self.length) = (*plate, *shape, 1);
     }
 
-    /// Where the plates were last.
+    /// Returns the last pose of the plates.
     pub(crate) fn plate(&self) -> &Plate {
         &self.plates[0]
     }
 
-    /// The equilibrium of this tick.
+    /// Adds the equilibrium of this tick.
     #[inline]
     pub(crate) fn push(&mut self, plate: Plate, shape: &Shape<N>) {
         self.plates.rotate_right(1);
@@ -54,7 +54,7 @@ impl<const N: usize> History<N> {
         self.length = DEPTH.min(self.length + 1);
     }
 
-    /// Expected shape at a pose. Real-time: bounded, no allocation.
+    /// Returns the expected shape at a pose. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn predict(&self, plate: &Plate) -> Shape<N> {
         let (mut best, mut least) = (&WEIGHTS[0], plate.distance(&self.plates[0]));

@@ -1,9 +1,9 @@
-//! The energy of the rod and its slope, for a search that needs nothing else.
+//! Energy of the rod and its slope, for a search without second derivatives.
 //!
-//! The energy is that of [`super::functional`] with ten bubbles and sixteen stations; what differs is how it is summed.
-//! Stations lie in pairs, mirrored about the middle of the rod, and a bubble is the same in both or the opposite. So
-//! with the half sums and half differences over a pair, half of the products are enough. Numbers lie in fours, one
-//! instruction for each four: four stations, or the coefficients of two bubbles in both components.
+//! The energy is that of [`super::functional`] with ten bubbles and sixteen stations, summed in another way. Stations
+//! come in pairs, mirrored about the middle of the rod, and a bubble is even or odd over a pair. So with the half sums
+//! and half differences over a pair, half of the products are enough. Numbers are arranged in fours, with one
+//! instruction per four: four stations, or the coefficients of two bubbles in both components.
 
 use flotor_hal::glam::{DMat3, DVec2, DVec3};
 use pulp::{Simd, cast};
@@ -19,23 +19,23 @@ use flotor_lanes::{Real, Wide};
 pub(crate) const BUBBLES: usize = 10;
 pub(crate) const COEFFICIENTS: usize = 2 * BUBBLES;
 pub(crate) const STATIONS: usize = 16;
-/// Fours that hold all coefficients, and one station of each pair.
+/// Numbers of fours for all coefficients, and for one station of each pair.
 pub(super) const FOURS: usize = COEFFICIENTS / 4;
 const GROUPS: usize = STATIONS / 8;
 
 /// Four numbers in memory.
 pub(super) type Four = [f64; 4];
-/// All coefficients: `[x, y]` of an even bubble and `[x, y]` of the odd one after it in each four.
+/// Coefficients in fours: `[x, y]` of an even bubble and `[x, y]` of the odd bubble after it.
 pub(super) type Fours<S> = [Wide<S>; FOURS];
 
-/// Four numbers in a register.
+/// Loads four numbers into a register.
 #[inline(always)]
 pub(super) fn four<S: Simd>(simd: S, numbers: Four) -> Wide<S> {
     const { assert!(S::F64_LANES == 4) };
     Wide::new(simd, cast(numbers))
 }
 
-/// The same in memory.
+/// Returns the four numbers of a register.
 #[inline(always)]
 pub(super) fn numbers<S: Simd>(four: Wide<S>) -> Four {
     cast(four.lanes())
@@ -53,36 +53,36 @@ fn turned<S: Simd>(simd: S, rows: [Wide<S>; 4]) -> [Wide<S>; 4] {
     ]
 }
 
-/// The sum of the numbers of each.
+/// Returns the sums of the numbers of each four.
 #[inline(always)]
 fn sums<S: Simd>(simd: S, fours: [Wide<S>; 4]) -> Four {
     let [a, b, c, d] = turned(simd, fours);
     numbers((a + c) + (b + d))
 }
 
-/// The sum of four numbers.
+/// Returns the sum of four numbers.
 #[inline(always)]
 fn sum<S: Simd>(four: Wide<S>) -> f64 {
     let [a, b, c, d] = numbers(four);
     (a + c) + (b + d)
 }
 
-/// Sum of the products of coefficients.
+/// Returns the sum of the products of coefficients.
 #[inline(always)]
 pub(super) fn dot<S: Simd>(a: &Fours<S>, b: &Fours<S>) -> f64 {
     sum(((a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])) + a[4] * b[4])
 }
 
-/// The tables of [`Basis`] as they are summed here.
+/// Tables of [`Basis`], arranged for the sums here.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SearchEnergy {
-    /// Of the stations in the lower half: weight, and scaled arc length from the middle.
+    /// Weights of the stations in the lower half, and their scaled arc lengths from the middle.
     weight: [Four; GROUPS],
     from_middle: [Four; GROUPS],
-    /// Bubbles and their slopes there.
+    /// Bubbles and their slopes at these stations.
     bubble: [[Four; GROUPS]; BUBBLES],
     slope: [[Four; GROUPS]; BUBBLES],
-    /// The same for each station, each number twice.
+    /// Bubbles and slopes of each station, each number twice.
     bubble_at: [[Four; FOURS]; STATIONS / 2],
     slope_at: [[Four; FOURS]; STATIONS / 2],
 }
@@ -100,7 +100,7 @@ pub(super) struct Sections<S: Simd> {
     rate_squared: Wide<S>,
 }
 
-/// What is the same in mirrored sections, and what is opposite: of the first derivatives by `p` and `p'`.
+/// Sums and differences, over mirrored sections, of the first derivatives by `p` and `p'`.
 struct Halves<S: Simd> {
     lean_sum: [Wide<S>; 2],
     lean_difference: [Wide<S>; 2],
@@ -108,10 +108,10 @@ struct Halves<S: Simd> {
     rate_difference: [Wide<S>; 2],
 }
 
-/// The sections of a shape: those below the middle, and those above.
+/// Sections of a shape, below the middle and above.
 pub(super) type AllSections<S> = [[Sections<S>; 2]; GROUPS];
 
-/// What all of them share.
+/// Quantities common to all sections.
 pub(super) struct Shared {
     load: Load,
     /// Energy of stretch, shear and twist.
@@ -127,14 +127,14 @@ impl<S: Simd> Sections<S> {
         Self { lean, rate, square, scale, area_rate: x * dy - y * dx, rate_squared: dx * dx + dy * dy }
     }
 
-    /// First derivatives of `l` by `p` and by `p'` ([`super::section`]), each times the weight.
+    /// Returns the first derivatives of `l` by `p` and by `p'` ([`super::section`]), each times the weight.
     #[inline(always)]
     fn slopes(&self, load: &Load, weight: Wide<S>) -> [[Wide<S>; 2]; 2] {
         let ([x, y], [dx, dy], w) = (self.lean, self.rate, self.scale);
         let Load { force, torsion, softening } = *load;
         let level = w * (x * force.x + y * force.y + force.z);
         let stress = (level - force.z) * softening + 1.0;
-        // What is along p: of the bending energy and the winding, and of the potential.
+        // Component along p: of the bending energy and the winding, and of the potential.
         let along = w * (self.area_rate * torsion - w * self.rate_squared) + stress * level;
         let part = weight * w;
         [
@@ -167,7 +167,7 @@ impl SearchEnergy {
         }
     }
 
-    /// Sections `4 group` to `4 group + 3`, and those mirrored.
+    /// Returns the sections `4 group` to `4 group + 3`, and their mirrored ones.
     #[inline(always)]
     fn group<S: Simd>(&self, simd: S, shape: &[Four; FOURS], end: DVec2, group: usize) -> [Sections<S>; 2] {
         let number = |value: f64| four(simd, [value; 4]);
@@ -207,7 +207,7 @@ impl SearchEnergy {
         ]
     }
 
-    /// The sections of a shape between plates. Real-time: bounded, no allocation.
+    /// Returns the sections of a shape between plates. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn sections<S: Simd>(&self, simd: S, shape: &Fours<S>, plate: &Plate) -> AllSections<S> {
         let mut in_memory = [[0.0; 4]; FOURS];
@@ -217,7 +217,7 @@ impl SearchEnergy {
         [self.group(simd, &in_memory, plate.lean, 0), self.group(simd, &in_memory, plate.lean, 1)]
     }
 
-    /// Stretch, shear and twist of least energy for these sections. Real-time: bounded, no allocation.
+    /// Computes stretch, shear and twist of least energy for these sections. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn shared<S: Simd>(
         &self,
@@ -276,7 +276,7 @@ impl SearchEnergy {
         }
     }
 
-    /// Slope of the energy by the coefficients. Real-time: bounded, no allocation.
+    /// Returns the slope of the energy by the coefficients. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn slope<S: Simd>(&self, simd: S, sections: &AllSections<S>, shared: &Shared) -> Fours<S> {
         let (mut by_lean, mut by_rate) = ([four(simd, [0.0; 4]); FOURS], [four(simd, [0.0; 4]); FOURS]);
@@ -299,7 +299,7 @@ impl SearchEnergy {
         by_lean
     }
 
-    /// Energy, and what the plates feel. Real-time: bounded, no allocation.
+    /// Returns the energy and its derivatives by the plate. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn reading<S: Simd>(&self, simd: S, sections: &AllSections<S>, shared: &Shared) -> Reading {
         let zero = four(simd, [0.0; 4]);
@@ -325,7 +325,7 @@ impl SearchEnergy {
     }
 }
 
-/// The coefficients in the order of [`super::functional`].
+/// Returns the coefficients in the sequence of [`super::functional`].
 #[inline(always)]
 pub(super) fn in_order<S: Simd>(shape: &Fours<S>) -> Shape<COEFFICIENTS> {
     let mut ordered = [0.0; COEFFICIENTS];

@@ -9,8 +9,8 @@
 //! w (p x p')                   rate at which the shortest turn to d winds about d
 //! ```
 //!
-//! Internal force `n` and torsional moment `T` are the same in every section, and with them held
-//! the rod's equilibrium is a stationary point of the sum over
+//! Internal force `n` and torsional moment `T` are the same in every section, and for fixed `n` and `T` the rod's
+//! equilibrium is a stationary point of the sum over
 //!
 //! ```text
 //! l(p, p') = w² p'²/2 - T w (p x p') - n.d - delta (n.d)²/2,   delta = 1/gamma - 1/beta,
@@ -23,10 +23,10 @@ use flotor_hal::glam::{DMat3, DVec3};
 
 use flotor_lanes::matrix::dot;
 
-/// One number for each of `Q` sections.
+/// Array of one number per section, for `Q` sections.
 pub(crate) type Along<const Q: usize> = [f64; Q];
 
-/// Normals of the sections and their change, and what the energy needs of them.
+/// Normals of the sections and their rates, with derived quantities of the energy.
 #[derive(Clone, Debug)]
 pub(crate) struct Sections<const Q: usize> {
     pub(crate) lean: [Along<Q>; 2],
@@ -42,17 +42,17 @@ pub(crate) struct Sections<const Q: usize> {
 /// Integrals over the rod.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Integrals {
-    /// Of the bending energy.
+    /// Bending energy.
     pub(crate) bending: f64,
-    /// Of the winding about the normal (rad).
+    /// Winding about the normal (rad).
     pub(crate) winding_rad: f64,
-    /// Of `d - z`.
+    /// Integral of `d - z`.
     pub(crate) lean: DVec3,
-    /// Of `d dᵀ`.
+    /// Integral of `d dᵀ`.
     pub(crate) second: DMat3,
 }
 
-/// What all sections of a rod in equilibrium share, in units of `alpha/L0²` and `alpha/L0`.
+/// Load common to all sections of a rod in equilibrium, in units of `alpha/L0²` and `alpha/L0`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Load {
     /// Force of the upper on the lower part of the rod, `n`.
@@ -106,7 +106,7 @@ impl<const Q: usize> Sections<Q> {
         }
     }
 
-    /// First derivatives of `l` by `p` and by `p'`, each times the weight.
+    /// Returns the first derivatives of `l` by `p` and by `p'`, each times the weight.
     #[inline(always)]
     pub(crate) fn slopes(&self, load: &Load, weight: &Along<Q>) -> [[Along<Q>; 2]; 2] {
         let ([x, y], [dx, dy]) = (&self.lean, &self.lean_rate);
@@ -115,7 +115,7 @@ impl<const Q: usize> Sections<Q> {
         for i in 0..Q {
             let (w, a) = (self.scale[i], weight[i]);
             let Potential { slope, stress, .. } = self.potential(load, i);
-            // What is along p: of the bending energy, and of the winding.
+            // Component along p: of the bending energy, and of the winding.
             let along = w * w * (self.area_rate[i] * load.torsion - w * (dx[i] * dx[i] + dy[i] * dy[i]));
             let twist = load.torsion * w;
             by_lean[0][i] = a * (along * x[i] - twist * dy[i] - stress * slope[0]);
@@ -126,7 +126,7 @@ impl<const Q: usize> Sections<Q> {
         [by_lean, by_rate]
     }
 
-    /// Second derivative of `n.d` by `p`.
+    /// Returns the second derivative of `n.d` by `p`.
     #[inline]
     pub(crate) fn level_curvature(
         &self,
@@ -144,7 +144,7 @@ impl<const Q: usize> Sections<Q> {
         -w2 * (force[c] * p[e] + p[c] * force[e]) + potential.level * scale_curvature
     }
 
-    /// Derivative of component `axis` of `d` by `p_c`.
+    /// Returns the derivative of component `axis` of `d` by `p_c`.
     #[inline]
     pub(crate) fn normal_slope(&self, axis: usize, c: usize, i: usize) -> f64 {
         let (w, p) = (self.scale[i], [self.lean[0][i], self.lean[1][i]]);
@@ -155,7 +155,7 @@ impl<const Q: usize> Sections<Q> {
         }
     }
 
-    /// `n.d`, its slope by `p`, and `1 + delta n.d`.
+    /// Returns `n.d`, its slope by `p`, and `1 + delta n.d`.
     #[inline(always)]
     pub(crate) fn potential(&self, load: &Load, i: usize) -> Potential {
         let (x, y, w, n) = (self.lean[0][i], self.lean[1][i], self.scale[i], load.force);
@@ -168,7 +168,7 @@ impl<const Q: usize> Sections<Q> {
         }
     }
 
-    /// Second derivatives of `l` and of the integrals that determine the load, each times the weight.
+    /// Returns the second derivatives of `l` and of the integrals that determine the load, each times the weight.
     #[inline]
     pub(crate) fn curvatures(&self, load: &Load, weight: &Along<Q>) -> Curvatures<Q> {
         let mut all = Curvatures {
@@ -240,7 +240,7 @@ pub(crate) struct Curvatures<const Q: usize> {
     pub(crate) by_lean_twice: [[Along<Q>; 2]; 2],
     pub(crate) by_lean_and_rate: [[Along<Q>; 2]; 2],
     pub(crate) by_rate_twice: [[Along<Q>; 2]; 2],
-    /// Of `d + delta (n.d) d`, the change of the centreline's direction at held force.
+    /// Derivatives of `d + delta (n.d) d`, the centreline's direction, at fixed force.
     pub(crate) strain_by_lean: [[Along<Q>; 2]; 3],
     pub(crate) strain_by_rate: [[Along<Q>; 2]; 3],
     pub(crate) winding_by_lean: [Along<Q>; 2],

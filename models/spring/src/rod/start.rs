@@ -1,7 +1,7 @@
-//! A shape to start from where there is no last tick: that of the linear beam-column between the same plates.
+//! Initial shape without a last tick: that of the linear beam-column between the same plates.
 //!
-//! Short of buckling it is the equilibrium to first order in the angles of the ends from the chord, so Newton's method
-//! is where it converges. It depends on the pose alone: what is found from it is a function of the pose.
+//! Short of buckling this shape is the equilibrium to first order in the angles of the ends from the chord, so Newton's
+//! method converges from it. The shape depends on the pose alone, so the equilibrium found is a function of the pose.
 
 use flotor_hal::glam::{DVec2, DVec3};
 
@@ -11,13 +11,14 @@ use crate::rigidity::Spring;
 use crate::shape::Shape;
 use flotor_lanes::basis::Basis;
 
-/// Largest lean from the chord that a start may have (rad). Close to buckling the linear shape has no bound, the rod's
-/// amplitude does.
+/// Largest lean of an initial shape from the chord (rad). Close to buckling the linear shape has no bound, but the
+/// rod's amplitude does.
 const LARGEST_LEAN_RAD: f64 = 0.8;
 
-/// Coefficients of the bubbles in both components, `[c][k]`; `None` where the linear column has no shape.
+/// Returns the coefficients of the bubbles in both components, `[c][k]`, without and with the bow; `None` if the linear column has no
+/// shape.
 ///
-/// Seen from the chord the ends lean by `theta_L` and `theta_U`, and the column by `theta(u)` between
+/// Relative to the chord the ends lean by `theta_L` and `theta_U`, and the column by `theta(u)` between
 /// ([`crate::shape`]). The slopes of the bubbles are orthonormal and of mean zero, so a coefficient is the integral of
 /// a slope and that of `p`. Real-time: bounded, no allocation.
 pub(crate) fn linear<const K: usize, const Q: usize>(
@@ -57,7 +58,7 @@ pub(crate) fn linear<const K: usize, const Q: usize>(
     shapes.as_flattened().as_flattened().iter().all(|coefficient| coefficient.is_finite()).then_some(shapes)
 }
 
-/// Derivative of `p = d_xy / (1 + d_z)` for a direction `d` along `along`, which changes by `by_s`.
+/// Returns the derivative of `p = d_xy / (1 + d_z)` for a direction `d` along `along`, with derivative `by_s`.
 fn rate(along: DVec3, by_s: DVec3) -> DVec2 {
     let inverse = 1.0 / along.length();
     let direction = along * inverse;

@@ -1,4 +1,4 @@
-//! The base of a spring that stands on the ground: where it stands, and the spring as it sees it.
+//! Base of a spring on the ground: its place, and the spring relative to the base.
 
 use flotor_hal::glam::{DQuat, DVec2, DVec3};
 use flotor_hal::math;
@@ -21,14 +21,13 @@ impl Lengths {
         Self { rim_radius_m: 0.5 * geometry.coil_diameter_m, free_length_m: geometry.free_length_m }
     }
 
-    /// From the centre of the base to that of the upper plate, without load.
+    /// Returns the vector from the centre of the base to that of the upper plate, without load.
     pub(super) fn rise_m(&self) -> DVec3 {
         DVec3::Z * self.free_length_m
     }
 }
 
-/// Where a base stands: its tilt (rad) towards the rim point that it stands on, where it has slid to (m), and how far it
-/// has turned about its normal (rad).
+/// Place of a base: tilt (rad) towards the rim point of contact, slide (m), and turn about its normal (rad).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Standing {
     pub(super) tilt_rad: DVec2,
@@ -37,10 +36,10 @@ pub(super) struct Standing {
 }
 
 impl Standing {
-    /// Flat, where it was put first.
+    /// Flat, at the initial place.
     pub(super) const SEATED: Self = Self { tilt_rad: DVec2::ZERO, slide_m: DVec2::ZERO, turn_rad: 0.0 };
 
-    /// The base of a spring that hangs from the upper plate, and how high its rim is above the ground (m).
+    /// Returns the base of a spring that hangs from the upper plate, and the height of its rim above the ground (m).
     pub(super) fn hanging(pose: &Pose, lengths: &Lengths, largest_tilt_rad: f64) -> (Self, f64) {
         let normal = pose.orientation * DVec3::Z;
         let center_m = pose.position_m + lengths.rise_m() - normal * lengths.free_length_m;
@@ -48,14 +47,14 @@ impl Standing {
         let lean = if sine > 0.0 { normal.truncate() / sine } else { DVec2::ZERO };
         let standing = Self {
             tilt_rad: lean * math::atan2(sine, normal.z).min(largest_tilt_rad),
-            // The rim point it would stand on is where a base that had rolled there would have it.
+            // The rim point of contact is the same as for a base that had rolled there.
             slide_m: center_m.truncate() - lean * (lengths.rim_radius_m * (1.0 - normal.z)),
             turn_rad: 2.0 * math::atan2(pose.orientation.z, pose.orientation.w),
         };
         (standing, center_m.z - lengths.rim_radius_m * sine)
     }
 
-    /// From here a part of the way to there.
+    /// Interpolates linearly towards another place.
     pub(super) fn toward(&self, there: &Self, part: f64) -> Self {
         Self {
             tilt_rad: self.tilt_rad.lerp(there.tilt_rad, part),
@@ -65,13 +64,13 @@ impl Standing {
     }
 }
 
-/// The base as it stands.
+/// Pose of a base.
 pub(super) struct Base {
-    /// Of its tilt: towards the rim point it stands on.
+    /// Direction of the tilt, towards the rim point of contact.
     pub(super) direction: DVec2,
     pub(super) angle_rad: f64,
     pub(super) rotation: DQuat,
-    /// Relative to where it was seated first.
+    /// Centre relative to the initial place.
     pub(super) center_m: DVec3,
     lengths: Lengths,
     is_seated: bool,
@@ -93,7 +92,7 @@ impl Base {
         }
     }
 
-    /// A pose as the base sees it.
+    /// Returns a pose relative to the base.
     pub(super) fn relative(&self, pose: &Pose) -> Pose {
         let (rise_m, back) = (self.lengths.rise_m(), self.rotation.conjugate());
         Pose {
@@ -102,12 +101,12 @@ impl Base {
         }
     }
 
-    /// The law's answer with the base here, in the model frame. Real-time: bounded, no allocation.
+    /// Returns the law's response on this base, in the model frame. Real-time: bounded, no allocation.
     pub(super) fn respond<S: HeldSpring>(&self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
         self.answer(pose, |relative| spring.respond(relative, demand))
     }
 
-    /// An answer at the pose relative to the base, in the model frame. Real-time: bounded, no allocation.
+    /// Evaluates a response at the pose relative to the base, and converts it to the model frame. Real-time: bounded, no allocation.
     pub(super) fn answer(&self, pose: &Pose, at: impl FnOnce(&Pose) -> Response) -> Response {
         if self.is_seated {
             return at(pose);
@@ -120,19 +119,19 @@ impl Base {
         }
     }
 
-    /// Moment of the spring on its base, about the base's centre.
+    /// Returns the moment of the spring on its base, about the base's centre.
     fn moment_nm(&self, pose: &Pose, response: &Response) -> DVec3 {
         let arm_m = pose.position_m + self.lengths.rise_m() - self.center_m;
         -(response.torque_nm + arm_m.cross(response.force_n))
     }
 
-    /// What the spring pulls its base with along the ground, and turns it with about its normal, over the radius (N).
+    /// Returns the pull of the spring on its base: the force along the ground, and the torque about the base's normal over the radius (N).
     pub(super) fn pull_n(&self, pose: &Pose, response: &Response) -> DVec3 {
         let turning_nm = self.moment_nm(pose, response).dot(self.rotation * DVec3::Z);
         (-response.force_n.truncate()).extend(turning_nm / self.lengths.rim_radius_m)
     }
 
-    /// Derivative of the stored energy by the tilt: minus the work of the spring on the moving base.
+    /// Returns the derivative of the stored energy by the tilt: minus the work of the spring on the moving base.
     pub(super) fn slope(&self, pose: &Pose, response: &Response) -> DVec2 {
         let force_n = response.force_n;
         let moment_nm = self.moment_nm(pose, response);

@@ -1,4 +1,4 @@
-//! The tilt of least energy: a step of Newton's method on an energy with a kink at zero tilt, the tip.
+//! Tilt of least energy: a Newton step on an energy with a kink at zero tilt, the tip.
 
 use flotor_hal::glam::{DMat2, DVec2};
 
@@ -7,30 +7,30 @@ const SECULAR_STEPS: u32 = 8;
 /// Smallest deviation of the slope from its prediction that corrects the curvature, in units of the error that the law's
 /// solver tolerates. A smaller deviation is noise, and its quotient by a short step may be any number.
 const LEAST_DEVIATION: f64 = 3.0;
-/// Smallest curvature assumed, as a share of that of the spring at rest: with a smaller one the steps would be too large.
+/// Smallest curvature assumed (N·m/rad): a smaller one would make the steps too large.
 const LEAST_CURVATURE: f64 = 1e-3;
 
-/// The energy by the tilt, without its tip, as a quadratic.
+/// Quadratic model of the energy by the tilt, without its tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Quadratic {
-    /// As observed (N·m/rad).
+    /// Observed curvature (N·m/rad).
     curvature: DMat2,
-    /// At rest (N·m/rad).
+    /// Stiffness at rest (N·m/rad).
     pub(super) stiffness_nm_per_rad: f64,
 }
 
 impl Quadratic {
-    /// That of a spring at rest.
+    /// Returns the model of a spring at rest.
     pub(super) fn at_rest(stiffness_nm_per_rad: f64) -> Self {
         Self { curvature: DMat2::from_diagonal(DVec2::splat(stiffness_nm_per_rad)), stiffness_nm_per_rad }
     }
 
-    /// The tilt of least energy, from the slope at a tilt and the cost of lifting.
+    /// Returns the tilt of least energy, from the slope at a tilt and the cost of lifting.
     pub(super) fn least(&self, tilt_rad: DVec2, slope: DVec2, tip_nm: f64, largest_rad: f64) -> DVec2 {
         tipped_minimum(self.curvature, self.curvature * tilt_rad - slope, tip_nm, largest_rad)
     }
 
-    /// Symmetric rank-one correction of the curvature (Nocedal and Wright, *Numerical Optimization*, 6.2).
+    /// Applies a symmetric rank-one correction to the curvature (Nocedal and Wright, *Numerical Optimization*, 6.2).
     pub(super) fn observe(&mut self, step: DVec2, change: DVec2, noise_rad: f64) {
         let deviation = change - self.curvature * step;
         if deviation.length() < LEAST_DEVIATION * noise_rad * self.stiffness_nm_per_rad {
@@ -44,8 +44,8 @@ impl Quadratic {
     }
 }
 
-/// Minimum of `s.H s/2 - b.s + c |s|`: zero while `|b| <= c`, else `s = t (t H + c)⁻¹ b` with its own length
-/// `t`.
+/// Returns the minimum of `s.H s/2 - b.s + c |s|`: zero while `|b| <= c`, else `s = t (t H + c)⁻¹ b` with its own
+/// length `t`.
 fn tipped_minimum(curvature: DMat2, pull: DVec2, tip: f64, largest: f64) -> DVec2 {
     if pull.length() <= tip {
         return DVec2::ZERO;
