@@ -1,8 +1,8 @@
-//! The `flotor` command: its arguments, what it prints, the pictures it draws, and the start of somebody's own plugin.
+//! The `flotor` command: its arguments, its output, pictures of runs, and templates of plugins.
 //!
 //! - [`cli`]: the commands.
 //! - [`scaffold`]: `flotor new`.
-//! - [`run_picture`], [`timing_picture`]: charts of a run and of how time was kept.
+//! - [`run_picture`], [`timing_picture`]: charts of a run and of its timing.
 //!
 //! To embed Flotor in a program, use `flotor-session`; this crate is for the command alone.
 

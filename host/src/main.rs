@@ -1,4 +1,4 @@
-//! The `flotor` command; everything is in the library.
+//! The `flotor` command; its code is in the library.
 
 fn main() -> std::process::ExitCode {
     flotor::cli::main()

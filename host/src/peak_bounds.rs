@@ -1,18 +1,18 @@
 //! Bounds of the largest force and torque of a run, as a test expects them: a panel of the magnitude, with a line at each bound
-//! and the instant of the largest value.
+//! and a mark at the time of the largest value.
 
 use flotor_core::trace::TickRecord;
 use flotor_plot::{Axis, Mark, Panel, Quantity, Series, Trace};
 use std::str::FromStr;
 
-/// A number of the summary that is largest at one instant.
+/// Number of the summary that is reached at one instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Peak {
     Force,
     Torque,
 }
 
-/// A bound of a peak, written as `peak_force_n=3.2`.
+/// Bound of a peak, written as `peak_force_n=3.2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeakBound {
     peak: Peak,
@@ -33,22 +33,22 @@ impl FromStr for PeakBound {
     }
 }
 
-/// The magnitude of a force or torque over time, the largest of all devices.
+/// Magnitude of a force or torque over time, the largest of all devices.
 struct Magnitude {
     peak: Peak,
     bounds_si: Vec<f64>,
     trace: Trace,
-    /// Time and magnitude of the tick whose devices have not all reported, SI.
+    /// Time and magnitude of the current tick, whose devices have not all reported, SI.
     tick: Option<(f64, f64)>,
-    /// Time and magnitude of the largest value, SI.
+    /// Time and value of the largest magnitude, SI.
     largest: (f64, f64),
 }
 
-/// The magnitudes that have bounds.
+/// Magnitudes with bounds.
 pub(crate) struct BoundedPeaks(Vec<Magnitude>);
 
 impl BoundedPeaks {
-    /// Nothing seen yet, with these bounds.
+    /// Creates the magnitudes with these bounds.
     pub(crate) fn new(bounds: &[PeakBound]) -> Self {
         let magnitude = |peak: Peak| {
             let bounds_si: Vec<f64> =
@@ -71,7 +71,7 @@ impl BoundedPeaks {
         self.0.iter_mut().for_each(|magnitude| magnitude.add(time_s, record));
     }
 
-    /// A panel for each magnitude.
+    /// Returns a panel for each magnitude.
     pub(crate) fn into_panels(self) -> impl Iterator<Item = Panel> {
         self.0.into_iter().map(Magnitude::into_panel)
     }

@@ -1,4 +1,4 @@
-//! A run as a picture: pose, force and torque, stored energy and, in real time, the timing.
+//! Picture of a run: pose, force and torque, stored energy and, in real time, the timing.
 
 use crate::peak_bounds::{BoundedPeaks, PeakBound};
 use crate::timing_picture::panels;
@@ -10,7 +10,7 @@ use flotor_plot::{Axis, Figure, Mark, Panel, Quantity, Series, Spans, Trace, Vec
 use flotor_servo::Timing;
 use flotor_session::Observer;
 
-/// The traces of a run, reduced while the run lasts; drawn at its end.
+/// Traces of a run, reduced while the run lasts, and drawn at its end.
 pub struct RunPicture {
     title: String,
     devices: Vec<DeviceTraces>,
@@ -20,7 +20,7 @@ pub struct RunPicture {
     is_real_time: bool,
 }
 
-/// The traces and events of one device.
+/// Traces and events of one device.
 struct DeviceTraces {
     name: String,
     position: VectorTrace,
@@ -31,31 +31,31 @@ struct DeviceTraces {
     events: EventTimes,
 }
 
-/// When events happened.
+/// Times of events.
 #[derive(Default)]
 struct EventTimes {
-    /// The time of the first tick with each fault and each limit, s.
+    /// Time of the first tick with each fault and each limit, s.
     first: Vec<(Events, f64)>,
-    /// The events of `first`.
+    /// Events in `first`.
     seen: Events,
-    /// Where any limit acted, s.
+    /// Intervals in which any limit acted, s.
     limited: Spans,
 }
 
-/// Changes of parameters while the run lasted.
+/// Changes of parameters during the run.
 #[derive(Default)]
 struct Changes {
-    /// The first ones: time, s, and text.
+    /// First changes: time, s, and text.
     marked: Vec<(f64, String)>,
     /// Number of changes without a mark.
     further: usize,
 }
 
-/// Most changes that are marked: more would cover the traces.
+/// Largest number of marked changes: more would cover the traces.
 const MOST_CHANGES: usize = 12;
 
 impl RunPicture {
-    /// An empty picture of a run with these devices, and the bounds that are drawn.
+    /// Creates an empty picture of a run with these devices, and the bounds to draw.
     #[must_use]
     pub fn new(title: &str, devices: Vec<String>, bounds: &[PeakBound]) -> Self {
         Self {
@@ -99,7 +99,7 @@ impl Observer for RunPicture {
         }
     }
 
-    /// The energy that is drawn.
+    /// Returns the drawn outputs: the energy, beside the force.
     fn demand(&self) -> Demand {
         Demand::ENERGY.with(Demand::FORCE)
     }
@@ -142,7 +142,7 @@ impl EventTimes {
         }
     }
 
-    /// Adds the events to a panel: the first tick of each fault and limit, and the stretches of limits.
+    /// Adds the events to a panel: the first tick of each fault and limit, and the intervals of limits.
     fn mark(&self, panel: Panel, names: Names) -> Panel {
         let marked = self.first.iter().fold(panel, |panel, (event, time_s)| {
             let name = match names {
@@ -158,7 +158,7 @@ impl EventTimes {
     }
 }
 
-/// Whether the marks of a panel have their names: those below the first of a device stand under it.
+/// Visibility of the names of marks: only the first panel of a device has them, above the others.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Names {
     Written,
@@ -189,7 +189,7 @@ impl DeviceTraces {
         self.events.add(time_s, record.events);
     }
 
-    /// The panels of the only device of a run.
+    /// Returns the panels of the only device of a run.
     fn all_panels(self, changes: &Changes) -> Vec<Result<Panel, String>> {
         let panels = vec![
             self.position.panel("position"),
@@ -201,7 +201,7 @@ impl DeviceTraces {
         with_events(panels, &self.events, changes)
     }
 
-    /// The panels of one device of several: motion, force and energy. The recording has the rest.
+    /// Returns the panels of one device of several: motion, force and energy. Rotation and torque are in the recording.
     fn main_panels(self, changes: &Changes) -> Vec<Result<Panel, String>> {
         let name = |quantity: &str| format!("{quantity}, {}", self.name);
         let panels = vec![
@@ -228,7 +228,7 @@ fn with_events(
     panels.into_iter().map(marked).collect()
 }
 
-/// The stored energy over time.
+/// Returns the panel of the stored energy over time.
 fn energy_panel(name: &str, trace: Trace) -> Result<Panel, String> {
     if !trace.has_data() {
         return Err(format!("{name} (not given by the models)"));
@@ -238,7 +238,7 @@ fn energy_panel(name: &str, trace: Trace) -> Result<Panel, String> {
 }
 
 impl Changes {
-    /// Adds a line for each change to a panel.
+    /// Adds a mark for each change to a panel.
     fn mark(&self, panel: Panel, names: Names) -> Panel {
         self.marked.iter().fold(panel, |panel, (time_s, text)| {
             panel.mark(Mark::at_x(*time_s, if names == Names::Written { text.as_str() } else { "" }))

@@ -1,10 +1,10 @@
-//! Timing as histograms: lateness and the stages of a tick.
+//! Histograms of timing: lateness and the stages of a tick.
 
 use flotor_plot::{Axis, Bin, Panel, Series};
 use flotor_servo::{Durations, Timing};
 
-/// Ticks by lateness and by compute time, and every sixteenth tick by the time of its stages; each panel has its own,
-/// logarithmic axis of time. Not real-time.
+/// Returns the panels of a run's timing: ticks by lateness and by compute time, and every sixteenth tick by the time of its stages; each
+/// has its own, logarithmic axis of time. Not real-time.
 #[must_use]
 pub fn panels(timing: &Timing) -> [Panel; 2] {
     let [read, models, envelope, write] = &timing.stages;
@@ -22,7 +22,7 @@ fn histogram() -> Panel {
     Panel::with_x(Axis::log("Time", "µs"), Axis::log("Ticks", ""))
 }
 
-/// Ticks by their time, µs; what is shorter than 10 ns takes no time.
+/// Counts ticks by their time, µs; times below 10 ns are in the first bar.
 fn times(durations: &Durations) -> Vec<Bin> {
     Bin::quarter_octaves(0.01, durations.bins().into_iter().map(|(ns, count)| (ns as f64 * 1.0e-3, count)))
 }

@@ -1,7 +1,7 @@
-//! Why a command failed, and its exit code.
+//! Errors of commands, and their exit codes.
 //!
 //! Exit codes are a contract: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 else;
-//! 130 after the third signal that asks for an end, or the first one before anything is energised.
+//! 130 after the third signal that requests an end, or the first one before anything is energised.
 
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
@@ -11,7 +11,7 @@ use flotor_session::registry::LookupError;
 use flotor_session::{Call, CallError, RunError};
 use std::path::{Path, PathBuf};
 
-/// Why a command failed, with its exit code.
+/// Error of a command, with its exit code.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CommandError {
@@ -29,7 +29,7 @@ pub enum CommandError {
     RunFault {
         /// The plugin's file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// Kind of fault, with its advice.
         fault: Fault,
         /// Message of the device; may be empty.
         words: String,
@@ -49,23 +49,23 @@ pub enum CommandError {
          gain of the scene (`flotor stability` says what the device can render)"
     )]
     Oscillation,
-    /// The watchdog process was gone, without which the scene does not run.
+    /// The required watchdog process exited, and the run was ended.
     #[error(
         "the watchdog process is gone; nothing stops the devices if this program is killed, so the run was ended, as `[limits] require_independent_stop` asks"
     )]
     Unguarded,
-    /// The device sets the pace, and its rate is above the scene's.
+    /// The device sets the pace, at a rate above the scene's.
     #[error(
         "the device paces the loop with {samples_per_s} samples a second, above the scene's `rate_hz = {rate_hz}`: ramps would be \
          too short and slew limits too high; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
     )]
     TooFast {
-        /// Sample rate of the device.
+        /// Sample rate of the device, Hz.
         samples_per_s: u32,
-        /// Loop rate of the scene.
+        /// Loop rate of the scene, Hz.
         rate_hz: f64,
     },
-    /// The scene lets the device set the pace, and the device does not.
+    /// The scene requires that the device sets the pace, which it does not.
     #[error(
         "the device does not set the pace of the loop with its present settings; remove `pacing = \"device\"` from the scene"
     )]
@@ -76,9 +76,9 @@ pub enum CommandError {
     /// A file could not be written or read.
     #[error("{}: {action}: {cause}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What was attempted.
+        /// Failed action.
         action: &'static str,
         /// Error of the system.
         cause: std::io::Error,
@@ -107,20 +107,20 @@ impl From<LoadError> for CommandError {
 }
 
 impl CommandError {
-    /// A file could not be written or read.
+    /// Creates the error of a file that could not be written or read.
     #[must_use]
     pub fn file(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
         Self::File { path: path.into(), action, cause }
     }
 
-    /// The exit code of the program.
+    /// Returns the exit code of the program.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::Read(_) | Self::Record(RecordError::Exists { .. }) | Self::NotPaced => 2,
             Self::Run(error) => match error {
                 wrong if wrong.is_configuration() => 2,
-                // Nobody knows whether it exerts a force.
+                // The device may still exert a force.
                 RunError::Calls(CallError::Unresponsive(hung)) if hung.call == Call::SafeStop => 4,
                 RunError::Calls(CallError::Stopped | CallError::NoThread)
                 | RunError::Lookup(LookupError::Calls(CallError::Stopped | CallError::NoThread)) => 1,
@@ -145,7 +145,7 @@ impl CommandError {
     }
 }
 
-/// Message of a device, before the advice for its fault.
+/// Returns the message of a device, to precede the advice for its fault; empty without a message.
 #[must_use]
 pub fn before_advice(words: &str) -> String {
     if words.is_empty() { String::new() } else { format!("{words}; ") }

@@ -1,14 +1,14 @@
-//! What Flotor's programs share on the command line.
+//! Command line library shared by Flotor's programs.
 //!
-//! - [`CommandError`]: why a command failed, with the exit code that is a contract.
-//! - [`options`]: options several commands have, and how they are read.
+//! - [`CommandError`]: errors of commands, with the exit code that is a contract.
+//! - [`options`]: options of several commands, and their parsers.
 //! - [`say!`], [`print_result`], [`write_json`], [`write_text`]: results for people and for machines.
 //! - [`tables`]: results as tables.
-//! - [`supervised`]: a command in a process of its own, whose end never passes for success.
+//! - [`supervised`]: a command in its own process, of which no unreported end counts as success.
 //! - [`PluginProcess`]: a process for the code of plugins, which ends with the command.
 //! - [`stopping`]: signals and keys that end a run.
 //! - [`separate`]: programs beside this one that carry out a command.
-//! - [`reference()`]: every command with its arguments, for the book; [`whole_program`]: the same for man pages.
+//! - [`reference()`]: every command with its arguments, for the book; [`whole_program`]: the parser with all of them, for man pages.
 //!
 //! Not real-time throughout.
 

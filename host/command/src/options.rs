@@ -1,4 +1,4 @@
-//! Options that several commands share, and their parsers.
+//! Options of several commands, and their parsers.
 
 use crate::CommandError;
 use clap::{Args, Command, Parser, ValueEnum};
@@ -17,11 +17,11 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Size of the smallest stack that the description of all options fits on in every build, bytes.
+/// Size of the smallest stack on which the description of all options fits in every build, bytes.
 const LEAST_STACK_BYTES: u64 = 1 << 20;
 
-/// The arguments of this process. A negative number is the value of its option, whose parser says what is legal: without
-/// this, clap takes it for another option. Ends the process where its stack is too small for them. Restores the default
+/// Parses the arguments of this process. A negative number is the value of its option, whose parser checks it: without
+/// this, clap takes it for another option. Ends the process if its stack is too small for the parser. Restores the default
 /// action of interrupts first: a shell ignores them for its commands in the background. Not real-time.
 pub fn arguments<T: Parser>() -> T {
     crate::platform::accept_interrupts();
@@ -49,7 +49,7 @@ fn with_negative_numbers(command: Command) -> Command {
     command.mut_subcommands(with_negative_numbers)
 }
 
-/// `--clock`
+/// Clock of a run for `--clock`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum ClockOption {
     /// The machine's clock
@@ -68,7 +68,7 @@ pub struct StrengthOption {
 }
 
 impl StrengthOption {
-    /// What was said.
+    /// Returns the strength that the option selects.
     #[must_use]
     pub fn strength(self) -> Strength {
         if self.allow_strong { Strength::Strong } else { Strength::UnderCeiling }
@@ -89,13 +89,13 @@ impl ControlGroupOption {
         limits.accept_shared_control_group |= self.accept_shared_control_group;
     }
 
-    /// Whether the consent was given.
+    /// Returns true if the consent was given.
     #[must_use]
     pub fn is_accepted(self) -> bool {
         self.accept_shared_control_group
     }
 
-    /// The option, if it was given, for another process of Flotor.
+    /// Returns the option, if it was given, for another process of Flotor.
     pub fn arguments(self) -> impl Iterator<Item = &'static str> {
         self.accept_shared_control_group.then_some("--accept-shared-control-group").into_iter()
     }
@@ -110,24 +110,24 @@ pub struct PluginPathOption {
 }
 
 impl PluginPathOption {
-    /// The folders that were given, in their order.
+    /// Returns the given folders, in their order.
     #[must_use]
     pub fn folders(&self) -> &[PathBuf] {
         &self.folders
     }
 
-    /// The plugins of these folders, and of those that are always searched. Not real-time.
+    /// Returns a registry of the plugins in the given folders and in the default ones. Not real-time.
     #[must_use]
     pub fn registry(&self) -> Registry {
         Registry::search(&self.folders)
     }
 
-    /// Puts the folders before those that the scene names.
+    /// Inserts the folders before those that the scene names.
     pub fn put_before_those_of(&self, scene: &mut Scene) {
         scene.plugin_folders.splice(0..0, self.folders.iter().cloned());
     }
 
-    /// The option with its values, for another process of Flotor.
+    /// Returns the option with its values, for another process of Flotor.
     pub fn arguments(&self) -> impl Iterator<Item = &OsStr> {
         self.folders.iter().flat_map(|folder| [OsStr::new("--plugin-path"), folder.as_os_str()])
     }
@@ -143,23 +143,23 @@ pub struct JsonOption {
 }
 
 impl JsonOption {
-    /// Where the JSON goes, `-` being standard output; `None` if none is asked for.
+    /// Returns the file for the JSON, `-` for standard output; `None` without the option.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         self.json.as_deref()
     }
 
-    /// True if the JSON is all that appears on standard output.
+    /// Returns true if the JSON is all that appears on standard output.
     #[must_use]
     pub fn is_on_standard_output(&self) -> bool {
         self.file().is_some_and(|file| file.as_os_str() == "-")
     }
 }
 
-/// Seconds from `10`, `10s`, `500ms`, `2min` or `1h`.
+/// Parses a duration in seconds from `10`, `10s`, `500ms`, `2min` or `1h`.
 ///
 /// # Errors
-/// If the text is no duration, or none a run may have.
+/// If the text is no duration, or not from 0 to 1 year.
 pub fn duration_s(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
@@ -181,7 +181,7 @@ pub fn duration_s(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A loop rate in Hz.
+/// Parses a loop rate in Hz.
 ///
 /// # Errors
 /// If the text is no rate, or not from 100 to 10000 Hz.
@@ -189,7 +189,7 @@ pub fn rate_hz(text: &str) -> Result<f64, String> {
     number("Hz", "rate", 100.0..=10_000.0)(text)
 }
 
-/// The parser of a number in a unit, which may be left out; its errors call the number `what`.
+/// Returns the parser of a number in a unit, which may be left out; its errors call the number `what`.
 pub fn number(
     unit: &'static str,
     what: &'static str,
@@ -204,7 +204,7 @@ pub fn number(
     }
 }
 
-/// The parser of a whole number in a range.
+/// Returns the parser of a whole number in a range.
 pub fn count<T: FromStr + PartialOrd + Display + Clone>(
     legal: RangeInclusive<T>,
 ) -> impl Fn(&str) -> Result<T, String> + Clone {
@@ -214,10 +214,10 @@ pub fn count<T: FromStr + PartialOrd + Display + Clone>(
     }
 }
 
-/// A file to write.
+/// Parses the path of a file to write.
 ///
 /// # Errors
-/// If it has no name, or its folder does not exist.
+/// If the path has no file name, or its folder does not exist.
 pub fn new_file(text: &str) -> Result<PathBuf, String> {
     let file = PathBuf::from(text);
     match file.parent() {
@@ -227,26 +227,26 @@ pub fn new_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// The file of a picture.
+/// Parses the path of a picture.
 ///
 /// # Errors
-/// If it cannot be written, or its name ends like that of another kind of picture.
+/// If the file cannot be written, or its name has the extension of another kind of file.
 pub fn svg_file(text: &str) -> Result<PathBuf, String> {
     file_of(text, "svg")?.ok_or_else(|| "the picture is an SVG; name it FILE.svg".to_owned())
 }
 
-/// The file of a recording.
+/// Parses the path of a recording.
 ///
 /// # Errors
-/// If it cannot be written, or its name ends like that of another kind of file.
+/// If the file cannot be written, or its name has the extension of another kind of file.
 pub fn mcap_file(text: &str) -> Result<PathBuf, String> {
     file_of(text, "mcap")?.ok_or_else(|| "the recording is an MCAP file; name it FILE.mcap".to_owned())
 }
 
-/// A file for JSON. Its name ends in `.json`: an option whose file may be left out would else overwrite the argument after it.
+/// Parses the path of a JSON file. Its name ends in `.json`: an option with an optional file would otherwise overwrite the next argument.
 ///
 /// # Errors
-/// If it cannot be written, or is named like another kind of file.
+/// If the file cannot be written, or its name has the extension of another kind of file.
 pub fn json_file(text: &str) -> Result<PathBuf, String> {
     let file = new_file(text)?;
     let is_json = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
@@ -255,7 +255,7 @@ pub fn json_file(text: &str) -> Result<PathBuf, String> {
     if is_json || is_special() { Ok(file) } else { Err("the result is JSON; name it FILE.json".to_owned()) }
 }
 
-/// The value of `--json`.
+/// Parses the value of `--json`.
 fn json_output(text: &str) -> Result<PathBuf, String> {
     if text == "-" {
         return Ok(text.into());
@@ -263,22 +263,22 @@ fn json_output(text: &str) -> Result<PathBuf, String> {
     json_file(text).map_err(|problem| format!("{problem}, or write - for standard output"))
 }
 
-/// A folder that exists.
+/// Parses the path of a folder.
 ///
 /// # Errors
-/// If it does not.
+/// If the folder does not exist.
 pub fn folder(text: &str) -> Result<PathBuf, String> {
     let folder = PathBuf::from(text);
     if folder.is_dir() { Ok(folder) } else { Err("no such folder".to_owned()) }
 }
 
-/// A new file, if it has this extension or none.
+/// Returns the path of a new file if it has this extension or none.
 fn file_of(text: &str, kind: &str) -> Result<Option<PathBuf>, String> {
     let file = new_file(text)?;
     Ok(file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case(kind)).then_some(file))
 }
 
-/// A number, such as a share.
+/// Parses a number, such as a share.
 ///
 /// # Errors
 /// If the text is no number.
@@ -286,10 +286,10 @@ pub fn real(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "write a number such as 0.75".to_owned())
 }
 
-/// Reads a seed, at most [`LARGEST_SEED`].
+/// Parses a seed, at most [`LARGEST_SEED`].
 ///
 /// # Errors
-/// If the text is no such number.
+/// If the text is no whole number in this range.
 pub fn seed(text: &str) -> Result<u64, String> {
     let number = text.trim().parse().ok().filter(|seed| *seed <= LARGEST_SEED);
     number.ok_or_else(|| {
@@ -297,10 +297,10 @@ pub fn seed(text: &str) -> Result<u64, String> {
     })
 }
 
-/// A core of the machine.
+/// Parses the number of a processor core.
 ///
 /// # Errors
-/// If the text is no number, or the system has no such core.
+/// If the text is no number, or the system has no core with this number.
 pub fn core(text: &str) -> Result<Core, String> {
     let number = text.trim().parse().map_err(|_| format!("invalid core number `{text}`"))?;
     Core::new(number).ok_or_else(|| format!("no core {number} on this machine"))
@@ -309,7 +309,7 @@ pub fn core(text: &str) -> Result<Core, String> {
 /// Checks the values `KEY=VALUE` of an option, such as `--set`, against the schema of a plugin.
 ///
 /// # Errors
-/// If the schema knows no such parameter, or the value is not legal.
+/// If the schema has no such parameter, or the value is invalid.
 pub fn settings(plugin: &Plugin, option: &str, sets: &[KeyValue]) -> Result<Vec<Setting>, CommandError> {
     let check = |set: &KeyValue| {
         let parameter = set.parameter();

@@ -1,4 +1,4 @@
-//! What commands print, for people and for machines.
+//! Output of commands, for people and for machines.
 
 use crate::platform::results_apart;
 use crate::style::for_terminal;
@@ -16,8 +16,8 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::print_line(format_args!($($text)*)) };
 }
 
-/// The exit code of a command; its error is printed, and its end reported to the supervisor. Ends the process itself where code of a plugin has not returned: what a
-/// process does at its end might wait for it. Not real-time.
+/// Returns the exit code of a command, prints its error, and reports its end to the supervisor. Ends the process itself if a plugin's
+/// code has not returned, because the exit handlers of the process might wait for that code. Not real-time.
 pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     let code = match result {
         Ok(()) => 0,
@@ -34,14 +34,13 @@ pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     ExitCode::from(code)
 }
 
-/// Standard output, where it is for results alone.
+/// Standard output, if it is reserved for results.
 static RESULTS: OnceLock<File> = OnceLock::new();
 
-/// From now on standard output is for results of this program alone: what a plugin prints there goes to standard error. Not
-/// real-time.
+/// Reserves standard output for results of this program: what a plugin prints there goes to standard error. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the system.
 pub fn keep_results_apart() -> Result<(), CommandError> {
     let moved = || {
         let _ = RESULTS.set(results_apart()?);
@@ -60,7 +59,7 @@ fn write_line(line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
     }
 }
 
-/// What `say!` does.
+/// Prints the line of `say!`.
 pub fn print_line(line: std::fmt::Arguments<'_>) {
     if let Err(error) = write_line(format_args!("{}", for_terminal(line))) {
         let code = if error.kind() == std::io::ErrorKind::BrokenPipe { 0 } else { 1 };
@@ -69,8 +68,7 @@ pub fn print_line(line: std::fmt::Arguments<'_>) {
     }
 }
 
-/// Prints a line for people where the command has more to do, or an exit code of its own: a closed pipe ends
-/// nothing.
+/// Prints a line for people where the command has more to do, or an exit code of its own: a closed pipe does not end the program.
 ///
 /// # Errors
 /// If standard output cannot be written; a closed pipe is no error.
@@ -78,7 +76,7 @@ pub fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
     report_text(format_args!("{}", for_terminal(line)))
 }
 
-/// The same with a text for machines, which is printed as it is.
+/// Prints a text for machines, unchanged; a closed pipe is no error.
 fn report_text(text: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
     match write_line(text) {
         Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
@@ -88,7 +86,7 @@ fn report_text(text: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
     }
 }
 
-/// Prints a line for people on standard error. `eprintln!` panics where nobody reads it, and the exit code is lost then.
+/// Prints a line for people on standard error. Unlike `eprintln!` it does not panic on a closed pipe, which would lose the exit code.
 pub fn print_error_line(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stderr(), "{}", for_terminal(line));
 }
@@ -98,10 +96,10 @@ pub fn note(text: impl std::fmt::Display) {
     print_error_line(format_args!("{} {text}", style::warning("note:")));
 }
 
-/// The first error: it decides the exit code, and the caller prints it last. This function prints the others.
+/// Returns the first error, which determines the exit code and which the caller prints last; prints the others.
 ///
 /// # Errors
-/// The first of the results that is one.
+/// The first error of the results.
 pub fn first_error(results: impl IntoIterator<Item = Result<(), CommandError>>) -> Result<(), CommandError> {
     let mut errors = results.into_iter().filter_map(Result::err);
     let first = errors.next();
@@ -111,7 +109,7 @@ pub fn first_error(results: impl IntoIterator<Item = Result<(), CommandError>>) 
     first.map_or(Ok(()), Err)
 }
 
-/// Writes a result for machines, `-` being standard output.
+/// Writes a result for machines to a file, `-` for standard output.
 ///
 /// # Errors
 /// If the file or standard output cannot be written.
@@ -141,7 +139,7 @@ pub fn print_result<T: serde::Serialize>(
     first_error([printed, json.map_or(Ok(()), |path| write_json(path, value))])
 }
 
-/// Writes a picture or a table to the given file, `-` being standard output.
+/// Writes a picture or a table to the given file, `-` for standard output.
 ///
 /// # Errors
 /// If the file or standard output cannot be written.

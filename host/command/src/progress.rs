@@ -1,4 +1,4 @@
-//! How far a command has come, on a terminal.
+//! Progress of a command, on a terminal.
 
 use crate::style::for_terminal;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -7,7 +7,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// A progress line on a terminal, nothing in a pipe.
+/// Creates a progress line on a terminal, nothing in a pipe.
 #[must_use]
 pub fn progress_bar(length: u64, template: &str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
@@ -15,7 +15,7 @@ pub fn progress_bar(length: u64, template: &str) -> ProgressBar {
     bar
 }
 
-/// Runs what may take long before the first tick, with the time that it has taken on a terminal: `{what}: prepares`.
+/// Runs lengthy preparations, and shows their elapsed time on a terminal: `{what}: prepares`.
 pub fn while_preparing<T>(what: &str, work: impl FnOnce() -> T) -> T {
     let spinner = progress_bar(0, "{spinner} {msg} {elapsed}");
     spinner.set_message(format!("{}: prepares", for_terminal(what)));
@@ -26,14 +26,14 @@ pub fn while_preparing<T>(what: &str, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// A progress line that a thread redraws until this is dropped.
+/// Thread that redraws a progress line until this is dropped.
 pub struct Redrawn {
     until: Option<Sender<Infallible>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Redrawn {
-    /// Redraws a progress line in steps of this length; never in a pipe, nor where the system has no thread for that.
+    /// Redraws a progress line in steps of this length; never in a pipe, nor if the system refuses the thread.
     #[must_use]
     pub fn every(step: Duration, line: &ProgressBar) -> Self {
         if line.is_hidden() {
@@ -58,5 +58,5 @@ impl Drop for Redrawn {
     }
 }
 
-/// Between two pictures of the spinner; short preparations show none.
+/// Interval between two frames of the spinner; short preparations show none.
 const SPINNER_STEP: Duration = Duration::from_millis(300);

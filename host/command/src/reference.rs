@@ -1,10 +1,10 @@
-//! Every command with its arguments and options, as the parser knows them: for the book.
+//! Reference of all commands with their arguments and options, generated from the parser, for the book.
 
 use clap::{Arg, Command};
 use std::fmt::Write;
 
-/// Returns a program with the arguments of the commands that `separate` programs carry out; the first line of their help stays that
-/// of the program. Not real-time.
+/// Returns a program with the arguments of the commands that `separate` programs carry out; their help retains its first line
+/// from the program. Not real-time.
 #[must_use]
 pub fn whole_program(program: Command, separate: &[Command]) -> Command {
     let described = |command: Command| match separate
@@ -19,12 +19,12 @@ pub fn whole_program(program: Command, separate: &[Command]) -> Command {
     program
 }
 
-/// Removes the command `help` on all levels: it repeats every other command.
+/// Removes the command `help` on all levels, which would repeat every other command.
 fn without_help_command(command: Command) -> Command {
     command.disable_help_subcommand(true).mut_subcommands(without_help_command)
 }
 
-/// Returns a chapter in Markdown for each command that the help of a program lists. Not real-time.
+/// Returns one chapter in Markdown for each command that the help of a program lists. Not real-time.
 #[must_use]
 pub fn reference(program: &Command) -> String {
     let mut text = String::new();
@@ -36,7 +36,7 @@ fn offered(command: &Command) -> impl Iterator<Item = &Command> {
     command.get_subcommands().filter(|command| !command.is_hide_set())
 }
 
-/// One command and, below it, its own.
+/// Appends the chapter of a command, and below it those of its subcommands.
 fn chapter(command: &Command, above: &str, depth: usize, text: &mut String) {
     let name = format!("{above} {}", command.get_name());
     let about = command.get_long_about().or(command.get_about()).map(ToString::to_string).unwrap_or_default();
@@ -59,7 +59,7 @@ fn chapter(command: &Command, above: &str, depth: usize, text: &mut String) {
     offered(command).for_each(|command| chapter(command, &name, depth + 1, text));
 }
 
-/// What every command has.
+/// Returns true for an argument of every command.
 fn is_everywhere(argument: &Arg) -> bool {
     ["help", "version"].contains(&argument.get_id().as_str())
 }
@@ -102,7 +102,7 @@ fn help(argument: &Arg) -> String {
     if words.is_empty() { help } else { format!("{help}: {}", words.join(", ")) }
 }
 
-/// Text that can stand in a cell of a table.
+/// Escapes a text for a cell of a Markdown table.
 fn cell(text: &str) -> String {
     text.replace('|', "\\|").split_whitespace().collect::<Vec<_>>().join(" ")
 }

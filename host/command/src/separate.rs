@@ -1,7 +1,7 @@
 //! Separate programs in the folder of this one: parts that are too heavy to build with the core.
 //!
-//! A program with its own workspace is built into its own folder below the core's `target`: plugins are libraries without a hash
-//! in their name, so two workspaces in one folder would overwrite each other's.
+//! A program with its own workspace is built into its own folder below the core's `target`: file names of plugin libraries have no hash,
+//! so that two workspaces in one folder would overwrite each other's plugins.
 
 use crate::CommandError;
 use crate::platform::{ask_to_end, become_program};
@@ -9,21 +9,21 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 
-/// Where a program comes from.
+/// Origin of a separate program.
 pub enum Built {
-    /// The same workspace.
+    /// Built in the workspace of this program.
     WithThis,
-    /// Its own workspace, built into this folder below `target`.
+    /// Built in its own workspace, into this folder below `target`.
     OwnWorkspace(&'static str),
 }
 
-/// A program in the folder of this one.
+/// Separate program in the folder of this one.
 pub struct SeparateProgram<'a> {
-    /// Its file, without the suffix of executables.
+    /// File name, without the suffix of executables.
     pub program: &'a str,
-    /// Where cargo puts it.
+    /// Workspace, which determines its folder.
     pub built: Built,
-    /// The command that builds it.
+    /// Command that builds it.
     pub build: &'a str,
 }
 
@@ -35,10 +35,10 @@ impl SeparateProgram<'_> {
         build: "cargo build --release -p flotor-viewer",
     };
 
-    /// A command that starts it.
+    /// Returns a command that starts the program.
     ///
     /// # Errors
-    /// [`CommandError::Usage`] with the command that builds it, if it is not there.
+    /// [`CommandError::Usage`] with the command that builds the program, if it is missing.
     pub fn command(&self) -> Result<Command, CommandError> {
         let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
         let (beside, own_build) = self.places(&own);
@@ -48,7 +48,7 @@ impl SeparateProgram<'_> {
         Err(CommandError::Usage(self.missing(&own)))
     }
 
-    /// Returns the message for a program that is missing, with its remedy: a build in Flotor's sources, or a copy to an installation.
+    /// Returns the message for a missing program, with its remedy: a build in Flotor's sources, or a copy to an installation.
     fn missing(&self, own: &Path) -> String {
         let (beside, own_build) = self.places(own);
         let build = match (&own_build, profile_of(own)) {
@@ -65,7 +65,7 @@ impl SeparateProgram<'_> {
         }
     }
 
-    /// Returns where the program may be: beside this one, and in cargo's target folder, if this one is there.
+    /// Returns the possible paths: beside this program, and in cargo's target folder, if this program is in one.
     fn places(&self, own: &Path) -> (PathBuf, Option<PathBuf>) {
         let name = format!("{}{}", self.program, std::env::consts::EXE_SUFFIX);
         let target = profile_of(own).and(own.parent()).and_then(Path::parent);
@@ -81,7 +81,7 @@ impl SeparateProgram<'_> {
     /// Replaces this process by the program, with a command and its arguments.
     ///
     /// # Errors
-    /// If it is not there or cannot be started.
+    /// If the program is missing or cannot be started.
     pub fn carry_out(&self, command: &str, arguments: &[OsString]) -> Result<(), CommandError> {
         self.become_with(&[&[command.into()], arguments].concat())
     }
@@ -89,25 +89,25 @@ impl SeparateProgram<'_> {
     /// Replaces this process by the separate program, which gives output and exit code.
     ///
     /// # Errors
-    /// If it is not there or cannot be started.
+    /// If the program is missing or cannot be started.
     pub fn become_with(&self, arguments: &[OsString]) -> Result<(), CommandError> {
         let cause = become_program(self.command()?.args(arguments));
         Err(CommandError::file(self.program.as_ref(), "cannot be started", cause))
     }
 }
 
-/// Returns the profile with which cargo has built a program, if it lies where cargo puts programs.
+/// Returns the profile with which cargo has built a program, if the program is in a target folder.
 fn profile_of(program: &Path) -> Option<&'static str> {
     let folder = program.parent()?;
     ["debug", "release"].into_iter().find(|profile| folder.ends_with(profile))
 }
 
-/// A running separate program. Drop sends SIGTERM, so that it removes its socket, and waits for its end.
+/// Running separate program. Drop sends SIGTERM, so that the program removes its socket, and waits for its end.
 pub struct Running(pub Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // The number of a process that has ended and been waited for may be another's by now.
+        // The id of a process that has ended and been waited for may belong to another process by now.
         if self.0.try_wait().ok().flatten().is_none() {
             ask_to_end(&mut self.0);
         }

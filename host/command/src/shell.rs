@@ -1,12 +1,12 @@
-//! Commands that are printed for people to repeat.
+//! Command lines that are printed for people to repeat.
 
-/// Returns a command line that a shell reads as these arguments of `flotor`.
+/// Returns a command line that a shell parses into these arguments of `flotor`.
 pub fn command_line<W: AsRef<str>>(arguments: impl IntoIterator<Item = W>) -> String {
     let words = arguments.into_iter().map(|word| format!(" {}", quoted(word.as_ref())));
     format!("flotor{}", words.collect::<String>())
 }
 
-/// Returns a word as a shell reads it back, in quotes where it needs them.
+/// Quotes a word for a shell, if necessary.
 #[must_use]
 pub fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./=,:@+%".contains(c);

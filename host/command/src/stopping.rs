@@ -1,10 +1,10 @@
-//! How a person ends a run: Ctrl-C in order; the space bar or `kill -USR1` at once.
+//! Requests of a person to end a run: Ctrl-C for an orderly end; the space bar or `kill -USR1` for an emergency stop.
 //!
 //! If an orderly end takes too long, the user repeats the signal: the second one is an emergency stop, the
-//! third ends the process, as does the second one some seconds later. Before anything is energised, the first does.
+//! third ends the process, as does the second one some seconds later. Before anything is energised, the first one ends the process.
 //!
-//! A thread of its own waits for what asks. On Linux these are signals, blocked in every other thread: a plugin that installs
-//! handlers or blocks signals takes none of them away. On Windows they are events of the console, and Ctrl-Break ends a run at once.
+//! A dedicated thread waits for requests. On Linux these are signals, blocked in every other thread, so that a plugin which installs
+//! handlers or blocks signals takes none of them away. On Windows they are events of the console, and Ctrl-Break is an emergency stop.
 
 use super::{CommandError, note, print_error_line};
 use crate::platform::{INTERRUPTED, KeyTerminal, Request, Requests, is_orphaned, outlive_requests};
@@ -14,49 +14,49 @@ use std::io::{self, Read, stdin};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Signals this close together are one request: `timeout` signals its child and then the group the child is in, a
-/// terminal that closes tells the shell, which tells its jobs. A person takes longer.
+/// Interval within which signals count as one request: `timeout` signals its child and then the child's group, and a closing
+/// terminal signals the shell, which signals its jobs. A person takes longer.
 const ONE_REQUEST: Duration = Duration::from_millis(100);
 
-/// How long a run may take to end after an emergency stop: what holds it up then is left behind.
+/// Grace period of a run after an emergency stop, before the process is ended by force.
 const LAST_PATIENCE: Duration = Duration::from_secs(5);
-/// How long a call of the loop may last once an end was requested, and the interval between two looks at it. A run that names the call
-/// itself waits for one second.
+/// Timeout of a call of the loop after a request to end, and the poll interval for it. A run that names the call itself waits for
+/// one second.
 const CALL_PATIENCE: Duration = Duration::from_millis(1500);
 const LOOK: Duration = Duration::from_millis(100);
-/// Interval between two looks at the switch as long as no signal was taken here.
+/// Poll interval of the switch while no signal was taken here.
 const UNASKED_LOOK: Duration = Duration::from_millis(400);
-/// How long devices may take to be told to stop when a process is left.
+/// Time for devices to stop when a process is left.
 const STOP_PATIENCE: Duration = Duration::from_millis(50);
 
-/// What the first signal means.
+/// Effect of the first signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum First {
-    /// End in order.
+    /// Orderly end.
     InOrder,
-    /// The same, once a run has energised something; before, nothing has to be put in order.
+    /// Orderly end, once a run has energised something; before, the process ends.
     InOrderOnceEnergised,
 }
 
-/// Returns a switch that the first signal of `ENDING` uses in order and the second at once (the third ends the
-/// process), and `SIGUSR1` at once. Called before there are other threads.
+/// Returns a switch that the first signal of `ENDING` uses for an orderly end and the second for an emergency stop (the third ends
+/// the process), and `SIGUSR1` for an emergency stop. Called before there are other threads.
 ///
 /// # Errors
-/// No thread for them.
+/// If the system refuses the signals or a thread.
 pub fn stop_on_signals() -> Result<StopSwitch, CommandError> {
     take_signals(First::InOrder)
 }
 
 /// Returns such a switch for a run that is yet to be prepared: as long as nothing has been energised, the first signal ends the
-/// process, whatever code a plugin executes.
+/// process, even while a plugin's code runs.
 ///
 /// # Errors
-/// No thread for them.
+/// If the system refuses the signals or a thread.
 pub fn stop_run_on_signals() -> Result<StopSwitch, CommandError> {
     take_signals(First::InOrderOnceEnergised)
 }
 
-/// Whatever asks this process to end does not: it ends by itself.
+/// Ignores all requests to end this process: it ends by itself.
 pub fn outlive_signals() {
     if let Err(error) = outlive_requests() {
         note(format_args!("cannot block signals: {error}"));
@@ -80,13 +80,13 @@ fn register(first: First, stop: &StopSwitch) -> io::Result<()> {
     Ok(())
 }
 
-/// Waits for signals as long as the process lives.
+/// Processes signals as long as the process lives.
 fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
     // Above a loop that hogs its core.
     enter_guard_priority();
     let (mut insistence, mut hang) = (Insistence::default(), Hang::default());
     loop {
-        // A thread that does not block a signal may have taken it: then only the switch says so.
+        // A thread that does not block a signal may have taken it: then only the switch shows the request.
         let is_asked = || insistence.last.is_some() || stop.is_stop_asked();
         let patience = if is_asked() { LOOK } else { UNASKED_LOOK };
         let Some(request) = requests.next(patience) else {
@@ -101,7 +101,7 @@ fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
                 ));
                 exit.take();
             }
-            // An orphan was asked to end when its supervisor ended.
+            // The end of the supervisor is a request to end.
             if insistence.is_out_of_patience(now)
                 || is_orphaned() && !insistence.is_younger_than_patience(now)
             {
@@ -122,7 +122,7 @@ fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
     }
 }
 
-/// The end of a process that hangs: a thread that stops its devices, started early because the system may refuse one later.
+/// Forced end of a process: a thread that stops the devices, started early because the system may refuse one later.
 struct Exit {
     stop: SyncSender<()>,
     stopped: Receiver<()>,
@@ -142,8 +142,7 @@ impl Exit {
         Ok(Self { stop, stopped })
     }
 
-    /// Stops the devices and ends the process, without what a process does at its end: that may be what hangs, and so may a
-    /// device's stop.
+    /// Stops the devices and ends the process without its exit handlers, which may hang, as may the stop of a device.
     fn take(&self) -> ! {
         let _ = self.stop.try_send(());
         let _ = self.stopped.recv_timeout(STOP_PATIENCE);
@@ -151,7 +150,7 @@ impl Exit {
     }
 }
 
-/// Answer to a signal that requests an end.
+/// Reaction to a signal that requests an end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Answer {
     InOrder,
@@ -159,21 +158,21 @@ enum Answer {
     Leave,
 }
 
-/// How often an end was requested: the last answer and its time.
+/// Last reaction to a request to end, and its time.
 #[derive(Default)]
 struct Insistence {
     last: Option<(Instant, Answer)>,
 }
 
 impl Insistence {
-    /// The run was to end at once, and that was some time ago.
+    /// Returns true if the grace period after an emergency stop is over.
     fn is_out_of_patience(&self, now: Instant) -> bool {
         self.last.is_some_and(|(since, answer)| {
             answer == Answer::AtOnce && now.duration_since(since) >= LAST_PATIENCE
         })
     }
 
-    /// An end was requested a short time ago.
+    /// Returns true if an end was requested within the grace period.
     fn is_younger_than_patience(&self, now: Instant) -> bool {
         self.last.is_some_and(|(since, _)| now.duration_since(since) < LAST_PATIENCE)
     }
@@ -190,7 +189,7 @@ impl Insistence {
     }
 }
 
-/// Calls that the loops were in at the last look, and the time when they were seen there first.
+/// Detector of calls that do not return: the calls of the loops at the last poll, and the time of the first sight of one.
 #[derive(Default)]
 struct Hang {
     seen: Vec<(String, Stuck)>,
@@ -198,7 +197,7 @@ struct Hang {
 }
 
 impl Hang {
-    /// Returns a call that has lasted too long.
+    /// Returns a call that has lasted longer than the timeout.
     fn look(&mut self, calls: Vec<(String, Stuck)>, now: Instant) -> Option<(String, Stuck)> {
         let lasting = calls.iter().find(|call| self.seen.contains(call)).cloned();
         let since = *self.since.get_or_insert(now);
@@ -214,18 +213,17 @@ impl Hang {
     }
 }
 
-/// Keys without a line end, while it lives.
+/// Keyboard input without a line end, until this is dropped.
 pub struct Keys {
     _terminal: KeyTerminal,
 }
 
 impl Keys {
-    /// Listens to the terminal: space is the emergency stop, `q` an orderly end. `None` where there is no terminal
-    /// to listen to: in a pipe, in the background.
+    /// Starts reading keys: space is the emergency stop, `q` an orderly end. `None` without a terminal: in a pipe, in the background.
     pub fn listen(stop: &StopSwitch) -> Option<Self> {
         let terminal = KeyTerminal::take()?;
         let stop = stop.clone();
-        // Ends with the process: nothing can call it back from a read.
+        // Ends with the process: nothing can interrupt its read.
         let thread = std::thread::Builder::new().name("flotor-keys".to_owned());
         let listening = thread.spawn(move || {
             for key in stdin().lock().bytes().map_while(Result::ok) {
@@ -236,7 +234,7 @@ impl Keys {
                 }
             }
         });
-        let keys = Self { _terminal: terminal }; // dropped, and the terminal put right, if there is no thread
+        let keys = Self { _terminal: terminal }; // restores the terminal when dropped, if there is no thread
         listening.ok().map(|_| keys)
     }
 }
@@ -249,7 +247,7 @@ enum KeyRequest {
 }
 
 impl KeyRequest {
-    /// The largest key is the emergency stop.
+    /// Returns the request of a key; the largest key is the emergency stop.
     fn of(key: u8) -> Option<Self> {
         match key {
             b' ' => Some(Self::Emergency),

@@ -1,6 +1,6 @@
-//! Colours, on terminals only; control characters of names and messages reach none.
+//! Colours, on terminals only; control characters in names and messages are escaped.
 //!
-//! A text carries its colours as marks, noncharacters of Unicode, which become sequences of the terminal when the text is printed.
+//! A text contains its colours as marks, noncharacters of Unicode, which are replaced by terminal sequences when the text is printed.
 
 use flotor_hal::terminal::escaped;
 use std::io::IsTerminal;
@@ -18,26 +18,26 @@ fn painted(mark: char, text: &str, terminal: bool) -> String {
     if wanted { format!("{mark}{text}{PLAIN}") } else { text.to_owned() }
 }
 
-/// Returns a text for people as a terminal may receive it: [escaped], with the sequences of its styles.
+/// Returns a text for people as a terminal may receive it: [escaped], with the terminal sequences of its styles.
 #[must_use]
 pub fn for_terminal(text: impl std::fmt::Display) -> String {
     let escaped = escaped(&text.to_string());
     MARKS.iter().fold(escaped, |shown, (mark, sequence)| shown.replace(*mark, sequence))
 }
 
-/// Red and bold, for the first word of an error.
+/// Returns a text in red and bold, for the first word of an error.
 #[must_use]
 pub fn error(text: &str) -> String {
     painted(ERROR, text, std::io::stderr().is_terminal())
 }
 
-/// Yellow, for the first word of a warning.
+/// Returns a text in yellow, for the first word of a warning.
 #[must_use]
 pub fn warning(text: &str) -> String {
     painted(WARNING, text, std::io::stderr().is_terminal())
 }
 
-/// Bold, for titles.
+/// Returns a text in bold, for titles.
 #[must_use]
 pub fn title(text: &str) -> String {
     painted(TITLE, text, std::io::stdout().is_terminal())

@@ -1,10 +1,10 @@
-//! A command that runs the code of plugins, in a process of its own: a supervisor waits for that process and gives its exit code.
+//! Supervision of a command that runs plugin code in a child process: the supervisor waits for the child and returns its exit code.
 //!
 //! A plugin can end its process without a message and with exit code 0: `_exit`, `exec`, a thread that crashes before the host's
-//! handlers stand. The supervisor runs no plugin. It forwards signals, and what ends without the end report of the host
-//! ([`flotor_servo::last_stop::report_end`]) fails with a message. If the supervisor is killed, the command is asked to end.
+//! handlers are installed. The supervisor runs no plugin. It forwards signals, and an end without the end report of the host
+//! ([`flotor_servo::last_stop::report_end`]) fails with a message. If the supervisor is killed, the command is requested to end.
 //!
-//! Windows has none.
+//! On Windows the process is not divided.
 
 use crate::platform::{die_by, divide};
 use crate::{CommandError, exit_code_of, print_error_line, style};
@@ -18,15 +18,15 @@ const PLUGIN_FAILED: u8 = 3;
 /// Exit code of a process that something else has killed.
 const KILLED: u8 = 1;
 
-/// The part of a process in which a call returns.
+/// Part of a divided process in which a call returns.
 pub(crate) enum Side {
     /// The process is not divided.
     Undivided,
-    /// The child, which reports its end in this word to the process of this number.
+    /// The child of a supervisor.
     Child {
-        /// Number of the supervisor.
+        /// Process id of the supervisor.
         supervisor: u32,
-        /// Memory of the end report.
+        /// Shared memory of the end report.
         report: &'static AtomicU32,
     },
     /// The supervisor of a child that has ended.
@@ -36,9 +36,9 @@ pub(crate) enum Side {
 /// End of a supervised process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum End {
-    /// With its report of this exit code.
+    /// Reported, with this exit code.
     Reported(u8),
-    /// By a signal that asks a process to end.
+    /// By a signal that requests an end.
     Asked(i32),
     /// Without a report, with this exit code.
     Left(u8),
@@ -46,7 +46,7 @@ pub(crate) enum End {
     Killed(i32),
 }
 
-/// Carries out a command under a supervisor; its exit code. Called while the process has one thread. Not real-time.
+/// Carries out a command under a supervisor and returns its exit code. Called while the process has one thread. Not real-time.
 pub fn supervised(command: impl FnOnce() -> Result<(), CommandError>) -> ExitCode {
     match divide() {
         Ok(Side::Undivided) => exit_code_of(command()),
@@ -62,7 +62,7 @@ pub fn supervised(command: impl FnOnce() -> Result<(), CommandError>) -> ExitCod
     }
 }
 
-/// Returns the exit code of a supervised process, and prints a message on an end without a report.
+/// Returns the exit code of a supervised process, and prints a message if the process ended without a report.
 fn code_of(end: End) -> u8 {
     let end = match end {
         End::Reported(code) => return code,

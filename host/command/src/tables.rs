@@ -1,8 +1,8 @@
-//! Results as tables: for people, and for other programs.
+//! Tables of results: for people, and as CSV for other programs.
 
 use serde::Serialize;
 
-/// Lines of a table for people: the first column to the left, the others to the right.
+/// Returns the lines of a table for people: the first column is aligned left, the others right.
 #[must_use]
 pub fn table<const N: usize>(head: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> Vec<String> {
     let lines: Vec<[String; N]> = [head.map(str::to_owned)].into_iter().chain(rows).collect();
@@ -18,7 +18,7 @@ pub fn table<const N: usize>(head: [&str; N], rows: impl IntoIterator<Item = [St
     lines.iter().map(line).collect()
 }
 
-/// Rows as CSV; without a head the names of their fields are it.
+/// Formats rows as CSV; without `head`, the field names are the header.
 #[must_use]
 pub fn to_csv<'h, T: Serialize>(
     head: impl IntoIterator<Item = &'h str>,
@@ -27,7 +27,7 @@ pub fn to_csv<'h, T: Serialize>(
     let head: Vec<&str> = head.into_iter().collect();
     let mut writer = csv::WriterBuilder::new().has_headers(head.is_empty()).from_writer(Vec::new());
     let begun = if head.is_empty() { Ok(()) } else { writer.write_record(head) };
-    // Into memory nothing fails but a row that is none.
+    // Writing to memory fails only for a row that is not a record.
     let written = begun.and_then(|()| rows.into_iter().try_for_each(|row| writer.serialize(row)));
     debug_assert!(written.is_ok(), "{written:?}");
     String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()

@@ -1,46 +1,46 @@
-//! What changed while the loop ran.
+//! Changes to plugins while the loop runs.
 
-/// A parameter or weight that changed in a run, or was to.
+/// Change of a parameter or weight, or replacement of a plugin, in a run; applied or rejected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// The tick before which it changed: the first that saw the new value.
+    /// Tick before which the change took place: the first with the new value.
     pub tick: u64,
-    /// The time of that tick, ns.
+    /// Time of this tick, ns.
     pub time_ns: u64,
     /// Name of the plugin in the scene.
     pub plugin: String,
-    /// What of it changed.
+    /// Kind of change.
     pub subject: ChangeSubject,
-    /// Id of the parameter, or the host's word for what is not one.
+    /// Id of the parameter; `weight` for a weight, the id of the new plugin for a replacement.
     pub parameter: String,
     /// The value as a person would type it.
     pub value: String,
-    /// The value as the plugin got it; for a choice, its index.
+    /// Value passed to the plugin; for a choice, its index.
     pub number: f64,
-    /// If the plugin itself was replaced, what was set for the new one, as written.
+    /// Settings of the new plugin after a replacement, as written.
     pub settings: Vec<(String, String)>,
-    /// What the plugin made of it.
+    /// Result of the change.
     pub outcome: ChangeOutcome,
 }
 
-/// What of a plugin changed.
+/// Kind of change of a plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangeSubject {
     /// A parameter of its schema.
     Parameter,
-    /// The part of its wrench that is felt, which the host mixes: it moves there at the rate of its fade.
+    /// The blend weight of its wrench, which the host applies: it moves to the new value at the rate of its fade.
     Weight,
     /// The plugin itself was replaced: `parameter` is the id of the new one, `value` its version.
     Plugin,
 }
 
-/// How a plugin took a change.
+/// Result of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangeOutcome {
     /// The value is in force from this tick on.
     Applied,
-    /// The plugin said no: the value does not fit its others. The old one stays.
+    /// The plugin rejected the value, which does not fit its other values. The old one remains.
     Refused,
-    /// The plugin panicked over it.
+    /// The plugin panicked on the change.
     Broke,
 }

@@ -2,17 +2,17 @@
 
 use crate::mapping::MappingConfig;
 
-/// What is done about energy that comes out of a port without having gone in.
+/// Treatment of energy that a port generates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PassivityMode {
-    /// It is measured.
+    /// The energy is measured.
     #[default]
     Observe,
-    /// It is measured and kept from coming out.
+    /// The energy is measured, and the passivity controller removes it.
     Control,
 }
 
-/// A virtual spring and damper between two devices, and the way between them.
+/// Virtual spring and damper between two devices, and the delay between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingConfig {
     /// Stiffness against displacement, N/m.
@@ -23,15 +23,15 @@ pub struct CouplingConfig {
     pub stiffness_nm_per_rad: f64,
     /// Damping of relative rotation, N·m·s/rad.
     pub damping_nms_per_rad: f64,
-    /// How long the peer state of one end takes to the other, ticks; of ends in one run.
+    /// Delay of the peer state between two ends in one run, ticks.
     pub delay_ticks: u32,
-    /// Energy an end may keep beyond what its spring stores, J.
+    /// Energy that a tank may hold beyond the energy stored in the spring, J.
     pub reserve_j: f64,
-    /// What is done about energy that nobody has put in.
+    /// Treatment of energy that a port generates.
     pub passivity: PassivityMode,
 }
 
-/// Longest delay, ticks: a second and more at any rate that is slow enough to be used with it.
+/// Longest delay, ticks: at least 1 s at rates up to 4 kHz.
 pub const MOST_DELAY_TICKS: u32 = 4096;
 
 impl Default for CouplingConfig {
@@ -54,21 +54,21 @@ impl Default for CouplingConfig {
 /// One end of a coupling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingEnd {
-    /// Number of the device in the scene.
+    /// Index of the device in the scene.
     pub device: u16,
-    /// From this device's frame to the one both ends share.
+    /// Mapping from the frame of the device to the shared frame of both ends.
     pub mapping: MappingConfig,
 }
 
-/// Largest rounding error of the gain of a coupling whose scales cancel, relative: above that of three quotients.
+/// Largest relative rounding error of the gain of a coupling whose scales cancel: above that of three quotients.
 const GAIN_ROUNDING: f64 = 1.0e-12;
 
-/// Where the ends of a coupling are.
+/// Locations of the ends of a coupling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CouplingEnds {
     /// Both in this run.
     Here([CouplingEnd; 2]),
-    /// One here, the other on another host, which knows the coupling by the same name.
+    /// One here, the other on another host, whose scene gives the coupling the same name.
     Remote(CouplingEnd),
 }
 
@@ -90,7 +90,7 @@ impl CouplingEnds {
         if gain <= 1.0 + GAIN_ROUNDING { 1.0 } else { gain }
     }
 
-    /// Those in this run.
+    /// Returns the ends in this run.
     #[must_use]
     pub fn here(&self) -> &[CouplingEnd] {
         match self {
@@ -103,11 +103,11 @@ impl CouplingEnds {
 /// A coupling of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CouplingDescription {
-    /// What the scene calls it.
+    /// Name in the scene.
     pub name: String,
     /// Spring, damper, delay.
     pub config: CouplingConfig,
-    /// What it holds together.
+    /// Coupled ends.
     pub ends: CouplingEnds,
 }
 

@@ -1,4 +1,4 @@
-//! Outputs of models that a run needs: those that reach the hand, and those that observers ask for.
+//! Outputs of models that a run needs: those that reach the hand, and those that observers request.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -21,21 +21,21 @@ pub struct TickDemand {
 }
 
 impl TickDemand {
-    /// The outputs that are felt at a device, and those that only observers ask for. Real-time: bounded, no allocation.
+    /// Creates the demand from the outputs felt at a device and those that only observers request. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn new(felt: Demand, observed: Demand) -> Self {
         Self { felt, computed: felt.with(observed) }
     }
 
-    /// Outputs that reach the hand.
+    /// Returns the outputs that reach the hand.
     #[inline]
     #[must_use]
     pub const fn felt(self) -> Demand {
         self.felt
     }
 
-    /// Outputs that reach the hand or an observer.
+    /// Returns the outputs that reach the hand or an observer.
     #[inline]
     #[must_use]
     pub const fn computed(self) -> Demand {
@@ -43,10 +43,10 @@ impl TickDemand {
     }
 }
 
-/// Outputs that are counted, each with one request for it in the word of counts.
+/// Counted outputs, each with the increment of one request in the word of counts.
 const COUNTS: [(Demand, u64); 2] = [(Demand::TORQUE, 1), (Demand::ENERGY, 1 << 32)];
 
-/// The outputs that observers of a run ask for: a count of requests for each, in one word that the loop reads every tick.
+/// Outputs that observers of a run request: a count of requests for each, in one word that the loop reads every tick.
 ///
 /// A clone counts the same requests. Force is always computed and never counted.
 #[derive(Clone, Debug, Default)]
@@ -55,7 +55,7 @@ pub struct ObserverDemand {
 }
 
 impl ObserverDemand {
-    /// Asks for outputs until the request is dropped; the loop computes them from its next tick on.
+    /// Requests outputs until the returned request is dropped; the loop computes them from its next tick on.
     pub fn request(&self, outputs: Demand) -> DemandRequest {
         let counted = counted(outputs);
         // Nothing else is published with the counts.
@@ -63,7 +63,7 @@ impl ObserverDemand {
         DemandRequest { demand: self.clone(), counted }
     }
 
-    /// Returns force and the outputs that at least one request is for. Real-time: bounded, no allocation.
+    /// Returns force and the outputs with at least one request. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn now(&self) -> Demand {
@@ -80,7 +80,7 @@ impl ObserverDemand {
     }
 }
 
-/// A request of one observer, withdrawn when dropped.
+/// Request of one observer, withdrawn when dropped.
 #[derive(Debug)]
 #[must_use = "a request is withdrawn when it is dropped"]
 pub struct DemandRequest {
@@ -89,16 +89,16 @@ pub struct DemandRequest {
 }
 
 impl DemandRequest {
-    /// Asks for other outputs from now on.
+    /// Replaces the requested outputs.
     pub fn change_to(&mut self, outputs: Demand) {
         if self.counted != counted(outputs) {
-            // The new request first: what both ask for is demanded throughout.
+            // The new request first: outputs of both requests stay demanded throughout.
             *self = self.demand.request(outputs);
         }
     }
 }
 
-/// Returns one request for each output, as counted in the word.
+/// Returns the increment of the counts for one request of these outputs.
 fn counted(outputs: Demand) -> u64 {
     COUNTS.iter().filter(|(output, _)| outputs.contains(*output)).map(|(_, one)| one).sum()
 }

@@ -1,11 +1,11 @@
-//! The live parameters with which a client guides the hand of a simulated device, such as the mouse in the viewer's window.
+//! Live parameters with which a client guides the hand of a simulated device, such as the mouse in the viewer's window.
 //!
-//! They change with every motion of the pointer, so pictures of a run do not mark their changes.
+//! The parameters change with every motion of the pointer, so pictures of a run do not mark their changes.
 
-/// The parameter with the number of the client that guides; 0 releases the hand.
+/// Parameter with the number of the client that guides; 0 releases the hand.
 pub const GUIDE: &str = "hand_guide";
 
-/// The parameters with the target: x, y, z of the device frame, mm.
+/// Parameters with the target: x, y, z of the device frame, mm.
 pub const TARGET_MM: [&str; 3] = ["hand_target_x_mm", "hand_target_y_mm", "hand_target_z_mm"];
 
 /// Returns whether a parameter guides a hand.

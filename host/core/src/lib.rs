@@ -1,15 +1,15 @@
-//! Plain data and maths of a run: what servo, recording and observers share, without any of them.
+//! Plain data and maths of a run, shared by servo, recording and observers and independent of them.
 //!
-//! - [`trace`]: what a tick leaves behind; [`demand`]: the outputs of models that a run needs.
-//! - [`mapping`]: between the device frame and a model's frame.
+//! - [`trace`]: record of a tick; [`demand`]: the outputs of models that a run needs.
+//! - [`mapping`]: mapping between the device frame and a model's frame.
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
 //!   a device, in a loop; [`region`]: the vectors that limits allow.
-//! - [`plausibility`]: whether a sample can be true.
-//! - [`coupling`]: two devices held together; [`peer`]: what the two ends tell each other.
+//! - [`plausibility`]: checks of device samples.
+//! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between its two ends.
 //! - [`guidance`]: the parameters that guide a simulated hand.
-//! - [`Change`]: a parameter that changed while the loop ran.
+//! - [`Change`]: a change to a plugin while the loop ran.
 //!
-//! Nothing here reads files, starts threads or talks to the system.
+//! The crate reads no files, starts no threads and makes no system calls.
 #![forbid(unsafe_code)]
 
 mod change;
@@ -33,7 +33,7 @@ pub use clock::Clock;
 pub use outputs::ModelOutputs;
 pub use random::Random;
 
-/// Largest seed that commands and files take: every program reads the whole numbers up to it as they stand in JSON.
+/// Largest seed that commands and files accept: every program reads whole numbers up to this one exactly from JSON.
 pub const LARGEST_SEED: u64 = 1 << 53;
-/// Devices of a run at most.
+/// Largest number of devices in a run.
 pub const MOST_DEVICES: u16 = 8;

@@ -1,9 +1,8 @@
-//! What a run allows: limits of force and motion, and the wall at the end of the device's range.
+//! Limits of force and motion in a run, and the wall at the end of the device's range.
 
 use crate::coupling::PassivityMode;
 
-/// How large a vector may be, in its unit: no longer than a norm in any direction, and along no axis more than
-/// its share. Both hold together.
+/// Bound of a vector, in its unit: a norm in any direction, and a largest component along each axis. Both apply together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bound {
     norm: f64,
@@ -11,22 +10,22 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// No bound.
+    /// Bound that allows every vector.
     pub const NONE: Self = Self { norm: f64::INFINITY, axes: [f64::INFINITY; 3] };
 
-    /// A ball: vectors no longer than this.
+    /// Creates a ball: vectors no longer than `norm`.
     #[must_use]
     pub const fn ball(norm: f64) -> Self {
         Self { norm, axes: [norm; 3] }
     }
 
-    /// A box: no component larger than that of its axis.
+    /// Creates a box: no component larger than that of its axis.
     #[must_use]
     pub const fn box_of(axes: [f64; 3]) -> Self {
         Self { norm: f64::INFINITY, axes }
     }
 
-    /// What both allow. Not real-time.
+    /// Returns the intersection of two bounds. Not real-time.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         let norm = self.norm.min(other.norm);
@@ -34,19 +33,19 @@ impl Bound {
         Self { norm, axes: std::array::from_fn(axis) }
     }
 
-    /// The longest vector it allows may be no longer than this; infinity where there is only a box.
+    /// Returns the norm that no vector exceeds; infinity for a box.
     #[must_use]
     pub const fn norm(&self) -> f64 {
         self.norm
     }
 
-    /// The most along each axis, never more than the norm.
+    /// Returns the largest component along each axis, at most the norm.
     #[must_use]
     pub const fn axes(&self) -> [f64; 3] {
         self.axes
     }
 
-    /// The longest vector it allows: the corner of the box, or the norm if that is less. Not real-time.
+    /// Returns the length of the longest vector within the bound: the corner of the box, or the norm if that is less. Not real-time.
     #[must_use]
     pub fn longest(&self) -> f64 {
         let corner = self.axes.iter().map(|axis| axis * axis).sum::<f64>().sqrt();
@@ -54,8 +53,8 @@ impl Bound {
     }
 }
 
-/// The most the host sends to a device that does not declare itself simulated: 20 N and 1 N·m in any direction. More than a
-/// hand wants of an object on a table, less than throws an arm; an adult's hand holds it.
+/// Ceiling of the host for a device that does not declare itself simulated: 20 N and 1 N·m in any direction. More than a
+/// hand wants of an object on a table, less than throws an arm; the hand of an adult resists it.
 pub const CEILING: Ceiling = Ceiling { force_n: 20.0, torque_nm: 1.0 };
 
 /// Largest norms that a host sends.
@@ -67,7 +66,7 @@ pub struct Ceiling {
     pub torque_nm: f64,
 }
 
-/// What a scene allows; the device's declaration applies too, whichever is tighter.
+/// Limits of a scene; those that the device declares apply too, whichever are tighter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Largest force, N.
@@ -78,9 +77,9 @@ pub struct Limits {
     pub force_slew_n_per_s: f64,
     /// Fastest change of torque, N·m/s: the norm of the change.
     pub torque_slew_nm_per_s: f64,
-    /// Velocity above which nothing may drive the handle on, m/s.
+    /// Velocity above which no force accelerates the handle, m/s.
     pub velocity_m_per_s: Bound,
-    /// Angular velocity above which nothing may drive the handle on, rad/s.
+    /// Angular velocity above which no torque accelerates the handle, rad/s.
     pub angular_velocity_rad_per_s: Bound,
     /// Time over which the force fades in at the start and out at an orderly end, s.
     pub ramp_s: f64,
@@ -88,16 +87,16 @@ pub struct Limits {
     pub watchdog_s: f64,
     /// Buttons of the device that are emergency stops, one bit each.
     pub emergency_buttons: u32,
-    /// What is done about energy that comes out of the port without having gone in.
+    /// Treatment of energy that the port generates.
     pub passivity: PassivityMode,
-    /// A device that nothing stops when the host's process is gone is refused.
+    /// True to reject a device that nothing stops once the host's process is gone.
     pub require_independent_stop: bool,
-    /// A device that only the watchdog process stops may run although a kill of one control group ends both processes.
+    /// True if a device that only the watchdog process stops may run although a kill of one control group ends both processes.
     pub accept_shared_control_group: bool,
 }
 
 impl Limits {
-    /// The same, under a ceiling. Not real-time.
+    /// Returns these limits, reduced to a ceiling. Not real-time.
     #[must_use]
     pub fn under(self, ceiling: Ceiling) -> Self {
         Self {
@@ -115,7 +114,7 @@ impl Default for Limits {
             torque_nm: Bound::NONE,
             force_slew_n_per_s: f64::INFINITY,
             torque_slew_nm_per_s: f64::INFINITY,
-            // Long enough not to startle a hand, short enough not to be waited for.
+            // Long enough not to startle a hand, short enough not to seem a delay.
             ramp_s: 0.2,
             velocity_m_per_s: Bound::NONE,
             angular_velocity_rad_per_s: Bound::NONE,
@@ -133,9 +132,9 @@ impl Default for Limits {
 /// A spring-damper wall a little inside the device's range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Boundary {
-    /// How far inside the device's range the wall begins at least, m.
+    /// Least distance of the wall inside the device's range, m.
     pub margin_m: f64,
-    /// How far inside the device's rotation range the wall begins, rad.
+    /// Distance of the wall inside the device's rotation range, rad.
     pub margin_rad: f64,
     /// Stiffness of the wall, N/m.
     pub stiffness_n_per_m: f64,

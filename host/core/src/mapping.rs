@@ -1,4 +1,4 @@
-//! Between the device frame and a model's frame: the one place where motion, force and torque are scaled.
+//! Mapping between the device frame and a model's frame: the only place that scales motion, force and torque.
 //!
 //! With `x_model = m R x_device`, scaling the energy by `f / m` gives the device the force `f R^T F` and the
 //! torque `(f / m) R^T M`: gradients of one energy, so a conservative model stays conservative at the hand
@@ -17,7 +17,7 @@ pub struct MappingConfig {
     pub motion_scale: f64,
     /// Device force per model force.
     pub force_scale: f64,
-    /// Device torque per model torque; `None`: force scale over motion scale, which keeps the field conservative.
+    /// Device torque per model torque; `None`: `force_scale / motion_scale`, with which the field stays conservative.
     pub torque_scale: Option<f64>,
 }
 
@@ -27,12 +27,12 @@ impl Default for MappingConfig {
     }
 }
 
-/// How a model is mixed with the others of its scene.
+/// Blending of a model with the others of its scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
-    /// Part of its wrench that is felt, 0 to 1.
+    /// Weight of its wrench, 0 to 1.
     pub weight: f64,
-    /// A model that pushes silences those of lower priority.
+    /// Priority: a model with a force silences models of lower priority.
     pub priority: u8,
     /// Time the weight takes from 0 to 1, s.
     pub fade_s: f64,
@@ -45,13 +45,13 @@ impl Default for Blend {
     }
 }
 
-/// When a model that is computed asynchronously gives a new linear field.
+/// Timing of the linear fields of an asynchronous model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldTiming {
-    /// How often, Hz.
+    /// Rate of new fields, Hz.
     pub rate_hz: f64,
-    /// Time from a look at the handle to the field that answers it, s. On the virtual clock it takes just this; on a
-    /// real one as long as the model takes.
+    /// Time from the sample of the handle to the field computed from it, s. Exact on the virtual clock; on a real one, the time that
+    /// the model takes.
     pub latency_s: f64,
 }
 
@@ -66,7 +66,7 @@ pub struct Mapping {
     energy_scale: f64,
 }
 
-/// Rotation from the device frame to the model frame. Most scenes have none, and then no tick computes one.
+/// Rotation from the device frame to the model frame. Most scenes have none, which saves the products.
 #[derive(Clone, Copy, Debug)]
 enum Turn {
     None,
@@ -78,7 +78,7 @@ impl Turn {
         if rotation == DQuat::IDENTITY { Self::None } else { Self::By(rotation) }
     }
 
-    /// A vector of the device frame in the model frame.
+    /// Rotates a vector from the device frame into the model frame.
     #[inline]
     fn there(self, vector: DVec3) -> DVec3 {
         match self {
@@ -87,7 +87,7 @@ impl Turn {
         }
     }
 
-    /// A vector of the model frame in the device frame.
+    /// Rotates a vector from the model frame into the device frame.
     #[inline]
     fn back(self, vector: DVec3) -> DVec3 {
         match self {
@@ -96,7 +96,7 @@ impl Turn {
         }
     }
 
-    /// A rotation of the device frame in the model frame.
+    /// Expresses a rotation of the device frame in the model frame.
     #[inline]
     fn rotation_there(self, turned: DQuat) -> DQuat {
         match self {
@@ -107,7 +107,7 @@ impl Turn {
 }
 
 impl Mapping {
-    /// A mapping from its checked configuration. Not real-time.
+    /// Creates a mapping from its checked configuration. Not real-time.
     #[must_use]
     pub fn new(config: &MappingConfig) -> Self {
         let energy_scale = config.force_scale / config.motion_scale;
@@ -116,13 +116,13 @@ impl Mapping {
             model_from_device: Turn::of(DQuat::from_array(config.rotation_xyzw)),
             motion_scale: config.motion_scale,
             force_scale: config.force_scale,
-            // What keeps force and torque gradients of one energy.
+            // The scale with which force and torque stay gradients of one energy.
             torque_scale: config.torque_scale.unwrap_or(energy_scale),
             energy_scale,
         }
     }
 
-    /// Rotation from the device frame to the model frame.
+    /// Returns the rotation from the device frame to the model frame.
     #[must_use]
     pub fn rotation(&self) -> DQuat {
         match self.model_from_device {
@@ -131,33 +131,33 @@ impl Mapping {
         }
     }
 
-    /// The same with the model's home somewhere else than the device's: there, m, device frame. Not real-time.
+    /// Returns the mapping with the model's home at this place, m, device frame, instead of the device's home. Not real-time.
     #[must_use]
     pub fn at(self, home_m: [f64; 3]) -> Self {
         Self { home_m: DVec3::from_array(home_m), ..self }
     }
 
-    /// Factor from the model's stiffness to the stiffness at the hand.
+    /// Returns the factor from the model's stiffness to the stiffness at the hand.
     #[must_use]
     pub fn stiffness_scale(&self) -> f64 {
         self.force_scale * self.motion_scale
     }
 
-    /// Factor from the model's energy to energy at the device.
+    /// Returns the factor from the model's energy to energy at the device.
     #[inline]
     #[must_use]
     pub fn energy_scale(&self) -> f64 {
         self.energy_scale
     }
 
-    /// True if forces and torques at the hand are gradients of one energy (when the model's are).
+    /// Returns true if forces and torques at the hand are gradients of one energy, provided that those of the model are.
     #[must_use]
     pub fn is_conservative(&self) -> bool {
         let conservative = self.energy_scale();
         (self.torque_scale - conservative).abs() <= 4.0 * f64::EPSILON * conservative
     }
 
-    /// Pose in the model frame. Real-time: bounded, no allocation.
+    /// Maps a pose into the model frame. Real-time: bounded, no allocation.
     #[inline(always)] // as `wrench_to_device`
     #[must_use]
     pub fn pose_to_model(&self, pose: &Pose) -> Pose {
@@ -166,28 +166,28 @@ impl Mapping {
         Pose::new(position_m, turn.rotation_there(pose.orientation()))
     }
 
-    /// Position in the device frame of a position in the model frame. Real-time: bounded, no allocation.
+    /// Maps a position from the model frame to the device frame. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn position_to_device(&self, position_m: DVec3) -> DVec3 {
         self.home_m + self.vector_to_device(position_m)
     }
 
-    /// Vector between positions in the device frame of one in the model frame. Real-time: bounded, no allocation.
+    /// Maps a vector between positions from the model frame to the device frame. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn vector_to_device(&self, vector_m: DVec3) -> DVec3 {
         self.model_from_device.back(vector_m) / self.motion_scale
     }
 
-    /// Length in the device frame of a length in the model frame. Real-time: bounded, no allocation.
+    /// Maps a length from the model frame to the device frame. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn length_to_device(&self, length_m: f64) -> f64 {
         length_m / self.motion_scale
     }
 
-    /// Half sides of the box along the device's axes that holds a box along the model's. Real-time: bounded, no
+    /// Returns half the sides of the box along the device's axes that encloses a box along the model's. Real-time: bounded, no
     /// allocation.
     #[must_use]
     pub fn half_sides_to_device(&self, half_sides_m: DVec3) -> DVec3 {
@@ -196,7 +196,7 @@ impl Mapping {
         side(DVec3::X, half_sides_m.x) + side(DVec3::Y, half_sides_m.y) + side(DVec3::Z, half_sides_m.z)
     }
 
-    /// What a model is told of a tick: the motion in its own frame, and what is asked for. Real-time: bounded, no allocation.
+    /// Returns the input of a model for a tick: the motion in its own frame, and the demanded outputs. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn input(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
@@ -211,7 +211,7 @@ impl Mapping {
         }
     }
 
-    /// Twist in the model frame. Real-time: bounded, no allocation.
+    /// Maps a twist into the model frame. Real-time: bounded, no allocation.
     #[inline(always)] // as `wrench_to_device`
     #[must_use]
     pub fn twist_to_model(&self, twist: &Twist) -> Twist {
@@ -219,8 +219,8 @@ impl Mapping {
         Twist::new(turn.there(twist.linear()) * self.motion_scale, turn.there(twist.angular()))
     }
 
-    /// Wrench in the device frame. Real-time: bounded, no allocation.
-    #[inline(always)] // 5 ns: a call hands it over in memory, and who reads that waits
+    /// Maps a wrench into the device frame. Real-time: bounded, no allocation.
+    #[inline(always)] // 5 ns: a call returns it in memory, and the reader waits for that
     #[must_use]
     pub fn wrench_to_device(&self, wrench: &Wrench) -> Wrench {
         let turn = self.model_from_device;
@@ -230,7 +230,7 @@ impl Mapping {
         )
     }
 
-    /// Wrench in the model frame: the way back of [`Self::wrench_to_device`]. Real-time: bounded, no allocation.
+    /// Maps a wrench into the model frame: the inverse of [`Self::wrench_to_device`]. Real-time: bounded, no allocation.
     #[must_use]
     pub fn wrench_to_model(&self, wrench: &Wrench) -> Wrench {
         let turn = self.model_from_device;

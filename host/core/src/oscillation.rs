@@ -1,24 +1,24 @@
-//! Detects a force that alternates between its limits: the sign of an unstable loop, for example of a stiffness that the device
-//! cannot render. It is damped first; if it goes on, the run has to end, whether anybody watches or not.
+//! Detection of a force that alternates between its limits: the sign of an unstable loop, for example of a stiffness that the device
+//! cannot render. The force is damped first; if the oscillation goes on, the run ends.
 //!
-//! What counts is a reversal at the limits: what is requested is cut, and points against what was cut before, at a place the
-//! handle has moved to since. A hand between two stiff walls makes a few in a second; an unstable loop makes tens. Noise of a model
-//! reverses the force in every tick and moves the handle by micrometres: the limits alone meet it.
+//! Reversals at the limits are counted: a limited force points against the force limited before, and the handle has moved in
+//! between. A hand between two stiff walls causes a few in a second; an unstable loop causes tens. Noise of a model reverses the
+//! force in every tick and moves the handle by micrometres: only the limits apply to it.
 
 use flotor_hal::{DQuat, DVec3, Pose, Wrench};
 
-/// Reversals in a row that are an oscillation.
+/// Number of reversals that count as an oscillation.
 const REVERSALS: usize = 10;
-/// The time in which they come, ns: 10 Hz and more, which no hand makes against the full force of a device.
+/// Time window of these reversals, ns: 10 Hz and more, which no hand reaches against the full force of a device.
 const WINDOW_NS: u64 = 500_000_000;
-/// Way of the handle, m, or its turn, rad, between two reversals that count.
+/// Least displacement, m, or rotation, rad, of the handle between two reversals that count.
 const LEAST_WAY_M: f64 = 0.1e-3;
 const LEAST_TURN_RAD: f64 = 1.0e-3;
-/// What is left of the force while it is damped.
+/// Gain of the force while an oscillation is damped.
 const DAMPED: f64 = 0.25;
-/// Time that damping has to act before the run is given up, ns.
+/// Time for damping to take effect before the run is ended, ns.
 const TRIED_NS: u64 = 250_000_000;
-/// Time without a reversal after which the force comes back, and the time it takes to, ns.
+/// Time without a reversal after which the force starts to return, and duration of the return, ns.
 const CALM_NS: u64 = 2_000_000_000;
 const RETURN_NS: u64 = 1_000_000_000;
 
@@ -26,7 +26,7 @@ const RETURN_NS: u64 = 1_000_000_000;
 #[derive(Clone, Copy, Debug)]
 struct Swing {
     last: DVec3,
-    /// Where the handle was at the last reversal that counted.
+    /// Pose of the handle at the last reversal that counted.
     last_pose: Pose,
     times_ns: [u64; REVERSALS],
     count: usize,
@@ -36,7 +36,7 @@ impl Swing {
     const NONE: Swing =
         Swing { last: DVec3::ZERO, last_pose: Pose::HOME, times_ns: [0; REVERSALS], count: 0 };
 
-    /// Takes in what was cut, and where; true if that was a reversal that counts.
+    /// Records a force or torque that was limited, and the pose; returns true for a reversal that counts.
     fn note(&mut self, cut: DVec3, pose: &Pose, now_ns: u64) -> bool {
         let is_reversal = cut.dot(self.last) < 0.0 && has_moved(&self.last_pose, pose);
         self.last = cut;
@@ -50,7 +50,7 @@ impl Swing {
         is_reversal
     }
 
-    /// Whether the last reversals came within the window; the count begins anew then.
+    /// Returns true if the last reversals came within the window, and then restarts the count.
     fn is_oscillation(&mut self, now_ns: u64) -> bool {
         let oldest = self.times_ns.get(self.count % REVERSALS).copied().unwrap_or(0);
         let is_one = self.count >= REVERSALS && now_ns.saturating_sub(oldest) <= WINDOW_NS;
@@ -61,7 +61,7 @@ impl Swing {
     }
 }
 
-/// Whether a handle has moved or turned far enough for a reversal to be one of the loop.
+/// Returns true if a handle has moved or turned far enough for a reversal to count.
 fn has_moved(from: &Pose, to: &Pose) -> bool {
     let way_m = (to.position() - from.position()).length();
     let turn: DQuat = from.orientation().conjugate() * to.orientation();
@@ -70,11 +70,11 @@ fn has_moved(from: &Pose, to: &Pose) -> bool {
     way_m >= LEAST_WAY_M || turn_rad >= LEAST_TURN_RAD
 }
 
-/// How the force is let through.
+/// Stage of the reaction to an oscillation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Whole,
-    /// With the times of the first and of the last reversal.
+    /// Damped, with the times of the first and of the last reversal.
     Damped {
         began_ns: u64,
         since_ns: u64,
@@ -82,7 +82,7 @@ enum Stage {
     GivenUp,
 }
 
-/// Watches the limited force of one device.
+/// Detector of oscillations in the limited force of one device.
 pub struct Oscillation {
     force: Swing,
     torque: Swing,
@@ -90,11 +90,11 @@ pub struct Oscillation {
 }
 
 impl Oscillation {
-    /// Nothing has happened yet.
+    /// Detector without reversals so far.
     pub const NONE: Oscillation =
         Oscillation { force: Swing::NONE, torque: Swing::NONE, stage: Stage::Whole };
 
-    /// Takes in a wrench whose force or torque, by these, had to be cut, and where the handle was. Real-time: bounded, no allocation.
+    /// Records a wrench and the handle's pose; `cut` flags a limited force and a limited torque. Real-time: bounded, no allocation.
     #[inline(never)] // seldom called
     pub fn note(&mut self, wrench: &Wrench, cut: [bool; 2], pose: &Pose, now_ns: u64) {
         let [cuts_force, cuts_torque] = cut;
@@ -106,7 +106,7 @@ impl Oscillation {
         let is_one = self.force.is_oscillation(now_ns) | self.torque.is_oscillation(now_ns);
         self.stage = match self.stage {
             Stage::Whole if is_one => {
-                // What goes on in spite of the damping has to show itself anew.
+                // An oscillation in spite of the damping has to be detected anew.
                 (self.force.count, self.torque.count) = (0, 0);
                 Stage::Damped { began_ns: now_ns, since_ns: now_ns }
             }
@@ -118,7 +118,7 @@ impl Oscillation {
         };
     }
 
-    /// What is let through, 0 to 1; `None` for all of it. Real-time: bounded, no allocation.
+    /// Returns the gain of the force, 0 to 1; `None` for all of it. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn gain(&mut self, now_ns: u64) -> Option<f64> {
@@ -137,7 +137,7 @@ impl Oscillation {
         }
     }
 
-    /// Whether damping was not enough: the run has to end. Real-time: bounded, no allocation.
+    /// Returns true if the oscillation went on in spite of damping: the run has to end. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_given_up(&self) -> bool {

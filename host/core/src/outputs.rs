@@ -1,4 +1,4 @@
-//! Outputs of the models in a tick, with those that nobody asked for absent.
+//! Outputs of the models in a tick; those that were not requested are absent.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -6,7 +6,7 @@ use flotor_hal::{DVec3, Demand, Wrench};
 
 /// Outputs of models and couplings together at one device, device frame.
 ///
-/// An output that was not computed is absent. An output that is there and not finite was computed for an observer alone and
+/// An output that was not computed is absent. One that is present and not finite was computed for an observer alone and
 /// reached no hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelOutputs {
@@ -19,7 +19,7 @@ impl ModelOutputs {
     /// No force, no torque and no energy, all of them computed.
     pub const ZERO: ModelOutputs = ModelOutputs::new(Wrench::ZERO, 0.0);
 
-    /// All outputs: wrench, N and N·m, and stored energy, J. Real-time: bounded, no allocation.
+    /// Creates a set of all outputs: wrench, N and N·m, and stored energy, J. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn new(wrench: Wrench, energy_j: f64) -> Self {
@@ -41,42 +41,42 @@ impl ModelOutputs {
         Self { wrench, energy_j, computed }
     }
 
-    /// Outputs that are there.
+    /// Returns the set of outputs that are present.
     #[inline]
     #[must_use]
     pub const fn computed(&self) -> Demand {
         self.computed
     }
 
-    /// Force, N.
+    /// Returns the force, N.
     #[inline]
     #[must_use]
     pub fn force(&self) -> DVec3 {
         self.wrench.force()
     }
 
-    /// Torque, N·m, if it was computed.
+    /// Returns the torque, N·m; `None` if it was not computed.
     #[inline]
     #[must_use]
     pub fn torque(&self) -> Option<DVec3> {
         self.computed.contains(Demand::TORQUE).then(|| self.wrench.torque())
     }
 
-    /// Force and torque, if both were computed.
+    /// Returns force and torque, if both were computed.
     #[inline]
     #[must_use]
     pub fn wrench(&self) -> Option<Wrench> {
         self.computed.contains(Demand::TORQUE).then_some(self.wrench)
     }
 
-    /// Stored energy, J, if it was computed.
+    /// Returns the stored energy, J; `None` if it was not computed.
     #[inline]
     #[must_use]
     pub fn energy_j(&self) -> Option<f64> {
         self.computed.contains(Demand::ENERGY).then_some(self.energy_j)
     }
 
-    /// Numbers in the order of a record's words, zero where an output is absent.
+    /// Returns the wrench and energy for the words of a record, zero where an output is absent.
     #[inline]
     pub(crate) const fn numbers(&self) -> (&Wrench, f64) {
         (&self.wrench, self.energy_j)

@@ -1,42 +1,42 @@
-//! What the two ends of a coupling tell each other, and how that crosses a network.
+//! Messages between the two ends of a coupling, and their encoding for a network.
 
 use flotor_hal::{Pose, Twist};
 use flotor_sync::Words;
 
-/// What one end tells the other in every tick, in the shared frame.
+/// State that one end sends to the other in every tick, in the shared frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeerState {
-    /// Where the handle is, m and unit quaternion.
+    /// Pose of the handle, m and unit quaternion.
     pub pose: Pose,
-    /// How it moves, m/s and rad/s.
+    /// Velocity of the handle, m/s and rad/s.
     pub twist: Twist,
-    /// All the energy this end has ever passed on to the other, J.
+    /// Running total of energy that this end has passed on to the other, J.
     pub told_j: f64,
 }
 
-/// The energy tank of an end in numbers, for reports.
+/// Energy tank of an end, for reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TankState {
-    /// What is there to be taken out, J; negative: more has come out than had gone in.
+    /// Energy available, J; below zero if more has come out than had gone in.
     pub level_j: f64,
-    /// The lowest it ever was, J.
+    /// Lowest level so far, J.
     pub lowest_j: f64,
-    /// What the hand has put in so far less what has come out, J.
+    /// Energy that the hand has put in so far less energy that has come out, J.
     pub gone_in_j: f64,
-    /// What was put in and can never come out again, J.
+    /// Energy that was put in and then discarded, J.
     pub given_up_j: f64,
 }
 
-/// The peer state with what its transport to another host needs.
+/// Peer state with the data for its transport to another host.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dispatch {
-    /// Which run tells: when it began, ns since 1970. Another run counts its energy from nothing.
+    /// Sending run: its start, ns since 1970. Each run counts its energy from zero.
     pub run: u64,
-    /// The run whose messages it answers; 0: none. Only who is named here is meant, by the energy as well.
+    /// Run that the sender takes for its partner; 0: none. The message, with its energy, is for this run alone.
     pub partner: u64,
-    /// The tick from which on it names that run: what it had passed on before was for somebody else.
+    /// First tick with this partner: energy passed on before was for another run.
     pub since: u64,
-    /// The tick that tells: of two dispatches of a run the higher is the newer.
+    /// Tick of the sender: of two dispatches of a run, the higher is the newer.
     pub tick: u64,
     /// The peer state.
     pub state: PeerState,
@@ -46,23 +46,23 @@ pub struct Dispatch {
 
 /// 64-bit words of a [`Dispatch`].
 pub const DISPATCH_WORDS: usize = 22;
-/// Bytes of a [`Dispatch`] on its way: a mark with the version, then [`DISPATCH_WORDS`], all little endian.
+/// Bytes of an encoded [`Dispatch`]: a mark with the version, then [`DISPATCH_WORDS`] words, all little endian.
 pub const DISPATCH_BYTES: usize = 8 * (1 + DISPATCH_WORDS);
-/// The word that says what it is; the digit is the version.
+/// First word of an encoded dispatch; the digit is the version.
 const MARK: u64 = u64::from_le_bytes(*b"flotnew2");
-/// Largest error of the length of a quaternion that is one after all: far above that of arithmetic.
+/// Tolerance for the length of a unit quaternion: far above the error of arithmetic.
 const UNIT_TOLERANCE: f64 = 1.0e-6;
 
-/// Bytes that are no dispatch.
+/// Reason why bytes are not a valid dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidDispatch {
-    /// Too long or too short.
+    /// Wrong length.
     #[error("peer message of {length} bytes, expected {DISPATCH_BYTES}")]
     Length {
-        /// How many.
+        /// Bytes received.
         length: usize,
     },
-    /// Not marked as one.
+    /// Wrong mark, or another version.
     #[error("unsupported message version; run the same release on both hosts")]
     Mark,
     /// A number is not finite, the orientation has no unit length, or the energy passed on is negative.
@@ -71,7 +71,7 @@ pub enum InvalidDispatch {
 }
 
 impl Dispatch {
-    /// As it travels. Not real-time.
+    /// Encodes the dispatch. Not real-time.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; DISPATCH_BYTES] {
         let mut bytes = [0; DISPATCH_BYTES];
@@ -82,10 +82,10 @@ impl Dispatch {
         bytes
     }
 
-    /// Checks what has travelled. Not real-time.
+    /// Decodes and checks a dispatch. Not real-time.
     ///
     /// # Errors
-    /// [`InvalidDispatch`].
+    /// If the length, the mark or a number is invalid.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, InvalidDispatch> {
         if bytes.len() != DISPATCH_BYTES {
             return Err(InvalidDispatch::Length { length: bytes.len() });

@@ -1,77 +1,76 @@
-//! Whether a sample can be true: what stands between a device and everything that believes it.
+//! Plausibility checks of samples, between a device and all users of its samples.
 //!
-//! A pose that is finite may still be a kilometre away, a rotation that is none, a jump no hand can make, or a minute old; a
-//! model would answer it with all the force the envelope lets pass. A sample that cannot be is not used: the last one that
-//! could stays, as when a sample is missing. [`Trust`] says what follows: one is borne, several in a short time take the
-//! force away, more are a fault of the device.
+//! A finite pose may still be a kilometre away, be no rotation, have jumped farther than a hand can move, or be a minute old; a
+//! model would respond to it with all the force that the envelope lets pass. An implausible sample is not used: the last plausible
+//! one stays in use, as when a sample is missing. [`Trust`] gives the consequence: one is tolerated, several in a short time remove
+//! the force, more are a fault of the device.
 //!
-//! A bound is one that no handle passes: a sample within it may still be wrong, and the envelope limits what it does.
+//! No real handle exceeds a bound: a sample within the bounds may still be wrong, and the envelope limits its effect.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 use flotor_hal::{Axes, Capabilities, Conditions, DQuat, DVec3, DeviceState, Pose, Tick, Twist};
 
-/// Largest error of the length of a quaternion: a hundred times that of six decimals, and too small to be another number.
+/// Tolerance of the length of a quaternion: a hundred times the error of six decimals.
 const LENGTH_TOLERANCE: f64 = 1.0e-3;
-/// Largest error of the squared length of a quaternion of length one: the rounding of its four numbers and of the sum.
+/// Rounding error of the squared length of a unit quaternion: that of its four numbers and of the sum.
 const LENGTH_ROUNDING: f64 = 8.0 * f64::EPSILON;
-/// How many times its range a device may report: it is asked where a handle is that has left it.
+/// Largest pose, as a multiple of the device's range: a device also reports handles that have left the range.
 const RANGES: f64 = 2.0;
-/// Where a handle may be along an axis whose device says no range, m: a room.
+/// Largest position along an axis without a declared range, m: a room.
 const ROOM_M: f64 = 10.0;
-/// Fastest that a handle goes from one sample to the next: a throw leaves the hand at ten times the fastest reach (0.5
+/// Largest velocity of a handle between samples: a throw leaves the hand at ten times the fastest reach (0.5
 /// m/s is fast within a workspace of centimetres), a wrist turns at 30 rad/s.
 const SPEED_M_PER_S: f64 = 5.0;
 const SPIN_RAD_PER_S: f64 = 50.0;
-/// Fastest change of that: 500 times that of a fall. Of a handle in a hand, a tap on a wall has a tenth of it.
+/// Largest acceleration: 500 times that of gravity. A tap on a wall with a handle in the hand has a tenth of it.
 const ACCELERATION_M_PER_S2: f64 = 5.0e3;
-/// How many times the fastest a reported velocity may be: estimates from positions overshoot.
+/// Largest reported velocity, as a multiple of the largest velocity: estimates from positions overshoot.
 const TWIST_OVERSHOOT: f64 = 2.0;
-/// What noise and a sample that was taken a little earlier or later add to a way: a tenth of a millimetre at each end, or
-/// the steps of the sensor where those are coarser; and a fifth of a degree.
+/// Tolerance of a displacement for noise and for samples taken a little early or late: a tenth of a millimetre at each end, or
+/// four steps of a coarser sensor; and a fifth of a degree.
 const SLACK_M: f64 = 2.0e-4;
 const SLACK_STEPS: f64 = 4.0;
 const SLACK_RAD: f64 = 4.0e-3;
-/// How far a sample's time may be from the loop's, beyond what periods and the device's latency explain, ns: ahead, where a
-/// device stamps when a late tick asks, and behind.
+/// Tolerance of the time of a sample against the loop's, beyond periods and the device's latency, ns: ahead, for a device that
+/// stamps when a late tick reads, and behind.
 const AHEAD_NS: u64 = 10_000_000;
 const BEHIND_NS: u64 = 100_000_000;
-/// The same in periods.
+/// Tolerance of the time of a sample, in periods.
 const AHEAD_PERIODS: u64 = 2;
 const BEHIND_PERIODS: u64 = 40;
-/// The force is zero after this time without a usable sample: the hand may have moved by 3 mm (10 Hz, amplitude 5 mm).
+/// Time without a usable sample after which the force is zero, ns: the hand may have moved by 3 mm (10 Hz, amplitude 5 mm).
 const STALE_LIMIT_NS: u64 = 10_000_000;
-/// Samples in a row that may be lost at any rate: one is normal.
+/// Least number of consecutive lost samples that is tolerated at any rate: one is normal.
 const STALE_TICKS_BORNE: u64 = 2;
-/// How much longer a pose with noise may stay the same to the bit.
+/// Timeout of a noisy pose without any changed bit, as a multiple of the sample timeout.
 const STUCK_TIMES: u32 = 5;
-/// How much longer samples that cannot be are borne before the device counts as faulty.
+/// Implausible samples until a device fault, as a multiple of those until the force is removed.
 const FAULT_TIMES: u32 = 10;
-/// Samples that can be and make up for one that cannot: of a device that is wrong more often than once in so many, nothing
-/// is believed in the end.
+/// Plausible samples that compensate for one implausible sample: a device that is wrong more often ends up as faulty.
 const GOOD_FOR_A_BAD: u32 = 20;
 
-/// Why a sample cannot be.
+/// Reason why a sample is implausible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Implausible {
     /// A number is NaN or infinite.
     NotFinite,
-    /// The orientation has not the length of a rotation.
+    /// The length of the orientation is not one.
     Quaternion,
     /// The pose is farther out than twice the range.
     Range,
-    /// No handle gets from the last sample to this one in that time, or has that velocity.
+    /// The velocity, reported or since the last sample, is higher than that of any handle.
     Speed,
-    /// No handle changes its velocity that fast.
+    /// The velocity changes faster than that of any handle.
     Acceleration,
-    /// It was taken in the future, long ago, before the last one, or is the last one again and again.
+    /// The sample was taken in the future, too long ago or before the last one, or is repeated too often.
     Time,
-    /// A pose with noise that has not changed in any bit.
+    /// A noisy pose has not changed in any bit.
     Stuck,
 }
 
 impl Implausible {
-    /// All of them.
+    /// All reasons.
     pub const ALL: [Implausible; 7] = [
         Self::NotFinite,
         Self::Quaternion,
@@ -82,7 +81,7 @@ impl Implausible {
         Self::Stuck,
     ];
 
-    /// For reports.
+    /// Returns the name of the reason, for reports.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -97,23 +96,23 @@ impl Implausible {
     }
 }
 
-/// What has been found of a device's samples in a run.
+/// Implausible samples of a device in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImplausibleSamples {
-    /// How many, in the order of [`Implausible::ALL`].
+    /// Counts in the order of [`Implausible::ALL`].
     counts: [u64; Implausible::ALL.len()],
-    /// Tick of the first.
+    /// Tick of the first implausible sample.
     first_tick: Option<u64>,
 }
 
 impl ImplausibleSamples {
-    /// How many could not be for this reason. Real-time: bounded, no allocation.
+    /// Returns the number of samples that were implausible for this reason. Real-time: bounded, no allocation.
     #[must_use]
     pub fn count(&self, why: Implausible) -> u64 {
         self.counts.get(why as usize).copied().unwrap_or(0)
     }
 
-    /// Tick of the first. Real-time: bounded, no allocation.
+    /// Returns the tick of the first implausible sample. Real-time: bounded, no allocation.
     #[must_use]
     pub fn first_tick(&self) -> Option<u64> {
         self.first_tick
@@ -141,24 +140,24 @@ impl std::fmt::Display for ImplausibleSamples {
     }
 }
 
-/// How far a device is believed.
+/// Trust in the samples of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trust {
-    /// What it says is used.
+    /// Samples are used.
     Full,
-    /// There have been too many samples that cannot be: no force for a while.
+    /// Too many samples were implausible: no force for a while.
     Withdrawn,
-    /// It goes on like that: the device is faulty.
+    /// Implausible samples continue: the device is faulty.
     Lost,
 }
 
-/// A sample that was believed, and when it came.
+/// An accepted sample and its time.
 #[derive(Clone, Copy)]
 struct Believed {
     pose: Pose,
     time_ns: u64,
     sampled_ns: u64,
-    /// Way from the one before, m, and its time, s; zero before there were two.
+    /// Displacement since the sample before, m, and its time, s; zero before there were two.
     way: DVec3,
     over_s: f64,
 }
@@ -166,7 +165,7 @@ struct Believed {
 /// Poses that a device may report: two ellipsoids, of twice its range in position and in rotation.
 #[derive(Clone, Copy, Debug)]
 pub struct PoseBounds {
-    /// Per metre from home, and per sine of half a rotation from home: their vector is longer than one outside the bounds.
+    /// Reciprocal bounds, per m from home and per sine of half a rotation: a scaled vector longer than one is outside.
     per_reach: DVec3,
     per_turn: DVec3,
 }
@@ -190,10 +189,10 @@ impl PoseBounds {
     }
 }
 
-/// The check of the samples of one device.
+/// Plausibility check of the samples of one device.
 #[derive(Clone)]
 pub struct PlausibilityCheck {
-    /// A device that senses no pose may leave it as it likes.
+    /// False for a device that senses no pose and may report any.
     has_pose: bool,
     bounds: PoseBounds,
     slack_m: f64,
@@ -201,16 +200,16 @@ pub struct PlausibilityCheck {
     behind_ns: u64,
     stale_ticks: u32,
     last: Option<Believed>,
-    /// Samples in a row that are the one before, by their time, and by all bits of their pose.
+    /// Consecutive samples equal to the one before, by their time, and by all bits of their pose.
     repeated: u32,
     unmoved: u32,
-    /// Grows by [`GOOD_FOR_A_BAD`] with each sample that cannot be, falls by one with each that can.
+    /// Counter that grows by [`GOOD_FOR_A_BAD`] with each implausible sample and falls by one with each plausible one.
     distrust: u32,
     found: ImplausibleSamples,
 }
 
 impl PlausibilityCheck {
-    /// For a device that can do this, in a loop of this period. Not real-time.
+    /// Creates the check for a device with these capabilities, in a loop of this period. Not real-time.
     #[must_use]
     pub fn new(device: &Capabilities, period_ns: u64) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some seconds
@@ -231,10 +230,10 @@ impl PlausibilityCheck {
         }
     }
 
-    /// Looks at a new sample; one that can be is the last one from now on.
+    /// Checks a new sample against the bounds and the last plausible one, and replaces that if it is plausible.
     ///
     /// # Errors
-    /// Why it cannot be.
+    /// If the sample is implausible, the reason.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -250,7 +249,7 @@ impl PlausibilityCheck {
         checked
     }
 
-    /// How far the device is believed by now. Real-time: bounded, no allocation.
+    /// Returns the present trust in the device. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn trust(&self) -> Trust {
@@ -263,7 +262,7 @@ impl PlausibilityCheck {
         }
     }
 
-    /// What was found. Real-time: bounded, no allocation.
+    /// Returns the implausible samples so far. Real-time: bounded, no allocation.
     #[must_use]
     pub fn found(&self) -> ImplausibleSamples {
         self.found
@@ -278,12 +277,12 @@ impl PlausibilityCheck {
         if !self.has_pose {
             return if sample.is_finite() { Ok(()) } else { Err(Implausible::NotFinite) };
         }
-        // Each bound is put so that a number which is not finite is outside of it.
+        // Each comparison fails for a number that is not finite.
         let looked = self.within_bounds(tick, sample).and_then(|()| self.after_last(tick, sample));
         looked.map_err(|why| if sample.is_finite() { why } else { Implausible::NotFinite })
     }
 
-    /// That a handle can be there and that fast, at this time.
+    /// Checks pose, velocity and time of a sample against their bounds.
     #[inline]
     fn within_bounds(&self, tick: &Tick, sample: &DeviceState) -> Result<(), Implausible> {
         let DeviceState { pose, twist, sampled_ns, .. } = sample;
@@ -304,7 +303,7 @@ impl PlausibilityCheck {
         Ok(())
     }
 
-    /// That a handle can have come there from the last sample; this one is the last from now on.
+    /// Checks a sample against the last plausible one, and stores it as the last.
     #[inline]
     fn after_last(&mut self, tick: &Tick, sample: &DeviceState) -> Result<(), Implausible> {
         let DeviceState { pose, sampled_ns, .. } = *sample;
@@ -319,13 +318,13 @@ impl PlausibilityCheck {
         Ok(())
     }
 
-    /// That it is a sample after the last one, and not that one again.
+    /// Checks that a sample is newer than the last one, not repeated and not stuck.
     #[inline]
     fn follow(&mut self, last: &Believed, sample: &DeviceState) -> Result<(), Implausible> {
         if sample.sampled_ns < last.sampled_ns {
             return Err(Implausible::Time);
         }
-        // Before the first sample has come through a device with latency, it has nothing but where it started.
+        // Until the first sample has passed the latency of a device, it repeats the initial one.
         let is_repeated = sample.sampled_ns == last.sampled_ns && last.sampled_ns > 0;
         self.repeated = if is_repeated { self.repeated.saturating_add(1) } else { 0 };
         if self.repeated > self.stale_ticks {
@@ -339,11 +338,11 @@ impl PlausibilityCheck {
         Ok(())
     }
 
-    /// That a handle can have moved so far in this time, s; its way, m, and the time it had for it, s.
+    /// Checks velocity and acceleration since the last sample, over this time, s; returns displacement, m, and time, s.
     #[inline]
     fn moved(&self, last: &Believed, pose: &Pose, over_s: f64) -> Result<(DVec3, f64), Implausible> {
         let way = pose.position() - last.pose.position();
-        // Of two quaternions of one rotation the nearer: twice their distance is the angle between, as far as it is small.
+        // The nearer of two quaternions of one rotation: twice their distance is the angle between, if it is small.
         let (now, before) = (pose.orientation(), last.pose.orientation());
         let nearer = if now.dot(before) < 0.0 { -now } else { now };
         let turn = (nearer - before) * 2.0;
@@ -353,10 +352,10 @@ impl PlausibilityCheck {
             return Err(Implausible::Speed);
         }
         if over_s <= 0.0 {
-            return Ok((last.way, last.over_s)); // a first tick twice: no loop of ours
+            return Ok((last.way, last.over_s)); // a repeated first tick: not from our loops
         }
         if last.over_s > 0.0 {
-            // Mean velocities over two intervals lie half of both apart in time; their change times the later interval is a way.
+            // Mean velocities over two intervals lie half of both apart in time; their change times the later interval is a displacement.
             let ratio = over_s / last.over_s;
             let most_m =
                 ACCELERATION_M_PER_S2 * 0.5 * (over_s + last.over_s) * over_s + self.slack_m * (1.0 + ratio);
@@ -368,23 +367,23 @@ impl PlausibilityCheck {
     }
 }
 
-/// Ticks without a usable sample that are borne in a loop of this period. Not real-time.
+/// Returns the number of ticks without a usable sample that is tolerated in a loop of this period. Not real-time.
 #[must_use]
 pub fn stale_ticks_limit(period_ns: u64) -> u32 {
     let ticks = (STALE_LIMIT_NS / period_ns.max(1)).max(STALE_TICKS_BORNE);
     u32::try_from(ticks).unwrap_or(u32::MAX)
 }
 
-/// Returns true if the length of a quaternion is one within 1e-3: the one tolerance for orientations of devices, peers and
-/// scenes. Real-time: bounded, no allocation.
+/// Returns true if the length of a quaternion is one within 1e-3: the tolerance for orientations of devices, peers and scenes.
+/// Real-time: bounded, no allocation.
 #[inline]
 #[must_use]
 pub fn is_rotation(quaternion: DQuat) -> bool {
     (quaternion.length_squared() - 1.0).abs() <= 2.0 * LENGTH_TOLERANCE // false for NaN
 }
 
-/// Returns an accepted pose with an orientation of length one; a model may refuse any other. An orientation of length one
-/// within rounding, and one that [`is_rotation`] refuses, keeps its bits. Real-time: bounded, no allocation.
+/// Returns a pose with its orientation scaled to length one, as a model may reject any other. An orientation of length one
+/// within rounding, and one that [`is_rotation`] rejects, keeps its bits. Real-time: bounded, no allocation.
 #[inline]
 #[must_use]
 pub fn normalised(pose: &Pose) -> Pose {
@@ -396,7 +395,7 @@ pub fn normalised(pose: &Pose) -> Pose {
     Pose::new(pose.position(), orientation / squared.sqrt())
 }
 
-/// True if no handle moves like that, or a number is NaN. Real-time: bounded, no allocation.
+/// Returns true if no handle is that fast, or a number is NaN. Real-time: bounded, no allocation.
 #[inline]
 #[must_use]
 pub fn is_too_fast(twist: &Twist) -> bool {

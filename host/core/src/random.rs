@@ -1,8 +1,8 @@
-//! Random numbers that are the same for the same seed, in any order of work.
+//! Random numbers that depend only on seed and stream, in any order of work.
 
 use flotor_hal::DVec3;
 
-/// Random numbers for what has more dimensions than the sequence: SplitMix64 (Steele, Lea and Flood, OOPSLA
+/// Generator for more dimensions than a low-discrepancy sequence has: SplitMix64 (Steele, Lea and Flood, OOPSLA
 /// 2014). Each `stream` of a seed is independent of the others, so work can be done in any order.
 #[derive(Clone, Debug)]
 pub struct Random {
@@ -10,7 +10,7 @@ pub struct Random {
 }
 
 impl Random {
-    /// Stream number `stream` of a seed.
+    /// Creates stream number `stream` of a seed.
     #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut random = Self { state: seed ^ 0x6a09_e667_f3bc_c908 };
@@ -19,7 +19,7 @@ impl Random {
         random
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mixed = (self.state ^ self.state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -27,22 +27,22 @@ impl Random {
         mixed ^ mixed >> 31
     }
 
-    /// Uniform in 0..1.
+    /// Returns a uniform number in 0..1.
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / 9_007_199_254_740_992.0
     }
 
-    /// Uniform in -1..1.
+    /// Returns a uniform number in -1..1.
     pub fn symmetric(&mut self) -> f64 {
         2.0 * self.unit() - 1.0
     }
 
-    /// A vector in the cube -1..1.
+    /// Returns a uniform vector in the cube -1..1.
     pub fn vector(&mut self) -> DVec3 {
         DVec3::new(self.symmetric(), self.symmetric(), self.symmetric())
     }
 
-    /// A unit vector.
+    /// Returns a uniform unit vector.
     pub fn direction(&mut self) -> DVec3 {
         loop {
             let inside = self.vector();

@@ -1,16 +1,16 @@
-//! The boundary wall as a loop renders it on a device: as stiff as is stable there, and far enough inside the range.
+//! Boundary wall as a loop renders it on a device: as stiff as is stable, and far enough inside the range.
 
 use crate::limits::{Bound, Boundary};
 use flotor_hal::{Capabilities, Damper, SampledLoop};
 use std::fmt::{self, Display, Formatter};
 
-/// Force that the wall takes inside the range of a device, where device and scene allow that much, N.
+/// Force that the wall withstands inside the range of a device, N, if device and scene allow that much.
 pub const TAKEN_N: f64 = 5.0;
 
-/// Depth of a weight that is laid on at once, in depths at rest: it swings as far beyond as it came.
+/// Ratio of the depth of a suddenly applied weight to its depth at rest.
 const SWING: f64 = 2.0;
 
-/// Part of the range that is free of the wall.
+/// Least part of the range that is free of the wall.
 const LEAST_SHARE_OF_RANGE: f64 = 0.5;
 
 /// Boundary wall of one device.
@@ -28,10 +28,10 @@ pub struct RenderedBoundary {
     pub stiffness_nm_per_rad: f64,
     /// Rotational damping outwards, N·m·s/rad.
     pub damping_nms_per_rad: f64,
-    /// Weight that may be laid on without leaving the range, N; [`TAKEN_N`] or the limit of force, unless half of the range
-    /// is too short. At once where the limit of force is twice that.
+    /// Weight that the wall holds inside the range, N; [`TAKEN_N`] or the limit of force, unless half of the range is too short.
+    /// A weight applied at once is held too, if the limit of force is twice that.
     pub takes_n: f64,
-    /// Force that it should take, N.
+    /// Force that the wall should withstand, N.
     wanted_n: f64,
     /// The scene's stiffness, N/m and N·m/rad; the second is 0 on a device without torque.
     requested: [f64; 2],
@@ -41,7 +41,7 @@ pub struct RenderedBoundary {
 }
 
 impl RenderedBoundary {
-    /// Computes the wall on a device that gets at most `most_n`. Not real-time.
+    /// Computes the wall on a device whose force is limited to `most_n`. Not real-time.
     ///
     /// The damping of the device is not known and counts as zero. A wall without a damper has the scene's stiffness.
     #[must_use]
@@ -77,7 +77,7 @@ impl RenderedBoundary {
         }
     }
 
-    /// Returns a sentence if the wall is not what the scene says, or takes less force than it should. Not real-time.
+    /// Returns a sentence if the wall differs from that of the scene, or withstands less force than it should. Not real-time.
     #[must_use]
     pub fn notice(&self) -> Option<String> {
         let [stiffness, rotational] = self.requested;
@@ -105,7 +105,7 @@ impl RenderedBoundary {
     }
 }
 
-/// How the wall is limited, and where it begins.
+/// Limits of the wall and the place at which it begins.
 impl Display for RenderedBoundary {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { period_s, latency_s, stiffness_n_per_m, takes_n, .. } = *self;
@@ -126,7 +126,7 @@ impl Display for RenderedBoundary {
 /// Wall along one axis.
 struct Room {
     begins_m: f64,
-    /// Force that the wall takes, as a share of the wanted force; at most 1.
+    /// Force that the wall withstands, as a share of the wanted force; at most 1.
     taken_share: f64,
 }
 
@@ -140,7 +140,7 @@ impl Room {
     }
 }
 
-/// Returns the place at which a wall begins that takes this margin of a range; infinity without a range.
+/// Returns the place at which a wall with this margin inside a range begins; infinity without a range.
 fn begins(range: f64, margin: f64) -> f64 {
     if range > 0.0 { (range - margin).max(range * LEAST_SHARE_OF_RANGE) } else { f64::INFINITY }
 }

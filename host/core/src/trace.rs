@@ -1,4 +1,4 @@
-//! What one tick leaves behind, for all observers: recorder, plot, digest, viewer.
+//! Record of one tick, for all observers: recorder, plot, digest, viewer.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -6,14 +6,14 @@ use crate::ModelOutputs;
 use flotor_hal::{Demand, Pose, Twist, Wrench};
 use flotor_sync::Words;
 
-/// Things that happened in a tick, as a bit set.
+/// Events of a tick, as a bit set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Events {
     bits: u32,
 }
 
 impl Events {
-    /// Nothing happened.
+    /// No events.
     pub const NONE: Events = Events { bits: 0 };
     /// The device had no new sample.
     pub const STALE_SAMPLE: Events = Events { bits: 1 << 0 };
@@ -31,7 +31,7 @@ impl Events {
     pub const MODEL_FAULT: Events = Events { bits: 1 << 6 };
     /// The device reported a fault.
     pub const DEVICE_FAULT: Events = Events { bits: 1 << 7 };
-    /// The start-up ramp was still rising.
+    /// The force was fading in.
     pub const RAMPING: Events = Events { bits: 1 << 8 };
     /// The model left its domain, clamped, or did not converge.
     pub const MODEL_DEGRADED: Events = Events { bits: 1 << 9 };
@@ -39,32 +39,32 @@ impl Events {
     pub const MISSED: Events = Events { bits: 1 << 10 };
     /// The device's actuators were at their limit and gave less than was commanded.
     pub const SATURATED: Events = Events { bits: 1 << 11 };
-    /// No usable sample for a while: no force.
+    /// No usable sample arrived for a while: no force.
     pub const HOLDING: Events = Events { bits: 1 << 12 };
     /// The force was fading out, on the way to an orderly end.
     pub const RELEASING: Events = Events { bits: 1 << 13 };
     /// The emergency stop was pressed.
     pub const EMERGENCY_STOP: Events = Events { bits: 1 << 14 };
-    /// The handle was faster than allowed: what would have driven it on was taken away.
+    /// The handle was faster than allowed: the force component along the velocity was removed.
     pub const VELOCITY_LIMITED: Events = Events { bits: 1 << 15 };
-    /// A parameter of a plugin was changed before this tick, or was to be.
+    /// A change to a plugin was applied or rejected before this tick.
     pub const PARAMETER_CHANGED: Events = Events { bits: 1 << 16 };
-    /// Energy would have come out that had not gone in; the passivity controller removed it.
+    /// The port would have generated energy; the passivity controller removed it.
     pub const PASSIVITY_DAMPED: Events = Events { bits: 1 << 17 };
     /// A model took longer than its budget.
     pub const MODEL_OVERRUN: Events = Events { bits: 1 << 18 };
-    /// The force requested of the device is more than it should be used with.
+    /// The force requested of the device exceeds its recommended force.
     pub const EXCESS_FORCE: Events = Events { bits: 1 << 19 };
-    /// Nothing is heard of a coupling's other end, on another host: the coupling does not pull.
+    /// No message of the remote end of a coupling arrives: the coupling exerts no force.
     pub const PARTNER_SILENT: Events = Events { bits: 1 << 20 };
-    /// A device, or a coupling's other end, reported what cannot be: it was not used.
+    /// A device or a remote end sent an implausible state, which was not used.
     pub const IMPLAUSIBLE_SAMPLE: Events = Events { bits: 1 << 21 };
-    /// A plugin left rounding mode, flush-to-zero or traps of the loop's thread changed; they were put back at once.
+    /// A plugin changed rounding mode, flush-to-zero or traps of the loop's thread; the host restored them at once.
     pub const FLOAT_ENVIRONMENT: Events = Events { bits: 1 << 22 };
-    /// The other end of a coupling, on another host, claimed more than is believed: a motion too fast, or too much energy.
+    /// The remote end of a coupling claimed too much motion or energy: the excess was ignored.
     pub const PARTNER_LIMITED: Events = Events { bits: 1 << 23 };
 
-    /// The force swung between its limits: only a part of it was let through.
+    /// The force alternated between its limits: it was reduced.
     pub const OSCILLATION_DAMPED: Events = Events { bits: 1 << 24 };
 
     /// Faults: each ends or disables a part of the run.
@@ -112,14 +112,14 @@ impl Events {
         "oscillation_damped",
     ];
 
-    /// Both sets in one. Real-time: bounded, no allocation.
+    /// Returns the union of both sets. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn with(self, other: Events) -> Self {
         Self { bits: self.bits | other.bits }
     }
 
-    /// Each event of the set with its name, as people read it. Not real-time.
+    /// Returns each event of the set with its name for people. Not real-time.
     pub fn named(self) -> impl Iterator<Item = (Events, String)> {
         let each = (0..).zip(Self::NAMES).map(|(bit, name)| (Self::from_bits(1 << bit), name));
         each.filter(move |(event, _)| self.intersects(*event))
@@ -132,21 +132,21 @@ impl Events {
         self.bits |= other.bits;
     }
 
-    /// True if any of `other` happened. Real-time: bounded, no allocation.
+    /// Returns true if any of `other` happened. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn intersects(self, other: Events) -> bool {
         self.bits & other.bits != 0
     }
 
-    /// The set as a number.
+    /// Returns the set as a number.
     #[inline]
     #[must_use]
     pub const fn bits(self) -> u32 {
         self.bits
     }
 
-    /// The set from a number.
+    /// Creates the set from a number.
     #[inline]
     #[must_use]
     pub const fn from_bits(bits: u32) -> Self {
@@ -154,12 +154,12 @@ impl Events {
     }
 }
 
-/// Everything one tick leaves behind at one device, in the device frame.
+/// Record of one tick at one device, in the device frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TickRecord {
     /// Number of the tick, below 2^46: 2200 years at 1 kHz.
     pub tick: u64,
-    /// Number of the device in the scene: a tick leaves one record for each, in this order.
+    /// Index of the device in the scene: each tick yields one record for each device, in this order.
     pub device: u16,
     /// Scheduled time since the loop started, ns.
     pub time_ns: u64,
@@ -171,19 +171,19 @@ pub struct TickRecord {
     pub twist: Twist,
     /// Outputs of models and couplings, in the device frame and scaled to the device.
     pub model: ModelOutputs,
-    /// What was sent to the device after the envelope, N and N·m.
+    /// Wrench sent to the device after the envelope, N and N·m.
     pub commanded: Wrench,
-    /// What the device says it delivered since the previous tick, N and N·m.
+    /// Wrench delivered since the previous tick, as the device reports it, N and N·m.
     pub delivered: Wrench,
     /// Energy the hand has put into the device's port so far less what has come out, J.
     pub port_energy_j: f64,
-    /// What happened.
+    /// Events of the tick.
     pub events: Events,
     /// Buttons of the device.
     pub buttons: u32,
-    /// How late the tick started, ns; 0 on the virtual clock. Not part of the digest.
+    /// Delay of the start of the tick, ns; 0 on the virtual clock. Not part of the digest.
     pub lateness_ns: u64,
-    /// How long the tick took, ns. Not part of the digest.
+    /// Duration of the tick, ns. Not part of the digest.
     pub compute_ns: u64,
 }
 
@@ -192,16 +192,16 @@ pub const RECORD_WORDS: usize = 39;
 /// Words at the end of a record that hold measured times.
 pub const TIMING_WORDS: usize = 2;
 
-/// Bits of the first word that hold the number of the tick; the absent outputs are above, and the device above these.
+/// Bits of the first word that hold the number of the tick; the flags of absent outputs come next, then the device.
 const TICK_BITS: u32 = 46;
 const TICK_MASK: u64 = (1 << TICK_BITS) - 1;
-/// Bit of the first word that is set where an output of the models is absent.
+/// Outputs of the models, each with the bit of the first word that marks it as absent.
 const ABSENT: [(Demand, u64); 2] = [(Demand::TORQUE, 1 << TICK_BITS), (Demand::ENERGY, 1 << (TICK_BITS + 1))];
 /// First bit of the number of the device.
 const DEVICE_BIT: u32 = TICK_BITS + 2;
 
 impl Words<RECORD_WORDS> for TickRecord {
-    /// Written out: a tick does this, and a loop over the parts costs it three times as much.
+    /// Unrolled: this runs in every tick, and a loop over the parts takes three times as long.
     #[inline]
     fn to_words(&self) -> [u64; RECORD_WORDS] {
         let Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] } = self.pose;

@@ -1,20 +1,20 @@
-//! Against a partner on another host that throws a handle here out of the range of its device.
+//! Protection from a partner on another host that throws a handle here out of the range of its device.
 //!
-//! Energy that is believed may be that of a partner who lies, and a spring that is pulled to and fro at the right moments collects it in
-//! the handle. So the position is extrapolated by the velocity: where that leaves the range, nothing pulls the handle outwards, and a
-//! damper slows it down. Inside the range both take energy away. Hands are not that fast near an edge.
+//! Even accepted energy may come from a partner with false claims, and a spring that is pulled to and fro at the right moments
+//! collects that energy in the handle. So the position is extrapolated by the velocity: if that leaves the range, no force pulls the
+//! handle outwards, and a damper slows it down. Inside the range both dissipate energy. Hands are not that fast near an edge.
 
 use super::Reach;
 use flotor_hal::{DVec3, DeviceState, Wrench, rotation_vector};
 
-/// Time by which the position is extrapolated, s. A handle that moves straight outwards may cover the distance that is left in that
-/// time; the damper, 50 N·s/m at 1 kHz, keeps handle and hand, 1.1 kg, to that with a damping ratio of `sqrt(50 * 0.05 / (4 * 1.1)) = 0.75`.
+/// Time by which the position is extrapolated, s. A handle that moves straight outwards may cover the remaining distance in that
+/// time; the damper, 50 N·s/m at 1 kHz, slows handle and hand (1.1 kg) to that with damping ratio `sqrt(50 * 0.05 / (4 * 1.1)) = 0.75`.
 const AHEAD_S: f64 = 0.05;
 /// Mass and moment of inertia of the lightest handle and hand, kg and kg m²: the damper stops half of its motion in a period.
 const LIGHTEST_KG: f64 = 0.1;
 const LIGHTEST_KG_M2: f64 = 1.0e-4;
 
-/// Slows a handle down that could not be stopped before the edge.
+/// Brake for a handle that could not be stopped before the edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Brake {
     reach: Reach,
@@ -23,13 +23,13 @@ pub(super) struct Brake {
 }
 
 impl Brake {
-    /// For a device with this range, and a tick this often. Not real-time.
+    /// Creates the brake of a device with this range. Not real-time.
     pub(super) fn new(reach: Reach, period_s: f64) -> Self {
         let half = 0.5 / period_s;
         Self { reach, damping_ns_per_m: half * LIGHTEST_KG, damping_nms_per_rad: half * LIGHTEST_KG_M2 }
     }
 
-    /// What is left of a wrench (device frame). Real-time: bounded, no allocation.
+    /// Limits a wrench (device frame) and adds damping. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn braked(&self, wrench: &Wrench, state: &DeviceState) -> Wrench {
         let Reach { range_m, range_rad } = self.reach;
@@ -43,7 +43,7 @@ impl Brake {
     }
 }
 
-/// The force at a place inside an ellipsoid of these semi-axes, while the handle moves. An axis without a range (0) is not looked at.
+/// Returns the braked force at a place within an ellipsoid of these semi-axes. An axis without a range (0) is ignored.
 #[inline]
 fn slowed(force: DVec3, place: DVec3, speed: DVec3, range: [f64; 3], damping: f64) -> DVec3 {
     let range = DVec3::from_array(range);
@@ -54,7 +54,7 @@ fn slowed(force: DVec3, place: DVec3, speed: DVec3, range: [f64; 3], damping: f6
         return force;
     }
     let edge = ahead / part;
-    // Normal of the ellipsoid there. From inside, the velocity along it is outwards and the damper only takes energy; from outside
+    // Normal of the ellipsoid there. From inside, the velocity along it is outwards and the damper only dissipates energy; from outside
     // it also pushes back.
     let Some(outwards) = (edge * inverse * inverse).try_normalize() else { return force };
     let excess = outwards.dot(ahead - edge) / AHEAD_S;

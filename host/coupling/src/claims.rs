@@ -1,9 +1,9 @@
-//! What a partner on another host is believed: nothing that a hand on a device like ours could not have done.
+//! Limits on the claims of a partner on another host: only what a hand on a device like ours could have done.
 //!
-//! Its message is a claim. One that no device could make, of a place, an orientation or a velocity, is not used at all. Of all
-//! others, the pose counts as far as this device reaches, and moves no faster than a hand. The energy that it says it has passed on counts up to
-//! what can be checked here: what this end has passed on itself, and the work of a hand that moved as the claimed pose did, against
-//! the coupling, with the power of a hand. The rest is cut and counted; who is cut too much is a partner no longer.
+//! A message is a claim. One with an impossible position, orientation or velocity is not used at all. Otherwise
+//! the pose counts within the range of this device, and moves no faster than a hand. The energy claimed as passed on counts up to
+//! the amount that can be checked here: the energy that this end has passed on itself, and the work of a hand that moved as the claimed
+//! pose did, against the coupling, with the power of a hand. The excess is cut and counted; a partner with too much excess is rejected.
 
 use flotor_core::coupling::CouplingConfig;
 use flotor_core::mapping::Mapping;
@@ -11,8 +11,8 @@ use flotor_core::peer::PeerState;
 use flotor_core::plausibility::{is_rotation, is_too_fast, normalised};
 use flotor_hal::{DVec3, DeviceState, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 
-/// How far the device here reaches, device frame: semi-axes of an ellipsoid of positions (m) and of one of rotation vectors (rad).
-/// An axis without a range (0) is not looked at.
+/// Range of the device here, device frame: semi-axes of an ellipsoid of positions (m) and of one of rotation vectors (rad).
+/// An axis without a range (0) is ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reach {
     /// Along each axis, m.
@@ -21,57 +21,57 @@ pub struct Reach {
     pub range_rad: [f64; 3],
 }
 
-/// What was not believed.
+/// Rejected part of a partner's claims.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cut {
     /// Energy, J, in the shared frame.
     pub energy_j: f64,
-    /// Way of the claimed position that was too fast, m, device frame.
+    /// Distance by which the claimed position moved too fast, m, device frame.
     pub path_m: f64,
-    /// The same of the orientation, rad.
+    /// Angle by which the claimed orientation turned too fast, rad.
     pub turn_rad: f64,
 }
 
-/// Fastest hand, m/s and rad/s: several times the speed of a hand that holds a handle.
+/// Largest speed of a hand, m/s and rad/s: several times that of a hand that holds a handle.
 const FASTEST_M_PER_S: f64 = 2.0;
 const FASTEST_RAD_PER_S: f64 = 30.0;
-/// What may come at once, because a message was late: so much time of the fastest motion, s.
+/// Motion accepted at once because a message may be late, as time of the fastest motion, s.
 const AT_ONCE_S: f64 = 0.01;
-/// What a hand can put into a handle, W, over longer than [`BURST_S`]; at once the work of so much time.
+/// Largest mean power of a hand, W, over longer than [`BURST_S`]; at once, the work of that time at this power.
 const HAND_W: f64 = 1.0;
 const BURST_S: f64 = 0.2;
-/// How old what an end sees of the other is at most where the coupling is of use, s: its spring is longer there than here.
+/// Largest age of a peer state for which the coupling is useful, s: the partner's spring is longer by the motion in that time.
 const OLDEST_S: f64 = 0.1;
-/// How much more than the work that is seen here may have been done there.
+/// Ratio of the largest work that the partner's hand may have done to the work estimated here.
 const MORE: f64 = 2.0;
-/// What a partner may have had before it was heard of, J: a full reserve and as much in its spring. It counts as work of its hand:
-/// who comes again and again has put in no more.
+/// Largest energy of a partner at its first message, J: a full reserve and as much in its spring. It counts as work of its hand,
+/// so that repeated connections add no energy.
 const AT_FIRST_J: f64 = 0.02;
-/// Who is cut by more than one of these within some [`MEMORY_S`] is no partner.
+/// Limits of the excess within some [`MEMORY_S`]; a partner above one of them is rejected.
 const TOO_MUCH: Cut = Cut { energy_j: 0.05, path_m: 0.25, turn_rad: 12.5 };
-/// Time after which a third is left of what was cut, s.
+/// Time constant with which the recent excess decays, s.
 const MEMORY_S: f64 = 1.0;
-/// How far from the middle a partner may be, in the shared frame of devices that are not scaled, m: the range of its device
+/// Largest distance of a partner from home, in the shared frame of devices that are not scaled, m: the range of its device
 /// is not known here; that of the largest arms is less.
 const FARTHEST_M: f64 = 2.0;
 
-/// What is believed of one partner. Energies in the shared frame.
+/// Check of the claims of one partner. Energies in the shared frame.
 pub(super) struct Claims {
     reach: Reach,
     config: CouplingConfig,
     energy_scale: f64,
     period_s: f64,
-    /// Where it was believed to be last, device frame: position and rotation vector.
+    /// Last accepted pose of the partner, device frame: position and rotation vector.
     last: Option<[DVec3; 2]>,
-    /// What it claimed to have passed on, and what of that was believed, J.
+    /// Energy that the partner claims to have passed on, and the accepted part of it, J.
     claimed_j: f64,
     believed_j: f64,
-    /// What it may still claim, J; what a hand may still have done, J.
+    /// Energy that the partner may still claim, and energy that its hand may still have put in, J.
     open_j: f64,
     hand_j: f64,
-    /// What this end had passed on in the last tick, J.
+    /// Energy that this end had passed on in the last tick, J.
     told_j: f64,
-    /// How far it may still have come, m and rad.
+    /// Remaining allowance of motion, m and rad.
     way: [f64; 2],
     cut: Cut,
     recent: Cut,
@@ -79,7 +79,7 @@ pub(super) struct Claims {
 }
 
 impl Claims {
-    /// Not real-time.
+    /// Creates the check without a partner. Not real-time.
     pub(super) fn new(config: &CouplingConfig, mapping: &Mapping, reach: Reach, period_s: f64) -> Self {
         Self {
             reach,
@@ -99,10 +99,10 @@ impl Claims {
         }
     }
 
-    /// Whether any device could be there and move like that; what could not is no message. Real-time: bounded, no allocation.
+    /// Returns true if a device could have this pose and velocity; other messages are ignored. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn can_be(&self, peer: &PeerState, mapping: &Mapping) -> bool {
-        // From metres of a device to the shared frame; the partner's may be another, but then is not smaller than one.
+        // From metres of a device to the shared frame; the partner's scale may differ, but then is not less than one.
         let scale = mapping.length_to_device(1.0).recip().max(1.0);
         let PeerState { pose, twist, .. } = peer;
         let unscaled = Twist::new(twist.linear() / scale, twist.angular());
@@ -113,8 +113,8 @@ impl Claims {
             && !is_too_fast(&unscaled)
     }
 
-    /// A partner claims from this state on: what it had passed on before was for somebody else. One that is not another remains
-    /// answerable for its claims of before. Real-time: bounded, no allocation.
+    /// Starts the claims of a partner at this state: energy passed on before was for another run. A partner that is not new stays
+    /// accountable for earlier claims. Real-time: bounded, no allocation.
     pub(super) fn meet(&mut self, peer: &PeerState, is_another: bool) {
         self.last = None;
         if is_another {
@@ -124,12 +124,12 @@ impl Claims {
         (self.claimed_j, self.open_j, self.hand_j) = (peer.told_j, had_j, self.hand_j - had_j);
     }
 
-    /// It was not heard of for a while: where it is now is where it begins. Real-time: bounded, no allocation.
+    /// Forgets the partner's pose after a silence: the next one is accepted as a start. Real-time: bounded, no allocation.
     pub(super) fn forget_place(&mut self) {
         self.last = None;
     }
 
-    /// A tick has gone by; `told_j` is all that this end has ever passed on. Real-time: bounded, no allocation.
+    /// Updates the allowances for a tick; `told_j` is the total energy passed on by this end. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn pass(&mut self, told_j: f64) {
         let period_s = self.period_s;
@@ -147,8 +147,8 @@ impl Claims {
         self.is_cut = false;
     }
 
-    /// What is believed of a claim, while the handle here is at `here` (device frame) and was not told anything for `silent_s`; its
-    /// energy is the running total of what was believed. Real-time: bounded, no allocation.
+    /// Returns the accepted part of a claim, with the handle here at `here` (device frame) and the last message `silent_s` ago; its
+    /// energy is the running total of accepted energy. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn believe(
         &mut self,
@@ -162,7 +162,7 @@ impl Claims {
             mapping.rotation().conjugate() * rotation_vector(peer.pose.orientation()),
         ];
         let within = [reached(claimed[0], self.reach.range_m), reached(claimed[1], self.reach.range_rad)];
-        // A partner with more range than this device is no liar: that is told, and not held against it.
+        // A partner with more range than this device makes no false claim: the cut is reported, and not counted.
         self.is_cut = within != claimed;
         let last = self.last.unwrap_or(within);
         let mut believed = within;
@@ -204,7 +204,7 @@ impl Claims {
         PeerState { pose, twist: bounded_twist(&peer.twist, mapping), told_j }
     }
 
-    /// The energy that is believed: all of it so far, J.
+    /// Returns the accepted energy: the total so far, J.
     fn energy(
         &mut self,
         told_j: f64,
@@ -215,7 +215,7 @@ impl Claims {
     ) -> f64 {
         let config = &self.config;
         let time_s = silent_s.max(self.period_s);
-        // Both hands move while the states of each other are on their way.
+        // Both hands move while the peer states are under way.
         let speed_m_per_s = path_m / time_s + motion.linear().length();
         let speed_rad_per_s = turn_rad / time_s + motion.angular().length();
         let away_m = (pose.position() - here.position()).length() + speed_m_per_s * OLDEST_S;
@@ -242,31 +242,31 @@ impl Claims {
         self.believed_j
     }
 
-    /// Whether something was cut in this tick. Real-time: bounded, no allocation.
+    /// Returns true if a claim was cut in this tick. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn is_cut(&self) -> bool {
         self.is_cut
     }
 
-    /// Whether more was cut than a partner may claim too much. Real-time: bounded, no allocation.
+    /// Returns true if the recent excess is above the limits for a partner. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn is_too_much(&self) -> bool {
         let Cut { energy_j, path_m, turn_rad } = self.recent;
         energy_j > TOO_MUCH.energy_j || path_m > TOO_MUCH.path_m || turn_rad > TOO_MUCH.turn_rad
     }
 
-    /// All that was ever cut, of any partner.
+    /// Returns the total excess of all partners.
     pub(super) fn cut(&self) -> Cut {
         self.cut
     }
 
-    /// All the energy that was ever believed, of any partner, J: no more than this, and what the hand here has put in, comes out.
+    /// Returns the total accepted energy of all partners, J: with the energy put in by the hand here, the most that can come out.
     pub(super) fn believed_j(&self) -> f64 {
         self.believed_j
     }
 }
 
-/// No faster than a hand, in the frame of the device.
+/// Limits a twist to that of a hand, in the frame of the device.
 fn bounded_twist(twist: &Twist, mapping: &Mapping) -> Twist {
     let most_m_per_s = FASTEST_M_PER_S / mapping.length_to_device(1.0);
     Twist::new(
@@ -275,7 +275,7 @@ fn bounded_twist(twist: &Twist, mapping: &Mapping) -> Twist {
     )
 }
 
-/// The vector, or the point of the ellipsoid in its direction.
+/// Limits a vector to an ellipsoid with these semi-axes.
 fn reached(vector: DVec3, range: [f64; 3]) -> DVec3 {
     let parts = vector.to_array().into_iter().zip(range).filter(|(_, range)| *range > 0.0);
     let outside = parts.map(|(part, range)| part / range).map(|ratio| ratio * ratio).sum::<f64>().sqrt();

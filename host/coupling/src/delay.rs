@@ -1,21 +1,21 @@
-//! Peer states on their way for a number of ticks.
+//! Delay of peer states by a number of ticks.
 
 use super::PeerState;
 
-/// What goes in comes out so many ticks later, in order.
+/// Delay line: returns each state a fixed number of ticks later, in order.
 pub(super) struct DelayLine {
-    /// As many places as the delay has ticks; empty without a delay.
+    /// One place for each tick of delay; empty without a delay.
     places: Box<[Option<PeerState>]>,
     next: usize,
 }
 
 impl DelayLine {
-    /// Not real-time.
+    /// Creates an empty delay line. Not real-time.
     pub(super) fn new(delay_ticks: u32) -> Self {
         Self { places: vec![None; delay_ticks as usize].into(), next: 0 }
     }
 
-    /// Takes the peer state of this tick in and gives the one that arrives in it; nothing has yet, in the first ticks.
+    /// Stores the peer state of this tick and returns the one that arrives; `None` in the first ticks.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]

@@ -1,4 +1,4 @@
-//! One end of a coupling: pulls its handle to where the partner was when last heard of.
+//! One end of a coupling: pulls its handle to the last known position of the partner.
 
 use super::brake::Brake;
 use super::{CouplingConfig, PassivityMode, Pull, Tank};
@@ -7,17 +7,17 @@ use flotor_core::mapping::{Mapping, MappingConfig};
 use flotor_core::peer::PeerState;
 use flotor_hal::{DVec3, DeviceState, Pose, Wrench, rotation_vector};
 
-/// Energy that is never counted on, J: what a surprise of 20 µm costs at 1 N. With it in hand, a hand that starts faster
-/// than expected does not take the tank below zero.
+/// Energy of the tank that stays in reserve, J: the cost of an unexpected motion of 20 µm at 1 N. With it, a hand that starts
+/// faster than expected does not take the tank below zero.
 const SURPRISE_J: f64 = 2.0e-5;
 
-/// Part of what the tank can spare that a tick may take: a force that drains it falls within ten ticks or more, and not in one.
+/// Share of the available energy that a tick may take: a force that drains the tank falls within ten ticks or more, and not in one.
 const DRAWN: f64 = 0.1;
-/// Time in which a force that was held back for want of energy comes back as a whole, s. At once it would draw more than there is
-/// in the next tick again, and go on and off from tick to tick: a hand feels that as a rattle.
+/// Time in which a force that was reduced for want of energy returns, s. At once it would draw more than there is
+/// in the next tick again, and switch on and off from tick to tick: a hand feels that as a rattle.
 const RETURN_S: f64 = 0.1;
 
-/// One end.
+/// One end of a coupling.
 pub struct End {
     config: CouplingConfig,
     mapping: Mapping,
@@ -26,18 +26,18 @@ pub struct End {
     tank: Tank,
     bounce: Bounce,
     partner: Option<PeerState>,
-    /// Part of the wrench that is asked for, 0 to 1: below one while the tank has been too low for it.
+    /// Share of the requested wrench, 0 to 1: below one while the tank has been too low.
     part: f64,
 }
 
 impl End {
-    /// An end at rest that has not heard of its partner; until it has, it asks for nothing. Not real-time.
+    /// Creates an end at rest without a peer state; until it receives one, it requests no force. Not real-time.
     ///
-    /// `mapping` leads from the device's frame to the shared one; `period_s` is the time between ticks.
+    /// `mapping` maps from the device's frame to the shared one; `period_s` is the time between ticks.
     #[must_use]
     pub fn new(config: &CouplingConfig, mapping: &MappingConfig, period_s: f64) -> Self {
         let mapping = Mapping::new(mapping);
-        // The damping of the coupling, as the hand feels it: what the pair is built to stand.
+        // The damping of the coupling, as the hand feels it, which the pair of devices can render.
         let controller = Controller::new(
             config.damping_ns_per_m * mapping.stiffness_scale(),
             config.damping_nms_per_rad * mapping.energy_scale(),
@@ -55,7 +55,7 @@ impl End {
         }
     }
 
-    /// Books what has crossed the port since the last tick, while `held` was applied (both in the device frame).
+    /// Books the energy that has crossed the port since the last tick, while `held` was applied (both in the device frame).
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -66,7 +66,7 @@ impl End {
         self.controller.follow(&state.twist);
     }
 
-    /// What the partner is to know, with a part of the energy that is here. Once a tick. Real-time: bounded, no
+    /// Returns the state for the partner, with a part of the energy in the tank. Call once a tick. Real-time: bounded, no
     /// allocation.
     #[inline]
     pub fn tell(&mut self, state: &DeviceState) -> PeerState {
@@ -74,7 +74,7 @@ impl End {
         self.peer_state(state, told_j)
     }
 
-    /// The same without energy: to a partner that may not be there nothing is passed on. Real-time: bounded, no allocation.
+    /// Returns the state for a partner that may not be there, to which no energy is passed on. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn call(&self, state: &DeviceState) -> PeerState {
         self.peer_state(state, self.tank.told_j())
@@ -89,25 +89,25 @@ impl End {
         }
     }
 
-    /// Takes the newest peer state in; those of ticks before may be missing. Real-time: bounded, no allocation.
+    /// Stores the newest peer state; those of earlier ticks may be missing. Real-time: bounded, no allocation.
     #[inline]
     pub fn hear(&mut self, peer: &PeerState) {
         self.tank.hear(peer.told_j);
         self.partner = Some(*peer);
     }
 
-    /// All that was ever passed on to the partner, J. Real-time: bounded, no allocation.
+    /// Returns the total energy passed on to the partner, J. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn told_j(&self) -> f64 {
         self.tank.told_j()
     }
 
-    /// From the device's frame to the shared one.
+    /// Returns the mapping from the device's frame to the shared one.
     pub(super) fn mapping(&self) -> &Mapping {
         &self.mapping
     }
 
-    /// What this end asks for. Real-time: bounded, no allocation.
+    /// Returns the wrench that this end requests. Real-time: bounded, no allocation.
     #[inline]
     pub fn pull(&mut self, state: &DeviceState) -> Pull {
         let pull = self.whole_pull(state);
@@ -115,7 +115,7 @@ impl End {
         pull
     }
 
-    /// A part of that, 0 to 1, which throws nothing out of the range: it brings out no more than the whole would. Real-time: bounded,
+    /// Returns a part of the pull, 0 to 1, limited by the brake: it takes no more energy than the whole would. Real-time: bounded,
     /// no allocation.
     #[inline]
     pub(super) fn pull_part(&mut self, state: &DeviceState, part: f64, brake: &Brake) -> Pull {
@@ -125,7 +125,7 @@ impl End {
         pull
     }
 
-    /// Nothing is asked for. Real-time: bounded, no allocation.
+    /// Requests no force. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn let_go(&mut self) -> Pull {
         self.bounce.asked = Wrench::ZERO;
@@ -158,7 +158,7 @@ impl End {
         Pull { wrench: given, energy_j: 0.5 * stored_j * scale, is_damped: given != wrench }
     }
 
-    /// As much of a wrench as the tank has the energy for, and no more than has come back of it yet.
+    /// Reduces a wrench to the energy in the tank, and to the share that has returned so far.
     #[inline]
     fn affordable(&mut self, whole: &Wrench, state: &DeviceState) -> Wrench {
         let part = (self.part + self.controller.period_s() / RETURN_S).min(1.0);
@@ -169,20 +169,20 @@ impl End {
         less.unwrap_or(asked)
     }
 
-    /// What stands in walls, J, in the shared frame.
+    /// Returns the energy stored in walls, J, in the shared frame.
     #[inline]
     fn bounce_j(&self) -> f64 {
         self.bounce.stored_j / self.mapping.energy_scale()
     }
 
-    /// The energy tank.
+    /// Returns the energy tank.
     #[must_use]
     pub fn tank(&self) -> &Tank {
         &self.tank
     }
 }
 
-/// The part of a wrench that another one is along it, 0 to 1, by force or torque, whichever is less.
+/// Returns the ratio of a reduced wrench to the whole along it, 0 to 1; the smaller one of force and torque.
 #[inline]
 fn part_along(less: &Wrench, whole: &Wrench) -> f64 {
     let of = |less: DVec3, whole: DVec3| {
@@ -192,22 +192,22 @@ fn part_along(less: &Wrench, whole: &Wrench) -> f64 {
     of(less.force(), whole.force()).min(of(less.torque(), whole.torque()))
 }
 
-/// What stands in springs that are not the coupling's: the walls at the boundary. It will come out at this end, and is not to be
+/// Energy stored in springs other than the coupling's: the walls at the boundary. It will come out at this end, and must not be
 /// passed on before.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bounce {
     observer: PortObserver,
-    /// What the coupling asked for last, device frame.
+    /// Wrench that the coupling requested last, device frame.
     asked: Wrench,
-    /// At most, J, as the device feels it.
+    /// Upper bound of the stored energy, J, as the device feels it.
     stored_j: f64,
 }
 
 impl Bounce {
-    /// Less than this is the rounding of sums, N; a tenth of it in N·m.
+    /// Rounding error of sums of forces, N; of torques a tenth of it, N·m.
     const NOTHING_N: f64 = 1.0e-9;
 
-    /// What is held beyond what was requested takes energy in and gives it back. Where nothing is, nothing stands in it.
+    /// Integrates the work of the wrench beyond the requested one; zero as long as there is no such wrench.
     #[inline]
     fn follow(&mut self, pose: &Pose, held: &Wrench) {
         let beyond = *held - self.asked;

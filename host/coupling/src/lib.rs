@@ -1,22 +1,22 @@
 //! Virtual coupling of two devices by a spring and a damper: bilateral teleoperation.
 //!
 //! Each device has an [`End`]. An end receives the state of its partner: pose, velocity and the energy it has
-//! passed on ([`PeerState`], some ticks old), and pulls its own handle there. It keeps an energy tank ([`Tank`]): what
-//! its hand puts in, less what comes out, plus what the partner has passed on. As long as no tank is below zero, the
-//! pair generates no energy, *whatever the delay*, constant or not, and even if messages get lost: the energy passed on
-//! is sent as a running total. That holds for ends that tell the truth; what one on another host claims is believed only as far as it
-//! can be checked here (`claims`), so that a lie brings out no more than that.
+//! passed on ([`PeerState`], some ticks old), and pulls its own handle there. It has an energy tank ([`Tank`]): the energy
+//! that its hand puts in, less the energy that comes out, plus the energy that the partner has passed on. As long as no tank is
+//! below zero, the pair generates no energy, *whatever the delay*, constant or not, and even if messages get lost: the energy passed
+//! on is sent as a running total. That holds for ends with true claims; the claims of one on another host are accepted only as far
+//! as they can be checked here (`claims`), so that a false claim yields no more energy than that.
 //!
 //! ```text
 //!  hand  <-- wrench --  End   -- PeerState: pose, twist, energy passed on -->  End  -- wrench -->  hand
 //!        -- motion -->  Tank  <-- PeerState ---------------------------------  Tank <-- motion --
 //! ```
 //!
-//! Where frames and scales differ, both ends speak of one shared frame; the way there is a mapping like a model's.
+//! Where frames and scales differ, both ends use one shared frame, with a mapping like a model's.
 //! Energies are those of the shared frame.
 //!
-//! [`Coupling`] is both ends in one loop with a delay of whole ticks. [`RemoteEnd`] is one end whose partner is on
-//! another host: the same end, the same peer state, which other threads transport over the [`Line`].
+//! [`Coupling`] has both ends in one loop with a delay of whole ticks. [`RemoteEnd`] is an end whose partner is on
+//! another host: the same end and peer state, which other threads transport over the [`Line`].
 //!
 //! Sources: energy tank and transfer of energy, M. Franken, S. Stramigioli, S. Misra, C. Secchi, A. Macchelli,
 //! "Bilateral telemanipulation with time delays: a two-layer approach combining passivity and transparency", IEEE
@@ -46,35 +46,35 @@ pub use tank::Tank;
 use delay::DelayLine;
 use flotor_hal::{DeviceState, Wrench};
 
-/// What happens at one of the devices of a coupling in a tick.
+/// State at one of the devices of a coupling in a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Grip<'a> {
-    /// Where the handle is and how it moves, device frame.
+    /// State of the handle, device frame.
     pub state: &'a DeviceState,
-    /// The wrench that was held since the last tick, as far as the coupling had asked for it, device frame.
+    /// Wrench applied since the last tick, as far as the coupling had requested it, device frame.
     pub held: Wrench,
 }
 
-/// What an end asks for in a tick.
+/// Request of an end in a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pull {
     /// Wrench on the hand, device frame.
     pub wrench: Wrench,
-    /// This end's half of what the spring stores, scaled to the device, J.
+    /// This end's half of the energy stored in the spring, scaled to the device, J.
     pub energy_j: f64,
-    /// The controller has taken something away.
+    /// True if the controller has reduced the wrench.
     pub is_damped: bool,
 }
 
-/// Two ends in one loop.
+/// Coupling with both ends in one loop.
 pub struct Coupling {
     ends: [End; 2],
-    /// Peer states on their way to the end of the same number.
+    /// Peer states under way to the end with the same index.
     ways: [DelayLine; 2],
 }
 
 impl Coupling {
-    /// A coupling at rest, with empty tanks; `period_s` is the time between ticks. Not real-time.
+    /// Creates a coupling at rest, with empty tanks; `period_s` is the time between ticks. Not real-time.
     #[must_use]
     pub fn new(config: &CouplingConfig, ends: &[CouplingEnd; 2], period_s: f64) -> Self {
         Self {
@@ -83,7 +83,7 @@ impl Coupling {
         }
     }
 
-    /// One tick: what both ends ask for. Real-time: bounded, no allocation.
+    /// Runs one tick and returns the request of each end. Real-time: bounded, no allocation.
     #[inline]
     pub fn step(&mut self, grips: [Grip<'_>; 2]) -> [Pull; 2] {
         let Self { ends: [first, second], ways: [to_first, to_second] } = self;
@@ -99,7 +99,7 @@ impl Coupling {
         [first.pull(at_first.state), second.pull(at_second.state)]
     }
 
-    /// The energy tanks of both ends.
+    /// Returns the energy tanks of both ends.
     #[must_use]
     pub fn tanks(&self) -> [&Tank; 2] {
         let [first, second] = &self.ends;

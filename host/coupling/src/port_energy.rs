@@ -1,17 +1,17 @@
-//! Energy at a port, between a hand and whatever pushes it: what has gone in, and how to keep more from coming out.
+//! Energy at a port between a hand and a device: measurement, and a controller that prevents its generation.
 //!
 //! With the wrench held from one sample to the next, the energy that crosses the port between two samples is known
-//! exactly: the wrench that was held times the way the handle went (the passivity observer of Hannaford and Ryu,
+//! exactly: the applied wrench times the displacement of the handle (the passivity observer of Hannaford and Ryu,
 //! "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation 18(1), 2002, eq. 5).
-//! A spring, a damper, a wall of stored or dissipated energy never gives back more than it got. A loop that does is
-//! active: its model creates energy, or sampling does.
+//! A spring, a damper, a wall of stored or dissipated energy never gives back more than it received. A loop that does is
+//! active: its model generates energy, or sampling does.
 //!
 //! The controller predicts the energy that the port may give until the next sample, from the velocity and from the accelerations of
-//! the recent past, and lets pass the share of the wrench for which the energy is there (the energy tank of Franken and others,
+//! the recent past, and passes the share of the wrench for which the energy is available (the energy tank of Franken and others,
 //! IEEE Trans. Robotics 27(4), 2011, section IV). In place of the rest it injects damping along the motion (the impedance form of the
 //! first paper), unless the handle hardly moves.
 //!
-//! The envelope guards each device's port with it, a [coupling](crate::Coupling) each of its ends.
+//! The envelope uses the controller at each device's port, a [coupling](crate::Coupling) at each of its ends.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -35,7 +35,7 @@ impl Displacement {
     }
 }
 
-/// Poses of a handle from sample to sample.
+/// Passivity observer: follows the poses of a handle from sample to sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PortObserver {
     /// Pose at the last sample; `None` before the first.
@@ -61,7 +61,7 @@ impl PortObserver {
     }
 }
 
-/// Accelerations of a handle in the recent past: a bound of the one until the next sample.
+/// Estimate of the largest acceleration of a handle until the next sample, from the recent past.
 ///
 /// A calm handle is assumed to remain calm, so that a hand that presses slowly feels a force from the first energy that it puts in;
 /// a handle that shakes is assumed to go on.
@@ -73,7 +73,7 @@ struct RecentMotion {
 }
 
 impl RecentMotion {
-    /// Acceleration that is assumed of the calmest handle: twice that of tremor, 0.1 mm at 10 Hz, and the same at a lever of a tenth
+    /// Least acceleration assumed of a handle: twice that of tremor, 0.1 mm at 10 Hz, and that motion at a lever of a tenth
     /// of a metre, m/s² and rad/s².
     const CALMEST: [f64; 2] = [0.8, 8.0];
     /// Mass and moment of inertia of the lightest handle and hand, kg and kg m²: a fifth and a tenth of the flotor alone (0.58 kg,
@@ -86,7 +86,7 @@ impl RecentMotion {
 
     const NONE: Self = Self { last: None, acceleration: Self::CALMEST };
 
-    /// Takes in the velocity at a sample.
+    /// Updates the estimate with the velocity at a sample.
     #[inline]
     fn follow(&mut self, twist: &Twist, period_s: f64) {
         let Some(last) = self.last.replace(*twist) else { return };
@@ -102,7 +102,7 @@ impl RecentMotion {
     }
 }
 
-/// Keeps energy from coming out of a port beyond what is available: of a device's port, and of each end of a coupling.
+/// Passivity controller: limits the energy that a device's port, or an end of a coupling, may give to the available energy.
 #[derive(Clone, Copy, Debug)]
 pub struct Controller {
     damping_ns_per_m: f64,
@@ -112,7 +112,7 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller of wrenches that are held for `period_s` seconds; it injects at most this damping, N·s/m and N·m·s/rad.
+    /// Creates a controller of wrenches that are held for `period_s` seconds; it injects at most this damping, N·s/m and N·m·s/rad.
     /// Not real-time.
     #[must_use]
     pub fn new(damping_ns_per_m: f64, damping_nms_per_rad: f64, period_s: f64) -> Self {
@@ -125,7 +125,7 @@ impl Controller {
         self.period_s
     }
 
-    /// Takes in the velocity at a sample; once a tick. Real-time: bounded, no allocation.
+    /// Updates the motion with the velocity at a sample; once a tick. Real-time: bounded, no allocation.
     #[inline]
     pub fn follow(&mut self, twist: &Twist) {
         self.motion.follow(twist, self.period_s);
@@ -191,23 +191,23 @@ impl Controller {
 /// Bisections of the share of a wrench that passes: to 1 mN of 60 N.
 const BISECTIONS: u32 = 16;
 
-/// Translation or rotation over the next period: effort in N or N·m, way in m or rad.
+/// Translation or rotation over the next period: effort in N or N·m, displacement in m or rad.
 struct Side {
     effort: DVec3,
     /// Effort over the last period.
     held: DVec3,
-    /// Way of the handle at its present velocity.
+    /// Displacement of the handle at its present velocity.
     way: DVec3,
-    /// Way that an acceleration of the recent past may add.
+    /// Displacement that an acceleration of the recent past may add.
     surprise: f64,
-    /// Way that a change of the effort adds to the lightest handle.
+    /// Displacement of the lightest handle per change of the effort.
     way_per_effort: f64,
-    /// Effort of which the port surely gives nothing: the damping that is injected, or zero.
+    /// Effort with which the port surely gives no energy: the injected damping, or zero.
     floor: DVec3,
 }
 
 impl Side {
-    /// Injects damping where it surely takes energy: not in a handle that hardly moves.
+    /// Adds injected damping if it surely dissipates energy: not on a handle that hardly moves.
     #[inline]
     fn with_floor(self, damping: DVec3) -> Self {
         if self.may_cost_j(damping) < 0.0 { Self { floor: damping, ..self } } else { self }
@@ -227,7 +227,7 @@ impl Side {
         steady_j + (effort - self.held).dot(effort).max(0.0) * self.way_per_effort
     }
 
-    /// Returns this share of the effort, 0 to 1, and damping for the rest; all of an effort that surely takes energy.
+    /// Returns this share of the effort, 0 to 1, and damping for the rest; all of an effort that surely dissipates energy.
     #[inline]
     fn part(&self, share: f64) -> DVec3 {
         if share >= 1.0 || self.may_cost_j(self.effort) <= 0.0 {
@@ -237,8 +237,8 @@ impl Side {
     }
 }
 
-/// Rotation vector of a rotation from one sample to the next, rad. The series of the arc sine up to its third power is
-/// exact to 1e-6 of the angle up to a tenth of a radian, which is 100 rad/s at 1 kHz; there is no arc tangent to wait for.
+/// Returns the rotation vector of a rotation between two samples, rad. The series of the arc sine up to its third power is
+/// exact to 1e-6 of the angle up to a tenth of a radian, which is 100 rad/s at 1 kHz, and avoids an arc tangent.
 fn small_rotation(rotation: DQuat) -> DVec3 {
     let sine = rotation.xyz();
     // q and -q are one rotation: the smaller one is that with w above zero.

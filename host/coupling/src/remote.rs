@@ -1,4 +1,4 @@
-//! One end of a coupling whose other end is on another host.
+//! End of a coupling whose other end is on another host.
 
 use super::brake::Brake;
 use super::claims::{Claims, Cut, Reach};
@@ -7,7 +7,7 @@ use flotor_core::peer::{DISPATCH_WORDS, Dispatch, PeerState, TankState};
 use flotor_hal::{DeviceState, Tick, Wrench};
 use flotor_sync::{Observer, Publisher, latest};
 
-/// How long an end goes by what it heard last.
+/// Timeout and fade of a remote end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
     /// Time without a message after which the end removes its force, ns.
@@ -16,44 +16,44 @@ pub struct Patience {
     pub fade_ns: u64,
 }
 
-/// Where the peer state leaves the loop and enters it, for a peer link. Neither side ever waits for the other: only the
-/// newest counts.
+/// Connection of an end's loop to a peer link, in both directions. Neither side ever waits for the other: only the
+/// newest state counts.
 pub struct Line {
-    /// What this end sent last. Its `run` is 0: the peer link knows when the run began, and who is the partner.
+    /// Last message of this end. Its `run`, `partner` and `since` are 0: the peer link sets them.
     pub told: Observer<Dispatch, DISPATCH_WORDS>,
-    /// What this end is to hear, newest last.
+    /// Messages for this end, newest last.
     pub heard: Publisher<Dispatch, DISPATCH_WORDS>,
     /// Time without a message after which the partner is gone, ns.
     pub silence_ns: u64,
 }
 
-/// How an end has heard its partner.
+/// Statistics of the messages from the partner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hearing {
     /// Ticks in which a message arrived.
     pub ticks: u64,
-    /// How often the partner fell silent for longer than is waited.
+    /// Number of timeouts of the partner.
     pub silences: u64,
     /// The longest wait for a message, ns.
     pub longest_wait_ns: u64,
-    /// Messages that cannot be true: they were not used.
+    /// Implausible messages, which were not used.
     pub implausible: u64,
     /// The partner's run; 0 without one so far.
     pub run: u64,
     /// The partner's energy tank, as received last.
     pub partner: TankState,
-    /// The energy that was believed of partners, J: with what the hand here has put in, the most that can have come out here.
+    /// Accepted energy of partners, J: with the energy put in by the hand here, the most that can have come out here.
     pub believed_j: f64,
-    /// What of their claims was not believed.
+    /// Rejected part of the partners' claims.
     pub cut: Cut,
-    /// Ticks in which something was not believed.
+    /// Ticks in which a claim was cut.
     pub cut_ticks: u64,
-    /// The runs that were let go because of their claims, and are not heard again; 0: none so far. With the last place taken, no
-    /// other is heard.
+    /// Runs rejected because of their claims, whose messages are ignored; 0: no run. When all places are taken, every message is
+    /// ignored.
     pub let_go: [u64; 3],
 }
 
-/// An end, and the line to its partner.
+/// End of a coupling, with the line to its partner.
 ///
 /// Until the first message of the partner, and after too long a silence, its force is zero: the position of the partner
 /// is unknown. When messages arrive (again) the force fades in.
@@ -64,28 +64,28 @@ pub struct RemoteEnd {
     heard: Observer<Dispatch, DISPATCH_WORDS>,
     /// Version of the message taken in last.
     version: u64,
-    /// The partner's run, and since when it names this one.
+    /// Partner's run, and the tick from which on it has this run as its partner.
     partner: Option<(u64, u64)>,
     hold: Hold,
     claims: Claims,
     brake: Brake,
     hearing: Hearing,
-    /// Whether the message of this tick was not believed.
+    /// True if the message of this tick was implausible.
     is_implausible: bool,
-    /// Whether a partner that was let go may have thrown the handle: it is braked until it no longer needs to be.
+    /// True if a rejected partner may have thrown the handle: the brake acts until the handle is slow enough.
     is_thrown: bool,
 }
 
-/// Whether the end holds on to its partner.
+/// State of the connection to the partner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hold {
-    /// Nothing is known of it.
+    /// The partner's position is unknown.
     Released,
-    /// It was heard of at `heard_ns`, and without silence since `since_ns`.
+    /// Last message at `heard_ns`, and no timeout since `since_ns`.
     On { since_ns: u64, heard_ns: u64 },
 }
 
-/// What the cells hold before the first message. It is never taken in.
+/// Initial content of the cells, never used as a message.
 const NOBODY: Dispatch = Dispatch {
     run: 0,
     partner: 0,
@@ -96,7 +96,7 @@ const NOBODY: Dispatch = Dispatch {
 };
 
 impl RemoteEnd {
-    /// An end at rest, and the line for its peer state. `period_s` is the time between ticks. Not real-time.
+    /// Creates an end at rest, and the line for its peer state. `period_s` is the time between ticks. Not real-time.
     #[must_use]
     pub fn new(
         config: &CouplingConfig,
@@ -125,7 +125,7 @@ impl RemoteEnd {
         (end, Line { told: for_partner, heard: from_partner, silence_ns: patience.silence_ns })
     }
 
-    /// One tick: what this end asks for. Real-time: bounded, no allocation.
+    /// Runs one tick and returns the request of this end. Real-time: bounded, no allocation.
     #[inline]
     pub fn step(&mut self, tick: &Tick, grip: Grip<'_>) -> Pull {
         self.end.observe(grip.state, &grip.held);
@@ -157,43 +157,43 @@ impl RemoteEnd {
         }
     }
 
-    /// True if the partner is not heard of. Real-time: bounded, no allocation.
+    /// Returns true while no messages of the partner arrive. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_alone(&self) -> bool {
         self.hold == Hold::Released
     }
 
-    /// True if the partner told in this tick what cannot be. Real-time: bounded, no allocation.
+    /// Returns true if the partner's message of this tick was implausible. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_implausible(&self) -> bool {
         self.is_implausible
     }
 
-    /// True if a claim of the partner was cut in this tick. Real-time: bounded, no allocation.
+    /// Returns true if a claim of the partner was cut in this tick. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_cut(&self) -> bool {
         self.claims.is_cut()
     }
 
-    /// This end's energy tank. Real-time: bounded, no allocation.
+    /// Returns the state of this end's energy tank. Real-time: bounded, no allocation.
     #[must_use]
     pub fn tank(&self) -> TankState {
         self.end.tank().state()
     }
 
-    /// How the partner was heard. Real-time: bounded, no allocation.
+    /// Returns the statistics of the partner's messages. Real-time: bounded, no allocation.
     #[must_use]
     pub fn hearing(&self) -> Hearing {
         Hearing { believed_j: self.claims.believed_j(), cut: self.claims.cut(), ..self.hearing }
     }
 
-    /// Takes in what is new, or notices that nothing is.
+    /// Processes a new message, or checks the timeout.
     #[inline]
     fn listen(&mut self, now_ns: u64, here: &DeviceState) {
-        // A cell that is being written just now is looked at again in the next tick.
+        // A cell that is being written now is read again in the next tick.
         self.is_implausible = false;
         let newest = self.heard.read().filter(|(version, _)| *version != self.version);
         if let Some((version, dispatch)) = newest {
@@ -228,7 +228,7 @@ impl RemoteEnd {
         let partner = (dispatch.run, dispatch.since);
         let before = self.partner.replace(partner);
         if before != Some(partner) {
-            // Another run may be anywhere: it is taken hold of as slowly as the first, and so is one that comes back from another.
+            // Another run may be anywhere: the force fades in as for the first one, also when a run returns after another.
             self.claims.meet(&dispatch.state, before.is_none_or(|(run, _)| run != dispatch.run));
             self.hold = Hold::Released;
         }
@@ -261,7 +261,7 @@ impl RemoteEnd {
         self.hold = Hold::On { since_ns, heard_ns: now_ns };
     }
 
-    /// Which part of the pull is felt so long after the end took hold.
+    /// Returns the share of the pull, by the time since the first message.
     #[inline]
     fn part_at(&self, held_ns: u64) -> f64 {
         let [held, fade] = [held_ns, self.patience.fade_ns].map(|ns| ns as f64);

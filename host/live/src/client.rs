@@ -1,4 +1,4 @@
-//! The watching side.
+//! Client of a running host.
 
 use crate::frame::{Frames, Kind, LongFrame, frame, ticks_from_payload};
 use crate::message::{Answer, Ask, ChangeMessage, End, Greeting, Request};
@@ -12,39 +12,39 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How long a host may take to say who it is.
+/// Timeout of a host's greeting.
 const GREETING_WAIT: Duration = Duration::from_secs(2);
-/// How long a request may take to leave this process.
+/// Timeout for sending a request.
 const ASK_WAIT: Duration = Duration::from_secs(1);
 
-/// Why a run cannot be watched.
+/// Reason why a client cannot observe a run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LiveError {
-    /// Nothing runs.
+    /// No session is running.
     #[error("no running session: start one with `flotor run` (searched in {})", path.display())]
     NoRun {
-        /// Where it was looked for.
+        /// Folder that was searched.
         path: PathBuf,
     },
-    /// Others run, not the process that was named.
+    /// Sessions are running, but none in the given process.
     #[error("process {process} runs no session; running: {}", running.join(", "))]
     OtherRuns {
-        /// The process that was named.
+        /// Process id that was given.
         process: u32,
-        /// Process and title of those that run.
+        /// Process and title of each running session.
         running: Vec<String>,
     },
     /// The connection broke.
     #[error("the host does not answer: {0}; is the run over?")]
     Connection(#[from] io::Error),
-    /// The host speaks something else.
+    /// The host uses another protocol version.
     #[error("the host speaks protocol {host}, this program {PROTOCOL}; use both from one build")]
     Protocol {
-        /// What the host speaks.
+        /// Protocol version of the host.
         host: u32,
     },
-    /// What the host says makes no sense.
+    /// A message of the host is malformed.
     #[error("malformed message from the host: {0}; use both from one build")]
     Garbled(String),
 }
@@ -55,14 +55,14 @@ impl From<LongFrame> for LiveError {
     }
 }
 
-/// What a run tells.
+/// Event received from a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// Ticks, in order.
+    /// Records of ticks, in order.
     Ticks {
-        /// The records.
+        /// Records in the order of ticks.
         records: Vec<TickRecord>,
-        /// How many found no room on the way, since the beginning.
+        /// Records dropped for want of room in the queue, since the beginning.
         dropped: u64,
     },
     /// A parameter changed.
@@ -73,7 +73,7 @@ pub enum Event {
     End(End),
 }
 
-/// A run being watched.
+/// Connection to a run.
 #[derive(Debug)]
 pub struct Client {
     stream: Stream,
@@ -83,7 +83,7 @@ pub struct Client {
     run: RunDescription,
 }
 
-/// Asks a run for something, from any thread; clone it freely.
+/// Client for sending requests to a run, from any thread; cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Asker {
     stream: Arc<Mutex<Stream>>,
@@ -91,18 +91,18 @@ pub struct Asker {
 }
 
 impl Client {
-    /// Watches the newest run that answers.
+    /// Connects to the newest run that answers.
     ///
     /// # Errors
-    /// [`LiveError::NoRun`], or what is wrong with the newest run if none answers.
+    /// [`LiveError::NoRun`], or the error of the newest run if none answers.
     pub fn find(directory: &Directory) -> Result<Self, LiveError> {
         Self::first_of(directory, directory.runs())
     }
 
-    /// Watches the run of a process.
+    /// Connects to the run of a process.
     ///
     /// # Errors
-    /// As [`Client::find`]; [`LiveError::OtherRuns`] if only other processes run.
+    /// Those of [`Client::find`]; [`LiveError::OtherRuns`] if only other processes run sessions.
     pub fn of_process(directory: &Directory, process: u32) -> Result<Self, LiveError> {
         let (runs, others): (Vec<_>, Vec<_>) =
             directory.runs().into_iter().partition(|run| run.process == process);
@@ -127,10 +127,10 @@ impl Client {
         Err(first.unwrap_or_else(|| LiveError::NoRun { path: directory.path().to_path_buf() }))
     }
 
-    /// Watches the run behind a socket. Nothing comes before [`Ask::Watch`].
+    /// Connects to the run of a socket. Ticks arrive only after [`Ask::Watch`].
     ///
     /// # Errors
-    /// [`LiveError`].
+    /// If the connection fails, or the host's protocol differs.
     pub fn connect(path: &Path) -> Result<Self, LiveError> {
         let mut stream = connect(path)?;
         let mut frames = Frames::default();
@@ -152,28 +152,28 @@ impl Client {
         Ok(Self { stream, frames, asker, greeting, run })
     }
 
-    /// What the host said of itself.
+    /// Returns the greeting of the host.
     #[must_use]
     pub fn greeting(&self) -> &Greeting {
         &self.greeting
     }
 
-    /// How the run was set up.
+    /// Returns the description of the run.
     #[must_use]
     pub fn run(&self) -> &RunDescription {
         &self.run
     }
 
-    /// The way to ask for something.
+    /// Returns a client for sending requests.
     #[must_use]
     pub fn asker(&self) -> Asker {
         self.asker.clone()
     }
 
-    /// What comes next; nothing if nothing comes in this time.
+    /// Waits for the next event; `None` on timeout.
     ///
     /// # Errors
-    /// [`LiveError`]: the host is gone, or not understood.
+    /// If the connection is closed, or a message is malformed.
     pub fn next(&mut self, timeout: Duration) -> Result<Option<Event>, LiveError> {
         let until = Instant::now() + timeout;
         let event = read_frame(&mut self.stream, &mut self.frames, until, |kind, payload| match kind {
@@ -191,10 +191,10 @@ impl Client {
 }
 
 impl Asker {
-    /// Sends a request; the number its answer will carry.
+    /// Sends a request; returns the number that its answer will contain.
     ///
     /// # Errors
-    /// [`LiveError::Connection`]: the host is gone, or takes nothing in.
+    /// [`LiveError::Connection`] if the host has closed the connection, or does not read in time.
     pub fn ask(&self, ask: Ask) -> Result<u64, LiveError> {
         let number = self.number.fetch_add(1, Ordering::Relaxed);
         let request = serde_json::to_vec(&Request { number, ask }).map_err(io::Error::from)?;
@@ -204,14 +204,14 @@ impl Asker {
     }
 }
 
-/// Reads until a frame is of use, or the time is over.
+/// Reads frames until `use_of` accepts one; `None` on timeout.
 fn read_frame<T>(
     stream: &mut Stream,
     frames: &mut Frames,
     until: Instant,
     mut use_of: impl FnMut(Kind, &[u8]) -> Option<T>,
 ) -> Result<Option<T>, LiveError> {
-    /// The system takes no time-out of zero.
+    /// Shortest timeout that the system accepts: zero is invalid.
     const SHORTEST: Duration = Duration::from_micros(100);
     loop {
         while let Some((kind, payload)) = frames.take()? {

@@ -1,4 +1,4 @@
-//! Where running hosts are found: one socket a run, in a folder that belongs to the user alone.
+//! Discovery of running hosts: one socket per run, in a folder that belongs to the user alone.
 
 use crate::platform::{
     Listening, Stream, is_ours, is_ours_alone, is_out_of_descriptors, is_same_file, make_folder,
@@ -12,56 +12,56 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::SystemTime;
 
-/// Ending of a socket's name.
+/// Extension of a socket's file.
 const SUFFIX: &str = "run";
 
-/// The folder of the sockets of running hosts.
+/// Folder with the sockets of running hosts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Directory {
     path: PathBuf,
 }
 
-/// A run that may be watched.
+/// Run found in the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
-    /// Its socket.
+    /// Socket of the run.
     pub path: PathBuf,
-    /// The process that runs it.
+    /// Id of the process that carries out the run.
     pub process: u32,
-    /// Since when.
+    /// Start of the run.
     pub since: SystemTime,
 }
 
-/// Why a run cannot be found by others.
+/// Reason why other programs cannot find a run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DirectoryError {
-    /// The folder cannot be made, or no socket in it.
+    /// The folder, or a socket in it, cannot be created.
     #[error("{}: {cause}; {}", path.display(), remedy(cause))]
     Unusable {
-        /// The folder or socket.
+        /// Path of the folder or socket.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         #[source]
         cause: io::Error,
     },
-    /// Others may enter the folder: they could change a run.
+    /// Other users may enter the folder: they could change a run.
     #[error("{}: unsafe permissions: other users may enter it and change a run; `chmod 700` it, and own it", path.display())]
     NotPrivate {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
 }
 
-/// Number set for this process; 0 if none is.
+/// Process id set for this process; 0 if none is.
 static PROCESS_NUMBER: AtomicU32 = AtomicU32::new(0);
 
-/// Gives this process the number of the process that started it and ends with it: users know that one. Not real-time.
+/// Sets the id under which other programs know this process: that of its supervisor, which users see. Not real-time.
 pub fn set_process_number(number: u32) {
     PROCESS_NUMBER.store(number, Ordering::Relaxed);
 }
 
-/// Returns the number by which others know this process. Not real-time.
+/// Returns the id under which other programs know this process. Not real-time.
 #[must_use]
 pub fn process_number() -> u32 {
     match PROCESS_NUMBER.load(Ordering::Relaxed) {
@@ -80,38 +80,38 @@ fn remedy(cause: &io::Error) -> &'static str {
 }
 
 impl Directory {
-    /// `$XDG_RUNTIME_DIR/flotor`, else `/tmp/flotor-UID`; on Windows `%LOCALAPPDATA%\\flotor\\run`.
+    /// Returns the folder of this user: `$XDG_RUNTIME_DIR/flotor`, else `/tmp/flotor-UID`; on Windows `%LOCALAPPDATA%\\flotor\\run`.
     #[must_use]
     pub fn of_this_user() -> Self {
         let runtime = std::env::var_os("XDG_RUNTIME_DIR").filter(|path| Path::new(path).is_dir());
         Self { path: runtime.map_or_else(run_folder, |runtime| Path::new(&runtime).join("flotor")) }
     }
 
-    /// Another folder.
+    /// Uses another folder.
     #[must_use]
     pub fn at(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into() }
     }
 
-    /// The folder.
+    /// Returns the path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether it is a folder of this user. Of another user's nothing is believed: in `/tmp` anybody can make one of this name.
+    /// Returns true if this user owns the folder. Other folders are not trusted: in `/tmp` any user can create one of this name.
     #[must_use]
     pub fn is_ours(&self) -> bool {
         std::fs::symlink_metadata(&self.path).is_ok_and(|attributes| is_ours(&attributes))
     }
 
-    /// The files in it; none in a folder of another user.
+    /// Returns the files in the folder; none if another user owns it.
     #[must_use]
     pub fn files(&self) -> Vec<DirEntry> {
         self.list().unwrap_or_default()
     }
 
-    /// The files in it; none if there is no folder.
+    /// Lists the files in the folder; none if there is no folder.
     fn list(&self) -> io::Result<Vec<DirEntry>> {
         match std::fs::symlink_metadata(&self.path) {
             Ok(attributes) if is_ours(&attributes) => std::fs::read_dir(&self.path)?.collect(),
@@ -121,16 +121,16 @@ impl Directory {
         }
     }
 
-    /// Runs whose sockets are open, the newest first; none where they cannot be listed. Removes the files of the other sockets.
+    /// Returns the runs whose sockets are open, the newest first; none if the folder cannot be read. Removes the files of closed sockets.
     #[must_use]
     pub fn runs(&self) -> Vec<Found> {
         self.try_runs().unwrap_or_default()
     }
 
-    /// As [`Directory::runs`].
+    /// Returns the runs of [`Directory::runs`], or the error.
     ///
     /// # Errors
-    /// [`DirectoryError::Unusable`]: the folder cannot be read, or is another user's.
+    /// [`DirectoryError::Unusable`] if the folder cannot be read, or another user owns it.
     pub fn try_runs(&self) -> Result<Vec<Found>, DirectoryError> {
         let mut runs: Vec<Found> = (self.list().map_err(unusable(&self.path))?.into_iter())
             .filter_map(|entry| {
@@ -147,22 +147,22 @@ impl Directory {
         Ok(runs)
     }
 
-    /// Makes the folder if need be, for this user alone.
+    /// Creates the folder if necessary, for this user alone.
     ///
     /// # Errors
-    /// [`DirectoryError`]: the folder is not usable, or not ours alone.
+    /// If the folder is not usable, or other users may enter it.
     pub fn make(&self) -> Result<(), DirectoryError> {
         private(&self.path)
     }
 
-    /// Makes the folder if need be, and a socket of this process in it.
+    /// Creates the folder if necessary, and a socket of this process in it.
     ///
     /// # Errors
-    /// [`DirectoryError`]: the folder is not usable, or not ours alone.
+    /// If the folder is not usable, or other users may enter it.
     pub fn listen(&self) -> Result<Listener, DirectoryError> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         private(&self.path)?;
-        let _ = self.runs(); // removes what is dead
+        let _ = self.runs(); // removes closed sockets
         loop {
             let number = NUMBER.fetch_add(1, Ordering::Relaxed);
             let path = self.path.join(format!("{}-{number}.{SUFFIX}", process_number()));
@@ -171,7 +171,7 @@ impl Directory {
                     let file = std::fs::symlink_metadata(&path).ok();
                     return Ok(Listener { socket: Arc::new(socket), path, file });
                 }
-                // A run of the same process number, in another container.
+                // A run with the same process id, in another container.
                 Err(error) if error.kind() == io::ErrorKind::AddrInUse => {}
                 Err(error) => return Err(unusable(&path)(error)),
             }
@@ -179,31 +179,31 @@ impl Directory {
     }
 }
 
-/// A socket that others can find; gone when dropped.
+/// Socket that other programs can find; removed when dropped.
 #[derive(Debug)]
 pub struct Listener {
     socket: Arc<Listening>,
     path: PathBuf,
-    /// Its file as it was made.
+    /// Metadata of the socket's file after its creation.
     file: Option<Metadata>,
 }
 
 impl Listener {
-    /// The socket.
+    /// Returns the socket.
     #[must_use]
     pub(crate) fn socket(&self) -> &Arc<Listening> {
         &self.socket
     }
 
-    /// Waits for the next connection, without an end.
+    /// Waits for the next connection, without a timeout.
     ///
     /// # Errors
-    /// The error of the system; `Interrupted` for a client that was turned away.
+    /// Errors of the system; `Interrupted` if a client was rejected.
     pub fn accept(&self) -> io::Result<Stream> {
         self.socket.accept()?.ok_or_else(|| io::ErrorKind::NotConnected.into())
     }
 
-    /// Its file.
+    /// Returns the path of the socket's file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -220,7 +220,7 @@ impl Drop for Listener {
     }
 }
 
-/// Makes a folder that only its user may enter, if it is not there.
+/// Creates a folder that only this user may enter, if necessary.
 pub(crate) fn private(path: &Path) -> Result<(), DirectoryError> {
     make_folder(path).map_err(unusable(path))?;
     let attributes = std::fs::symlink_metadata(path).map_err(unusable(path))?;
@@ -236,7 +236,7 @@ pub(crate) fn unusable(path: &Path) -> impl FnOnce(io::Error) -> DirectoryError 
     move |cause| DirectoryError::Unusable { path, cause }
 }
 
-/// The process whose socket this is.
+/// Returns the process id in a socket's file name.
 fn process_of(path: &Path) -> Option<u32> {
     let name = path.file_stem()?.to_str()?;
     let (process, _) = name.split_once('-')?;

@@ -1,24 +1,24 @@
-//! Frames: what cuts a stream of bytes into messages.
+//! Frames: encoding of messages in a stream of bytes.
 
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_sync::Words;
 use std::io::{self, Read};
 
-/// The longest payload either side sends, bytes: a few seconds of ticks. A longer one is no frame of ours.
+/// Longest payload, bytes: a few seconds of ticks. A longer one is malformed.
 pub const MOST_PAYLOAD: usize = 1 << 21;
-/// Length and kind.
+/// Bytes of length and kind.
 const HEAD: usize = 5;
 /// Bytes of a record.
 const RECORD: usize = 8 * RECORD_WORDS;
 
-/// What a frame holds.
+/// Kind of a frame, which determines its payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// [`crate::Greeting`].
     Greeting,
     /// `flotor.Run`.
     Run,
-    /// Records.
+    /// Records of ticks.
     Ticks,
     /// [`crate::ChangeMessage`].
     Change,
@@ -28,7 +28,7 @@ pub enum Kind {
     End,
     /// [`crate::Request`].
     Request,
-    /// Something of a later protocol: to be ignored.
+    /// A kind of a later protocol: to be ignored.
     Unknown(u8),
 }
 
@@ -60,15 +60,15 @@ impl Kind {
     }
 }
 
-/// A frame longer than any of ours: the other side uses another protocol.
+/// Error of a frame that is too long: the other side uses another protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a frame of {length} bytes exceeds {MOST_PAYLOAD}: protocol mismatch; use both sides from one build")]
 pub struct LongFrame {
-    /// What it says of its length.
+    /// Length in the frame's head, bytes.
     pub length: usize,
 }
 
-/// A message as bytes. `payload` is at most [`MOST_PAYLOAD`] long.
+/// Encodes a message as a frame. `payload` is at most [`MOST_PAYLOAD`] long.
 #[must_use]
 pub fn frame(kind: Kind, payload: &[u8]) -> Vec<u8> {
     debug_assert!(payload.len() <= MOST_PAYLOAD);
@@ -80,7 +80,7 @@ pub fn frame(kind: Kind, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Bytes as they come in, and the frames in them.
+/// Decoder of frames from received bytes.
 #[derive(Debug, Default)]
 pub struct Frames {
     bytes: Vec<u8>,
@@ -88,10 +88,10 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Takes in what a reader has; how many bytes that were, 0 at its end.
+    /// Reads available bytes; returns their number, 0 at the end of the stream.
     ///
     /// # Errors
-    /// What the reader says, time-outs among it; nothing is lost then.
+    /// Errors of the reader, timeouts included; no bytes are lost then.
     pub fn fill(&mut self, reader: &mut impl Read) -> io::Result<usize> {
         let mut some = [0; 1 << 14];
         let count = reader.read(&mut some)?;
@@ -99,17 +99,17 @@ impl Frames {
         Ok(count)
     }
 
-    /// Takes in bytes.
+    /// Appends received bytes.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.drain(..self.taken);
         self.taken = 0;
         self.bytes.extend(bytes);
     }
 
-    /// The next whole frame, if there is one.
+    /// Returns the next complete frame; `None` if more bytes are needed.
     ///
     /// # Errors
-    /// [`LongFrame`]: nothing that follows can be trusted.
+    /// [`LongFrame`]: the bytes that follow are not usable.
     pub fn take(&mut self) -> Result<Option<(Kind, &[u8])>, LongFrame> {
         let Some((head, rest)) = self.bytes[self.taken..].split_first_chunk::<HEAD>() else {
             return Ok(None);
@@ -125,7 +125,7 @@ impl Frames {
     }
 }
 
-/// Payload of a frame of ticks.
+/// Encodes the payload of a frame of ticks.
 #[must_use]
 pub fn ticks_to_payload<'a>(dropped: u64, records: impl ExactSizeIterator<Item = &'a TickRecord>) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(8 + RECORD * records.len());
@@ -136,7 +136,7 @@ pub fn ticks_to_payload<'a>(dropped: u64, records: impl ExactSizeIterator<Item =
     bytes
 }
 
-/// What a frame of ticks holds: how many were dropped so far, and the records. A cut-off record is left out.
+/// Decodes the payload of a frame of ticks: number of records dropped so far, and the records. An incomplete record is left out.
 #[must_use]
 pub fn ticks_from_payload(payload: &[u8]) -> (u64, Vec<TickRecord>) {
     let word = |bytes: &[u8]| u64::from_le_bytes(std::array::from_fn(|i| bytes.get(i).copied().unwrap_or(0)));

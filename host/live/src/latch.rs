@@ -1,11 +1,11 @@
-//! The latch of a machine: an emergency stop that stays, whoever ran and whoever pressed it.
+//! Latch of a machine: an emergency stop that outlasts runs and restarts, until it is released.
 //!
-//! A file in the folder of the run sockets with room for two entries: the last press, and the last release, which names the press
-//! that it releases. A press overwrites the one and a release the other, each with one write. So neither needs a lock, a release
-//! never undoes a press that it did not see, and no restart changes anything. What cannot be read counts as a press.
+//! The latch is a file in the folder of the run sockets with room for two entries: the last press, and the last release, which names the
+//! press that it releases. Each press or release overwrites its entry with one write. So neither needs a lock, a release
+//! never undoes a press that it did not see, and no restart changes anything. An unreadable entry counts as a press.
 //!
-//! A run opens the file and takes its room before it energises a device. From then on a press needs neither a free descriptor nor
-//! room, and no permission of the folder. Not real-time.
+//! A run opens the file and reserves its space before it energises a device. From then on a press needs neither a free descriptor nor
+//! disk space, and no permission of the folder. Not real-time.
 
 use crate::Directory;
 use crate::directory::{DirectoryError, unusable};
@@ -17,16 +17,16 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Its file.
+/// File name of the latch.
 const FILE: &str = "latch";
-/// Room of an entry, bytes: more than the longest one takes.
+/// Size of an entry, bytes: more than the longest one needs.
 const ENTRY_BYTES: usize = 1024;
-/// Longest name of who presses, characters.
+/// Longest name of a source of a press, characters.
 const LONGEST_NAME: usize = 120;
 /// Descriptors that are reserved for an emergency stop: to list the other runs, and to connect to some of them.
 const SPARE_DESCRIPTORS: usize = 4;
 
-/// Stops every run of this user on this machine until it is released.
+/// Latch that stops every run of this user on this machine until it is released.
 #[derive(Clone, Debug)]
 pub struct Latch {
     directory: Directory,
@@ -34,7 +34,7 @@ pub struct Latch {
     kept: Arc<Kept>,
 }
 
-/// The file as it was opened.
+/// File of the latch as it was opened.
 #[derive(Debug)]
 struct Kept {
     file: Option<File>,
@@ -42,48 +42,48 @@ struct Kept {
     spare: Mutex<Vec<File>>,
 }
 
-/// Who pressed the emergency stop, and when.
+/// Press of the emergency stop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pressed {
-    /// In words for people.
+    /// Source of the press, in words for people.
     pub who: String,
-    /// By this machine's clock.
+    /// Time of the press by this machine's clock.
     pub at: SystemTime,
 }
 
-/// What the latch says.
+/// State of the latch.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LatchState {
-    /// Numbers of the last presses, released or not: of the file that was opened, and of one that has taken its place.
+    /// Numbers of the last presses, released or not: of the file that was opened, and of one that has replaced it.
     presses: Vec<u64>,
-    /// The press that is not released; nothing may be energised while there is one.
+    /// Press that is not released; nothing may be energised while there is one.
     pub pressed: Option<Pressed>,
 }
 
-/// The places of the file.
+/// Position of an entry in the file.
 #[derive(Clone, Copy)]
 enum Place {
     Press,
     Release,
 }
 
-/// What stands at a place.
+/// Entry of the file.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 enum Entry {
     /// `number` is the time in ns since 1970, and larger than that of the press before.
     Press { number: u64, who: String },
-    /// `press` is the number of the one that is released.
+    /// `press` is the number of the released press.
     Release { press: u64, who: String },
 }
 
 impl Directory {
-    /// Opens the latch of the runs whose sockets are in this folder, and takes its room. Makes the folder if need be.
+    /// Opens the latch of the runs whose sockets are in this folder, and reserves its space. Creates the folder if necessary.
     #[must_use]
     pub fn latch(&self) -> Latch {
         let path = self.path().join(FILE);
         let problem = self.make().err();
-        // A folder that others may enter is still this user's.
+        // A folder that other users may enter still belongs to this user.
         let writable = if self.is_ours() { Some(open(&path)) } else { None };
         let (file, unwritable) = match writable {
             Some(Ok(file)) => (Some(file), None),
@@ -97,7 +97,7 @@ impl Directory {
     }
 }
 
-/// Opens the file with its room. Only ever lengthens it, so that no press is overwritten.
+/// Opens the file and reserves its space. The file only ever grows, so that no press is overwritten.
 fn open(path: &Path) -> Result<File, DirectoryError> {
     let open = || {
         let mut file = private_file(OpenOptions::new().append(true).create(true)).open(path)?;
@@ -109,13 +109,13 @@ fn open(path: &Path) -> Result<File, DirectoryError> {
 }
 
 impl Latch {
-    /// Its file.
+    /// Returns the path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Why an emergency stop cannot be kept here, if so: known before anything is energised.
+    /// Returns the reason why no emergency stop can be stored here, if any: known before anything is energised.
     #[must_use]
     pub fn problem(&self) -> Option<&DirectoryError> {
         self.kept.problem.as_ref()
@@ -133,12 +133,12 @@ impl Latch {
         *self.kept.spare.lock().unwrap_or_else(PoisonError::into_inner) = spare;
     }
 
-    /// The folder of the runs that it stops.
+    /// Returns the folder of the runs that the latch stops.
     pub(crate) fn directory(&self) -> &Directory {
         &self.directory
     }
 
-    /// What it says now. In a folder of another user there is none: others could press it, and nothing can be pressed there.
+    /// Returns the present state. A folder of another user has no latch: others could press it, and this user could not.
     #[must_use]
     pub fn state(&self) -> LatchState {
         let mut state = LatchState::default();
@@ -155,10 +155,10 @@ impl Latch {
         state
     }
 
-    /// Presses it. One that is pressed stays as it is.
+    /// Presses the latch. A pressed latch does not change.
     ///
     /// # Errors
-    /// [`DirectoryError`]: what is written does not reach every run, or no later start.
+    /// If the press does not reach every run, or no later start.
     pub fn press(&self, who: &str) -> Result<(), DirectoryError> {
         if self.state().pressed.is_some() {
             return Ok(());
@@ -166,10 +166,10 @@ impl Latch {
         self.write_each(|file| press(file, who))
     }
 
-    /// Releases what is pressed now; who had pressed it, if anybody.
+    /// Releases the present press; returns it, if there was one.
     ///
     /// # Errors
-    /// [`DirectoryError`]: nothing can be written; it stays pressed.
+    /// If nothing can be written; the latch stays pressed.
     pub fn release(&self, who: &str) -> Result<Option<Pressed>, DirectoryError> {
         let LatchState { presses, pressed } = self.state();
         if pressed.is_some() {
@@ -183,14 +183,14 @@ impl Latch {
         Ok(pressed)
     }
 
-    /// Whether the path still leads to the file that was opened.
+    /// Returns true if the path still leads to the file that was opened.
     fn is_kept(&self) -> bool {
         let kept = self.kept.file.as_ref().and_then(|file| file.metadata().ok());
         let there = std::fs::metadata(&self.path);
         kept.zip(there.ok()).is_some_and(|(kept, there)| is_same_file(&kept, &there))
     }
 
-    /// Writes to the file that was opened, which the runs of that time read, and to one that has taken its place, which later ones do.
+    /// Writes to the file that was opened, which earlier runs read, and to one that has replaced it, which later runs read.
     fn write_each(&self, write: impl Fn(&File) -> std::io::Result<()>) -> Result<(), DirectoryError> {
         let to_kept = self.kept.file.as_ref().map(|file| write(file).map_err(unusable(&self.path)));
         if matches!(to_kept, Some(Ok(()))) && self.is_kept() {
@@ -203,7 +203,7 @@ impl Latch {
         if self.is_kept() { Ok(()) } else { to_kept.unwrap_or(Ok(())) }
     }
 
-    /// Adds what a file says.
+    /// Adds the entries of a file to a state.
     fn add(&self, file: &File, state: &mut LatchState) {
         let Some((number, who)) = last_press(file) else { return };
         let who = who
@@ -221,7 +221,7 @@ impl Latch {
 }
 
 impl LatchState {
-    /// Whether it was pressed after an earlier state, even if it is released by now.
+    /// Returns true if the latch was pressed after an earlier state, even if it has been released since.
     #[must_use]
     pub fn was_pressed_after(&self, earlier: &Self) -> bool {
         self.presses.iter().any(|press| !earlier.presses.contains(press))
@@ -241,7 +241,7 @@ fn press(file: &File, who: &str) -> std::io::Result<()> {
     write(file, Place::Press, &Entry::Press { number, who: short(who) })
 }
 
-/// The number of the last press of a file, and who it was; one that cannot be read has a number of its own.
+/// Returns number and source of the last press of a file; an unreadable one has a hash as its number.
 fn last_press(file: &File) -> Option<(u64, Result<String, String>)> {
     let text = match read(file, Place::Press) {
         Ok(text) if text.is_empty() => return None,
@@ -254,20 +254,20 @@ fn last_press(file: &File) -> Option<(u64, Result<String, String>)> {
     }
 }
 
-/// Hash of a text (FNV-1a), below any time of the present in nanoseconds.
+/// Returns a hash of a text (FNV-1a), less than any present time in nanoseconds.
 fn fingerprint(text: &str) -> u64 {
     let hash = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     text.bytes().fold(0xcbf2_9ce4_8422_2325, hash) >> 8
 }
 
-/// The text at a place, without the blanks about it; nothing beyond the end of the file.
+/// Reads the text of an entry, trimmed; empty beyond the end of the file.
 fn read(file: &File, place: Place) -> std::io::Result<String> {
     let mut bytes = [b' '; ENTRY_BYTES];
     read_at(file, &mut bytes, place.offset())?;
     Ok(String::from_utf8_lossy(&bytes).trim().to_owned())
 }
 
-/// Overwrites a place, with one call of the system.
+/// Overwrites an entry, with one system call.
 fn write(file: &File, place: Place, entry: &Entry) -> std::io::Result<()> {
     let mut bytes = serde_json::to_vec(entry)?;
     bytes.resize(ENTRY_BYTES - 1, b' ');

@@ -1,7 +1,7 @@
-//! Watching a running host, and talking to it, from another program on the same machine: viewer, bridges, scripts.
+//! Observation and control of a running host by other programs on the same machine: viewer, bridges, scripts.
 //!
-//! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); whoever may open
-//! the socket may watch and change the run, and nobody else. [`Publication`] is the host's end, [`Client`] the other:
+//! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); programs that may open
+//! the socket, and no others, may observe and change the run. [`Publication`] is the host's end, [`Client`] the other:
 //!
 //! ```no_run
 //! use flotor_live::{Ask, Client, Directory, Event};
@@ -25,32 +25,32 @@
 //!
 //! | kind | from | payload |
 //! |---|---|---|
-//! | 1 greeting | host | JSON [`Greeting`]: what can be asked for, with ranges and the values in force. First, once |
+//! | 1 greeting | host | JSON [`Greeting`]: plugins, with the ranges and present values of their parameters. First, once |
 //! | 2 run | host | protobuf `flotor.Run`, as in a recording (`host/proto`). Second, once |
 //! | 3 ticks | host | records dropped so far (8 bytes), then records of 39 words of 8 bytes, see below |
-//! | 4 change | host | JSON [`ChangeMessage`]: a parameter that changed, before the tick that saw it first |
+//! | 4 change | host | JSON [`ChangeMessage`]: a change to a plugin, before the first tick that uses it |
 //! | 5 answer | host | JSON [`Answer`] to a request |
-//! | 6 end | host | JSON [`End`]: how the run ended. Last |
+//! | 6 end | host | JSON [`End`]: outcome of the run. Last |
 //! | 16 request | client | JSON [`Request`] |
 //!
-//! A record is what the digest of a run is made of ([`flotor_core::trace::TickRecord`]): tick, time (ns), time since the
+//! A record has the words of a run's digest ([`flotor_core::trace::TickRecord`]): tick, time (ns), time since the
 //! last tick (ns) as integers; position (3), quaternion xyzw (4), velocity (3), angular velocity (3), model's force and
 //! torque (6), commanded (6), delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons
 //! (high half); lateness and compute time (ns). SI units, device frame, little endian.
 //!
-//! **No client can delay the loop.** A host sends nothing but the first two frames until it is asked to, and
-//! does nothing per tick without a client. Between loop and socket lies a queue of fixed length for each client; what
-//! finds no room is dropped and counted. Requests are answered at most a thousand times a second for each client.
+//! **No client can delay the loop.** A host sends only the first two frames until a client requests more, and
+//! does nothing per tick without a client. Between loop and socket lies a queue of fixed length for each client; frames
+//! beyond it are dropped and counted. Requests are answered at most a thousand times a second for each client.
 //!
 //! # The latch
 //!
-//! An emergency stop of any run stops every run of the folder and refuses new ones until it is released: [`Latch`], a file beside
-//! the sockets, and a request to each socket, which confirms it.
+//! An emergency stop of any run stops every run of the folder and rejects new ones until it is released: [`Latch`], a file beside
+//! the sockets, and a request to each socket, which the run confirms.
 //!
 //! # Couplings
 //!
-//! A run with a coupling whose other end is on another host has a second socket, for datagrams: [`PeerSocket`] gives
-//! and takes what the ends tell each other ([`flotor_core::peer`]).
+//! A run with a coupling whose other end is on another host has a second socket, for datagrams: [`PeerSocket`] sends
+//! and receives the messages between the ends ([`flotor_core::peer`]).
 //!
 //! Not real-time.
 
@@ -75,5 +75,5 @@ pub use message::{
 pub use peer_socket::{CALL_PERIOD, FoundCoupling, PeerSocket};
 pub use server::{Publication, PublishError, Serve};
 
-/// Version of what is said over the socket.
+/// Version of the protocol.
 pub const PROTOCOL: u32 = 1;

@@ -1,4 +1,4 @@
-//! What is said, as JSON.
+//! JSON messages of the live protocol.
 
 use flotor_core::{Change, ChangeOutcome, ChangeSubject};
 use flotor_hal::{Mutability, Parameter, ParameterKind, SoftRange};
@@ -6,85 +6,85 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// The first thing a host says.
+/// First message of a host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Greeting {
-    /// Version of what follows: [`crate::PROTOCOL`].
+    /// Version of the protocol: [`crate::PROTOCOL`].
     pub protocol: u32,
     /// Version of the host.
     pub flotor_version: String,
-    /// Process of the host.
+    /// Process id of the host.
     pub process: u32,
     /// Title of the scene.
     pub title: String,
     /// The device, then the models in the scene's order.
     pub plugins: Vec<PanelPlugin>,
-    /// The most that may reach the hand.
+    /// Limits of force and torque at the hand.
     pub limits: WrenchLimits,
 }
 
-/// The most that may reach the hand, along and about each axis of the device frame, and in any direction.
+/// Limits of force and torque at the hand, along and about each axis of the device frame, and of their norms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WrenchLimits {
-    /// Force, N; without one, no limit.
+    /// Force, N; `None`: no limit.
     pub force_n: [Option<f64>; 3],
-    /// Torque, N·m; without one, no limit.
+    /// Torque, N·m; `None`: no limit.
     pub torque_nm: [Option<f64>; 3],
-    /// The norm of the force, N; without one, no limit.
+    /// Norm of the force, N; `None`: no limit.
     #[serde(default)]
     pub force_norm_n: Option<f64>,
-    /// The norm of the torque, N·m; without one, no limit.
+    /// Norm of the torque, N·m; `None`: no limit.
     #[serde(default)]
     pub torque_norm_nm: Option<f64>,
 }
 
-/// A plugin of the run and what it can be told: all that a panel is made of.
+/// Plugin of the run with its parameters, as shown in a client's panel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PanelPlugin {
-    /// What the scene calls it; `device` for the device.
+    /// Name in the scene; `device` for the device.
     pub name: String,
-    /// Id.
+    /// Id of the plugin.
     pub id: String,
-    /// Its library.
+    /// Path of its library.
     pub file: PathBuf,
-    /// Whether it is a device that exists in numbers only: nothing that it does reaches a person.
+    /// True for a simulated device, whose force reaches no person.
     #[serde(default)]
     pub is_simulated: bool,
-    /// Its parameters, in the order of its schema.
+    /// Parameters in the order of its schema.
     pub parameters: Vec<PanelParameter>,
 }
 
-/// A parameter, with its value in force.
+/// Parameter with its present value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PanelParameter {
-    /// Id.
+    /// Id of the parameter.
     pub id: String,
-    /// Unit for people; empty where there is none.
+    /// Unit for people; empty without one.
     pub unit: String,
-    /// One sentence for people.
+    /// Description for people, one sentence.
     pub doc: String,
-    /// What values it takes.
+    /// Type and range of its values.
     pub shape: ParameterShape,
-    /// Whether it may change while the loop runs.
+    /// True if the parameter may change while the loop runs.
     pub live: bool,
-    /// The value in force, as a person would type it.
+    /// Present value, as a person would type it.
     pub value: String,
-    /// The value it began the run with, as a person would type it; empty if that is not known.
+    /// Value at the start of the run, as a person would type it; empty if unknown.
     #[serde(default)]
     pub first: String,
-    /// Where a number is usefully moved by hand.
+    /// Range for changes by hand.
     #[serde(default)]
     pub soft: Option<SoftLimits>,
 }
 
-/// Where a number is usefully moved by hand: a slider goes no farther, and a larger number is typed.
+/// Range for changes of a number by hand: the limits of a slider; numbers beyond have to be typed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoftLimits {
-    /// Smallest.
+    /// Smallest value.
     pub min: f64,
-    /// Largest.
+    /// Largest value.
     pub max: f64,
-    /// The step of a key.
+    /// Step of a key.
     pub step: f64,
 }
 
@@ -94,24 +94,24 @@ impl From<&SoftRange> for SoftLimits {
     }
 }
 
-/// What values a parameter takes.
+/// Type and range of a parameter's values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum ParameterShape {
     /// A number.
     Real {
-        /// Smallest legal.
+        /// Smallest valid value.
         min: f64,
-        /// Largest legal.
+        /// Largest valid value.
         max: f64,
-        /// What it is when nothing is set.
+        /// Default value.
         default: f64,
     },
-    /// One of a list.
+    /// One of a list of choices.
     Choice {
-        /// The list.
+        /// Names of the choices.
         choices: Vec<String>,
-        /// Index of what it is when nothing is set.
+        /// Index of the default choice.
         default: usize,
     },
     /// Text; only when the plugin is created.
@@ -121,7 +121,7 @@ pub enum ParameterShape {
 }
 
 impl Greeting {
-    /// Keeps the values in force up to date, for those who come later.
+    /// Updates the stored parameter values, for clients that connect later.
     pub fn keep(&mut self, change: &ChangeMessage) {
         if change.outcome != Outcome::Applied || change.subject != Subject::Parameter {
             return;
@@ -135,7 +135,7 @@ impl Greeting {
 }
 
 impl PanelPlugin {
-    /// Of a schema, with the values in force.
+    /// Creates the description from a schema, with the present values.
     #[must_use]
     pub fn new(
         name: &str,
@@ -186,21 +186,21 @@ impl ParameterShape {
     }
 }
 
-/// Something a client asks for.
+/// Request of a client.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Request {
-    /// Number the answer will carry.
+    /// Number that the answer will contain.
     pub number: u64,
-    /// What is asked for.
+    /// Requested action.
     #[serde(flatten)]
     pub ask: Ask,
 }
 
 impl Request {
-    /// Reads one. A key that we do not know is a misunderstanding; the emergency stop is followed whatever stands beside it.
+    /// Parses a request. An unknown key is an error, except in an emergency stop.
     ///
     /// # Errors
-    /// Its number, as far as there is one, and what is wrong.
+    /// The number of the request, 0 without one, and the error of the parser.
     pub(crate) fn read(json: &[u8]) -> Result<Self, (u64, serde_json::Error)> {
         let said: Value = serde_json::from_slice(json).map_err(|error| (0, error))?;
         let number = said.get("number").and_then(Value::as_u64).unwrap_or(0);
@@ -216,7 +216,7 @@ impl Request {
     }
 }
 
-/// A key that was said and not read, wherever it is.
+/// Finds a JSON key that deserialisation ignored.
 fn unknown_key(said: &Value, read: &Value) -> Option<String> {
     match (said, read) {
         (Value::Object(said), Value::Object(read)) => {
@@ -232,134 +232,134 @@ fn unknown_key(said: &Value, read: &Value) -> Option<String> {
     }
 }
 
-/// What can be asked for.
+/// Action that a client requests.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "ask", rename_all = "kebab-case")]
 pub enum Ask {
-    /// Ticks from now on: those whose number is a multiple of `every` (0 counts as 1), with the events of the ones
+    /// Send ticks whose number is a multiple of `every` (0 counts as 1), with the events of the ticks
     /// between them.
     Watch {
-        /// Which ticks.
+        /// Divisor of the number of a tick.
         every: u32,
     },
-    /// No more ticks.
+    /// Send no more ticks.
     LookAway,
-    /// New values for live parameters, all before the same tick.
+    /// Set new values of live parameters, all before the same tick.
     Set {
         /// The values.
         values: Vec<SetValue>,
     },
-    /// How much of a model is felt, 0 to 1.
+    /// Set the blend weight of a model, 0 to 1.
     Weight {
-        /// Its name in the scene.
+        /// Name of the model in the scene.
         model: String,
         /// The new weight.
         weight: f64,
     },
-    /// Hot swap of a model by another plugin, or by the same one rebuilt, faded in while the old one fades out. It is
-    /// created before the answer comes.
+    /// Hot swap of a model by another plugin, or by the same one rebuilt, faded in while the old one fades out. The new model is
+    /// created before the answer is sent.
     Swap {
-        /// Its name in the scene.
+        /// Name of the model in the scene.
         model: String,
-        /// Id of a plugin, or the whole path of its file; without it the one of the scene, with the scene's settings.
+        /// Id of a plugin, or the absolute path of its file; `None`: the plugin of the scene, with the scene's settings.
         #[serde(default)]
         plugin: Option<String>,
-        /// Parameters set on top, each with its value as a person would type it.
+        /// Additional parameters, each with its value as a person would type it.
         #[serde(default)]
         settings: Vec<(String, String)>,
     },
-    /// An orderly end: force fades out.
+    /// Orderly end: the force fades out.
     Stop,
-    /// The emergency stop: no force at once, and the run is over.
+    /// Emergency stop: the force is removed at once, and the run ends.
     EmergencyStop,
-    /// The emergency stop of another run of the machine: the same, and is not passed on.
+    /// Emergency stop of another run of the machine: like [`Ask::EmergencyStop`], but not passed on.
     MachineStop,
 }
 
-/// A new value for a parameter.
+/// New value of a parameter.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SetValue {
     /// `device`, a model's name in the scene, or a plugin's id.
     pub plugin: String,
     /// Id of the parameter.
     pub parameter: String,
-    /// Its value, as a person would type it.
+    /// Value, as a person would type it.
     pub value: String,
 }
 
-/// What became of a request.
+/// Result of a request.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Answer {
-    /// The request's number.
+    /// Number of the request.
     pub number: u64,
-    /// Why not, in words; nothing if it was done, or passed on to the loop.
+    /// Reason for a rejection, in words; `None` if the request was carried out, or passed on to the loop.
     pub refused: Option<String>,
-    /// What is wrong, if it was refused.
+    /// Kind of reason, if the request was rejected.
     #[serde(default)]
     pub cause: RefusalCause,
 }
 
-/// What is wrong with a request that is refused.
+/// Kind of reason for a rejected request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RefusalCause {
-    /// The request: what it names is not there, or not legal.
+    /// The request: an unknown name, or an invalid value.
     Request,
-    /// The plugin it names.
+    /// The plugin named in the request.
     Plugin,
-    /// Something else, such as the moment.
+    /// Another reason, such as the state of the run.
     #[default]
     Other,
 }
 
-/// How a run ended.
+/// Message with the outcome of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct End {
     /// One line for people.
     pub words: String,
-    /// Whether that is as it should be.
+    /// Kind of outcome.
     #[serde(default)]
     pub kind: EndKind,
 }
 
-/// Whether a run ended as it should.
+/// Kind of outcome of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EndKind {
-    /// Its time was over, or somebody stopped it.
+    /// The run reached its duration, or was stopped.
     #[default]
     InOrder,
     /// A fault, or an emergency stop.
     Failed,
 }
 
-/// A parameter that changed, or was to.
+/// Message about a change to a plugin, applied or rejected.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChangeMessage {
-    /// The tick before which it changed.
+    /// Tick before which the change took place.
     pub tick: u64,
-    /// The time of that tick, ns.
+    /// Time of this tick, ns.
     pub time_ns: u64,
     /// Name of the plugin in the scene.
     pub plugin: String,
-    /// What of it.
+    /// Kind of change.
     pub subject: Subject,
-    /// Id of the parameter, or the host's word for what is none.
+    /// Id of the parameter; `weight` for a weight, the id of the new plugin for a replacement.
     pub parameter: String,
     /// The value as a person would type it.
     pub value: String,
-    /// The value as a number.
+    /// Value as a number.
     pub number: f64,
-    /// What the plugin made of it.
+    /// Result of the change.
     pub outcome: Outcome,
-    /// If the plugin was replaced, what was set for the new one.
+    /// Settings of the new plugin after a replacement.
     #[serde(default)]
     pub settings: Vec<(String, String)>,
 }
 
 impl ChangeMessage {
-    /// True if both are of the same parameter and had the same outcome, whatever the values: of two such messages the later one
-    /// says what is in force. A value that was refused says nothing of the one in force.
+    /// Returns true if both messages are about the same parameter and have the same outcome, so that the later one replaces the earlier.
+    /// A rejected value implies nothing about the present one.
     #[must_use]
     pub fn is_of_the_same(&self, other: &Self) -> bool {
         let of = |message: &Self| (message.subject, message.outcome);
@@ -367,27 +367,27 @@ impl ChangeMessage {
     }
 }
 
-/// What of a plugin changed.
+/// Kind of change to a plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Subject {
     /// A parameter of its schema.
     Parameter,
-    /// How much of it is felt.
+    /// The blend weight of its wrench.
     Weight,
-    /// The plugin itself.
+    /// The plugin itself, which was replaced.
     Plugin,
 }
 
-/// How a plugin took a change.
+/// Result of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// In force from this tick on.
+    /// The new value applies from this tick on.
     Applied,
-    /// The old value stays.
+    /// The plugin rejected the value; the old one remains.
     Refused,
-    /// The plugin panicked over it.
+    /// The plugin panicked on the change.
     Broke,
 }
 

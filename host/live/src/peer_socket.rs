@@ -1,12 +1,12 @@
-//! Where the peer state of a coupling leaves a host and enters it: a datagram socket beside that of the run.
+//! Datagram socket for the peer state of a coupling, between a host and a bridge, beside the socket of the run.
 //!
 //! ```text
 //!  host: PeerSocket::listen  <- peer state, or an empty call -  PeerSocket::join :bridge
 //!                            -  peer state                      ->
 //! ```
 //!
-//! Datagrams because only the newest counts: one that finds no room is dropped, and nothing waits behind it. Whoever
-//! joined tells so again every [`CALL_PERIOD`]; a host forgets who has not for a while. Not real-time.
+//! Datagrams are used because only the newest state counts: one that finds no room is dropped, and nothing waits behind it. A program
+//! that has joined repeats its subscription every [`CALL_PERIOD`]; the host drops subscribers that stay silent. Not real-time.
 
 use crate::Directory;
 use crate::directory::{DirectoryError, private, process_number};
@@ -17,30 +17,30 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-/// Ending of the name of a host's socket.
+/// Extension of a host's socket file.
 const HOST: &str = "peer";
-/// Ending of the name of one that joined.
+/// Extension of a subscriber's socket file.
 const JOINED: &str = "joined";
-/// Who joined calls this often.
+/// Interval between calls of a subscriber.
 pub const CALL_PERIOD: Duration = Duration::from_millis(100);
-/// A host forgets who has not called for so long.
+/// Timeout of a subscription without a call.
 const FORGET_AFTER: Duration = Duration::from_secs(1);
-/// Who may join a host's coupling at a time.
+/// Largest number of subscribers of a coupling.
 const MOST_JOINED: usize = 8;
-/// Longer than any message: what fills this is malformed.
+/// Buffer size, bytes, more than any message: a datagram that fills it is malformed.
 const BUFFER_BYTES: usize = 1024;
 
-/// A coupling of a running host whose other end is on another host.
+/// Coupling of a running host whose other end is on another host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FoundCoupling {
-    /// What both hosts call it.
+    /// Name of the coupling in both hosts' scenes.
     pub name: String,
-    /// The process of the run.
+    /// Process id of the run.
     pub process: u32,
     path: PathBuf,
 }
 
-/// One end of the local way; its file is gone when dropped.
+/// End of the local connection of a coupling; its file is removed when dropped.
 #[derive(Debug)]
 pub struct PeerSocket {
     socket: Datagrams,
@@ -48,16 +48,16 @@ pub struct PeerSocket {
     peers: Vec<Peer>,
 }
 
-/// Who is told.
+/// Receiver of the peer state.
 #[derive(Debug)]
 struct Peer {
     path: PathBuf,
-    /// When it called last; never forgotten without.
+    /// Time of its last call; `None` for a host, which never times out.
     called: Option<Instant>,
 }
 
 impl Directory {
-    /// Couplings of runs that live. Sockets of dead ones are removed on the way.
+    /// Returns the couplings of running hosts, and removes the files of closed sockets.
     #[must_use]
     pub fn couplings(&self) -> Vec<FoundCoupling> {
         let mut found: Vec<FoundCoupling> = (self.files().into_iter())
@@ -78,20 +78,20 @@ impl Directory {
 }
 
 impl PeerSocket {
-    /// The host's end for a coupling.
+    /// Creates the host's end for a coupling.
     ///
     /// # Errors
-    /// [`DirectoryError`]: the folder is not usable, or not ours alone.
+    /// If the folder is not usable, or other users may enter it.
     pub fn listen(directory: &Directory, coupling: &str) -> Result<Self, DirectoryError> {
         private(directory.path())?;
         let path = directory.path().join(format!("{}-{coupling}.{HOST}", process_number()));
         Self::bind(path).map_err(|(path, cause)| DirectoryError::Unusable { path, cause })
     }
 
-    /// The end of a program that transports the peer state to a host and from it.
+    /// Creates the end of a program that transports the peer state between this host and another.
     ///
     /// # Errors
-    /// [`DirectoryError`]: the folder is not usable, or not ours alone.
+    /// If the folder is not usable, or other users may enter it.
     pub fn join(directory: &Directory, coupling: &FoundCoupling) -> Result<Self, DirectoryError> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         private(directory.path())?;
@@ -104,7 +104,7 @@ impl PeerSocket {
     }
 
     fn bind(path: PathBuf) -> Result<Self, (PathBuf, io::Error)> {
-        // A process that died without removing it.
+        // A killed process leaves its file.
         remove_if_dead(&path);
         match Datagrams::bind(&path) {
             Ok(socket) => Ok(Self { socket, path, peers: Vec::new() }),
@@ -112,18 +112,18 @@ impl PeerSocket {
         }
     }
 
-    /// Its file.
+    /// Returns the path of the socket's file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Sends the peer state to all at the other end. A closed socket is forgotten; a full one misses it.
+    /// Sends the peer state to all receivers. Drops closed sockets; a full one misses the state.
     pub fn tell(&mut self, dispatch: &Dispatch) {
         self.send(&dispatch.to_bytes());
     }
 
-    /// Subscribes, without a peer state. False if the host is gone.
+    /// Subscribes, without a peer state. Returns false if the host has closed its socket.
     pub fn call(&mut self) -> bool {
         self.send(&[]);
         !self.peers.is_empty()
@@ -139,11 +139,11 @@ impl PeerSocket {
         });
     }
 
-    /// The next message, or what was malformed; nothing when all has been read. Does not wait. A caller of a host
-    /// receives from then on.
+    /// Returns the next message, or the error of a malformed one; `None` when all have been read. Does not wait. A caller of a host
+    /// is subscribed from then on.
     ///
     /// # Errors
-    /// [`InvalidDispatch`].
+    /// If a message is malformed.
     pub fn hear(&mut self) -> Result<Option<Dispatch>, InvalidDispatch> {
         let mut buffer = [0; BUFFER_BYTES];
         loop {
@@ -177,7 +177,7 @@ impl Drop for PeerSocket {
     }
 }
 
-/// Whether an error says that there is no room now, rather than that nobody is there.
+/// Returns true for an error of a full socket, false for that of a closed one.
 fn is_passing(kind: ErrorKind) -> bool {
     matches!(kind, ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }

@@ -1,6 +1,6 @@
-//! The second way of an emergency stop, beside the latch: over the sockets of the other runs, which confirm it.
+//! Emergency stop over the sockets of the other runs, which confirm it; in addition to the latch.
 //!
-//! One thread asks all of them and waits for none in particular. Not real-time.
+//! One thread sends the request to all runs and does not block on any. Not real-time.
 
 use crate::frame::{Frames, Kind, frame};
 use crate::message::{Answer, Ask, Request};
@@ -9,15 +9,15 @@ use crate::{DirectoryError, Found, Latch};
 use std::io::{ErrorKind, Write};
 use std::time::{Duration, Instant};
 
-/// Pause between two looks at those that have not confirmed.
+/// Poll interval of the runs that have not confirmed.
 const LOOK_PERIOD: Duration = Duration::from_millis(2);
 
 impl Latch {
-    /// Asks each run of the folder to stop, and waits until all have confirmed or are over, at most until then; the processes of
-    /// those that have not.
+    /// Requests each run of the folder to stop, and waits until all have confirmed or ended, or until the deadline; returns the process
+    /// ids of the others.
     ///
     /// # Errors
-    /// [`DirectoryError`]: the runs cannot be listed.
+    /// If the runs cannot be listed.
     pub fn stop_runs(&self, until: Instant) -> Result<Vec<u32>, DirectoryError> {
         self.free_descriptors();
         let unconfirmed = self.unconfirmed(until);
@@ -39,14 +39,14 @@ impl Latch {
     }
 }
 
-/// A run that has not confirmed yet.
+/// Run that has not confirmed yet.
 struct Stopping {
     run: Found,
     connection: Option<(Stream, Frames)>,
 }
 
 impl Stopping {
-    /// Whether the run has confirmed, or is over.
+    /// Returns true if the run has confirmed, or is over.
     fn is_done(&mut self) -> bool {
         let (stream, frames) = match &mut self.connection {
             Some(connection) => connection,
@@ -60,7 +60,7 @@ impl Stopping {
                 Ok(length) if length > 0 => {}
                 Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return false,
-                // Over, or evicted in favour of another client: the next connection decides.
+                // Over, or evicted in favour of another client: the next connection shows which.
                 _ => {
                     self.connection = None;
                     return false;

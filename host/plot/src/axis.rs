@@ -1,6 +1,6 @@
-//! Axes: what they measure, and the range ([`Domain`]) they end up covering.
+//! Axes: their quantity, and the range ([`Domain`]) that they cover.
 //!
-//! Every value enters the picture through [`Scale::forward`], which refuses what cannot be drawn. Behind it,
+//! Every value enters the picture through [`Scale::forward`], which rejects values that cannot be drawn. Behind it,
 //! all geometry is linear: a log axis is a linear axis of decimal logarithms.
 
 use super::quantity::Quantity;
@@ -15,16 +15,16 @@ const NARROWEST_RELATIVE_SPAN: f64 = 1e-9;
 /// Room between the data and the ends of a padded axis, as a fraction of the data's span.
 const PADDING: f64 = 0.06;
 
-/// The least range of a logarithmic axis, in decades: what lies nearer together shows as equal.
+/// Least range of a logarithmic axis, in decades: smaller differences show as equal.
 const LEAST_DECADES: f64 = 0.1;
 
-/// How far a tight axis reaches for a round end, as a fraction of the data's span.
+/// Largest distance from a tight axis to a round end, as a fraction of the data's span.
 const ROUNDING_REACH: f64 = 0.015;
 
-/// Room under the lowest bar of a histogram on a log axis, so that a single count is seen as a bar.
+/// Room under the lowest bar of a histogram on a log axis, so that a single count is visible as a bar.
 const LOG_FLOOR_DECADES: f64 = 0.3;
 
-/// Data of one sign are shown down to zero when they come nearer to it than this fraction of their far end.
+/// Largest distance of data of one sign from zero at which the axis reaches zero, as a fraction of their far end.
 const SNAP_TO_ZERO: f64 = 0.25;
 
 /// A quantity with its unit, a linear or logarithmic scale, and an optional fixed range.
@@ -40,7 +40,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis; `unit` is empty for a pure number.
+    /// Creates a linear axis; `unit` is empty for a pure number.
     pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Self {
             label: label.into(),
@@ -53,19 +53,19 @@ impl Axis {
         }
     }
 
-    /// A linear axis in the unit of `quantity`, with its least range.
+    /// Creates a linear axis in the unit of `quantity`, with its least range.
     pub fn of(label: impl Into<String>, quantity: Quantity) -> Self {
         let (unit, per_si) = quantity.unit();
         Self::linear(label, unit).least_range(quantity.least_range_si() * per_si)
     }
 
-    /// A decimal-logarithmic axis; `unit` is empty for a pure number.
+    /// Creates a decimal-logarithmic axis; `unit` is empty for a pure number.
     pub fn log(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { scale: Scale::Log, least: LEAST_DECADES, ..Self::linear(label, unit) }
     }
 
     /// Fixes the range, in the unit of the axis; the order of the ends does not matter. A range that cannot
-    /// be drawn (not finite, empty, not positive on a log axis) leaves the automatic one.
+    /// be drawn (not finite, empty, not positive on a log axis) is ignored in favour of the automatic one.
     #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.fixed = Some((low.min(high), low.max(high)));
@@ -82,21 +82,21 @@ impl Axis {
         self
     }
 
-    /// Lets an automatic range of a linear axis reach zero, so that lengths are in proportion to values.
+    /// Extends an automatic range of a linear axis to zero, so that lengths are in proportion to values.
     #[must_use]
     pub fn with_zero(mut self) -> Self {
         self.includes_zero = true;
         self
     }
 
-    /// Numbers at these values and nowhere else: the levels of an experiment.
+    /// Places tick labels at these values and nowhere else: the levels of an experiment.
     #[must_use]
     pub fn levels(mut self, levels: impl IntoIterator<Item = f64>) -> Self {
         self.levels = levels.into_iter().collect();
         self
     }
 
-    /// The unit in parentheses, scaled by the power of ten the tick labels leave out: `(10⁻⁶ N)`.
+    /// Returns the unit in parentheses, scaled by the power of ten that the tick labels leave out: `(10⁻⁶ N)`.
     pub(super) fn unit_label(&self, exponent: i32) -> String {
         let power = if exponent == 0 { String::new() } else { format!("10{}", text::superscript(exponent)) };
         match (power.is_empty(), self.unit.is_empty()) {
@@ -107,12 +107,12 @@ impl Axis {
         }
     }
 
-    /// Label and unit, as far as there are any: `Force (10⁻⁶ N)`.
+    /// Returns label and unit, as far as there are any: `Force (10⁻⁶ N)`.
     pub(super) fn name(&self, exponent: i32) -> String {
         format!("{} {}", self.label, self.unit_label(exponent)).trim().to_owned()
     }
 
-    /// The range the axis covers for data within `extent`.
+    /// Returns the range that the axis covers for data within `extent`.
     pub(super) fn domain(&self, mut extent: Extent, fit: Fit) -> Domain {
         if self.includes_zero && self.scale == Scale::Linear && !extent.is_empty() {
             extent.include(0.0);
@@ -126,7 +126,7 @@ impl Axis {
     }
 }
 
-/// How values become distances along an axis.
+/// Mapping from values to distances along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scale {
     Linear,
@@ -134,7 +134,7 @@ pub(super) enum Scale {
 }
 
 impl Scale {
-    /// The coordinate of `value` along the axis (the value, or its decimal logarithm), or nothing when it
+    /// Returns the coordinate of `value` along the axis (the value, or its decimal logarithm); `None` if it
     /// cannot be drawn.
     pub(super) fn forward(self, value: f64) -> Option<f64> {
         match self {
@@ -143,7 +143,7 @@ impl Scale {
         }
     }
 
-    /// The value at a coordinate.
+    /// Returns the value at a coordinate.
     pub(super) fn backward(self, coordinate: f64) -> f64 {
         match self {
             Self::Linear => coordinate,
@@ -152,7 +152,7 @@ impl Scale {
     }
 }
 
-/// The least and greatest coordinate met so far; `low > high` as long as there was none.
+/// Least and greatest coordinate so far; `low > high` if there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Extent {
     pub(super) low: f64,
@@ -177,7 +177,7 @@ impl Extent {
     }
 }
 
-/// How an automatic range surrounds the data.
+/// Rule for the automatic range around the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fit {
     /// Ends where the data end, or at a round value just beyond: the x axis of lines.
@@ -189,7 +189,7 @@ pub(super) enum Fit {
 }
 
 impl Fit {
-    /// The range around the data, at least `least` wide.
+    /// Returns the range around the data, at least `least` wide.
     fn apply(self, scale: Scale, extent: Extent, least: f64) -> (f64, f64) {
         let Extent { mut low, mut high } = extent;
         if extent.is_empty() {
@@ -219,7 +219,7 @@ impl Fit {
     }
 }
 
-/// Each end moved to the round value just beyond it, if one is that near: 0 to 9.999 s is shown as 0 to 10 s.
+/// Moves each end to the round value just beyond it, if one is near: 0 to 9.999 s is shown as 0 to 10 s.
 fn rounded_outward(low: f64, high: f64) -> (f64, f64) {
     let reach = ROUNDING_REACH * (high - low);
     let step = ticks::nice_step((high - low) / 10.0);
@@ -230,12 +230,12 @@ fn rounded_outward(low: f64, high: f64) -> (f64, f64) {
     )
 }
 
-/// Whether two ends are too close to distinguish, in particular equal.
+/// Returns true if two ends are too close to distinguish, in particular equal.
 fn is_narrow(low: f64, high: f64) -> bool {
     high - low <= NARROWEST_RELATIVE_SPAN * low.abs().max(high.abs()) || high - low < 1.0 / LARGEST_DRAWABLE
 }
 
-/// The ends moved apart to a span of `least`: upwards where the range stands on zero.
+/// Moves the ends apart to a span of `least`: upwards where the range stands on zero.
 fn widened(fit: Fit, scale: Scale, [low, high]: [f64; 2], least: f64) -> (f64, f64) {
     if fit == Fit::OnZero && scale == Scale::Linear {
         return if high > 0.0 { (low, low + least) } else { (high - least, high) };
@@ -244,7 +244,7 @@ fn widened(fit: Fit, scale: Scale, [low, high]: [f64; 2], least: f64) -> (f64, f
     (middle - 0.5 * least, middle + 0.5 * least)
 }
 
-/// A range with a constant in its middle: a tenth of its magnitude to either side and at least half of `least`; around zero
+/// Returns a range with a constant in its middle: a tenth of its magnitude to either side and at least half of `least`; around zero
 /// without a least range one unit, a third of a decade on a log axis.
 fn around_constant(scale: Scale, low: f64, high: f64, least: f64) -> (f64, f64) {
     let middle = 0.5 * low + 0.5 * high;
@@ -256,7 +256,7 @@ fn around_constant(scale: Scale, low: f64, high: f64, least: f64) -> (f64, f64) 
     (middle - room, middle + room)
 }
 
-/// The range an axis covers, in scale coordinates. `low < high`, both finite.
+/// Range that an axis covers, in scale coordinates. `low < high`, both finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Domain {
     pub(super) scale: Scale,
@@ -269,7 +269,7 @@ impl Domain {
         self.high - self.low
     }
 
-    /// Where a coordinate lies: 0 at the low end, 1 at the high end, beyond outside.
+    /// Returns the position of a coordinate: 0 at the low end, 1 at the high end, beyond outside.
     pub(super) fn fraction(&self, coordinate: f64) -> f64 {
         (coordinate - self.low) / self.span()
     }

@@ -1,9 +1,9 @@
-//! Lines cut at the edges of the plotting area.
+//! Clipping of lines at the edges of the plotting area.
 
 use super::decimate::Point;
 use super::path::Rect;
 
-/// The parts of a line that lie within `frame`, in order. A line that stays within it is one part, its points unchanged.
+/// Returns the parts of a line within `frame`, in order. A line that stays within it is one part, its points unchanged.
 pub(super) fn clipped(line: &[Point], frame: &Rect) -> Vec<Vec<Point>> {
     if let [only] = line {
         return if frame.contains(*only) { vec![vec![*only]] } else { Vec::new() };
@@ -22,9 +22,9 @@ pub(super) fn clipped(line: &[Point], frame: &Rect) -> Vec<Vec<Point>> {
     parts
 }
 
-/// The piece of a segment within `frame` (Liang and Barsky, "A New Concept and Method for Line Clipping", ACM
-/// Transactions on Graphics 3(1), 1984); ends within the frame keep their bits. None if at most one point of it
-/// lies there, unless the segment is that point.
+/// Clips a segment to `frame` (Liang and Barsky, "A New Concept and Method for Line Clipping", ACM
+/// Transactions on Graphics 3(1), 1984); ends within the frame keep their bits. Returns `None` if at most one point of the
+/// segment is within, unless the segment is that point.
 fn segment_within(from: Point, to: Point, frame: &Rect) -> Option<(Point, Point)> {
     let step = (to.0 - from.0, to.1 - from.1);
     let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);

@@ -1,25 +1,25 @@
-//! Lines that lie over one another. A line that later ones cover is drawn wider and paler, so that it is seen beside them.
+//! Detection of lines that cover one another. A covered line is drawn wider and paler, so that it is visible beside the others.
 
 use super::decimate::Point;
 use super::path::{Drawing, Rect};
 
-/// Lines nearer to each other than this are one line to the eye.
+/// Distance below which two lines look like one.
 const ONE_LINE_PX: f64 = 1.2;
 
-/// Share of the pixel columns of a line that another has to lie on to cover it.
+/// Least share of the pixel columns of a line in which another line covers it.
 const COVERING_SHARE: f64 = 0.5;
 
-/// Widths of covered lines that are distinguished; more lines over one another share the largest.
+/// Number of distinct widths of covered lines; more lines over one another share the largest.
 const MOST_COVERS: usize = 3;
 
-/// The lowest and highest point of a line in each pixel column of its panel.
+/// Lowest and highest point of a line in each pixel column of its panel.
 #[derive(Debug, Default)]
 pub(super) struct Course {
     columns: Vec<Option<(f64, f64)>>,
 }
 
 impl Course {
-    /// The course of unbroken runs of points, in pixels, within `frame`.
+    /// Computes the course of unbroken runs of points, in pixels, within `frame`.
     pub(super) fn of(runs: &[Vec<Point>], frame: &Rect) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most 8000 columns
         let count = frame.width.ceil().max(1.0) as usize;
@@ -32,7 +32,7 @@ impl Course {
         course
     }
 
-    /// Adds the columns that a straight line passes.
+    /// Adds the columns that a straight line crosses.
     fn add(&mut self, [from, to]: [Point; 2]) {
         let (left, right) = if from.0 <= to.0 { (from, to) } else { (to, from) };
         let slope = if right.0 > left.0 { (right.1 - left.1) / (right.0 - left.0) } else { 0.0 };
@@ -50,7 +50,7 @@ impl Course {
         }
     }
 
-    /// Whether `upper` lies on this line where this line is drawn.
+    /// Returns true if `upper` covers this line.
     fn is_under(&self, upper: &Self) -> bool {
         let drawn = self.columns.iter().flatten().count();
         let shared = self.columns.iter().zip(&upper.columns).filter(|(lower, upper)| {
@@ -74,10 +74,10 @@ pub fn covering_lines(lines: &[Vec<Vec<(f64, f64)>>], [left, right]: [f64; 2]) -
     courses.iter().enumerate().map(covers).collect()
 }
 
-/// Returns the width of a line under so many others, in widths of a line, and its opacity.
+/// Returns the width of a line under so many others, as a multiple of its normal width, and its opacity.
 #[must_use]
 pub const fn covered_style(covers: usize) -> (f64, f64) {
-    /// A covered line is seen by so much on both sides together, in widths of a line.
+    /// Visible width of a covered line on both sides together, per covering line, in widths of a line.
     const BESIDE: f64 = 2.125;
     if covers == 0 { (1.0, 1.0) } else { (1.0 + BESIDE * covers as f64, 0.45) }
 }

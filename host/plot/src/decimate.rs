@@ -1,11 +1,11 @@
-//! Reduction of long lines to what a picture can show.
+//! Reduction of long lines to the resolution of a picture.
 //!
 //! The x axis is cut into buckets one pixel wide, and of the samples in a bucket the first, the lowest, the
 //! highest and the last remain. Drawn one pixel per bucket, the reduced line covers the same pixels as the
 //! full one (M4 aggregation: Jugel, Jerzak, Hackenbroich, Markl, "M4: A Visualization-Oriented Time Series
 //! Data Aggregation", PVLDB 7(10), 2014, section 4).
 
-/// A sample in scale coordinates.
+/// Sample in scale coordinates.
 pub(super) type Point = (f64, f64);
 
 /// Splits `samples` at gaps (`None`) into unbroken runs and reduces each to at most four samples per bucket.
@@ -44,7 +44,7 @@ pub(super) fn decimate(
     runs
 }
 
-/// First, lowest, highest and last of consecutive samples, each with its place in the bucket.
+/// First, lowest, highest and last of consecutive samples, each with its index in the bucket.
 struct Bucket {
     index: f64,
     count: usize,

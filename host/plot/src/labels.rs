@@ -23,26 +23,26 @@ pub(super) const MARK_ROW_PX: f64 = 15.0;
 pub(super) const SWATCH_PX: f64 = 24.0;
 /// Length of the marker or bar sample in a legend.
 const SHORT_SWATCH_PX: f64 = 10.0;
-/// From the sample in a legend to its text.
+/// Distance from the sample in a legend to its text.
 const SWATCH_TO_TEXT_PX: f64 = 6.0;
 const LEGEND_GAP_PX: f64 = 18.0;
 /// Longest text in a legend; longer ones end in an ellipsis.
 const LEGEND_TEXT_LIMIT_PX: f64 = 260.0;
 
-/// From the plotting area to the names of horizontal marks: room for the leader.
+/// Distance from the plotting area to the names of horizontal marks: room for the leader.
 pub(super) const SIDE_LABEL_GAP_PX: f64 = 12.0;
 /// Longest name of a horizontal mark.
 const SIDE_LABEL_LIMIT_PX: f64 = 150.0;
 const SIDE_LABEL_PITCH_PX: f64 = 14.0;
-/// From the pole of a vertical mark to its name.
+/// Distance from the pole of a vertical mark to its name.
 const FLAG_GAP_PX: f64 = 4.0;
-/// How far the name of a vertical mark may pass the frame's right end: within margin and column gap.
+/// Largest overhang of the name of a vertical mark beyond the frame's right end: within margin and column gap.
 const FLAG_OVERHANG_PX: f64 = 20.0;
 
-/// From the middle of lower-case letters to the baseline, as a fraction of the font size.
+/// Distance from the middle of lower-case letters to the baseline, as a fraction of the font size.
 const BASELINE_BELOW_MIDDLE_EM: f64 = 0.34;
 
-/// The panel's title and the y axis' name and unit, the first in semi-bold.
+/// Panel title and the y axis' name and unit, the first in semi-bold.
 #[derive(Debug)]
 pub(super) struct Heading {
     pub(super) strong: String,
@@ -50,7 +50,7 @@ pub(super) struct Heading {
 }
 
 impl Heading {
-    /// The heading of `panel`, whose y tick labels leave out `exponent`, cut to `limit_px`.
+    /// Composes the heading of `panel`, whose y tick labels leave out `exponent`, cut to `limit_px`.
     pub(super) fn new(panel: &Panel, exponent: i32, limit_px: f64) -> Self {
         let (strong, light) = match panel.title.is_empty() {
             true => (&panel.y.label, panel.y.unit_label(exponent)),
@@ -69,11 +69,11 @@ impl Heading {
     }
 }
 
-/// One legend entry, placed relative to the top left corner of its legend.
+/// Legend entry, placed relative to the top left corner of its legend.
 #[derive(Debug)]
 pub(super) struct LegendEntry<'a> {
     pub(super) series: &'a Series,
-    /// Number of the series in its panel.
+    /// Index of the series in its panel.
     pub(super) index: usize,
     pub(super) text: String,
     /// Left end of the sample.
@@ -95,7 +95,7 @@ impl LegendEntry<'_> {
     }
 }
 
-/// The legend of a panel: beside the heading, ending at the frame's right, or in rows of its own below.
+/// Legend of a panel: beside the heading, ending at the frame's right, or in rows of its own below.
 #[derive(Debug)]
 pub(super) struct Legend<'a> {
     pub(super) entries: Vec<LegendEntry<'a>>,
@@ -104,7 +104,7 @@ pub(super) struct Legend<'a> {
 }
 
 impl<'a> Legend<'a> {
-    /// Places the entries between `left` and `right`, where the heading takes the first `heading` of the row.
+    /// Places the entries between `left` and `right`, with `heading` at the start of the row.
     /// Series without a label have no entry.
     pub(super) fn new(panel: &'a Panel, x: &Domain, heading: &Heading, left: f64, right: f64) -> Self {
         let mut entries: Vec<LegendEntry<'a>> = panel
@@ -139,7 +139,7 @@ impl<'a> LegendEntry<'a> {
     }
 }
 
-/// Places entries from `left` on, in a new row where one would pass `right`; returns the number of rows.
+/// Places entries from `left` on, and starts a new row before one that would pass `right`; returns the number of rows.
 fn flow(entries: &mut [LegendEntry<'_>], left: f64, right: f64) -> usize {
     let (mut x, mut row) = (left, 0);
     for entry in entries {
@@ -152,45 +152,45 @@ fn flow(entries: &mut [LegendEntry<'_>], left: f64, right: f64) -> usize {
     row + 1
 }
 
-/// The name of a mark.
+/// Name of a mark.
 #[derive(Debug)]
 pub(super) struct MarkLabel {
     pub(super) text: String,
-    /// Where the mark meets the frame, in pixels along the mark's axis.
+    /// Point where the mark meets the frame, in pixels along the mark's axis.
     pub(super) anchor: f64,
-    /// Where the middle of the name lies along that axis.
+    /// Middle of the name along this axis.
     pub(super) middle: f64,
     /// Half the length of the name.
     half_px: f64,
-    /// Names of vertical marks: the row above the frame, 0 the nearest.
+    /// Row of the name of a vertical mark above the frame, 0 the nearest.
     pub(super) row: usize,
 }
 
 impl MarkLabel {
-    /// Left end of a name of a vertical mark.
+    /// Returns the left end of a name of a vertical mark.
     pub(super) fn start(&self) -> f64 {
         self.middle - self.half_px
     }
 
-    /// Right end of a name of a vertical mark.
+    /// Returns the right end of a name of a vertical mark.
     fn end(&self) -> f64 {
         self.middle + self.half_px
     }
 }
 
-/// The baseline of text whose middle is at `middle`.
+/// Returns the baseline of text whose middle is at `middle`.
 pub(super) fn baseline(middle: f64, font_px: f64) -> f64 {
     middle + BASELINE_BELOW_MIDDLE_EM * font_px
 }
 
-/// Width of the gutter that the names of horizontal marks take right of the frame.
+/// Returns the width of the gutter for the names of horizontal marks right of the frame.
 pub(super) fn side_gutter_px(marks: &[Mark], y: &Domain) -> f64 {
     visible_marks(marks, Direction::Y, y)
         .map(|(label, _)| text::width_px(&side_text(label), font_px::LABEL) + SIDE_LABEL_GAP_PX)
         .fold(0.0, f64::max)
 }
 
-/// Names of horizontal marks, top to bottom, none over another.
+/// Places the names of horizontal marks, top to bottom, without overlap.
 pub(super) fn side_labels(marks: &[Mark], projection: &Projection) -> Vec<MarkLabel> {
     let mut labels: Vec<MarkLabel> = visible_marks(marks, Direction::Y, &projection.y)
         .map(|(label, at)| (side_text(label), projection.y_px(at)))
@@ -201,15 +201,15 @@ pub(super) fn side_labels(marks: &[Mark], projection: &Projection) -> Vec<MarkLa
     labels
 }
 
-/// Names of vertical marks: flags that fly to the right of their mark, or to the left where the picture ends. No pole crosses a name:
-/// rows fill with right flags from the right, as what stands in a lower row begins further right, then with left flags from the left.
+/// Places the names of vertical marks: flags to the right of their mark, or to the left at the end of the picture. No pole crosses a
+/// name: rows fill with right flags from the right, as flags in lower rows begin further right, then with left flags from the left.
 pub(super) fn top_labels(marks: &[Mark], x: &Domain, left: f64, right: f64) -> Vec<MarkLabel> {
     let mut named: Vec<(f64, &str)> = visible_marks(marks, Direction::X, x)
         .map(|(label, at)| (left + (right - left) * x.fraction(at), label))
         .collect();
     named.sort_by(|(one, _), (other, _)| other.total_cmp(one));
     let (mut flags, mut left_flags) = (Vec::new(), Vec::new());
-    // A right flag ends before the pole of the first left one, which stands in a higher row.
+    // A right flag ends before the pole of the first left one, which is in a higher row.
     let mut limit = right + FLAG_OVERHANG_PX;
     for (anchor, label) in named {
         let text = text::shorten(label, right - left, font_px::LABEL);
@@ -251,7 +251,7 @@ fn side_text(label: &str) -> String {
     text::shorten(label, SIDE_LABEL_LIMIT_PX, font_px::LABEL)
 }
 
-/// Labels of the marks on one axis that are seen, with their coordinates.
+/// Returns the labels of visible marks on one axis, with their coordinates.
 fn visible_marks<'a>(
     marks: &'a [Mark],
     direction: Direction,

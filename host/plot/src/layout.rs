@@ -1,4 +1,4 @@
-//! Where everything goes: from the model to rectangles, ticks and placed labels.
+//! Layout: from the model to rectangles, ticks and placed labels.
 //!
 //! Three passes, each needing the one before: ranges and y ticks ([`drafts`]), then gutters, which fix the
 //! width of each column ([`columns`]; panels of one column share them, so that their x axes line up), then
@@ -19,11 +19,11 @@ use super::{Figure, Panel};
 pub(super) const MARGIN_PX: f64 = 24.0;
 pub(super) const TITLE_LINE_PX: f64 = 24.0;
 pub(super) const SUBTITLE_LINE_PX: f64 = 18.0;
-/// From the frame to the tick labels left of it.
+/// Distance from the frame to the tick labels left of it.
 pub(super) const FRAME_TO_Y_LABEL_PX: f64 = 8.0;
-/// From the frame down to the baseline of the tick labels below it.
+/// Distance from the frame down to the baseline of the tick labels below it.
 pub(super) const FRAME_TO_X_LABEL_PX: f64 = 17.0;
-/// From the frame down to the baseline of the x axis' name.
+/// Distance from the frame down to the baseline of the x axis' name.
 pub(super) const FRAME_TO_X_NAME_PX: f64 = 35.0;
 
 const COLUMN_GAP_PX: f64 = 36.0;
@@ -32,10 +32,10 @@ const HEADING_TO_FRAME_PX: f64 = 5.0;
 const DESCENDER_PX: f64 = 5.0;
 const Y_LABEL_PITCH_PX: f64 = 21.0;
 const X_LABEL_GAP_PX: f64 = 26.0;
-/// The narrowest plotting area that gutters may leave.
+/// Least width of a plotting area between gutters.
 const LEAST_FRAME_WIDTH_PX: f64 = 40.0;
 
-/// The arranged figure.
+/// Arranged figure.
 #[derive(Debug)]
 pub(super) struct Layout<'a> {
     pub(super) height: f64,
@@ -44,7 +44,7 @@ pub(super) struct Layout<'a> {
     pub(super) cells: Vec<Cell<'a>>,
 }
 
-/// One arranged panel.
+/// Arranged panel.
 #[derive(Debug)]
 pub(super) struct Cell<'a> {
     pub(super) draft: Draft<'a>,
@@ -75,7 +75,7 @@ pub(super) fn arrange(figure: &Figure) -> Layout<'_> {
     Layout { height: y + MARGIN_PX, title, subtitle, cells }
 }
 
-/// A panel with its ranges, before it has a place.
+/// Panel with its ranges, not placed yet.
 #[derive(Debug)]
 pub(super) struct Draft<'a> {
     pub(super) panel: &'a Panel,
@@ -83,9 +83,9 @@ pub(super) struct Draft<'a> {
     x: Domain,
     y: Domain,
     pub(super) y_ticks: Ticks,
-    /// Whether the x tick labels and the x axis' name stand under this panel.
+    /// True if the x tick labels and the x axis' name are under this panel.
     pub(super) has_x_labels: bool,
-    /// Whether any sample is seen.
+    /// True if any sample is visible.
     pub(super) has_data: bool,
 }
 
@@ -105,7 +105,7 @@ fn drafts(figure: &Figure) -> Vec<Draft<'_>> {
         .collect()
 }
 
-/// Whether panel `index` carries its x labels: it has an axis of its own, or is the last of its column that
+/// Returns true if panel `index` has x labels: it has its own axis, or is the last of its column that
 /// shares the figure's.
 fn has_x_labels(figure: &Figure, index: usize) -> bool {
     let mut from_here_down = figure.panels.iter().skip(index).step_by(figure.columns);
@@ -113,7 +113,7 @@ fn has_x_labels(figure: &Figure, index: usize) -> bool {
     !is_shared || from_here_down.all(|panel| panel.own_x.is_some())
 }
 
-/// The x range that covers the series and marks of `panels`.
+/// Returns the x range that covers the series and marks of `panels`.
 fn x_domain<'a>(axis: &Axis, panels: impl IntoIterator<Item = &'a Panel>) -> Domain {
     let mut extent = Extent::EMPTY;
     let mut fit = Fit::Tight;
@@ -143,7 +143,7 @@ impl<'a> Draft<'a> {
         }
         let has_bars = panel.series.iter().any(|series| matches!(series.shape, Shape::Histogram(_)));
         let y = panel.y.domain(extent, if has_bars { Fit::OnZero } else { Fit::Padded });
-        // Numbers beside an axis that nothing was measured on would mislead.
+        // Numbers beside an axis without data would mislead.
         let y_ticks = match extent.is_empty() && panel.y.fixed.is_none() {
             true => Ticks::none(),
             false => Ticks::fit(&y, height_px, Spacing::Vertical { pitch_px: Y_LABEL_PITCH_PX }),
@@ -156,7 +156,7 @@ impl<'a> Draft<'a> {
     }
 }
 
-/// Horizontal place of a column: its left edge, and its plotting area between the gutters.
+/// Horizontal position of a column: its left edge, and its plotting area between the gutters.
 #[derive(Debug, Clone, Copy)]
 struct Column {
     left: f64,
@@ -181,7 +181,7 @@ fn columns(figure: &Figure, drafts: &[Draft<'_>]) -> Vec<Column> {
         .collect()
 }
 
-/// What stands above a panel, and its x ticks: all that depends on its column and not on its row.
+/// Labels above a panel, and its x ticks: the parts that depend on its column and not on its row.
 #[derive(Debug)]
 pub(super) struct Head<'a> {
     pub(super) x_ticks: Ticks,
@@ -221,7 +221,7 @@ fn place_row<'a>(
     top: f64,
     cells: &mut Vec<Cell<'a>>,
 ) -> f64 {
-    // Where one panel of a row carries x labels there is room for all to.
+    // If one panel of a row has x labels, all panels get the room for them.
     let has_x_labels = row.iter().any(|draft| draft.has_x_labels);
     let foot_px = if has_x_labels { row.iter().map(Draft::foot_px).fold(0.0, f64::max) } else { 0.0 };
     let heads: Vec<Head<'a>> =
@@ -237,7 +237,7 @@ fn place_row<'a>(
 }
 
 impl Draft<'_> {
-    /// Height of x tick labels and the axis' name below the frame.
+    /// Returns the height of x tick labels and the axis' name below the frame.
     fn foot_px(&self) -> f64 {
         let is_nameless = self.x_axis.label.is_empty() && self.x_axis.unit.is_empty();
         DESCENDER_PX + if is_nameless { FRAME_TO_X_LABEL_PX } else { FRAME_TO_X_NAME_PX }

@@ -1,22 +1,22 @@
-//! Charts as self-contained SVG text: every picture the command line makes comes from here.
+//! Charts as self-contained SVG text: the source of every picture of the command line.
 //!
 //! A [`Figure`] has a title and [`Panel`]s; a panel has axes, [`Series`] of samples and [`Mark`]s (reference
 //! lines). [`Figure::to_svg`] lays them out and writes one SVG document that needs no other
-//! file, reads on light and dark pages, scales with the page and says in words what it shows.
+//! file, is readable on light and dark pages, scales with the page and describes its content in words.
 //!
-//! Five promises shape the code:
+//! Design goals:
 //! - **No peak is lost, no file is large.** Lines are reduced to at most four samples per pixel column
 //!   (`decimate`, after Jugel et al., "M4", VLDB 2014), so ten minutes at 1 kHz cost what a second costs. A [`Trace`]
 //!   reduces them while they arrive: its memory does not grow with the run.
 //! - **Rounding is no signal.** An axis covers at least the range below which differences of its [`Quantity`] are rounding.
-//! - **Every series is seen.** A line that later ones cover is wider and paler than they are (`cover`).
+//! - **Every series is visible.** A line that later ones cover is wider and paler than they are (`cover`).
 //! - **Bad samples stay local.** NaN, infinity, and anything not positive on a log axis break the line there
 //!   and touch neither the axis range nor the rest of the curve.
 //! - **Same input, same bytes.** Coordinates are rounded to a tenth of a pixel; nothing depends on time,
 //!   locale or installed fonts.
 //!
 //! Data flows one way: the model (this file, `series`, `mark`, `spans`) -> `axis` and `ticks` (ranges) -> `layout` and
-//! `labels` (places) -> `path` and `svg` (text). `theme` holds all that is a matter of taste.
+//! `labels` (places) -> `path` and `svg` (text). `theme` has all matters of taste.
 //!
 //! Not real-time: every function here allocates.
 //!
@@ -67,11 +67,11 @@ pub use vector::VectorTrace;
 /// Width of a figure: fits the text column of the book and a laptop screen at full size.
 const WIDTH_PX: f64 = 960.0;
 
-/// Height of a panel's plotting area unless [`Figure::panel_height_px`] says otherwise: five stacked panels
+/// Default height of a panel's plotting area, see [`Figure::panel_height_px`]: five stacked panels
 /// fit one screen.
 const DEFAULT_PANEL_HEIGHT_PX: f64 = 120.0;
 
-/// A picture: a title over panels that fill a grid row by row, one column unless told otherwise.
+/// Picture with a title over panels, which fill a grid row by row; one column by default.
 ///
 /// Panels without an x axis of their own share the figure's: one range that covers all of them, its labels
 /// drawn once at the foot of each column.
@@ -92,7 +92,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// An empty figure whose panels share the x axis `shared_x`.
+    /// Creates an empty figure whose panels share the x axis `shared_x`.
     pub fn new(title: impl Into<String>, shared_x: Axis) -> Self {
         Self {
             title: title.into(),
@@ -110,28 +110,28 @@ impl Figure {
         }
     }
 
-    /// The line under the title: conditions of the measurement, seed, versions. Long text wraps.
+    /// Sets the line under the title: conditions of the measurement, seed, versions. Long text wraps.
     #[must_use]
     pub fn subtitle(mut self, subtitle: impl Into<String>) -> Self {
         self.subtitle = subtitle.into();
         self
     }
 
-    /// The text behind the panels, large and pale: a restriction that must stay with the picture wherever it is copied to.
+    /// Sets the text behind the panels, large and pale: a restriction that applies to every copy of the picture.
     #[must_use]
     pub fn watermark(mut self, watermark: impl Into<String>) -> Self {
         self.watermark = watermark.into();
         self
     }
 
-    /// Number of panels side by side; 0 counts as 1.
+    /// Sets the number of panels side by side; 0 counts as 1.
     #[must_use]
     pub fn columns(mut self, columns: usize) -> Self {
         self.columns = columns.max(1);
         self
     }
 
-    /// Height of each plotting area, without headings and tick labels, held within 40 px to 2000 px; NaN changes nothing.
+    /// Sets the height of each plotting area, without headings and tick labels, clamped to 40 px to 2000 px; NaN changes nothing.
     #[must_use]
     pub fn panel_height_px(mut self, panel_height_px: f64) -> Self {
         if !panel_height_px.is_nan() {
@@ -140,7 +140,7 @@ impl Figure {
         self
     }
 
-    /// Width and height of the whole picture, each held within 200 px and 8000 px; panels share the height that titles and labels
+    /// Sets width and height of the whole picture, each clamped to 200 px to 8000 px; panels share the height that titles and labels
     /// leave, at least 40 px each.
     #[must_use]
     pub fn size_px(mut self, [width_px, height_px]: [f64; 2]) -> Self {
@@ -149,7 +149,7 @@ impl Figure {
         self
     }
 
-    /// Shows the picture so many times as large, text and lines included, held within 0.1 and 10; NaN changes nothing.
+    /// Enlarges the picture by a factor, text and lines included, clamped to 0.1 to 10; NaN changes nothing.
     #[must_use]
     pub fn scale(mut self, scale: f64) -> Self {
         if !scale.is_nan() {
@@ -158,21 +158,21 @@ impl Figure {
         self
     }
 
-    /// Light or dark, or as the page it is read on.
+    /// Selects light or dark colours, or those of the page that shows the picture.
     #[must_use]
     pub fn paper(mut self, paper: Paper) -> Self {
         self.paper = paper;
         self
     }
 
-    /// Adds a panel after the ones already there.
+    /// Adds a panel after the existing ones.
     #[must_use]
     pub fn panel(mut self, panel: Panel) -> Self {
         self.panels.push(panel);
         self
     }
 
-    /// Adds a panel, or names under the subtitle what has none and why.
+    /// Adds a panel, or a note under the subtitle with a quantity that has no panel and the reason.
     #[must_use]
     pub fn panel_or_note(mut self, panel: Result<Panel, String>) -> Self {
         match panel {
@@ -182,7 +182,7 @@ impl Figure {
         self
     }
 
-    /// The line that names what has no panel; empty if nothing was left out.
+    /// Returns the line with the quantities without a panel; empty if there are none.
     fn note(&self) -> String {
         if self.left_out.is_empty() {
             String::new()
@@ -191,7 +191,7 @@ impl Figure {
         }
     }
 
-    /// The picture as one SVG document. Never fails: a figure without data says so in its place.
+    /// Returns the picture as one SVG document. Never fails: a panel without data contains the text "no data".
     #[must_use]
     pub fn to_svg(&self) -> String {
         let layout = layout::arrange(self);
@@ -202,7 +202,7 @@ impl Figure {
     }
 }
 
-/// What a picture is read on.
+/// Background of a picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Paper {
     /// Light, and dark on pages in dark mode.
@@ -214,7 +214,7 @@ pub enum Paper {
     Dark,
 }
 
-/// One plotting area with its axes, series and marks.
+/// Plotting area with its axes, series and marks.
 #[derive(Debug, Clone)]
 pub struct Panel {
     title: String,
@@ -226,7 +226,7 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// An empty panel on the figure's x axis. The y axis' label is the panel's heading.
+    /// Creates an empty panel on the figure's x axis. The y axis' label is the panel's heading.
     #[must_use]
     pub fn new(y: Axis) -> Self {
         Self {
@@ -239,13 +239,13 @@ impl Panel {
         }
     }
 
-    /// An empty panel with an x axis of its own.
+    /// Creates an empty panel with an x axis of its own.
     #[must_use]
     pub fn with_x(x: Axis, y: Axis) -> Self {
         Self { own_x: Some(x), ..Self::new(y) }
     }
 
-    /// A name before the y axis' label, for grids whose panels differ in their case and not in quantity.
+    /// Sets a name before the y axis' label, for grids whose panels differ in their case and not in quantity.
     #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
@@ -266,7 +266,7 @@ impl Panel {
         self
     }
 
-    /// Marks the stretches of x in which a limit acted, as a bar along the foot of the panel.
+    /// Marks the intervals of x in which a limit acted, as a bar along the foot of the panel.
     #[must_use]
     pub fn limited(mut self, spans: Spans) -> Self {
         self.limited.push(spans);

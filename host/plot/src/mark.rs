@@ -1,9 +1,9 @@
-//! Marks: reference lines under the data, and faults.
+//! Marks: reference lines under the data, and faults over it.
 
 use super::axis::{Domain, Extent, Scale};
 
-/// A reference line under the data, or a fault, with a label outside the plotting area. A mark widens an automatic range so that
-/// it is seen; outside a fixed range it is left out.
+/// Reference line under the data, or a fault, with a label outside the plotting area. A mark widens an automatic range so that
+/// it is visible; outside a fixed range it is left out.
 #[derive(Debug, Clone)]
 pub struct Mark {
     pub(super) direction: Direction,
@@ -12,7 +12,7 @@ pub struct Mark {
     at: f64,
 }
 
-/// How a mark is drawn.
+/// Style of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MarkLook {
     /// A thin dashed line.
@@ -21,7 +21,7 @@ pub(super) enum MarkLook {
     Fault,
 }
 
-/// The axis on which a mark's value lies.
+/// Axis on which a mark's value lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Direction {
     X,
@@ -29,22 +29,22 @@ pub(super) enum Direction {
 }
 
 impl Mark {
-    /// A vertical line at `x`, in the unit of the x axis.
+    /// Creates a vertical line at `x`, in the unit of the x axis.
     pub fn at_x(x: f64, label: impl Into<String>) -> Self {
         Self { direction: Direction::X, label: label.into(), look: MarkLook::Reference, at: x }
     }
 
-    /// A fault at `x`, in the unit of the x axis: a line over the whole height with a cross.
+    /// Creates a fault at `x`, in the unit of the x axis: a line over the whole height with a cross.
     pub fn fault_at_x(x: f64, label: impl Into<String>) -> Self {
         Self { look: MarkLook::Fault, ..Self::at_x(x, label) }
     }
 
-    /// A horizontal line at `y`, in the unit of the y axis.
+    /// Creates a horizontal line at `y`, in the unit of the y axis.
     pub fn at_y(y: f64, label: impl Into<String>) -> Self {
         Self { direction: Direction::Y, ..Self::at_x(y, label) }
     }
 
-    /// The coordinate of the mark in `domain`. Nothing when it lies outside or has no place (NaN, infinity).
+    /// Returns the coordinate of the mark in `domain`; `None` if it is outside or cannot be drawn (NaN, infinity).
     pub(super) fn visible(&self, domain: &Domain) -> Option<f64> {
         domain.scale.forward(self.at).filter(|at| (domain.low..=domain.high).contains(at))
     }

@@ -1,7 +1,7 @@
-//! Compact SVG path data, and the outlines of series as paths.
+//! SVG path data in a compact form, and the outlines of series as paths.
 //!
 //! Coordinates are whole tenths of a pixel. Each step is written relative to the last *rounded* point, so
-//! rounding never adds up along a line, and a step costs about six characters.
+//! rounding errors do not add up along a line, and a step takes about six characters.
 
 use std::collections::BTreeSet;
 
@@ -13,23 +13,23 @@ use super::series::{Bin, ErrorBar, Series, Shape};
 use super::text;
 use super::theme::Slot;
 
-/// A line longer than this many times its width crosses itself up and down: dashes would hide its peaks.
+/// Ratio of length to width above which a line crosses itself up and down, so that dashes would hide its peaks.
 const BUSY_LENGTH_PER_WIDTH: f64 = 4.0;
 
-/// Markers whose centres fall into the same square of this size are drawn once.
+/// Size of the squares in each of which only one marker is drawn.
 const MARKER_CELL_PX: f64 = 1.0;
 
-/// Coordinates are held within this many sizes of the plotting area around it. Far outside, a point only
+/// Largest distance of coordinates from the plotting area, in sizes of the area. Farther outside, a point only
 /// gives the direction of the line that leaves.
 const FARTHEST_FRACTION: f64 = 1000.0;
 
 /// Half the width of the end of an error bar.
 const ERROR_CAP_PX: f64 = 5.0;
 
-/// A point this near to the frame lies on its edge: half of what coordinates are rounded to.
+/// Tolerance for a point on the edge of the frame: half of the rounding of coordinates.
 const EDGE_PX: f64 = 0.05;
 
-/// An axis-aligned rectangle in pixels, y down.
+/// Axis-aligned rectangle in pixels, y down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rect {
     pub(super) left: f64,
@@ -47,17 +47,17 @@ impl Rect {
         self.top + self.height
     }
 
-    /// The x at a fraction of the width, from the left.
+    /// Returns the x at a fraction of the width, from the left.
     pub(super) fn x_at(&self, fraction: f64) -> f64 {
         self.left + self.width * fraction
     }
 
-    /// The y at a fraction of the height, from the bottom.
+    /// Returns the y at a fraction of the height, from the bottom.
     pub(super) fn y_at(&self, fraction: f64) -> f64 {
         self.bottom() - self.height * fraction
     }
 
-    /// The rectangle, larger on all sides.
+    /// Returns the rectangle, larger on all sides.
     fn grown(&self, by_px: f64) -> Self {
         let Self { left, top, width, height } = self;
         Self {
@@ -68,22 +68,22 @@ impl Rect {
         }
     }
 
-    /// True if the point lies in the rectangle or on its edge.
+    /// Returns true if the point lies in the rectangle or on its edge.
     pub(super) fn contains(&self, point: Point) -> bool {
         self.nearest(point) == point
     }
 
-    /// The point of the rectangle nearest to `point`.
+    /// Returns the point of the rectangle nearest to `point`.
     pub(super) fn nearest(&self, (x, y): Point) -> Point {
         (x.clamp(self.left, self.right()), y.clamp(self.top, self.bottom()))
     }
 
-    /// A line from bottom to top at `x`.
+    /// Returns a line from bottom to top at `x`.
     pub(super) fn upright(&self, x: f64) -> [Point; 2] {
         [(x, self.bottom()), (x, self.top)]
     }
 
-    /// A line from left to right at `y`.
+    /// Returns a line from left to right at `y`.
     pub(super) fn level(&self, y: f64) -> [Point; 2] {
         [(self.left, y), (self.right(), y)]
     }
@@ -94,7 +94,7 @@ impl Rect {
 pub(super) struct Path {
     data: String,
     at: (f64, f64),
-    /// Where the data end in a level step, and how far it goes: the next one the same way makes it longer.
+    /// Start and length of a level step at the end of the data, which the next one in the same direction extends.
     level: Option<(usize, f64)>,
 }
 
@@ -153,7 +153,7 @@ impl Path {
         self.data.push('z');
     }
 
-    /// An open line through the points; a single point becomes a dot of the line's width (with round caps).
+    /// Adds an open line through the points; a single point becomes a dot of the line's width (with round caps).
     pub(super) fn polyline(&mut self, points: impl IntoIterator<Item = Point>) {
         let mut points = points.into_iter();
         let Some((x, y)) = points.next() else { return };
@@ -168,12 +168,12 @@ impl Path {
         }
     }
 
-    /// A closed outline through offsets from (x, y).
+    /// Adds a closed outline through offsets from (x, y).
     pub(super) fn polygon(&mut self, x: f64, y: f64, offsets: &[Point]) {
         self.outline(offsets.iter().map(|&(dx, dy)| (x + dx, y + dy)));
     }
 
-    /// A closed outline through points.
+    /// Adds a closed outline through points.
     pub(super) fn outline(&mut self, points: impl IntoIterator<Item = Point>) {
         self.polyline(points);
         self.close();
@@ -183,13 +183,13 @@ impl Path {
         self.arcs(x, y, radius, 1);
     }
 
-    /// A circle with a hole: the inner outline runs the other way, which keeps it unfilled.
+    /// Adds a circle with a hole: the inner outline has the opposite direction, so that it is not filled.
     pub(super) fn ring(&mut self, x: f64, y: f64, outer: f64, inner: f64) {
         self.arcs(x, y, outer, 1);
         self.arcs(x, y, inner, 0);
     }
 
-    /// The end of an error bar.
+    /// Adds the end of an error bar.
     pub(super) fn error_cap(&mut self, x: f64, y: f64) {
         self.polyline([(x - ERROR_CAP_PX, y), (x + ERROR_CAP_PX, y)]);
     }
@@ -206,7 +206,7 @@ fn tenths(px: f64) -> f64 {
     (px * 10.0).round() + 0.0
 }
 
-/// From scale coordinates to pixels of one panel.
+/// Projection from scale coordinates to pixels of one panel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Projection {
     pub(super) x: Domain,
@@ -231,7 +231,7 @@ impl Projection {
         self.x.scale.forward(x).zip(self.y.scale.forward(y))
     }
 
-    /// Width of one pixel column in x coordinates.
+    /// Returns the width of one pixel column in x coordinates.
     fn column(&self) -> f64 {
         self.x.span() / self.frame.width
     }
@@ -241,11 +241,11 @@ fn bounded(fraction: f64) -> f64 {
     fraction.clamp(-FARTHEST_FRACTION, FARTHEST_FRACTION)
 }
 
-/// What is drawn for one series.
+/// Drawing of one series.
 #[derive(Debug)]
 pub(super) enum Drawing {
-    /// A line, and the samples that stand alone between gaps (dashes would swallow them); `busy` when it goes
-    /// up and down so much that dashes would hide parts of it. `covers` later lines lie over it.
+    /// A line, and the samples that stand alone between gaps (dashes would swallow them); `busy` if it goes
+    /// up and down so much that dashes would hide parts of it. `covers` later lines are over it.
     Line { path: Path, dots: Path, busy: bool, course: Course, covers: usize },
     /// Filled marker outlines.
     Markers(Path),
@@ -255,7 +255,7 @@ pub(super) enum Drawing {
     Errors(Path),
 }
 
-/// The drawing of `series`, or nothing when no sample can be drawn.
+/// Draws `series`; returns `None` if no sample can be drawn.
 pub(super) fn draw(series: &Series, slot: Slot, projection: &Projection) -> Option<Drawing> {
     let drawing = match &series.shape {
         Shape::Line(samples) => {
@@ -288,7 +288,7 @@ fn line(samples: impl Iterator<Item = Option<Point>>, slot: Slot, projection: &P
         slot.add_marker(&mut path, *x, *y);
         return Drawing::Markers(path);
     }
-    // One of many neither covers nor is covered.
+    // A faint line neither covers others nor counts as covered.
     let course = if slot.is_faint() { Course::default() } else { Course::of(&runs, &projection.frame) };
     let busy = is_busy(&runs);
     for run in runs {
@@ -298,7 +298,7 @@ fn line(samples: impl Iterator<Item = Option<Point>>, slot: Slot, projection: &P
     Drawing::Line { path, dots, busy, course, covers: 0 }
 }
 
-/// Whether the lines are much longer than the width they cover.
+/// Returns true if the lines are much longer than the width that they cover.
 fn is_busy(runs: &[Vec<Point>]) -> bool {
     let steps =
         || runs.iter().flat_map(|run| run.windows(2)).filter_map(|pair| pair.first().zip(pair.last()));
@@ -307,7 +307,7 @@ fn is_busy(runs: &[Vec<Point>]) -> bool {
     length > BUSY_LENGTH_PER_WIDTH * width
 }
 
-/// Corners of the zero-order hold: each value is carried to the x of the next sample.
+/// Inserts the corners of the zero-order hold: each value extends to the x of the next sample.
 fn corners(samples: impl Iterator<Item = Option<Point>>) -> impl Iterator<Item = Option<Point>> {
     let mut held: Option<f64> = None;
     samples.flat_map(move |sample| {
@@ -334,7 +334,7 @@ fn markers(samples: &[(f64, f64)], slot: Slot, projection: &Projection) -> Drawi
     Drawing::Markers(path)
 }
 
-/// Strokes from the lower to the upper ends, cut at the frame; a cap where the end is within it.
+/// Draws strokes from the lower to the upper ends, cut at the frame, with a cap at each end within it.
 fn errors(bars: &[ErrorBar], projection: &Projection) -> Drawing {
     let mut path = Path::default();
     let frame = projection.frame.grown(EDGE_PX);
@@ -348,7 +348,7 @@ fn errors(bars: &[ErrorBar], projection: &Projection) -> Drawing {
     Drawing::Errors(path)
 }
 
-/// One closed outline per block of bins that touch.
+/// Draws one closed outline per block of adjacent bins.
 fn bars(bins: &[Bin], projection: &Projection) -> Drawing {
     let floor = projection.y.scale.forward(0.0).unwrap_or(projection.y.low);
     let mut path = Path::default();
@@ -359,7 +359,7 @@ fn bars(bins: &[Bin], projection: &Projection) -> Drawing {
     Drawing::Bars(path)
 }
 
-/// The outline of the bars, with a gap (`None`) between blocks.
+/// Returns the outline of the bars, with a gap (`None`) between blocks.
 fn bar_outline(bins: &[Bin], projection: &Projection, floor: f64) -> Vec<Option<Point>> {
     let mut outline = Vec::new();
     let mut reached: Option<f64> = None;

@@ -1,8 +1,8 @@
-//! Measured quantities: the units of their axes, and the least range that an axis of each covers.
+//! Measured quantities: the units of their axes, and their least axis ranges.
 //!
-//! Below the least range differences come from rounding, and an axis that followed them would draw noise as a signal.
+//! Differences below the least range come from rounding, and an axis that followed them would draw noise as a signal.
 
-/// A quantity that a run or an experiment measures.
+/// Quantity that a run or an experiment measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// A position or a length.
@@ -30,14 +30,14 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// The unit of an axis, and how many of it make one SI unit.
+    /// Returns the unit of an axis, and the number of units in one SI unit.
     #[must_use]
     pub const fn unit(self) -> (&'static str, f64) {
         let (symbol, per_si, _) = self.entry();
         (symbol, per_si)
     }
 
-    /// A value in the unit of an axis, as text.
+    /// Formats a value in the unit of an axis.
     pub(super) fn text(self, value: f64) -> String {
         match self {
             Self::Angle | Self::AngularVelocity => format!("{value}{}", self.unit().0),
@@ -45,13 +45,13 @@ impl Quantity {
         }
     }
 
-    /// The least range of an axis, in SI units.
+    /// Returns the least range of an axis, in SI units.
     #[must_use]
     pub const fn least_range_si(self) -> f64 {
         self.entry().2
     }
 
-    /// Unit, units in one SI unit, least range in SI units. The ranges lie far below what a hand feels or a device resolves, and
+    /// Returns unit, units in one SI unit, and least range in SI units. The ranges lie far below the resolution of hands and devices, and
     /// far above rounding errors.
     const fn entry(self) -> (&'static str, f64, f64) {
         const DEGREE: f64 = std::f64::consts::PI / 180.0;

@@ -1,13 +1,13 @@
-//! Series: the samples of one curve, how they are drawn, and the range they cover.
+//! Series: the samples of one curve, their style, and the range they cover.
 
 use super::axis::{Domain, Extent, Scale};
 use super::theme::{Slot, Weight};
 use super::trace::Trace;
 
-/// A bin that starts at zero has no left edge on a log axis; it is drawn this wide.
+/// Width of a bin that starts at zero on a log axis, where it has no left edge.
 const OPEN_BIN_DECADES: f64 = 0.5;
 
-/// Named samples and the way to draw them. Colour, dash and marker follow from the series' place in its
+/// Named samples and their style. Colour, dash and marker follow from the series' place in its
 /// panel unless [`Series::slot`] sets them.
 #[derive(Debug, Clone)]
 pub struct Series {
@@ -19,14 +19,14 @@ pub struct Series {
     pub(super) given: usize,
 }
 
-/// Where colour and dash come from.
+/// Source of colour and dash.
 #[derive(Debug, Clone, Copy)]
 enum Look {
     Slot(usize),
     Axis(usize),
 }
 
-/// How the samples are drawn.
+/// Samples with the kind of their drawing.
 #[derive(Debug, Clone)]
 pub(super) enum Shape {
     Line(Vec<(f64, f64)>),
@@ -36,10 +36,10 @@ pub(super) enum Shape {
     Errors(Vec<ErrorBar>),
 }
 
-/// A bar from `low` to `high` at `x`, in the units of the panel's axes.
+/// Bar from `low` to `high` at `x`, in the units of the panel's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorBar {
-    /// Place, unit of the x axis.
+    /// Position, unit of the x axis.
     pub x: f64,
     /// Lower end, unit of the y axis.
     pub low: f64,
@@ -48,32 +48,32 @@ pub struct ErrorBar {
 }
 
 impl ErrorBar {
-    /// A bar of `error` to each side of `value`.
+    /// Creates a bar of `error` to each side of `value`.
     #[must_use]
     pub fn around(x: f64, value: f64, error: f64) -> Self {
         Self { x, low: value - error, high: value + error }
     }
 
-    /// Both ends in the coordinates of the scales, or nothing when one cannot be drawn.
+    /// Returns both ends in the coordinates of the scales; `None` if one cannot be drawn.
     pub(super) fn ends(&self, x: Scale, y: Scale) -> Option<[(f64, f64); 2]> {
         let x = x.forward(self.x)?;
         Some([(x, y.forward(self.low)?), (x, y.forward(self.high)?)])
     }
 }
 
-/// One bar of a histogram: `height` over `from..to`, in the units of the panel's axes.
+/// Bar of a histogram: `height` over `from..to`, in the units of the panel's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bin {
     /// Left edge, unit of the x axis.
     pub from: f64,
-    /// Right edge, unit of the x axis; a bin that is not wider than nothing is left out.
+    /// Right edge, unit of the x axis; a bin without width is left out.
     pub to: f64,
     /// Height, unit of the y axis.
     pub height: f64,
 }
 
 impl Bin {
-    /// Bars of a quarter octave from `first` up, of values and how often each occurs; values below `first` are in the first.
+    /// Counts values into bars of a quarter octave from `first` up; values below `first` are in the first bar.
     #[must_use]
     pub fn quarter_octaves(first: f64, counts: impl IntoIterator<Item = (f64, u64)>) -> Vec<Self> {
         const STEP: f64 = 1.189_207_115_002_721; // 2^(1/4)
@@ -99,7 +99,7 @@ impl Bin {
         heights.into_iter().map(bin).collect()
     }
 
-    /// Left and right edge in the coordinates of `scale`, or nothing when the bin cannot be drawn.
+    /// Returns left and right edge in the coordinates of `scale`; `None` if the bin cannot be drawn.
     pub(super) fn edges(&self, scale: Scale) -> Option<(f64, f64)> {
         let right = scale.forward(self.to)?;
         let left = match scale {
@@ -111,34 +111,34 @@ impl Bin {
 }
 
 impl Series {
-    /// Samples `(x, y)` joined by straight lines in the order given; x need not grow. A sample that is not
-    /// finite breaks the line; one that stands alone is drawn as a dot.
+    /// Creates a line of samples `(x, y)`, joined in the order given; x need not grow. A sample that is not
+    /// finite breaks the line; an isolated one is drawn as a dot.
     pub fn line(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(label, Shape::Line(samples.into_iter().collect()))
     }
 
-    /// The samples of `trace`, joined as those of [`Series::line`].
+    /// Creates a line of the samples of `trace`, joined as in [`Series::line`].
     pub fn trace(label: impl Into<String>, trace: Trace) -> Self {
         let (samples, given) = trace.into_parts();
         Self { given, ..Self::new(label, Shape::Line(samples)) }
     }
 
-    /// Samples `(x, y)` whose y holds until the next x (zero-order hold).
+    /// Creates steps of samples `(x, y)` whose y holds until the next x (zero-order hold).
     pub fn steps(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(label, Shape::Steps(samples.into_iter().collect()))
     }
 
-    /// A marker at each sample `(x, y)`; those that would cover one another within a pixel are drawn once.
+    /// Creates a marker for each sample `(x, y)`; markers that coincide within a pixel are drawn once.
     pub fn points(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(label, Shape::Points(samples.into_iter().collect()))
     }
 
-    /// Filled bars in order of x. On a log y axis the bars stand on the axis' lower end.
+    /// Creates filled bars in order of x. On a log y axis the bars stand on the axis' lower end.
     pub fn histogram(label: impl Into<String>, bins: impl IntoIterator<Item = Bin>) -> Self {
         Self::new(label, Shape::Histogram(bins.into_iter().collect()))
     }
 
-    /// Bars with caps at both ends: standard errors, or intervals. Draw them after what they belong to.
+    /// Creates bars with caps at both ends: standard errors, or intervals. Add them after the series of their values.
     pub fn errors(label: impl Into<String>, bars: impl IntoIterator<Item = ErrorBar>) -> Self {
         Self::new(label, Shape::Errors(bars.into_iter().collect()))
     }
@@ -152,29 +152,29 @@ impl Series {
         Self { label: label.into(), slot: None, weight: Weight::Full, shape, given }
     }
 
-    /// Draws with the palette entry `slot` (counted from 0), so that the same thing looks the same in every
-    /// panel, or a theory line matches its measured points.
+    /// Sets the palette entry `slot` (counted from 0), for the same look of a quantity in every
+    /// panel, or of a theory line and its measured points.
     #[must_use]
     pub fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(Look::Slot(slot));
         self
     }
 
-    /// Draws as the component 0, 1 or 2 of a vector, x, y or z: a solid line in the same colour in every panel and picture.
+    /// Sets the colour of vector component 0, 1 or 2 (x, y or z): a solid line in the same colour in every panel and picture.
     #[must_use]
     pub fn axis(mut self, component: usize) -> Self {
         self.slot = Some(Look::Axis(component));
         self
     }
 
-    /// Draws a line thin, solid and pale, as one of many of its kind.
+    /// Draws the line thin, solid and pale, as one of many of its kind.
     #[must_use]
     pub fn faint(mut self) -> Self {
         self.weight = Weight::Faint;
         self
     }
 
-    /// Colour, dash and marker of the series when it is number `index` of its panel.
+    /// Returns colour, dash and marker of the series at `index` in its panel.
     pub(super) fn look(&self, index: usize) -> Slot {
         let slot = match self.slot {
             None => Slot::new(index),
@@ -184,7 +184,7 @@ impl Series {
         slot.with_weight(self.weight)
     }
 
-    /// The x range of what can be drawn, in the coordinates of the x scale.
+    /// Returns the x range of the samples that can be drawn, in the coordinates of the x scale.
     pub(super) fn extent_x(&self, x_scale: Scale, y_scale: Scale) -> Extent {
         let mut extent = Extent::EMPTY;
         match &self.shape {
@@ -210,7 +210,7 @@ impl Series {
         extent
     }
 
-    /// The y range of what is seen within the x domain, in the coordinates of the y scale.
+    /// Returns the y range of the samples within the x domain, in the coordinates of the y scale.
     pub(super) fn extent_y(&self, x_domain: &Domain, y_scale: Scale) -> Extent {
         let mut extent = Extent::EMPTY;
         match &self.shape {

@@ -1,16 +1,16 @@
-//! The stretches of an axis in which a condition held, while they arrive, in bounded memory.
+//! Intervals of an axis in which a condition held, collected in bounded memory.
 
 use super::axis::LARGEST_DRAWABLE;
 
-/// Most stretches kept: about one for each pixel column of a figure.
+/// Largest number of intervals: about one for each pixel column of a figure.
 const CAPACITY: usize = 1024;
 
-/// Stretches that remain apart after a reduction, at most.
+/// Largest number of intervals after a reduction.
 const REDUCED: f64 = 512.0;
 
-/// Stretches of growing x. Past 1 024 of them, neighbours nearer than a 512th of the whole are joined: about two pixels.
+/// Intervals of growing x. Beyond 1 024 of them, neighbours nearer than a 512th of the whole are joined: about two pixels.
 ///
-/// Not real-time: adding a stretch may allocate, at most 16 KiB.
+/// Not real-time: adding an interval may allocate, at most 16 KiB.
 #[derive(Debug, Clone, Default)]
 pub struct Spans {
     stretches: Vec<[f64; 2]>,
@@ -18,7 +18,7 @@ pub struct Spans {
 }
 
 impl Spans {
-    /// Extends the stretch to `x`, or begins one there. An x that is not finite changes nothing.
+    /// Extends the interval to `x`, or begins one there. An x that is not finite changes nothing.
     pub fn extend(&mut self, x: f64) {
         if x.abs() > LARGEST_DRAWABLE || x.is_nan() {
             return;
@@ -35,12 +35,12 @@ impl Spans {
         self.is_open = true;
     }
 
-    /// Ends the stretch.
+    /// Ends the interval.
     pub fn interrupt(&mut self) {
         self.is_open = false;
     }
 
-    /// Where each stretch begins and ends, in order.
+    /// Returns begin and end of each interval, in order.
     pub(super) fn stretches(&self) -> &[[f64; 2]] {
         &self.stretches
     }

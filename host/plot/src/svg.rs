@@ -1,8 +1,8 @@
-//! The document: an arranged figure written as SVG.
+//! SVG document of an arranged figure.
 //!
 //! Within a panel, from back to front: grid, reference lines, data, axis. The document has no ids and its style is confined
-//! to `.plot`, so that several pictures fit in one page. It has one `<svg>` and no `<clipPath>`: programs that make PDF of a
-//! picture draw neither well, and data are cut at the frame before they are written (`clip`).
+//! to `.plot`, so that several pictures fit in one page. It has one `<svg>` and no `<clipPath>`, which programs that convert
+//! pictures to PDF draw badly; data are cut at the frame before they are written (`clip`).
 
 use super::Figure;
 use super::axis::{Domain, Scale};
@@ -21,21 +21,21 @@ use super::spans::Spans;
 use super::text::{self, escape, px};
 use super::theme::{Slot, font_px, style_sheet};
 
-/// Half the size of the cross of a fault, and how far its middle lies below the top of the frame.
+/// Half the size of the cross of a fault, and distance of its middle from the top of the frame.
 const FAULT_CROSS_PX: f64 = 4.5;
 const FAULT_CROSS_DEPTH_PX: f64 = 8.0;
 
-/// Height of the bar that marks where a limit acted, and the least width of a stretch.
+/// Height of the bar that marks where a limit acted, and the least width of an interval.
 const LIMITED_BAR_PX: f64 = 5.0;
 const LEAST_STRETCH_PX: f64 = 1.5;
 
 const MAJOR_TICK_PX: f64 = 5.0;
 const MINOR_TICK_PX: f64 = 3.0;
 
-/// Decades shorter than this have no room for lines between 1 and 10.
+/// Least length of a decade with lines between 1 and 10.
 const MINOR_GRID_DECADE_PX: f64 = 60.0;
 
-/// Writes the figure.
+/// Writes the figure as an SVG document.
 pub(super) fn document(figure: &Figure, layout: &Layout<'_>) -> String {
     let mut writer = Writer::default();
     let (width, height) = (px(figure.width_px), px(layout.height));
@@ -65,7 +65,7 @@ pub(super) fn document(figure: &Figure, layout: &Layout<'_>) -> String {
     writer.out
 }
 
-/// What the picture shows, for those who do not see it.
+/// Describes the content of the picture in words, for screen readers.
 fn description(figure: &Figure, layout: &Layout<'_>) -> String {
     let mut description = format!("{} {}", figure.subtitle, figure.note()).trim().to_owned();
     for cell in &layout.cells {
@@ -102,7 +102,7 @@ fn description(figure: &Figure, layout: &Layout<'_>) -> String {
     description.trim().to_owned()
 }
 
-/// The document under construction.
+/// Document under construction.
 #[derive(Default)]
 struct Writer {
     out: String,
@@ -117,7 +117,7 @@ impl Writer {
         self.raw(&format!("<{name}>{}</{name}>\n", escape(content)));
     }
 
-    /// A line of text with its baseline at `y`; the class decides which end `x` names.
+    /// Writes a line of text with its baseline at `y`; the class decides which end `x` refers to.
     fn text(&mut self, class: &str, x: f64, y: f64, content: &str) {
         self.raw(&format!(
             "<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>\n",
@@ -127,9 +127,9 @@ impl Writer {
         ));
     }
 
-    /// A text across the middle of the picture, over most of its width; nothing for an empty one.
+    /// Writes a text across the middle of the picture, over most of its width; nothing for an empty one.
     fn watermark(&mut self, content: &str, width: f64, height: f64) {
-        /// Width of a character in units of the size of the type, about.
+        /// Approximate width of a character in units of the font size.
         const CHARACTER: f64 = 0.6;
         /// Share of the width that the text takes.
         const SHARE: f64 = 0.85;
@@ -191,7 +191,7 @@ impl Writer {
         self.path("reference", &path);
     }
 
-    /// A line with a cross for each fault, over the data.
+    /// Draws a line with a cross for each fault, over the data.
     fn faults(&mut self, cell: &Cell<'_>) {
         let projection @ Projection { x, frame, .. } = &cell.projection;
         let mut path = Path::default();
@@ -207,7 +207,7 @@ impl Writer {
         self.path("fault", &path);
     }
 
-    /// A bar along the foot where a limit acted.
+    /// Draws a bar along the foot where a limit acted.
     fn limited(&mut self, cell: &Cell<'_>) {
         let projection @ Projection { x, frame, .. } = &cell.projection;
         let mut path = Path::default();
@@ -320,7 +320,7 @@ impl Writer {
         }
     }
 
-    /// Heading and legend.
+    /// Writes heading and legend.
     fn head(&mut self, cell: &Cell<'_>, drawings: &[Option<Drawing>]) {
         let y = baseline(cell.top + 0.5 * HEADING_ROW_PX, font_px::HEADING);
         let light = match cell.head.heading.light.is_empty() {
@@ -344,7 +344,7 @@ impl Writer {
         }
     }
 
-    /// One entry, with a sample of what the series is drawn as in this panel.
+    /// Writes one legend entry, with a sample of the series as drawn in this panel.
     fn legend_entry(&mut self, entry: &LegendEntry<'_>, drawing: Option<&Drawing>, middle: f64) {
         let (left, right) = (entry.x, entry.x + entry.swatch_px());
         let center = 0.5 * (left + right);
@@ -371,7 +371,7 @@ impl Writer {
                 let class = format!("line {} {}", under(*covers), slot.stroke_class()).replace("  ", " ");
                 self.dashed_path(&class, dash, &path);
             }
-            // Nothing is drawn, so there is nothing to show a sample of.
+            // Without a drawing there is no sample.
             None => {}
         }
         self.text("label", entry.text_x(), baseline(middle, font_px::LABEL), &entry.text);
@@ -394,12 +394,12 @@ impl Writer {
     }
 }
 
-/// The style class of a line under so many others; none for one that is not covered.
+/// Returns the style class of a line under so many others; empty for one that is not covered.
 fn under(covers: usize) -> String {
     if covers == 0 { String::new() } else { format!("under{covers}") }
 }
 
-/// Whether a log axis gets thin lines between its labelled ones: they show that it is one.
+/// Returns true if a log axis gets thin lines between its labelled ones, which show that it is logarithmic.
 fn has_minor_grid(domain: &Domain, length_px: f64) -> bool {
     domain.scale == Scale::Log && length_px >= MINOR_GRID_DECADE_PX * domain.span()
 }

@@ -1,6 +1,6 @@
-//! Text for pictures: escaping, numbers, and the room a text takes without asking a font.
+//! Text for pictures: escaping, numbers, and estimates of its width without a font.
 
-/// Escapes what XML reserves and replaces what XML 1.0 forbids (control characters, section 2.2), so that
+/// Escapes characters that XML reserves and replaces those that XML 1.0 forbids (control characters, section 2.2), so that
 /// any string is safe as content and as attribute value.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -19,7 +19,7 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// `value` with a fixed number of decimals, a true minus sign, and thin spaces between groups of three digits
+/// Formats `value` with a fixed number of decimals, a true minus sign, and thin spaces between groups of three digits
 /// where the integer part has five or more (SI Brochure, section 5.4.4).
 pub(super) fn decimal(value: f64, decimals: usize) -> String {
     let written = format!("{:.decimals$}", value.abs());
@@ -39,7 +39,7 @@ pub(super) fn decimal(value: f64, decimals: usize) -> String {
     grouped + fraction
 }
 
-/// `value` with four significant digits, for running text.
+/// Formats `value` with four significant digits, for running text.
 pub(super) fn significant(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude != 0.0 && !(1e-3..1e5).contains(&magnitude) {
@@ -53,15 +53,15 @@ pub(super) fn significant(value: f64) -> String {
     }
 }
 
-/// An exponent in superscript digits.
+/// Formats an exponent in superscript digits.
 pub(super) fn superscript(exponent: i32) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     let raised = |sign: char| sign.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
     exponent.to_string().chars().map(raised).collect()
 }
 
-/// Width that `text` takes at most, at `font_px`. The advance widths are those of a wide face (DejaVu Sans),
-/// so that what fits here fits in the narrower system fonts as well.
+/// Returns an upper bound of the width of `text` at `font_px`. The advance widths are those of a wide face (DejaVu Sans),
+/// so that a text which fits here fits in the narrower system fonts as well.
 pub(super) fn width_px(text: &str, font_px: f64) -> f64 {
     text.chars().map(advance_em).sum::<f64>() * font_px
 }
@@ -81,7 +81,7 @@ fn advance_em(character: char) -> f64 {
     }
 }
 
-/// `text`, or as much of it as fits `limit_px` with an ellipsis at its end.
+/// Shortens `text` to `limit_px`, with an ellipsis at its end, if necessary.
 pub(super) fn shorten(text: &str, limit_px: f64, font_px: f64) -> String {
     if width_px(text, font_px) <= limit_px {
         return text.to_owned();
@@ -128,7 +128,7 @@ pub(super) fn push_tenths(out: &mut String, tenths: f64) {
     }
 }
 
-/// A length or coordinate in pixels, rounded to a tenth.
+/// Formats a length or coordinate in pixels, rounded to a tenth.
 pub(super) fn px(value: f64) -> String {
     let mut out = String::new();
     // Adding zero turns -0 into 0.

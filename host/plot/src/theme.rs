@@ -1,9 +1,9 @@
-//! How pictures look: colours, dash patterns, markers, type sizes and the style sheet.
+//! Theme of pictures: colours, dash patterns, markers, type sizes and the style sheet.
 //!
 //! Series colours are the colour-blind-safe palette of Okabe and Ito ("Color Universal Design", 2008), in an
 //! order that puts strong contrast first. Its yellow is left out (unreadable on white) for the neutral grey
 //! that many tools add to the palette; its black follows the text colour and so turns light on a dark page.
-//! Dash patterns and marker shapes repeat what the colour says.
+//! Dash patterns and marker shapes repeat the distinctions of colour.
 
 use super::Paper;
 use super::path::Path;
@@ -30,7 +30,7 @@ pub const FAULT_COLORS: (&str, &str) = ("#c4003c", "#ff6082");
 /// Colours of limits on a light and a dark page, the same as in the viewer's window.
 pub const LIMIT_COLORS: (&str, &str) = ("#603400", "#ffe86e");
 
-/// Dash patterns in pixels, drawn and left out in turn; the first is solid.
+/// Dash patterns in pixels, lengths of dashes and gaps in turn; the first is solid.
 const DASHES: [&str; 8] = ["", "8 3", "3 2", "9 3 2 3", "15 4", "6 2 1.5 2 1.5 2", "1.5 2", "11 3 4 3"];
 
 /// Colour, dash and marker of a series.
@@ -41,7 +41,7 @@ pub(super) struct Slot {
     weight: Weight,
 }
 
-/// How strongly a line is drawn.
+/// Weight of a line.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) enum Weight {
     #[default]
@@ -51,20 +51,20 @@ pub(super) enum Weight {
 }
 
 impl Slot {
-    /// The look of series number `index`. After one round of colours the dashes and markers shift by one, so
+    /// Returns the style of series `index`. After one round of colours the dashes and markers shift by one, so
     /// that 64 series differ.
     pub(super) fn new(index: usize) -> Self {
         let color = index % PALETTE.len();
         Self { color, cue: (color + index / PALETTE.len()) % DASHES.len(), weight: Weight::Full }
     }
 
-    /// The look of a component, x, y or z: the same in every panel.
+    /// Returns the style of a component, x, y or z: equal in every panel.
     pub(super) fn of_axis(component: usize) -> Self {
         let component = component % AXIS_COLORS.len();
         Self { color: PALETTE.len() + component, cue: component, weight: Weight::Full }
     }
 
-    /// The look with another weight.
+    /// Returns the style with another weight.
     pub(super) fn with_weight(self, weight: Weight) -> Self {
         Self { weight, ..self }
     }
@@ -73,7 +73,7 @@ impl Slot {
         self.weight == Weight::Faint
     }
 
-    /// The style classes for a stroke in the colour.
+    /// Returns the style classes for a stroke in the colour.
     pub(super) fn stroke_class(self) -> String {
         match self.weight {
             Weight::Full => format!("s{}", self.color),
@@ -81,12 +81,12 @@ impl Slot {
         }
     }
 
-    /// The style class for an area in the colour.
+    /// Returns the style class for an area in the colour.
     pub(super) fn fill_class(self) -> String {
         format!("f{}", self.color)
     }
 
-    /// The dash pattern; empty for a solid line. Components are solid, as in the viewer's window.
+    /// Returns the dash pattern; empty for a solid line. Components are solid, as in the viewer's window.
     pub(super) fn dash(self) -> &'static str {
         if self.color >= PALETTE.len() || self.is_faint() {
             return "";
@@ -94,7 +94,7 @@ impl Slot {
         DASHES.get(self.cue).copied().unwrap_or_default()
     }
 
-    /// Adds the marker to `path`, centred on (x, y): eight shapes of like area.
+    /// Adds the marker to `path`, centred on (x, y): eight shapes of similar area.
     pub(super) fn add_marker(self, path: &mut Path, x: f64, y: f64) {
         match self.cue {
             0 => path.circle(x, y, 3.0),
@@ -110,19 +110,19 @@ impl Slot {
     }
 }
 
-/// A plus sign with arms of the given reach and half width: the upper arm and the corner after it, turned by quarters.
+/// Returns a plus sign with arms of the given reach and half width: the upper arm and the corner after it, turned by quarters.
 fn plus_outline(reach: f64, half: f64) -> [(f64, f64); 12] {
     let arm = [(-half, -reach), (half, -reach), (half, -half)];
     std::array::from_fn(|corner| (0..corner / 3).fold(arm[corner % 3], |(x, y), _| (-y, x)))
 }
 
-/// The plus sign turned by an eighth.
+/// Returns the plus sign turned by an eighth.
 fn cross_outline(reach: f64, half: f64) -> [(f64, f64); 12] {
     use std::f64::consts::FRAC_1_SQRT_2;
     plus_outline(reach * 1.2, half).map(|(x, y)| (FRAC_1_SQRT_2 * (x - y), FRAC_1_SQRT_2 * (x + y)))
 }
 
-/// Type sizes in pixels. The style sheet repeats them; layout measures with them.
+/// Type sizes in pixels. The style sheet repeats them; the layout measures with them.
 pub(super) mod font_px {
     pub(in super::super) const TITLE: f64 = 18.0;
     pub(in super::super) const SUBTITLE: f64 = 12.5;
@@ -131,10 +131,10 @@ pub(super) mod font_px {
     pub(in super::super) const TICK: f64 = 11.0;
 }
 
-/// The style sheet: everything under `.plot`, so that a picture placed inside a page leaves the page alone.
+/// Returns the style sheet: all rules are under `.plot`, so that a picture in a page does not affect the page.
 /// Colours are given twice, the second time for pages in dark mode.
 ///
-/// It holds only what CairoSVG, svglib, Inkscape, librsvg and browsers all apply: plain colours for `fill` and `stroke`, no inherited
+/// All rules are understood by CairoSVG, svglib, Inkscape, librsvg and browsers: plain colours for `fill` and `stroke`, no inherited
 /// size of type, and no size of the picture, which is in the root's attributes.
 pub(super) fn style_sheet(paper: Paper) -> String {
     let light = Page { paper: "#ffffff", ink: "#1f2328", muted: "#59636e", axis: "#8c959f", grid: "#e7eaee" };
@@ -180,7 +180,7 @@ pub(super) fn style_sheet(paper: Paper) -> String {
     )
 }
 
-/// Colours of everything that is not a series.
+/// Colours of all parts other than series.
 struct Page {
     paper: &'static str,
     ink: &'static str,
@@ -190,7 +190,7 @@ struct Page {
 }
 
 impl Page {
-    /// The rules for text, grid and axes, then two for each series: `s0` for strokes, `f0` for areas.
+    /// Returns the rules for text, grid and axes, then two for each series: `s0` for strokes, `f0` for areas.
     fn rules(&self, series_color: impl Fn((&'static str, &'static str)) -> &'static str) -> String {
         let Self { paper, ink, muted, axis, grid } = self;
         let mut rules = format!(

@@ -1,21 +1,21 @@
 //! Ticks: round values along an axis, with labels that agree in their decimals.
 //!
 //! Linear steps are 1, 2 or 5 times a power of ten (the classic nice numbers: Heckbert, "Nice numbers for
-//! graph labels", Graphics Gems, 1990). Log axes are labelled at decades, at 1-2-5 where there is room, and
-//! like a linear axis when they cover too little for either.
+//! graph labels", Graphics Gems, 1990). Log axes are labelled at decades, at 1-2-5 if there is room, and
+//! like a linear axis if they cover too little for either.
 
 use super::axis::{Domain, Scale};
 use super::text;
 
-/// Magnitudes from which on tick labels leave out a power of ten and the axis label states it.
+/// Magnitude from which tick labels leave out a power of ten, which the axis label then contains.
 const LARGEST_PLAIN: f64 = 1e5;
-/// Magnitudes below which tick labels leave out a power of ten and the axis label states it.
+/// Magnitude below which tick labels leave out a power of ten, which the axis label then contains.
 const SMALLEST_PLAIN: f64 = 1e-2;
 
 /// Decades labelled in plain digits (0.001 to 10 000); beyond, all labels of the axis are powers.
 const PLAIN_DECADES: std::ops::RangeInclusive<i32> = -3..=4;
 
-/// Ticks within this fraction of the span beyond an end still count as on it (rounding of `k * step`).
+/// Tolerance of ticks at the ends, as a fraction of the span (rounding of `k * step`).
 const END_TOLERANCE: f64 = 1e-9;
 
 /// Ticks of one axis; positions are fractions of its domain.
@@ -27,14 +27,14 @@ pub(super) struct Ticks {
     pub(super) exponent: i32,
 }
 
-/// A labelled tick.
+/// Labelled tick.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tick {
     pub(super) position: f64,
     pub(super) label: String,
 }
 
-/// How much room a label takes along its axis.
+/// Room that a label takes along its axis.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Spacing {
     /// Labels one below the other, at least this far apart.
@@ -56,12 +56,12 @@ impl Spacing {
 }
 
 impl Ticks {
-    /// An axis without numbers.
+    /// Returns no ticks, for an axis without numbers.
     pub(super) fn none() -> Self {
         Self { major: Vec::new(), minor: Vec::new(), exponent: 0 }
     }
 
-    /// The densest ticks whose labels keep their distance on an axis of `length_px`.
+    /// Returns the densest ticks whose labels have enough distance on an axis of `length_px`.
     pub(super) fn fit(domain: &Domain, length_px: f64, spacing: Spacing) -> Self {
         let most = match spacing {
             Spacing::Vertical { pitch_px } => length_px / pitch_px,
@@ -77,7 +77,7 @@ impl Ticks {
         }
     }
 
-    /// Labels at these values, without minor ticks; those outside the axis are left out.
+    /// Places labels at these values, without minor ticks; those outside the axis are left out.
     pub(super) fn at(domain: &Domain, values: &[f64]) -> Self {
         let tick = |value: &f64| {
             let position = domain.fraction(domain.scale.forward(*value)?);
@@ -87,7 +87,7 @@ impl Ticks {
         Self { major: values.iter().filter_map(tick).collect(), ..Self::none() }
     }
 
-    /// About `most` ticks or fewer.
+    /// Places about `most` ticks or fewer.
     fn at_most(domain: &Domain, most: f64) -> Self {
         match domain.scale {
             Scale::Linear => linear(domain.low, domain.high, most, |value| domain.fraction(value)),
@@ -95,7 +95,7 @@ impl Ticks {
         }
     }
 
-    /// Distance of the two closest labelled ticks, as a fraction of the axis.
+    /// Returns the distance of the two closest labelled ticks, as a fraction of the axis.
     fn closest(&self) -> f64 {
         self.major
             .windows(2)
@@ -104,7 +104,7 @@ impl Ticks {
     }
 }
 
-/// Multiples of a nice step within `low..=high`, placed by `fraction`.
+/// Places multiples of a nice step within `low..=high`, mapped by `fraction`.
 fn linear(low: f64, high: f64, most: f64, fraction: impl Fn(f64) -> f64) -> Ticks {
     let step = NiceStep::at_least((high - low) / most);
     let exponent = left_out_exponent(low.abs().max(high.abs()));
@@ -117,12 +117,12 @@ fn linear(low: f64, high: f64, most: f64, fraction: impl Fn(f64) -> f64) -> Tick
     Ticks { major, minor, exponent }
 }
 
-/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
+/// Returns the smallest of 1, 2 and 5 times a power of ten that is not below `least`.
 pub(super) fn nice_step(least: f64) -> f64 {
     NiceStep::at_least(least).size()
 }
 
-/// A step of 1, 2 or 5 times a power of ten.
+/// Step of 1, 2 or 5 times a power of ten.
 #[derive(Debug, Clone, Copy)]
 struct NiceStep {
     mantissa: f64,
@@ -130,7 +130,7 @@ struct NiceStep {
 }
 
 impl NiceStep {
-    /// The smallest nice step that is not below `least`.
+    /// Returns the smallest nice step that is not below `least`.
     fn at_least(least: f64) -> Self {
         let exponent = exponent_of(least);
         let leading = least / power_of_ten(exponent);
@@ -145,13 +145,13 @@ impl NiceStep {
         self.mantissa * power_of_ten(self.exponent)
     }
 
-    /// Minor steps per step, so that minor ticks are nice as well: 0.2 of 1, 0.5 of 2, 1 of 5.
+    /// Returns the number of minor steps per step, so that minor ticks are nice as well: 0.2 of 1, 0.5 of 2, 1 of 5.
     fn subdivisions(self) -> f64 {
         if self.mantissa == 2.0 { 4.0 } else { 5.0 }
     }
 }
 
-/// Multiples of `step` from `low` to `high`.
+/// Returns the multiples of `step` from `low` to `high`.
 fn multiples(low: f64, high: f64, step: f64) -> impl Iterator<Item = f64> {
     let tolerance = END_TOLERANCE * (high - low);
     let first = ((low - tolerance) / step).ceil();
@@ -160,7 +160,7 @@ fn multiples(low: f64, high: f64, step: f64) -> impl Iterator<Item = f64> {
         .take_while(move |&value| value <= high + tolerance)
 }
 
-/// The power of ten, a multiple of three, that labels of values up to `magnitude` leave out.
+/// Returns the power of ten, a multiple of three, that labels of values up to `magnitude` leave out.
 fn left_out_exponent(magnitude: f64) -> i32 {
     if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&magnitude) {
         0
@@ -169,7 +169,7 @@ fn left_out_exponent(magnitude: f64) -> i32 {
     }
 }
 
-/// Ticks of a log axis: decades, or 1-2-5 in each decade, or linear steps, whichever gives enough labels.
+/// Places ticks of a log axis: decades, or 1-2-5 in each decade, or linear steps, whichever gives enough labels.
 fn log(domain: &Domain, most: f64) -> Ticks {
     const DIGITS_1_2_5: [f64; 3] = [1.0, 2.0, 5.0];
     let minor = log_positions(domain, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], 1);
@@ -178,12 +178,12 @@ fn log(domain: &Domain, most: f64) -> Ticks {
         let place = |value: f64| domain.fraction(value.max(f64::MIN_POSITIVE).log10());
         return linear(domain.scale.backward(domain.low), domain.scale.backward(domain.high), most, place);
     }
-    // 2 and 5 split a decade unevenly, so room for the closest pair (1-2, 0.30 decade) is what counts.
+    // 2 and 5 split a decade unevenly, so the room for the closest pair (1-2, 0.30 decade) counts.
     let fits_dense = domain.span() / 0.30 <= most;
     let stride = (1..).find(|&stride| domain.span() / f64::from(stride) <= most).unwrap_or(1);
     let decades = log_positions(domain, &[1.0], stride);
     let is_plain = |ticks: &[LogTick]| ticks.iter().all(|tick| PLAIN_DECADES.contains(&tick.decade));
-    // Beyond plain digits, `2×10⁵` between decades says less than it clutters.
+    // Beyond plain digits, `2×10⁵` between decades adds more clutter than information.
     let wants_dense = fits_dense && (is_plain(&dense) || decades.len() < 3);
     let chosen = if wants_dense || decades.len() < 2 { dense } else { decades };
     let plain = is_plain(&chosen);
@@ -192,7 +192,7 @@ fn log(domain: &Domain, most: f64) -> Ticks {
     Ticks { major, minor: minor.iter().map(|tick| tick.position).collect(), exponent: 0 }
 }
 
-/// A tick `digit * 10^decade` of a log axis.
+/// Tick `digit * 10^decade` of a log axis.
 struct LogTick {
     digit: f64,
     decade: i32,
@@ -210,7 +210,7 @@ impl LogTick {
     }
 }
 
-/// The given digits in every `stride`-th decade of the domain.
+/// Places the given digits in every `stride`-th decade of the domain.
 fn log_positions(domain: &Domain, digits: &[f64], stride: i32) -> Vec<LogTick> {
     let tolerance = END_TOLERANCE * domain.span();
     let inside = domain.low - tolerance..=domain.high + tolerance;
@@ -223,7 +223,7 @@ fn log_positions(domain: &Domain, digits: &[f64], stride: i32) -> Vec<LogTick> {
         .collect()
 }
 
-/// The decimal exponent of a positive number: 2 for 100 and for 999.
+/// Returns the decimal exponent of a positive number: 2 for 100 and for 999.
 fn exponent_of(value: f64) -> i32 {
     let estimate = to_integer(value.max(f64::MIN_POSITIVE).log10().floor());
     // log10 of a number just below a power of ten may round up to it.
@@ -234,7 +234,7 @@ fn power_of_ten(exponent: i32) -> f64 {
     10.0_f64.powi(exponent)
 }
 
-/// An integral `f64` as `i32`, held within the exponents of `f64`.
+/// Converts an integral `f64` to `i32`, clamped to the exponents of `f64`.
 #[expect(clippy::cast_possible_truncation, reason = "held within ±400 first")]
 fn to_integer(value: f64) -> i32 {
     value.clamp(-400.0, 400.0) as i32

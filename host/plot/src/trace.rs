@@ -1,20 +1,20 @@
-//! The samples of a line while they arrive, in bounded memory.
+//! Samples of a line, collected in bounded memory.
 
 use super::axis::LARGEST_DRAWABLE;
 use super::decimate::Point;
 
-/// Most samples a trace keeps: seventeen for each pixel column of a figure.
+/// Largest number of samples of a trace: seventeen for each pixel column of a figure.
 const CAPACITY: usize = 16_384;
 
-/// Buckets over the whole line after a reduction. Each keeps at most six samples, so that a reduction frees at
+/// Buckets over the whole line after a reduction. Each has at most six samples, so that a reduction frees at
 /// least a quarter of the capacity.
 const BUCKETS: f64 = 2_048.0;
 
-/// Samples of growing x, added one at a time. Up to 16 384 are kept as they are; past that, the line is cut into
-/// 2 048 buckets, and the first, lowest, highest and last sample of each are kept, and one gap. The extremes are
+/// Samples of growing x, added one at a time. Up to 16 384 are stored unchanged; beyond, the line is cut into
+/// 2 048 buckets, and the first, lowest, highest and last sample of each are stored, and one gap. The extremes are
 /// exact, and a picture of the trace differs from that of all samples by less than a pixel.
 ///
-/// Not real-time: adding a sample may allocate, at most 256 KiB a trace.
+/// Not real-time: adding a sample may allocate, at most 256 KiB per trace.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
     samples: Vec<Point>,
@@ -32,24 +32,24 @@ impl Trace {
         self.given += 1;
     }
 
-    /// True if any sample can be drawn.
+    /// Returns true if any sample can be drawn.
     #[must_use]
     pub fn has_data(&self) -> bool {
         self.largest().is_some()
     }
 
-    /// The largest magnitude of a sample that can be drawn, if there is one.
+    /// Returns the largest magnitude of a sample that can be drawn, if there is one.
     #[must_use]
     pub fn largest(&self) -> Option<f64> {
         self.samples.iter().map(|(_, y)| y.abs()).filter(|size| size.is_finite()).reduce(f64::max)
     }
 
-    /// The kept samples, and the number of samples that were added.
+    /// Returns the stored samples, and the number of samples that were added.
     pub(super) fn into_parts(self) -> (Vec<Point>, usize) {
         (self.samples, self.given)
     }
 
-    /// Keeps at most six samples of each bucket: at most 12 294, as x does not fall.
+    /// Reduces each bucket to at most six samples: at most 12 294, as x does not fall.
     fn reduce(&mut self) {
         let samples = std::mem::take(&mut self.samples);
         let ends = samples.first().zip(samples.last());
@@ -64,7 +64,7 @@ impl Trace {
     }
 }
 
-/// The first, lowest, highest and last finite sample of a bucket, its first gap and one at its end, in their order.
+/// Returns the first, lowest, highest and last finite sample of a bucket, its first gap and one at its end, in their order.
 fn kept(bucket: &[Point]) -> impl Iterator<Item = Point> + '_ {
     let finite = || bucket.iter().enumerate().filter(|(_, (_, y))| y.is_finite());
     let place = |found: Option<(usize, &Point)>| found.map(|(place, _)| place);

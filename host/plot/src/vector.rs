@@ -1,8 +1,8 @@
-//! A vector quantity over time, while it arrives: a panel of three components, or the reason why there is nothing to draw.
+//! Vector quantity over time, collected sample by sample: a panel of three components, or the reason for its absence.
 
 use super::{Axis, Panel, Quantity, Series, Trace};
 
-/// The traces of the components x, y and z of a quantity, in the unit of its axis.
+/// Traces of the components x, y and z of a quantity, in the unit of its axis.
 #[derive(Debug, Clone)]
 pub struct VectorTrace {
     quantity: Quantity,
@@ -10,22 +10,22 @@ pub struct VectorTrace {
 }
 
 impl VectorTrace {
-    /// Empty traces of a quantity.
+    /// Creates empty traces of a quantity.
     #[must_use]
     pub fn new(quantity: Quantity) -> Self {
         Self { quantity, components: Default::default() }
     }
 
-    /// Adds a sample, in SI units; a component that is not finite breaks its line. Allocates as [`Trace::add`].
+    /// Adds a sample, in SI units; a component that is not finite breaks its line. May allocate, see [`Trace::add`].
     pub fn add(&mut self, x: f64, si: [f64; 3]) {
         let (_, per_si) = self.quantity.unit();
         self.components.iter_mut().zip(si).for_each(|(trace, value)| trace.add(x, value * per_si));
     }
 
-    /// A panel with the components in their colours. `name` begins with a lower-case letter, and the heading with its capital.
+    /// Returns a panel with the components in their colours. `name` begins with a lower-case letter, which the heading capitalises.
     ///
     /// # Errors
-    /// Name and reason, if no sample differs from zero by more than rounding: there is nothing to see.
+    /// Name and reason, if no sample differs from zero by more than rounding.
     pub fn panel(self, name: &str) -> Result<Panel, String> {
         let (_, per_si) = self.quantity.unit();
         let least = self.quantity.least_range_si() * per_si;
@@ -44,7 +44,7 @@ impl VectorTrace {
     }
 }
 
-/// The name with a capital letter at its start.
+/// Capitalises a name.
 fn heading(name: &str) -> String {
     let mut letters = name.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())

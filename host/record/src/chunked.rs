@@ -1,7 +1,7 @@
-//! The MCAP layer of writing: messages in whole chunks, and an index of the chunks at the end.
+//! MCAP layer of the writer: messages in complete chunks, and an index of the chunks at the end.
 //!
-//! `mcap::Writer` keeps the index in memory until the end, some 5 GB after 1 000 hours. Here it waits in an unnamed
-//! file beside the recording, and memory does not grow.
+//! `mcap::Writer` stores the index in memory until the end, some 5 GB after 1 000 hours. This writer stores it in an unnamed
+//! file beside the recording, so that memory does not grow.
 
 use crate::file::NewFile;
 use binrw::BinWrite;
@@ -15,37 +15,37 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Cursor, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Bytes of the index that are copied at a time.
+/// Block size for copying the index, bytes.
 const BLOCK_BYTES: usize = 64 << 10;
 
-/// An MCAP file being written from front to back. Dropped without [`ChunkedFile::finish`] it still gets its end.
+/// MCAP file written from front to back. Dropped without [`ChunkedFile::finish`], the file is still completed.
 pub(crate) struct ChunkedFile {
     sink: Checksummed,
     chunk: Chunk,
     /// Index records of the chunks written so far.
     index: BufWriter<File>,
     index_bytes: u64,
-    /// Records that the end repeats, by opcode in the order of the end.
+    /// Records that the summary repeats, by opcode in the order of the summary.
     repeated: [(u8, Vec<u8>); 3],
     statistics: Statistics,
     phase: Phase,
 }
 
-/// How far a file is written.
+/// State of writing.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Open,
-    /// Complete, or given up.
+    /// Complete, or removed.
     Closed,
     /// A write failed: bytes may be missing, and nothing may follow.
     Failed,
 }
 
 impl ChunkedFile {
-    /// Begins a file that will stand at this path.
+    /// Begins the file at this path.
     ///
     /// # Errors
-    /// The system's: the file cannot be written to, or no file for the index can be made.
+    /// Errors of the system, if the file cannot be written to, or no file for the index can be created.
     pub(crate) fn create(file: NewFile, path: &Path, library: String) -> io::Result<Self> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let index =
@@ -64,7 +64,7 @@ impl ChunkedFile {
         Ok(chunked)
     }
 
-    /// Writes metadata, and lists it at the end.
+    /// Writes metadata, and lists it in the summary.
     pub(crate) fn add_metadata(&mut self, metadata: &Metadata) -> io::Result<()> {
         let offset = self.sink.bytes;
         self.write_record(op::METADATA, metadata)?;
@@ -76,7 +76,7 @@ impl ChunkedFile {
         Ok(())
     }
 
-    /// Writes a schema, here and at the end.
+    /// Writes a schema, here and in the summary.
     pub(crate) fn add_schema(&mut self, header: &SchemaHeader, data: &[u8]) -> io::Result<()> {
         let mut body = little_endian(header)?;
         let length = u32::try_from(data.len()).map_err(io::Error::other)?;
@@ -88,7 +88,7 @@ impl ChunkedFile {
         self.emit(&record)
     }
 
-    /// Writes a channel, here and at the end.
+    /// Writes a channel, here and in the summary.
     pub(crate) fn add_channel(&mut self, channel: &Channel) -> io::Result<()> {
         let record = encoded(op::CHANNEL, channel)?;
         self.statistics.channel_count += 1;
@@ -113,7 +113,7 @@ impl ChunkedFile {
         self.chunk.append(header, data)
     }
 
-    /// Hands the chunk and its message indexes to the system, and keeps its place for the index.
+    /// Writes the chunk and its message indexes to the file, and stores its offset for the index.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         if self.chunk.messages.is_empty() {
             return self.flush_sink();
@@ -152,16 +152,16 @@ impl ChunkedFile {
         self.flush_sink()
     }
 
-    /// Writes the last chunk and the end, and closes the file, which has to be the one at the path, in full length.
+    /// Writes the last chunk and the summary, and closes the file, which must be the file at the path, in full length.
     ///
     /// # Errors
-    /// The system's, or one around a [`FileError`](crate::FileError).
+    /// Errors of the system, or one around a [`FileError`](crate::FileError).
     pub(crate) fn finish(mut self, path: &Path) -> io::Result<()> {
         self.write_end()?;
         self.sink.file.close(path)
     }
 
-    /// Removes the file, unless the path names another one by now.
+    /// Removes the file, unless the path leads to another one by now.
     pub(crate) fn remove(mut self, path: &Path) {
         self.phase = Phase::Closed;
         self.sink.file.remove(path);
@@ -246,7 +246,7 @@ impl ChunkedFile {
         self.attempt(flushed)
     }
 
-    /// Passes a result on; after a failure nothing more is written.
+    /// Returns a result unchanged; after a failure nothing more is written.
     fn attempt(&mut self, result: io::Result<()>) -> io::Result<()> {
         if result.is_err() {
             self.phase = Phase::Failed;
@@ -263,7 +263,7 @@ impl Drop for ChunkedFile {
     }
 }
 
-/// The messages of a chunk, encoded, and their places in it by channel.
+/// Encoded messages of a chunk, and their offsets by channel.
 #[derive(Default)]
 struct Chunk {
     messages: Vec<u8>,
@@ -292,7 +292,7 @@ impl Chunk {
         Ok(())
     }
 
-    /// Describes the chunk: its header, and where the messages of each channel are.
+    /// Returns the header of the chunk, and the offsets of the messages of each channel.
     fn described(&mut self) -> (ChunkHeader, Vec<MessageIndex>) {
         let size = self.messages.len() as u64;
         let header = ChunkHeader {
@@ -307,14 +307,14 @@ impl Chunk {
         (header, places.map(|(channel_id, records)| MessageIndex { channel_id, records }).collect())
     }
 
-    /// Empties the chunk and keeps the memory of its messages.
+    /// Empties the chunk and reuses the memory of its messages.
     fn clear(&mut self, mut messages: Vec<u8>) {
         messages.clear();
         *self = Self { messages, ..Self::default() };
     }
 }
 
-/// A file with the number of bytes written to it, and their checksum.
+/// File with the number of bytes written to it, and their checksum.
 struct Checksummed {
     file: NewFile,
     bytes: u64,

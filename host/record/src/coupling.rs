@@ -1,4 +1,4 @@
-//! A coupling as a message of a recording, and back.
+//! Conversion of couplings to messages of a recording, and back.
 
 use crate::schema::{Coupling as CouplingMessage, CouplingEnd as EndMessage, Mapping, Missing, Passivity};
 use flotor_core::coupling::{

@@ -1,4 +1,4 @@
-//! A run in one line: equal digests, equal runs.
+//! Digest of a run: equal digests mean equal runs.
 
 use flotor_core::ModelOutputs;
 use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
@@ -8,7 +8,7 @@ use xxhash_rust::xxh3::Xxh3;
 /// Words of a record that depend on the run alone, not on the machine.
 const DIGEST_WORDS: usize = RECORD_WORDS - TIMING_WORDS;
 
-/// The parts of a record that a digest covers.
+/// Parts of a record that a digest covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coverage {
     /// Time, pose, twist, commanded and delivered wrench, events and buttons: equal for a run with and without observers.
@@ -19,7 +19,7 @@ pub enum Coverage {
 }
 
 impl Coverage {
-    /// The record with zeros in the parts that the digest does not cover.
+    /// Returns the record with zeros in the parts that the digest does not cover.
     #[inline]
     fn of(self, record: &TickRecord) -> TickRecord {
         match self {
@@ -32,9 +32,9 @@ impl Coverage {
 /// Streaming xxh3-64 over the records of a run, without measured times.
 ///
 /// The hash runs over the 64-bit words of each record, little endian, in the order of [`TickRecord`], so it
-/// depends neither on the machine nor on how records arrive; a part that the digest does not [cover](Coverage) counts as
-/// zero. Every NaN counts as the same and zero has no sign: processors and
-/// compilers choose these as they please. It distinguishes runs; it is no protection against malice.
+/// depends neither on the machine nor on the batches in which records arrive; a part that the digest does not [cover](Coverage) counts
+/// as zero. Every NaN counts as the same and zero has no sign, because these differ between processors and
+/// compilers. It distinguishes runs; it is no protection against malice.
 #[derive(Clone, Default)]
 pub struct TraceDigest {
     coverage: Coverage,
@@ -43,13 +43,13 @@ pub struct TraceDigest {
 }
 
 impl TraceDigest {
-    /// The digest of no ticks, of what the hand gets.
+    /// Creates a digest without ticks, with the default [`Coverage`].
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The digest of no ticks, of these parts of a record.
+    /// Creates a digest without ticks, with this coverage.
     #[must_use]
     pub fn covering(coverage: Coverage) -> Self {
         Self { coverage, ..Self::default() }
@@ -59,7 +59,7 @@ impl TraceDigest {
     pub fn update(&mut self, record: &TickRecord) {
         let mut bytes = [0; DIGEST_WORDS * size_of::<u64>()];
         let words = self.coverage.of(record).to_words();
-        // The shorter side ends the walk: the timing words at the end find no place.
+        // The shorter side ends the iteration: the timing words at the end are left out.
         for (place, word) in bytes.chunks_exact_mut(size_of::<u64>()).zip(words) {
             place.copy_from_slice(&canonical(word).to_le_bytes());
         }
@@ -67,14 +67,14 @@ impl TraceDigest {
         self.ticks += 1;
     }
 
-    /// The digest as text: `xxh3:`, sixteen hexadecimal digits, `-`, number of ticks.
+    /// Returns the digest as text: `xxh3:`, sixteen hexadecimal digits, `-`, number of ticks.
     #[must_use]
     pub fn finish(&self) -> String {
         format!("xxh3:{:016x}-{}", self.hash.digest(), self.ticks)
     }
 }
 
-/// The word of a number as all machines have it; no count or flag of a record is as large as those that change.
+/// Returns the canonical bits of a number; counts and flags of a record are never as large as the changed bit patterns.
 fn canonical(word: u64) -> u64 {
     match f64::from_bits(word) {
         number if number.is_nan() => f64::NAN.to_bits(),

@@ -1,4 +1,4 @@
-//! The file of a recording while it is written: created by its one writer, and checked against changes by other
+//! File of a recording during writing: created by its only writer, and checked against changes by other
 //! programs.
 
 use same_file::Handle;
@@ -10,7 +10,7 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// The file is shorter or longer than its writer made it.
+    /// The file is shorter or longer than the bytes written.
     #[error("another program changed the length of the file from {written} to {found} bytes")]
     Length {
         /// Bytes written.
@@ -18,12 +18,12 @@ pub enum FileError {
         /// Bytes in the file.
         found: u64,
     },
-    /// The path names no file, or another one.
+    /// The path leads to no file, or to another one.
     #[error("the file was removed or replaced during the run")]
     Replaced,
 }
 
-/// A buffered file that did not exist before.
+/// Buffered file that did not exist before.
 ///
 /// Only one program can create the file of one name, so two writers never share one.
 pub(crate) struct NewFile {
@@ -34,7 +34,7 @@ impl NewFile {
     /// Creates the file.
     ///
     /// # Errors
-    /// The system's; of kind `AlreadyExists` where anything of that name exists, a link or a pipe included.
+    /// Errors of the system; of kind `AlreadyExists` if anything of that name exists, a link or a pipe included.
     pub(crate) fn create(path: &Path) -> io::Result<Self> {
         Ok(Self::over(File::options().write(true).create_new(true).open(path)?))
     }
@@ -44,10 +44,10 @@ impl NewFile {
         Self { buffer: BufWriter::new(LengthChecked { file, written: 0 }) }
     }
 
-    /// Writes buffered bytes of the complete file, which has to be the one at the path, in full length.
+    /// Writes buffered bytes of the complete file, which must be the file at the path, in full length.
     ///
     /// # Errors
-    /// The system's, or one around a [`FileError`].
+    /// Errors of the system, or one around a [`FileError`].
     pub(crate) fn close(&mut self, path: &Path) -> io::Result<()> {
         self.buffer.flush()?;
         let checked = self.buffer.get_ref();
@@ -55,7 +55,7 @@ impl NewFile {
         if checked.is_at(path) { Ok(()) } else { Err(io::Error::other(FileError::Replaced)) }
     }
 
-    /// Removes the file, unless the path names another one by now.
+    /// Removes the file, unless the path leads to another one by now.
     pub(crate) fn remove(&self, path: &Path) {
         if self.buffer.get_ref().is_at(path) {
             let _ = fs::remove_file(path);
@@ -73,7 +73,7 @@ impl Write for NewFile {
     }
 }
 
-/// A file written from front to back, whose length is compared with the bytes written before each further write.
+/// File written from front to back, whose length is compared with the bytes written before each further write.
 struct LengthChecked {
     file: File,
     written: u64,
@@ -81,7 +81,7 @@ struct LengthChecked {
 
 impl LengthChecked {
     fn check(&self) -> Result<(), FileError> {
-        // A file without readable metadata is judged by its next write.
+        // Without readable metadata, the next write shows whether the file is usable.
         let found = self.file.metadata().map_or(self.written, |metadata| metadata.len());
         if found == self.written { Ok(()) } else { Err(FileError::Length { written: self.written, found }) }
     }

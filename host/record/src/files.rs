@@ -1,36 +1,36 @@
-//! Files that parameters of a run named: which they were and what was in them, so that a replay can tell
-//! whether it has the same ones.
+//! Path and content hash of files named by parameters of a run, so that a replay can check
+//! whether it has the same files.
 //!
-//! A setting is kept as it was written (`curve = "spring.csv"`), which says nothing about the folder it was
-//! meant from. Path and hash stand beside it among the [parameters](crate::PluginDescription::parameters),
-//! under keys that no parameter has (`curve.path`, `curve.xxh3`): readers that do not know them pass them
-//! over.
+//! A setting is stored as written (`curve = "spring.csv"`), without the folder that it refers to.
+//! Path and hash are stored beside it among the [parameters](crate::PluginDescription::parameters),
+//! under keys that no parameter has (`curve.path`, `curve.xxh3`): readers that do not know them
+//! ignore them.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
-/// Bytes read at once.
+/// Block size for reading, bytes.
 const BLOCK_BYTES: usize = 64 * 1024;
 
-/// What the hash begins with, as that of a run does.
+/// Prefix of a hash, equal to that of a run's digest.
 const HASH_PREFIX: &str = "xxh3:";
 
-/// A file as it was when it was looked at.
+/// Path and hash of a file at the time of reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NamedFile {
-    /// Where it is, from the root.
+    /// Absolute path.
     pub path: PathBuf,
-    /// xxh3-64 of what is in it. It distinguishes files; it is no protection against malice.
+    /// xxh3-64 of the content. It distinguishes files; it is no protection against malice.
     pub hash: u64,
 }
 
 impl NamedFile {
-    /// Reads a file. Not real-time.
+    /// Reads a file and computes its hash. Not real-time.
     ///
     /// # Errors
-    /// What the system says; also of what is no regular file: a pipe would be waited for, and emptied.
+    /// Errors of the system, and for a file that is not regular: reading a pipe would block, and empty it.
     pub fn read(path: &Path) -> io::Result<Self> {
         if !fs::metadata(path)?.is_file() {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
@@ -48,20 +48,20 @@ impl NamedFile {
         }
     }
 
-    /// The hash as text: `xxh3:` and sixteen hexadecimal digits.
+    /// Returns the hash as text: `xxh3:` and sixteen hexadecimal digits.
     #[must_use]
     pub fn hash_text(&self) -> String {
         format!("{HASH_PREFIX}{:016x}", self.hash)
     }
 
-    /// What stands beside the parameter that named it.
+    /// Returns the entries for path and hash, to be stored beside the parameter.
     #[must_use]
     pub fn to_parameters(&self, parameter: &str) -> [(String, String); 2] {
         let path = self.path.to_string_lossy().into_owned();
         [(path_key(parameter), path), (hash_key(parameter), self.hash_text())]
     }
 
-    /// The file a parameter named, if it stands beside it: recordings of earlier versions do not have it.
+    /// Finds the file of a parameter by its stored entries; `None` in recordings of earlier versions.
     #[must_use]
     pub fn among(parameters: &[(String, String)], parameter: &str) -> Option<Self> {
         let value = |key: String| parameters.iter().find(|(known, _)| *known == key).map(|(_, value)| value);

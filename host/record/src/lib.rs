@@ -1,29 +1,29 @@
-//! Recordings: everything a run leaves behind, in one file that other people's tools open.
+//! Recordings: all results of a run, in one file that common tools open.
 //!
-//! A crate of its own because two programs need it: the host writes it, the viewer reads it.
+//! A separate crate because two programs need it: the host writes recordings, the viewer reads them.
 //!
-//! A recording is an [MCAP](https://mcap.dev/spec) file of protobuf messages. It carries its own schemas, so
+//! A recording is an [MCAP](https://mcap.dev/spec) file of protobuf messages. It contains its own schemas, so
 //! Foxglove and Rerun draw it, Python's `mcap-protobuf-support` decodes it, and none of them needs this program:
 //!
 //! | topic | message | when |
 //! |---|---|---|
-//! | `/flotor/run` | `flotor.Run` | once, first: all that is needed to repeat the run |
-//! | `/tf` | `foxglove.FrameTransform` | every tick and device: pose of frame `handle` in frame `device`; with several devices of `NAME/handle` in `NAME` |
+//! | `/flotor/run` | `flotor.Run` | once, first: all data needed to repeat the run |
+//! | `/tf` | `foxglove.FrameTransform` | each tick and device: pose of `handle` in `device`, with several devices `NAME/handle` in `NAME` |
 //! | `/flotor/tick` | `flotor.Tick` | every tick and device: twist, wrenches, energy, events, timing |
-//! | `/flotor/change` | `flotor.Change` | when a parameter changed: before the tick that saw it first |
-//! | `/flotor/log` | `foxglove.Log` | when something happened that needs words: faults |
+//! | `/flotor/change` | `flotor.Change` | when a parameter changed: before the first tick with the new value |
+//! | `/flotor/log` | `foxglove.Log` | on events described in words: faults |
 //!
-//! [`RunDescription`] goes in first (and once more as the metadata record `flotor.run`, for tools that list
-//! those), then [`Recorder::record`] appends ticks; [`Recording`] gives them back, bit for bit. [`TraceDigest`]
-//! is a run in one line: equal digests, equal runs.
+//! [`RunDescription`] is written first (and once more as the metadata record `flotor.run`, for tools that list
+//! metadata), then [`Recorder::record`] appends ticks; [`Recording`] reads them back, bit for bit. [`TraceDigest`]
+//! is a digest of a run: equal digests, equal runs.
 //!
 //! **Time** is time since the loop started, in nanoseconds, also as MCAP's `log_time` and `publish_time`: a
 //! recording begins at 0 (viewers show 1 January 1970), so that equal runs leave equal times.
 //!
-//! **A killed process** loses at most 250 ms: messages go out in chunks, and a chunk reaches the file whole. A
-//! file without its end is read up to its last whole chunk and says so ([`Ending::CutOff`]).
+//! **A killed process** loses at most 250 ms: messages are written in chunks, and a chunk is written as a whole. A
+//! truncated file is read up to its last complete chunk, and marked ([`Ending::CutOff`]).
 //!
-//! **Schemas** are written in `host/proto`; `schema` mirrors them in Rust and carries them compiled, so that no
+//! **Schemas** are written in `host/proto`; `schema` mirrors them in Rust and includes them in compiled form, so that no
 //! build needs a protobuf compiler. After a change of `host/proto`, one command compiles them again:
 //!
 //! ```text
@@ -57,26 +57,26 @@ pub use repair::{RepairError, Repaired, repair};
 pub use run::{NoRun, PluginDescription, Role, RunDescription};
 pub use writer::{RecordError, Recorder};
 
-/// How bad it is, what a [`Note`] tells.
+/// Severity of a [`Note`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
-    /// Good to know.
+    /// Information.
     Info,
-    /// The run goes on, not as asked for.
+    /// The run goes on, but not as requested.
     Warning,
-    /// Something failed.
+    /// A part of the run failed.
     Error,
 }
 
-/// Something that happened in a run, in words: a fault, a model that was switched off.
+/// Event of a run, in words: a fault, a disabled model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
     /// Time since the loop started, ns.
     pub time_ns: u64,
-    /// How bad it is.
+    /// Severity of the event.
     pub severity: Severity,
-    /// What it happened to: "device" or the name of a model.
+    /// Source of the event: "device" or the name of a model.
     pub source: String,
-    /// What happened, for people.
+    /// Description of the event, for people.
     pub text: String,
 }

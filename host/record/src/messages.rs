@@ -1,11 +1,11 @@
-//! Ticks and changes as the messages of a recording, for those who carry them elsewhere than into a file.
+//! Ticks and changes as messages of a recording, for transports other than a file.
 
 use crate::schema::{Change as ChangeMessage, FrameTransform, Missing, Tick};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use prost::Message;
 
-/// Bytes that are no message of a recording, or not all of one.
+/// Error of bytes that are not a complete message of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no {message}: {reason}")]
 pub struct NoMessage {
@@ -13,7 +13,7 @@ pub struct NoMessage {
     reason: String,
 }
 
-/// Makes the two messages of a tick. Keeps what all of them share.
+/// Encoder for the two messages of a tick. Reuses the parts that all ticks share.
 #[derive(Debug)]
 pub struct TickMessages {
     pose: FrameTransform,
@@ -26,17 +26,17 @@ impl Default for TickMessages {
 }
 
 impl TickMessages {
-    /// A `foxglove.FrameTransform` and a `flotor.Tick`: together all of a record, to the bit. Not real-time.
+    /// Encodes a `foxglove.FrameTransform` and a `flotor.Tick`: together all of a record, to the bit. Not real-time.
     pub fn encode(&mut self, record: &TickRecord) -> (Vec<u8>, Vec<u8>) {
         self.pose.set(record);
         (self.pose.encode_to_vec(), Tick::new(record).encode_to_vec())
     }
 }
 
-/// The record of a tick from its two messages. Not real-time.
+/// Decodes the record of a tick from its two messages. Not real-time.
 ///
 /// # Errors
-/// [`NoMessage`]: they are none, lack something, or are of two different ticks.
+/// [`NoMessage`] if they cannot be decoded, are incomplete, or belong to two different ticks.
 pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, NoMessage> {
     let wrong = |message: &'static str| move |reason: String| NoMessage { message, reason };
     let lacks = |Missing(part)| format!("it has no `{part}`");
@@ -52,16 +52,16 @@ pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, NoMess
     Ok(record)
 }
 
-/// A change as the protobuf message `flotor.Change`, which has no time of its own. Not real-time.
+/// Encodes a change as the protobuf message `flotor.Change`, which contains no time. Not real-time.
 #[must_use]
 pub fn change_to_bytes(change: &Change) -> Vec<u8> {
     ChangeMessage::new(change).encode_to_vec()
 }
 
-/// A change from a protobuf message `flotor.Change` of this time, ns. Not real-time.
+/// Decodes a change from a protobuf message `flotor.Change`, given its time, ns. Not real-time.
 ///
 /// # Errors
-/// [`NoMessage`]: it is none, or lacks something.
+/// [`NoMessage`] if it cannot be decoded or is incomplete.
 pub fn change_from_bytes(bytes: &[u8], time_ns: u64) -> Result<Change, NoMessage> {
     let wrong = |reason: String| NoMessage { message: "flotor.Change", reason };
     let message = ChangeMessage::decode(bytes).map_err(|cause| wrong(cause.to_string()))?;

@@ -1,4 +1,4 @@
-//! Reads a recording back: how the run was set up, then tick by tick, bit for bit.
+//! Reader of recordings: the description of the run, then tick by tick, bit for bit.
 
 use crate::schema::{
     Change as ChangeMessage, ENCODING, FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic,
@@ -12,10 +12,10 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// End of the name of the library that wrote a repaired file.
+/// Suffix of the library name in a repaired file.
 pub(crate) const REPAIRED: &str = " (repaired)";
 
-/// What keeps a recording from being read on.
+/// Damage that prevents further reading of a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Damage {
@@ -27,16 +27,16 @@ pub enum Damage {
     Message {
         /// Topic of the message.
         topic: &'static str,
-        /// What is wrong with it.
+        /// Error of the decoder.
         #[source]
         cause: prost::DecodeError,
     },
-    /// A message lacks a part that every recording has.
+    /// A message lacks a field that every recording has.
     #[error("a message on `{topic}` lacks `{field}`")]
     Missing {
         /// Topic of the message.
         topic: &'static str,
-        /// What it lacks.
+        /// Name of the missing field.
         field: &'static str,
     },
     /// A tick has no pose.
@@ -45,106 +45,106 @@ pub enum Damage {
     /// Ticks are missing.
     #[error("{missing} ticks are missing")]
     Gap {
-        /// How many.
+        /// Number of missing ticks.
         missing: u32,
     },
 }
 
-/// Why a recording cannot be read, or not any further.
+/// Error of opening or reading a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be opened.
     #[error("cannot open the recording `{}`: {cause}", path.display())]
     Open {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         #[source]
         cause: io::Error,
     },
-    /// It is some other kind of file.
+    /// The file has another format.
     #[error("`{}` is not an MCAP file; `flotor run --record FILE.mcap` makes recordings", path.display())]
     NotMcap {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// It is MCAP, but not ours.
+    /// The file is MCAP, but no recording of a run.
     #[error(
         "`{}` is an MCAP file, but no recording of a run: `/flotor/run` does not come first; \
          `flotor run --record FILE.mcap` makes recordings",
         path.display()
     )]
     NotARecording {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// It breaks off before anything of use.
+    /// The file is truncated before the end of the run description.
     #[error("`{}` is truncated before the run description and cannot be used; record again", path.display())]
     CutOffAtStart {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A later version wrote it.
+    /// A later version wrote the file.
     #[error(
         "`{}` has format {format}, written by flotor {flotor_version}; this one reads up to {FORMAT}: update flotor",
         path.display()
     )]
     TooNew {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its format.
+        /// Format of the file.
         format: u32,
         /// Version of the program that wrote it.
         flotor_version: String,
     },
-    /// Somebody compressed it.
+    /// The file is compressed, which no writer of this crate does.
     #[error(
         "`{}` is compressed with `{compression}`; `mcap decompress` makes a copy that can be read",
         path.display()
     )]
     Compressed {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// With what.
+        /// Name of the compression.
         compression: String,
     },
-    /// It cannot be read any further.
+    /// The file is damaged, and cannot be read any further.
     #[error("`{}` is damaged {}: {cause}; ticks before that are good: `flotor repair` copies them to a new file",
         path.display(),
         after_tick.map_or_else(|| "before its first tick".to_owned(), |tick| format!("after tick {tick}")))]
     Damaged {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The last good tick.
+        /// Last good tick; `None` before the first one.
         after_tick: Option<u64>,
-        /// What is wrong.
+        /// Damage that was found.
         #[source]
         cause: Damage,
     },
 }
 
-/// A recording being read: an iterator over its ticks.
+/// Reader of a recording: an iterator over its ticks.
 pub struct Recording {
     path: PathBuf,
     messages: MessageReader<File, Topic>,
     run: RunDescription,
     notes: Vec<Note>,
-    /// Changes before the tick read last, not taken yet.
+    /// Changes before the last tick read, not returned yet.
     changes: Vec<Change>,
-    /// The pose that came last, and its time.
+    /// Time and pose of the last pose message.
     pose: Option<(u64, Pose)>,
-    /// Number in the file that the next tick must have.
+    /// Sequence number that the next tick must have.
     sequence: u32,
     last_tick: Option<u64>,
     is_over: bool,
 }
 
 impl Recording {
-    /// Opens a recording and reads how the run was set up. Not real-time.
+    /// Opens a recording and reads the description of the run. Not real-time.
     ///
     /// # Errors
-    /// [`ReadError`]: not a recording, or nothing of it can be read.
+    /// If the file is not a recording, or is damaged before its first tick.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let unreadable = |cause: io::Error| match cause.kind() {
             io::ErrorKind::InvalidInput => ReadError::NotMcap { path: path.into() },
@@ -175,30 +175,30 @@ impl Recording {
         })
     }
 
-    /// How the run was set up.
+    /// Returns the description of the run.
     #[must_use]
     pub fn run(&self) -> &RunDescription {
         &self.run
     }
 
-    /// Whether the end of the run is there; known from the start.
+    /// Returns whether the recording is complete; known from the start.
     #[must_use]
     pub fn ending(&self) -> Ending {
         if self.is_repaired() { Ending::CutOff } else { self.messages.ending() }
     }
 
-    /// True if the file has an end, that of a repair included.
+    /// Returns true if the file has an end, that of a repair included.
     pub(crate) fn has_end(&self) -> bool {
         self.messages.ending() == Ending::Finished
     }
 
-    /// True if [`repair`](crate::repair) made the file from a truncated one.
+    /// Returns true if [`repair`](crate::repair) made the file from a truncated one.
     #[must_use]
     pub fn is_repaired(&self) -> bool {
         self.messages.library().ends_with(REPAIRED)
     }
 
-    /// Returns the next message as it is stored, but for the description of the run.
+    /// Returns the next message as it is stored, except the description of the run.
     pub(crate) fn next_message(&mut self) -> Result<Option<Message<Topic>>, Damage> {
         while let Some(message) = self.messages.next_message()? {
             if message.topic != Topic::Run {
@@ -208,13 +208,13 @@ impl Recording {
         Ok(None)
     }
 
-    /// What happened, in words, up to the tick read last.
+    /// Returns the notes up to the last tick read.
     #[must_use]
     pub fn notes(&self) -> &[Note] {
         &self.notes
     }
 
-    /// The parameters that changed before the tick read last, since this was asked last; oldest first.
+    /// Returns the changes up to the last tick read, since the last call; oldest first.
     pub fn take_changes(&mut self) -> Vec<Change> {
         std::mem::take(&mut self.changes)
     }
@@ -275,7 +275,7 @@ impl Iterator for Recording {
 
 impl std::iter::FusedIterator for Recording {}
 
-/// Returns the topic of a channel that is one of a recording's in name and kind.
+/// Returns the topic of a channel with the name, schema and encoding of a recording's.
 fn known_topic(channel: ChannelInfo<'_>) -> Option<Topic> {
     let matches = |topic: &Topic| channel.topic == topic.name() && channel.schema == topic.schema();
     Topic::ALL.into_iter().find(matches).filter(|_| channel.encoding == ENCODING)

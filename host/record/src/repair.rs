@@ -1,4 +1,4 @@
-//! Repair of a truncated recording: its whole chunks in a new file with an end, which every reader of MCAP takes.
+//! Repair of a truncated recording: copies its complete chunks to a new file with an end, which every reader of MCAP accepts.
 
 use crate::reader::{Damage, ReadError, Recording};
 use crate::schema::Topic;
@@ -15,10 +15,10 @@ pub enum RepairError {
     /// The repaired recording cannot be written.
     #[error(transparent)]
     Write(#[from] RecordError),
-    /// There is nothing to repair.
+    /// The recording is complete: there is nothing to repair.
     #[error("`{}` is whole: there is nothing to repair", path.display())]
     Whole {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
 }
@@ -30,18 +30,18 @@ pub struct Repaired {
     pub ticks: u64,
     /// Recorded time of the last tick, ns.
     pub end_ns: u64,
-    /// Length of the run as planned, s.
+    /// Planned duration of the run, s.
     pub planned_s: f64,
-    /// Damage in the middle of the file, if it is not only truncated: nothing after that place was kept.
+    /// Damage in the middle of the file, if it is not only truncated: messages after it are lost.
     pub damage: Option<Damage>,
 }
 
-/// Copies the whole chunks of a truncated or damaged recording to a new file, message by message and bit for bit, and
-/// closes it with index and end. The new file is marked as repaired: [`Recording::ending`] stays
-/// [`Ending::CutOff`](crate::Ending::CutOff). The old file is not touched. Not real-time.
+/// Copies the complete chunks of a truncated or damaged recording to a new file, message by message and bit for bit, and
+/// closes it with index and end. The new file is marked as repaired: its [`Recording::ending`] is
+/// [`Ending::CutOff`](crate::Ending::CutOff). The old file is not changed. Not real-time.
 ///
 /// # Errors
-/// [`RepairError`]; a new file without any message is removed.
+/// If the recording cannot be read or is complete, or the new file cannot be written; a new file without any message is removed.
 pub fn repair(from: &Path, to: &Path) -> Result<Repaired, RepairError> {
     let mut recording = Recording::open(from)?;
     let is_truncated = !recording.has_end();

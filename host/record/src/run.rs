@@ -1,4 +1,4 @@
-//! What is known before a run begins, in a form that can be kept: enough to repeat it.
+//! Description of a run, known before it begins and sufficient to repeat it.
 
 use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Run, Setting, Vector3};
 use flotor_core::Clock;
@@ -8,19 +8,19 @@ use flotor_hal::Demand;
 use prost::Message;
 use std::collections::BTreeMap;
 
-/// Bytes that describe no run.
+/// Error of bytes that do not describe a run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("not a run description: {0}")]
 pub struct NoRun(String);
 
-/// How a run was set up.
+/// Description of a run before its start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunDescription {
-    /// Version of the program that ran it.
+    /// Version of the program that carried out the run.
     pub flotor_version: String,
-    /// Rate asked for, Hz.
+    /// Requested loop rate, Hz.
     pub rate_hz: f64,
-    /// How long it was to run, s.
+    /// Planned duration, s.
     pub duration_s: f64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -28,63 +28,63 @@ pub struct RunDescription {
     pub clock: Clock,
     /// The scene as it was written (TOML); the command line may have overruled rate, duration and settings.
     pub scene_toml: String,
-    /// Devices first, then the models, both in the order of the scene.
+    /// Plugins: devices first, then the models, both in the order of the scene.
     pub plugins: Vec<PluginDescription>,
-    /// What held devices together.
+    /// Couplings between devices.
     pub couplings: Vec<CouplingDescription>,
 }
 
-/// A plugin of a run.
+/// Plugin of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PluginDescription {
-    /// What the scene calls it.
+    /// Name in the scene.
     pub name: String,
-    /// Id.
+    /// Id of the plugin.
     pub id: String,
-    /// Version.
+    /// Version of the plugin.
     pub version: String,
-    /// Name of the library's file, without folders: recordings travel.
+    /// Name of the library's file, without folders, which differ between machines.
     pub file: String,
-    /// What it was there for.
+    /// Role in the run.
     pub role: Role,
-    /// Number of the device it was, or, of a model, was on.
+    /// Index of the device; of a model, that of its device.
     pub device: u16,
-    /// Of a model: where its homes were in the device frame, m, one for each instance.
+    /// Home positions of a model in the device frame, m, one for each instance.
     pub places_m: Vec<[f64; 3]>,
-    /// Of a model: how it was mixed with the others.
+    /// Blending of a model with the others.
     pub blend: Blend,
-    /// Of a model that was computed asynchronously: when.
+    /// Timing of an asynchronous model.
     pub field: Option<FieldTiming>,
-    /// Of a device: the latency that it declares, s; 0 in recordings of earlier versions.
+    /// Declared latency of a device, s; 0 in recordings of earlier versions.
     pub latency_s: f64,
-    /// Of a device: the outputs of models that reach the hand there; force and torque in recordings of earlier versions.
+    /// Outputs of models that reach the hand at a device; force and torque in recordings of earlier versions.
     pub felt: Demand,
-    /// What scene and command line set, as written, in order: to repeat the run, set these.
+    /// Settings of scene and command line, as written, in order: these repeat the run.
     pub settings: Vec<(String, String)>,
-    /// Every parameter with the value in force: to know what they were.
+    /// All parameters with the values that the run used.
     pub parameters: Vec<(String, String)>,
 }
 
-/// What a plugin was there for.
+/// Role of a plugin in a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Role {
-    /// Gave the pose and took the wrench.
+    /// Device, which provided the pose and received the wrench.
     Device,
-    /// Gave a wrench, by way of this mapping.
+    /// Model, which provided a wrench through this mapping.
     Model(MappingConfig),
 }
 
 impl RunDescription {
-    /// As the protobuf message `flotor.Run` of a recording. Not real-time.
+    /// Encodes the protobuf message `flotor.Run` of a recording. Not real-time.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         self.to_message().encode_to_vec()
     }
 
-    /// From a protobuf message `flotor.Run`. Not real-time.
+    /// Decodes a protobuf message `flotor.Run`. Not real-time.
     ///
     /// # Errors
-    /// [`NoRun`]: it is none, or of a later format, or lacks something.
+    /// If the message cannot be decoded, has a later format, or is incomplete.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, NoRun> {
         let run = Run::decode(bytes).map_err(|cause| NoRun(cause.to_string()))?;
         if run.format > FORMAT {
@@ -140,12 +140,12 @@ impl RunDescription {
         })
     }
 
-    /// The devices, in order.
+    /// Returns the devices, in order.
     pub fn devices(&self) -> impl Iterator<Item = &PluginDescription> {
         self.plugins.iter().filter(|plugin| plugin.role == Role::Device)
     }
 
-    /// The same in flat text, for tools that show an MCAP file's metadata.
+    /// Returns the description as flat text, for tools that show an MCAP file's metadata.
     pub(crate) fn to_metadata(&self) -> BTreeMap<String, String> {
         let clock = match self.clock {
             Clock::Real => "real",
@@ -212,7 +212,7 @@ impl PluginDescription {
             None => Role::Device,
             Some(mapping) => Role::Model(mapping.config()?),
         };
-        // A recording from before there were places has its models at the device's home, alone.
+        // Recordings from versions without places have each model at the device's home only.
         let places_m = match (role, plugin.places.as_slice()) {
             (Role::Model(_), []) => vec![[0.0; 3]],
             (_, places) => places.iter().map(|place| place.to_array()).collect(),

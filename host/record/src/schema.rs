@@ -1,6 +1,6 @@
-//! The messages of a recording, as `host/proto` defines them, and their way from and to a [`TickRecord`].
+//! Messages of a recording, as `host/proto` defines them, and their conversion from and to a [`TickRecord`].
 //!
-//! Numbers and types are repeated here by hand; a test reads a recording by the schema inside it and compares
+//! Numbers and types are repeated here by hand; a test reads a recording with the schema that it contains and compares
 //! every field. Every `f64` is an `Option` that is always filled: protobuf leaves out a plain field that equals its
 //! default, -0.0 equals 0.0, and a recording is bit-exact. On the wire it is the plain field of the schema.
 
@@ -12,13 +12,13 @@ use flotor_hal::{Demand, Pose, Twist as TwistValue, Wrench as WrenchValue};
 use prost::{Enumeration, Message};
 use prost_types::Timestamp;
 
-/// `host/proto` compiled (a `google.protobuf.FileDescriptorSet`): what a stranger needs to read the messages.
+/// Compiled `host/proto` (a `google.protobuf.FileDescriptorSet`): the schemas that other programs need to read the messages.
 pub(crate) const DESCRIPTOR_SET: &[u8] = include_bytes!("../proto/flotor.binpb");
 
 /// The encoding of messages and schemas, as MCAP's registry names it.
 pub(crate) const ENCODING: &str = "protobuf";
 
-/// Format this program writes, and the highest it reads.
+/// Format that this program writes, and the highest that it reads.
 pub(crate) const FORMAT: u32 = 2;
 
 /// Frame of all numbers; its axes are those of the device frame.
@@ -26,7 +26,7 @@ const DEVICE_FRAME: &str = "device";
 /// Frame that moves with the handle.
 const HANDLE_FRAME: &str = "handle";
 
-/// What a channel is about. The number is the id of channel and schema in files written here.
+/// Topic of a channel. The number is the id of channel and schema in files written here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
 pub(crate) enum Topic {
@@ -65,11 +65,11 @@ impl Topic {
     }
 }
 
-/// A message lacks a part that every recording has.
+/// Name of a field that every recording has and a message lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Missing(pub(crate) &'static str);
 
-/// A message for each name, as `prost` makes them: a field's type here, its number and its kind on the wire.
+/// Defines a `prost` message for each name: type of each field here, its number and its kind on the wire.
 macro_rules! messages {
     ($($message:ident $(: $also:ident)? { $($field:ident: $value:ty = $number:tt [$($kind:tt)+],)+ })+) => {
         $(#[derive(Clone, $($also,)? PartialEq, Message)]
@@ -311,7 +311,7 @@ impl Quaternion {
 }
 
 impl FrameTransform {
-    /// A message to be filled tick by tick: the names of the frames are allocated once.
+    /// Creates a message to be filled tick by tick: the names of the frames are allocated once.
     pub(crate) fn of_handle() -> Self {
         Self {
             parent_frame_id: DEVICE_FRAME.to_owned(),
@@ -320,7 +320,7 @@ impl FrameTransform {
         }
     }
 
-    /// The same for one of several devices, by its name.
+    /// Creates the message for one of several devices, by its name.
     pub(crate) fn of_handle_at(device: &str) -> Self {
         Self {
             parent_frame_id: device.to_owned(),
@@ -335,7 +335,7 @@ impl FrameTransform {
         self.rotation = Some(Quaternion::new(record.pose.orientation_xyzw));
     }
 
-    /// True if it belongs to the tick of this record.
+    /// Returns true if the message belongs to the tick of this record.
     pub(crate) fn is_of(&self, record: &TickRecord) -> bool {
         self.timestamp == Some(timestamp(record.time_ns))
     }
@@ -368,13 +368,13 @@ impl Wrench {
         Self { force_n: Some(force), torque_nm: Some(torque) }
     }
 
-    /// Without the torque where it is absent.
+    /// Creates the message of the models' wrench, without an absent torque.
     fn of_models(outputs: &ModelOutputs) -> Self {
         let force_n = Some(Vector3::new(outputs.force().to_array()));
         Self { force_n, torque_nm: outputs.torque().map(|torque| Vector3::new(torque.to_array())) }
     }
 
-    /// Outputs of the models, with torque and energy absent where the messages have none.
+    /// Returns the outputs of the models, with torque and energy absent where the messages have none.
     fn outputs(self, energy_j: Option<f64>) -> Result<ModelOutputs, Missing> {
         let force_n = self.force_n.ok_or(Missing("force_n"))?.to_array();
         let torque_nm = self.torque_nm.map(Vector3::to_array);
@@ -417,7 +417,7 @@ impl Tick {
         }
     }
 
-    /// Together with the pose of the same time, what the tick left behind.
+    /// Combines the message with the pose of the same time into the record of the tick.
     pub(crate) fn record(&self, pose: Pose) -> Result<TickRecord, Missing> {
         Ok(TickRecord {
             tick: self.tick,
@@ -514,7 +514,7 @@ impl Change {
     }
 }
 
-/// Protobuf's time for nanoseconds since the loop started.
+/// Converts nanoseconds since the loop started to protobuf's time.
 fn timestamp(time_ns: u64) -> Timestamp {
     const NS_PER_S: u64 = 1_000_000_000;
     // Neither can saturate: 2^64 / 10^9 fits in an i64, a remainder below 10^9 in an i32.

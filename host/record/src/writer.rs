@@ -1,4 +1,4 @@
-//! Writes a recording: a chunk at a time, whole, at least every quarter of a second.
+//! Writer of recordings: a complete chunk at a time, at least every quarter of a second.
 
 use crate::chunked::ChunkedFile;
 use crate::file::{FileError, NewFile};
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Recorded time that a killed process may lose, ns.
+/// Largest recorded time that a killed process may lose, ns.
 const CHUNK_NS: u64 = 250_000_000;
 
 /// Name of the metadata record with the run's description.
@@ -27,22 +27,22 @@ const EVENT_BITS: &str = "events";
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// Something of that name exists: recordings are never overwritten.
+    /// A file of that name exists: recordings are never overwritten.
     #[error(
         "the recording `{}` exists already, and recordings are not overwritten; name another file, or remove \
          this one",
         path.display()
     )]
     Exists {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The file could not be created.
     #[error("cannot make the recording `{}`: {cause}; name a file in a folder you may write to", path.display())]
     Create {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Message of the system.
+        /// Error of the system.
         #[source]
         cause: io::Error,
     },
@@ -53,34 +53,34 @@ pub enum RecordError {
         path.display()
     )]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Message of the system.
+        /// Error of the system.
         #[source]
         cause: io::Error,
     },
     /// Another program removed, replaced or shortened the file during the run.
     #[error("the recording `{}` is lost or damaged: {damage}; record again", path.display())]
     Lost {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What happened to the file.
+        /// Detected change of the file.
         #[source]
         damage: FileError,
     },
 }
 
-/// A recording being written.
+/// Writer of a recording.
 ///
-/// Dropped without [`Recorder::finish`] it still closes the file properly, but errors are lost.
+/// Dropped without [`Recorder::finish`], the writer still completes the file, but errors are lost.
 pub struct Recorder {
     path: PathBuf,
     file: ChunkedFile,
-    /// Of each device, filled anew for each tick.
+    /// Pose message of each device, filled anew for each tick.
     poses: Vec<FrameTransform>,
-    /// One encoded message; keeps its memory.
+    /// Buffer of one encoded message, reused.
     buffer: Vec<u8>,
-    /// Number of the next tick in the file: a reader that finds a gap knows that something is missing.
+    /// Sequence number of the next tick in the file: a gap shows a reader that ticks are missing.
     sequence: u32,
     /// Time of the first tick that is not yet in the file.
     chunk_start_ns: Option<u64>,
@@ -90,7 +90,7 @@ impl Recorder {
     /// Creates the file and writes the description of the run to it. Not real-time.
     ///
     /// # Errors
-    /// [`RecordError`]: the file exists, or cannot be created or written to.
+    /// If the file exists, or cannot be created or written to.
     pub fn create(path: &Path, run: &RunDescription) -> Result<Self, RecordError> {
         Self::begin(path, new_file(path)?, run)
     }
@@ -98,7 +98,7 @@ impl Recorder {
     /// Creates the file of a repaired recording. Not real-time.
     ///
     /// # Errors
-    /// As [`Self::create`].
+    /// Those of [`Self::create`].
     pub(crate) fn create_repaired(path: &Path, run: &RunDescription) -> Result<Self, RecordError> {
         let library = library(run) + REPAIRED;
         Self::begin_as(path, new_file(path)?, run, library)
@@ -129,15 +129,15 @@ impl Recorder {
     /// Appends a tick. Not real-time: every quarter of a second it writes a chunk to the file.
     ///
     /// # Errors
-    /// [`RecordError::Write`]. The recording is over then: later calls fail too.
+    /// [`RecordError::Write`], after which the recording is over: later calls fail too.
     pub fn record(&mut self, record: &TickRecord) -> Result<(), RecordError> {
         self.try_record(record).map_err(|cause| write_error(&self.path, cause))
     }
 
-    /// Appends a parameter that changed; it belongs before the tick that saw it first. Not real-time.
+    /// Appends a change, before the first tick with the new value. Not real-time.
     ///
     /// # Errors
-    /// [`RecordError::Write`]. The recording is over then: later calls fail too.
+    /// [`RecordError::Write`], after which the recording is over: later calls fail too.
     pub fn change(&mut self, change: &Change) -> Result<(), RecordError> {
         // In the chunk with its tick: a file that lost the change has lost the tick too.
         encode(&ChangeMessage::new(change), &mut self.buffer)
@@ -145,17 +145,17 @@ impl Recorder {
             .map_err(|cause| write_error(&self.path, cause))
     }
 
-    /// Appends something that happened, in words. Not real-time.
+    /// Appends an event in words. Not real-time.
     ///
     /// # Errors
-    /// [`RecordError::Write`]. The recording is over then: later calls fail too.
+    /// [`RecordError::Write`], after which the recording is over: later calls fail too.
     pub fn note(&mut self, note: &Note) -> Result<(), RecordError> {
-        // Words are rare and explain why a run ended: they do not wait for the chunk to fill.
+        // Notes are rare and explain why a run ended, so they are written at once.
         self.write_now(Topic::Log, &Log::new(note), note.time_ns)
             .map_err(|cause| write_error(&self.path, cause))
     }
 
-    /// Appends a message of another recording as it is. Not real-time: every quarter of a second it writes a chunk to the file.
+    /// Appends a message of another recording unchanged. Not real-time: every quarter of a second it writes a chunk to the file.
     ///
     /// # Errors
     /// [`RecordError::Write`].
@@ -173,21 +173,21 @@ impl Recorder {
     /// Writes the last chunk and the index, and closes the file. Not real-time.
     ///
     /// # Errors
-    /// [`RecordError::Write`]: the index may be missing, chunks flushed before can be read. [`RecordError::Lost`]:
+    /// [`RecordError::Write`]: the index may be missing; chunks flushed before can be read. [`RecordError::Lost`]:
     /// the file at the path is not the one written.
     pub fn finish(self) -> Result<(), RecordError> {
         let Self { path, file, .. } = self;
         file.finish(&path).map_err(|cause| write_error(&path, cause))
     }
 
-    /// Closes the file and removes it: there was nothing to record. Not real-time.
+    /// Closes and removes the file, if nothing was recorded. Not real-time.
     pub fn discard(self) {
         let Self { path, file, .. } = self;
         file.remove(&path);
     }
 
     fn try_record(&mut self, record: &TickRecord) -> io::Result<()> {
-        // A device the description does not have is recorded as the first, not lost.
+        // A device that the description lacks is recorded as the first, not lost.
         let device = usize::from(record.device).min(self.poses.len().saturating_sub(1));
         if let Some(pose) = self.poses.get_mut(device) {
             pose.set(record);
@@ -199,7 +199,7 @@ impl Recorder {
         self.sequence = self.sequence.wrapping_add(1);
 
         let start_ns = *self.chunk_start_ns.get_or_insert(record.time_ns);
-        // This tick lasts until the next: a chunk closed one tick later would hold more than it may lose.
+        // This tick lasts until the next: with a chunk closed one tick later, more time could be lost.
         let end_ns = record.time_ns.saturating_add(record.dt_ns);
         if end_ns.saturating_sub(start_ns) >= CHUNK_NS { self.flush() } else { Ok(()) }
     }
@@ -221,7 +221,7 @@ impl Recorder {
         self.file.write(&header, &self.buffer)
     }
 
-    /// Hands the chunk to the system, whole.
+    /// Writes the complete chunk to the file.
     fn flush(&mut self) -> io::Result<()> {
         self.chunk_start_ns = None;
         self.file.flush()
@@ -235,7 +235,7 @@ fn new_file(path: &Path) -> Result<NewFile, RecordError> {
     })
 }
 
-/// Name of the library that wrote the recording of a run.
+/// Returns the library name for the recording of a run.
 fn library(run: &RunDescription) -> String {
     format!("flotor/{}", run.flotor_version)
 }
@@ -260,7 +260,7 @@ fn write_head(path: &Path, file: NewFile, run: &RunDescription, library: String)
     Ok(file)
 }
 
-/// Puts an encoded message in place of what the buffer held.
+/// Encodes a message into the emptied buffer.
 fn encode(message: &impl Message, buffer: &mut Vec<u8>) -> io::Result<()> {
     buffer.clear();
     message.encode(buffer).map_err(io::Error::from)

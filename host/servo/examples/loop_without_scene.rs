@@ -23,13 +23,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sampled =
         SampledLoop { period_s: config.period_ns as f64 * 1.0e-9, latency_s: capabilities.latency_s };
 
-    // The force model, where the handle's home is its own.
+    // The force model, whose home is that of the handle.
     let mut model = Plugin::in_process(&flotor_wall::FLOTOR_ENTRY)?.create_model(&[])?;
     model.prepare(&config)?;
     let instances = vec![(Engine::Here(model), Mapping::new(&MappingConfig::default()))];
     let layer = Layer::new(instances, &Blend::default(), TimeBudget::default(), &sampled);
 
-    // Nothing is scheduled, and nobody changes anything while it runs.
+    // No scheduled changes, and none during the run.
     let (parameters, _sender, _reports) = ParameterQueue::new(Vec::new(), 1);
     let (swaps, _host_swaps) = swap_queues(1, Vec::new());
     let forces = Forces::new(1, vec![(0, layer)], Vec::new());

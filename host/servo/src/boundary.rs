@@ -1,10 +1,10 @@
-//! The wall at the edge of a device's range: spring and damper that push back what has left it, and never pull.
+//! Boundary wall at the edge of a device's range: spring and damper that push the handle back, and never pull.
 //!
 //! The range is an ellipsoid of positions and one of rotation vectors; equal semi-axes make it the sphere of the thesis's boundary
 //! (section 3.2). The spring pushes along the normal at the nearest point of the ellipsoid, by the distance from it: its force is a
-//! gradient, and no lap gains energy. Nearly every tick is inside, so that is seen first, without a root or an arc.
+//! gradient, and no closed path gains energy. Nearly every tick is inside, which is tested first, without a root or an arc.
 //!
-//! Stiffness and place of the wall are those of a [`RenderedBoundary`].
+//! Stiffness and position of the wall come from a [`RenderedBoundary`].
 
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_hal::{DVec3, DeviceState, Wrench, math, rotation_vector};
@@ -17,7 +17,7 @@ pub(super) struct BoundaryWall {
 }
 
 impl BoundaryWall {
-    /// A wall as it is rendered on a device. Not real-time.
+    /// Creates the wall of a device. Not real-time.
     pub(super) fn new(rendered: &RenderedBoundary) -> Self {
         let RenderedBoundary {
             begins_m,
@@ -34,13 +34,13 @@ impl BoundaryWall {
         }
     }
 
-    /// The push of the wall; `None` inside, and where nobody knows where the handle is. Real-time: bounded, no allocation.
+    /// Returns the push of the wall; `None` inside, and for an unknown position of the handle. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn push(&self, state: &DeviceState) -> Option<Wrench> {
         if self.surely_holds(state) { None } else { self.push_outside(state) }
     }
 
-    /// True only inside. Real-time: bounded, no allocation.
+    /// Returns true only inside; false close to the edge. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn surely_holds(&self, state: &DeviceState) -> bool {
         // A rotation vector is the axis times the angle, which is at most pi times the sine of its half.
@@ -56,7 +56,7 @@ impl BoundaryWall {
         let force = force.map(|beyond| self.position.push(&beyond, state.twist.linear()));
         let rotation_rad = rotation_vector(state.pose.orientation());
         let torque = self.rotation.beyond(rotation_rad).map(|beyond| {
-            // Of an axis of the rotation nothing turns.
+            // A gradient along the rotation axis needs no conversion.
             let is_axis = self.rotation.shape == Shape::Sphere;
             let outward = if is_axis { beyond.outward } else { by_turning(rotation_rad, beyond.outward) };
             self.rotation.push(&Beyond { outward, ..beyond }, state.twist.angular())
@@ -68,8 +68,8 @@ impl BoundaryWall {
     }
 }
 
-/// Gradient of a function of the rotation vector by a turn about the fixed axes, from the gradient by the vector: the inverse
-/// transposed of the left Jacobian of SO(3) (Chirikjian, section 10.8.5).
+/// Converts a gradient by the rotation vector to one by a turn about the fixed axes, with the inverse transposed left Jacobian of
+/// SO(3) (Chirikjian, section 10.8.5).
 fn by_turning(rotation_rad: DVec3, gradient: DVec3) -> DVec3 {
     let angle = rotation_rad.length();
     let (sin, cos) = math::sin_cos(angle);
@@ -83,14 +83,14 @@ fn by_turning(rotation_rad: DVec3, gradient: DVec3) -> DVec3 {
     gradient + across * 0.5 + rotation_rad.cross(across) * second
 }
 
-/// Where translation or rotation may be, and what it meets outside. Metres and newtons, or radians and newton metres.
+/// Range of translation or rotation, with spring and damper outside. Metres and newtons, or radians and newton metres.
 struct Ellipsoid {
-    /// Without end on an axis without range, so that nothing there is beyond it.
+    /// Infinite on an axis without range, so that no point is outside there.
     semi_axes: DVec3,
-    /// Their reciprocals.
+    /// Reciprocals of the semi-axes.
     per_semi_axis: DVec3,
     shape: Shape,
-    /// Effort per way.
+    /// Effort per distance.
     stiffness: f64,
     /// Effort per speed.
     damping: f64,
@@ -98,20 +98,20 @@ struct Ellipsoid {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shape {
-    /// All axes with a range have the same.
+    /// All axes with a range are equal.
     Sphere,
     Unequal,
 }
 
-/// Place of a point outside of an ellipsoid.
+/// Place of a point outside an ellipsoid.
 struct Beyond {
     /// Distance from the ellipsoid.
     depth: f64,
-    /// Unit normal at its nearest point.
+    /// Unit normal at the nearest point.
     outward: DVec3,
 }
 
-/// Squared distance from the centre, in semi-axes, below which rounding cannot make an inside of an outside.
+/// Squared distance from the centre, in semi-axes, below which a point is inside despite rounding.
 const SURELY_INSIDE: f64 = 1.0 - 1.0e-12;
 
 impl Ellipsoid {
@@ -123,13 +123,13 @@ impl Ellipsoid {
         Self { semi_axes, per_semi_axis: semi_axes.recip(), shape, stiffness, damping }
     }
 
-    /// True only inside.
+    /// Returns true only inside; false close to the edge.
     #[inline]
     fn surely_holds(&self, at: DVec3) -> bool {
         (at * self.per_semi_axis).length_squared() < SURELY_INSIDE // false for NaN
     }
 
-    /// Place of a point outside; `None` inside.
+    /// Returns the place of a point outside; `None` inside.
     fn beyond(&self, at: DVec3) -> Option<Beyond> {
         let has_no_range = self.semi_axes.cmpeq(DVec3::INFINITY);
         let at = DVec3::select(has_no_range, DVec3::ZERO, at);
@@ -149,14 +149,14 @@ impl Ellipsoid {
         })
     }
 
-    /// Spring and damper along a direction. Damping acts outwards only: the wall never pulls.
+    /// Returns the push of spring and damper along a direction. Damping acts outwards only: the wall never pulls.
     fn push(&self, beyond: &Beyond, velocity: DVec3) -> DVec3 {
         let Beyond { depth, outward } = *beyond;
         outward * -(self.stiffness * depth + self.damping * velocity.dot(outward).max(0.0)).max(0.0)
     }
 }
 
-/// Steps of Newton's method at most: four reach rounding within a tenth of a semi-axis, twelve a hundred semi-axes away.
+/// Most steps of Newton's method: four reach rounding within a tenth of a semi-axis, twelve a hundred semi-axes away.
 const MOST_STEPS: usize = 20;
 
 /// Finds the nearest point of an ellipsoid with these squared semi-axes; `scaled` is the place times the semi-axes.

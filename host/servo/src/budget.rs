@@ -1,63 +1,63 @@
-//! The time a model may take: who overruns it again and again is faded out and named.
+//! Time budget of a model: a model with too many overruns is faded out and reported.
 
 use super::clock::monotonic_ns;
 
-/// How many more ticks a model may be too slow than in time, since it last made up for all: one alone is more likely the
-/// machine's fault than the model's, but one that is slow in most ticks is out soon, also if never in many in a row.
+/// Tolerated excess of slow ticks over ticks in time. A single slow tick is more likely the machine's fault than the model's; a
+/// model that is slow in most ticks is soon disabled, even if never in many in a row.
 const TOLERATED_OVERRUNS: u32 = 4;
-/// Time over which a model that took too long fades out, ns. It is not asked meanwhile: its last answer fades.
+/// Time over which a model with too many overruns fades out, ns. It is not stepped meanwhile: its last answer fades.
 const FADE_NS: u64 = 50_000_000;
 
-/// How much of a model's answer is used, and whether it is asked.
+/// Permission to step a model, with the weight of its answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Allowed {
-    /// It is asked, and all of its answer is used.
+    /// Step the model and use its whole answer.
     Asked,
-    /// It is not asked; this much of its last answer is used, above 0 and up to 1.
+    /// Do not step; weight of the last answer, above 0 and up to 1.
     Fading(f64),
-    /// It is out.
+    /// Disabled.
     Nothing,
 }
 
-/// Whether there was an answer at the end of a step.
+/// Presence of an answer at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
-    /// There was.
+    /// Answered.
     There,
-    /// A process that was waited for, or is still at an earlier step, had none.
+    /// No reply from a worker that timed out or is still at an earlier step.
     Missing,
 }
 
-/// The time one model may take, and how it keeps to it.
+/// Time budget of one model, with its overruns.
 #[derive(Clone, Debug, Default)]
 pub struct TimeBudget {
-    /// `None`: nobody looks at the clock.
+    /// Time limit of a step, ns; `None`: steps are not timed.
     limit_ns: Option<u64>,
-    /// Ticks in which it was too slow less those in which it was not; never below zero.
+    /// Slow ticks less ticks in time; never below zero.
     overruns: u32,
-    /// Tick and time at which the model was taken out.
+    /// Tick and time at which the model was disabled.
     out_at: Option<(u64, u64)>,
     longest_ns: u64,
 }
 
-/// A model that was too slow.
+/// Overrun for which a model was disabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overrun {
-    /// The tick after which it was not asked any more.
+    /// Last tick in which the model was stepped.
     pub tick: u64,
-    /// The longest step it took, ns.
+    /// Longest step, ns.
     pub longest_ns: u64,
-    /// What it may take, ns.
+    /// Time limit of a step, ns.
     pub limit_ns: u64,
 }
 
 impl TimeBudget {
-    /// A budget of so many ns a step, or none. Not real-time.
+    /// Creates a budget with a time limit per step, ns, or without. Not real-time.
     pub fn new(limit_ns: Option<u64>) -> Self {
         Self { limit_ns, ..Self::default() }
     }
 
-    /// Whether the model is to be asked at a time of the run. Real-time: bounded, no allocation.
+    /// Returns the permission to step the model at a time of the run. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn allowed(&self, now_ns: u64) -> Allowed {
         let Some((_, since_ns)) = self.out_at else { return Allowed::Asked };
@@ -68,13 +68,13 @@ impl TimeBudget {
         Allowed::Fading(1.0 - elapsed_ns as f64 / FADE_NS as f64)
     }
 
-    /// When a step begins, ns; `None` if nobody looks at the clock. Real-time: bounded, no allocation.
+    /// Returns the start of a step, ns; `None` if steps are not timed. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn begin(&self) -> Option<u64> {
         self.limit_ns.map(|_| monotonic_ns())
     }
 
-    /// Books a step that began at [`Self::begin`]; true if it took too long. Real-time: bounded, no allocation.
+    /// Records a step that began at [`Self::begin`]; returns true if it took too long. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn end(&mut self, begun_ns: u64, answer: Answer, tick: u64, now_ns: u64) -> bool {
         let Some(limit_ns) = self.limit_ns else { return false };
@@ -96,7 +96,7 @@ impl TimeBudget {
         true
     }
 
-    /// How the model was too slow, if it was taken out.
+    /// Returns the overrun for which the model was disabled, if there was one.
     pub(super) fn overrun(&self) -> Option<Overrun> {
         let ((tick, _), limit_ns) = (self.out_at?, self.limit_ns?);
         Some(Overrun { tick, longest_ns: self.longest_ns, limit_ns })

@@ -1,4 +1,4 @@
-//! When ticks happen: on the machine's clock at absolute deadlines, or on a virtual clock without waiting.
+//! Schedule of the ticks: absolute deadlines on the machine's clock, or a virtual clock without waiting.
 //!
 //! The schedule is the same for both: tick `k` belongs to time `k T`, and a tick whose whole period has
 //! passed is missed, counted and skipped, never caught up in a burst.
@@ -10,20 +10,20 @@ use flotor_hal::{SampleWait, Tick};
 /// The final stretch before a deadline, which is spun and not slept: a sleeping thread wakes late.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SpinWindow {
-    /// Length of the stretch, ns.
+    /// Length of the window, ns.
     pub spin_ns: u64,
 }
 
 impl SpinWindow {
-    /// Sleeps measured to find the window.
+    /// Number of measured sleeps.
     const SAMPLES: usize = 64;
     /// Length of a measured sleep, ns: long enough for the core to go idle, as between ticks.
     const SAMPLE_SLEEP_NS: u64 = 400_000;
-    /// Narrowest and widest window, ns: below, the spin could not absorb anything; above, it would burn the core.
+    /// Narrowest and widest window, ns: a narrower one absorbs no lateness, a wider one burns the core.
     const BOUNDS_NS: [u64; 2] = [20_000, 250_000];
 
-    /// Measures how late this thread wakes and takes the lateness of 19 in 20 wake-ups, plus a quarter; at most
-    /// half the period. Not real-time: some 30 ms. Call it on the loop's own thread, with its priority.
+    /// Measures the lateness of this thread's wake-ups; the window is the 95th percentile plus a quarter, at most half the period.
+    /// Not real-time: some 30 ms. Call it on the loop's own thread, with its priority.
     #[must_use]
     pub fn measure(period_ns: u64) -> Self {
         let mut lateness_ns = [0; Self::SAMPLES];
@@ -40,79 +40,79 @@ impl SpinWindow {
     }
 }
 
-/// Gives one tick after the other, each when it is due.
+/// Schedule of the ticks of a loop.
 pub struct Schedule {
     pace: Pace,
     period_ns: u64,
     start_ns: u64,
-    /// Number of periods since the start that the next tick belongs to.
+    /// Number of periods from the start to the next tick.
     slot: u64,
     next_index: u64,
     last_slot: u64,
 }
 
-/// What ticks wait for.
+/// Time base of the ticks.
 enum Pace {
-    /// Nothing.
+    /// Virtual clock, without waiting.
     Virtual,
-    /// A deadline on the machine's clock.
+    /// Deadlines on the machine's clock.
     Clock(SpinWindow),
-    /// The device's next sample; the last one came at this time.
+    /// Samples of the device, with the time of the last one.
     Device { last_ns: u64 },
 }
 
-/// A tick that is due, and how the machine kept to it.
+/// Due tick with its lateness.
 #[derive(Debug)]
 pub struct Due {
     /// Index, time and step of the tick.
     pub tick: Tick,
-    /// How long after its deadline it starts, ns; on the virtual clock nothing is ever late.
+    /// Delay after the deadline, ns; `None` on the virtual clock.
     pub lateness_ns: Option<u64>,
-    /// Ticks skipped just before it.
+    /// Number of ticks skipped just before the tick.
     pub missed: u64,
 }
 
-/// Why there is no next tick on a device's pace.
+/// Reason why a device that sets the pace gives no next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PaceLost {
-    /// It does not set the pace after all.
+    /// The device does not set the pace after all.
     NotPaced,
-    /// Samples come faster than the loop counts time: every limit per time would be one too high.
+    /// Samples come faster than the loop counts time: every limit per time would be too high.
     TooFast {
-        /// So many so far.
+        /// Number of samples so far.
         samples: u64,
-        /// Since the start, ns.
+        /// Time since the start, ns.
         elapsed_ns: u64,
     },
 }
 
-/// How far the samples of a device that sets the pace may run ahead of the machine's clock, ns: what it may have kept for the
-/// loop before the start, or while that was delayed.
+/// Allowed lead of a device that sets the pace over the machine's clock, ns: samples that the device buffered before the start, or
+/// while the loop was delayed.
 const AHEAD_NS: u64 = 250_000_000;
-/// And by which part of the time since the start: one in so many, 2 %. Two oscillators differ by far less.
+/// Allowed further lead, relative to the time since the start: 1/50, 2 %. Two oscillators differ by far less.
 const AHEAD_SHARE: u64 = 50;
 
-/// How a wait ended on the machine's clock.
+/// Result of a wait on the machine's clock.
 #[derive(Clone, Copy)]
 struct Woken {
-    /// After the deadline of the first period that has not passed.
+    /// Delay after the deadline of the first period that has not passed, ns.
     late_ns: u64,
-    /// Whole periods that passed before it, or samples nobody read.
+    /// Whole periods that passed before, or unread samples.
     missed: u64,
 }
 
 impl Schedule {
-    /// A schedule on the machine's clock, whose first tick is due one period from now.
+    /// Creates a schedule on the machine's clock, whose first tick is due one period from now.
     pub fn start_real(period_ns: u64, window: SpinWindow) -> Self {
         Self::start(Pace::Clock(window), period_ns, monotonic_ns() + period_ns)
     }
 
-    /// A schedule without waiting, whose first tick is at time 0.
+    /// Creates a schedule without waiting, whose first tick is at time 0.
     pub fn start_virtual(period_ns: u64) -> Self {
         Self::start(Pace::Virtual, period_ns, 0)
     }
 
-    /// A schedule of a device's samples; the first is expected one period from now.
+    /// Creates a schedule paced by a device's samples; the first is expected one period from now.
     pub fn start_paced(period_ns: u64) -> Self {
         let now_ns = monotonic_ns();
         Self::start(Pace::Device { last_ns: now_ns }, period_ns, now_ns)
@@ -122,11 +122,11 @@ impl Schedule {
         Self { pace, period_ns, start_ns, slot: 0, next_index: 0, last_slot: 0 }
     }
 
-    /// Waits for the next tick; `wait_for_sample` is how to wait for a device, for so many ns at most, if it is the
-    /// device that sets the pace. Real-time: sleeps, then spins; no allocation.
+    /// Waits for the next tick. If a device sets the pace, `wait_for_sample` waits for its next sample with a timeout, ns.
+    /// Real-time: sleeps, then spins; no allocation.
     ///
     /// # Errors
-    /// [`PaceLost`] if it turns out not to set it, or another one.
+    /// [`PaceLost`] if the device does not set the pace, or too fast a one.
     pub fn wait(&mut self, wait_for_sample: impl FnOnce(u64) -> SampleWait) -> Result<Due, PaceLost> {
         let woken = match self.pace {
             Pace::Virtual => None,
@@ -149,8 +149,7 @@ impl Schedule {
         Ok(Due { tick, lateness_ns: woken.map(|woken| woken.late_ns), missed })
     }
 
-    /// How long a tick waits for a sample. After that it runs without one: force has to fade out even if the device
-    /// has nothing more to say.
+    /// Timeout of a sample, in periods. The tick then runs without a sample: the force has to fade out even if the device is silent.
     const PATIENCE_PERIODS: u64 = 2;
 
     /// Waits for the deadline of a tick on the machine's clock.
@@ -166,18 +165,18 @@ impl Schedule {
             now = monotonic_ns();
         }
         let late = now - deadline;
-        // Whole periods that have passed belong to ticks that nobody can use any more.
+        // Whole periods that have passed belong to ticks that are of no use any more.
         let missed = late / self.period_ns;
         Woken { late_ns: late - missed * self.period_ns, missed }
     }
 
-    /// A tick that a sample began, or that waited for one in vain.
+    /// Converts the result of a wait for a sample to a tick.
     fn follow(&mut self, last_ns: u64, waited: SampleWait) -> Result<Woken, PaceLost> {
         let periods = match waited {
             SampleWait::NotPaced => return Err(PaceLost::NotPaced),
             SampleWait::Arrived { samples } => samples.max(1),
             SampleWait::TimedOut => {
-                // A device that gives up at once must not make the loop spin.
+                // A wait that returns at once must not make the loop spin.
                 sleep_until(last_ns + self.period_ns);
                 ((monotonic_ns() - last_ns) / self.period_ns).max(1)
             }
@@ -192,8 +191,8 @@ impl Schedule {
         Ok(Woken { late_ns, missed: periods - 1 })
     }
 
-    /// Waits for the end of the last tick's period; time since the start, ns. As for a tick, whole periods by which the
-    /// loop was delayed count as passed over: the run was over before them.
+    /// Waits for the end of the last tick's period; returns the time since the start, ns. Whole periods of delay are left out, as
+    /// for a tick: the run was over before.
     pub fn finish(mut self) -> u64 {
         match self.pace {
             Pace::Virtual => self.next_time_ns(),
@@ -202,12 +201,12 @@ impl Schedule {
         }
     }
 
-    /// Number of the next tick, from 0 and without a gap.
+    /// Returns the index of the next tick, from 0 and without a gap.
     pub fn next_index(&self) -> u64 {
         self.next_index
     }
 
-    /// Scheduled time of the next tick, ns.
+    /// Returns the scheduled time of the next tick, ns.
     pub fn next_time_ns(&self) -> u64 {
         self.slot * self.period_ns
     }

@@ -1,13 +1,13 @@
-//! The envelope: what stands between models and device, and what nothing gets past.
+//! Safety envelope: the stages between models and device that every command passes.
 //!
 //! Order: guard (a number that is not finite becomes zero) -> gate (the start-up ramp and the other
 //! [states of the run](super::state)) -> velocity limit -> [boundary wall](super::boundary) -> force and torque limits
 //! -> [damping of an oscillation](flotor_core::oscillation) -> [passivity](super::passivity), and the limits once more if it took something
 //! away -> slew limit.
 //!
-//! The [slew limit](slew) is last, so that no fault upstream, not even a model that vanishes, makes the force jump, unless the part
-//! that accelerates the handle falls. The limits hold after it too: where the slew limit changes the wrench, the limited
-//! [regions](flotor_core::region) do once more.
+//! The [slew limit](slew) is last, so that no fault upstream, not even the loss of a model, makes the force jump; only the part
+//! that accelerates the handle may fall faster. The limits hold after the slew limit too: where it changes the wrench, the limited
+//! [regions](flotor_core::region) apply once more.
 
 mod slew;
 
@@ -35,15 +35,15 @@ pub struct StageEffect {
 /// Effects of the stages that store or remove energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnvelopeEffects {
-    /// The passivity controller.
+    /// Effect of the passivity controller.
     pub passivity: StageEffect,
-    /// The slew limit.
+    /// Effect of the slew limit.
     pub slew: StageEffect,
 }
 
-/// Limits of force, torque and their change, and a wall at the edge of the range.
+/// Limits of force, torque and their change, with a wall at the edge of the range.
 pub struct Envelope {
-    /// The most that may be sent, N and N·m.
+    /// Largest force and torque, N and N·m.
     force: Region,
     torque: Region,
     /// Velocity (m/s, rad/s) above which force components along it are scaled down.
@@ -60,7 +60,7 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Combines what the scene allows with what the device declares; the tighter wins. Not real-time.
+    /// Combines the limits of the scene with those of the device; the tighter ones apply. Not real-time.
     #[must_use]
     pub fn new(limits: &Limits, boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
         let force_n = limits.force_n.and(Bound::box_of(device.max_force_n));
@@ -73,7 +73,7 @@ impl Envelope {
             spin: Region::of(limits.angular_velocity_rad_per_s),
             slew: SlewLimit::new(limits, device),
             wall: BoundaryWall::new(&RenderedBoundary::new(boundary, device, &force_n, period_ns)),
-            // Damping the device is known to stand: that of its boundary.
+            // The device is known to be stable with the damping of its boundary.
             passivity: Passivity::new(
                 limits.passivity,
                 Controller::new(
@@ -91,13 +91,13 @@ impl Envelope {
         }
     }
 
-    /// The most that may reach the hand: force (N), torque (N·m).
+    /// Returns the largest force (N) and torque (N·m) that may reach the hand.
     #[must_use]
     pub fn most(&self) -> [Bound; 2] {
         [self.force.bound(), self.torque.bound()]
     }
 
-    /// The wrench that goes to the device for what the models ask. Real-time: bounded, no allocation.
+    /// Limits the request of the models to the wrench for the device. Real-time: bounded, no allocation.
     #[inline]
     pub fn apply(
         &mut self,
@@ -112,7 +112,7 @@ impl Envelope {
         let gated = guarded * gate.models;
         let driven = self.limit_velocity(gated, state, events);
         let walled = self.add_boundary(driven, gate, state, events);
-        // Before passivity: what cannot be sent anyway may be too large to be squared.
+        // Before passivity: an unlimited wrench may be too large to be squared.
         let bounded = self.limit_wrench(walled, events);
         let calmed = self.limit_oscillation(bounded, state, tick, events);
         let passive = self.limit_energy(calmed, state, tick, events);
@@ -121,20 +121,20 @@ impl Envelope {
         sent
     }
 
-    /// Energy the hand has put into the device's port so far less what has come out, J; negative: the loop has created
-    /// energy. Real-time: bounded, no allocation.
+    /// Returns the energy that the hand has put into the device's port less the energy that it received, J; negative: the loop has
+    /// generated energy. Real-time: bounded, no allocation.
     #[must_use]
     pub fn port_energy_j(&self) -> f64 {
         self.passivity.energy_j()
     }
 
-    /// Returns what the stages that store or remove energy did so far. Real-time: bounded, no allocation.
+    /// Returns the effects of the stages that store or remove energy. Real-time: bounded, no allocation.
     #[must_use]
     pub fn effects(&self) -> EnvelopeEffects {
         self.effects
     }
 
-    /// Books the energy that crossed the port since the last sample.
+    /// Records the energy that crossed the port since the last sample.
     #[inline]
     fn observe(&mut self, state: &DeviceState) {
         let moved = self.motion.moved(&state.pose);
@@ -142,8 +142,7 @@ impl Envelope {
         self.effects.slew.work_j += self.slew.observe(&moved, &self.last);
     }
 
-    /// Whether the force swung between its limits and went on when it was damped: the run has to end. Real-time: bounded, no
-    /// allocation.
+    /// Returns true if the force oscillated between its limits even after damping: the run has to end. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_unstable(&self) -> bool {
@@ -175,7 +174,7 @@ impl Envelope {
     }
 
     /// Scales force and torque down into their limits.
-    #[inline(always)] // 3 ns: its wrench stays in registers
+    #[inline(always)] // 3 ns: the wrench stays in registers
     fn limit_wrench(&self, wrench: Wrench, events: &mut Events) -> Wrench {
         if self.force.holds(wrench.force()) && self.torque.holds(wrench.torque()) {
             return wrench;
@@ -190,7 +189,7 @@ impl Envelope {
         Wrench::new(force, torque)
     }
 
-    /// Lets a part of the force through while it swings between its limits.
+    /// Scales the force down while it oscillates between its limits.
     #[inline]
     fn limit_oscillation(
         &mut self,
@@ -208,7 +207,7 @@ impl Envelope {
         bounded * gain
     }
 
-    /// Removes the energy that the port does not have, if the scene has a passivity controller.
+    /// Damps a wrench for which the port lacks the energy, if the scene has a passivity controller.
     #[inline]
     fn limit_energy(
         &mut self,
@@ -220,7 +219,7 @@ impl Envelope {
         let Some(damped) = self.passivity.limit(&wrench, &self.last, state) else { return wrench };
         events.insert(Events::PASSIVITY_DAMPED);
         self.effects.passivity.active_ns += self.slew_time_ns(tick);
-        // Damping may be more than an axis can give.
+        // Damping may exceed the limit of an axis.
         self.limit_wrench(damped, events)
     }
 
@@ -239,7 +238,7 @@ impl Envelope {
         let Some(limited) = limited else { return wrench };
         events.insert(Events::SLEW_LIMITED);
         self.effects.slew.active_ns += dt_ns;
-        // A rounding on the way may leave the region.
+        // Rounding may leave the region.
         Wrench::new(self.force.shrink(limited.force()), self.torque.shrink(limited.torque()))
     }
 
@@ -251,7 +250,7 @@ impl Envelope {
     }
 }
 
-/// A wrench that is not finite becomes none.
+/// Replaces a non-finite wrench with zero.
 #[inline]
 fn guard(request: &Wrench, events: &mut Events) -> Wrench {
     if request.is_finite() {
@@ -261,8 +260,8 @@ fn guard(request: &Wrench, events: &mut Events) -> Wrench {
     Wrench::ZERO
 }
 
-/// A force without the part along the velocity that adds to it, which fades from all at an excess of 1 to nothing at 2. A
-/// request near the largest double that cannot be split is no force.
+/// Returns the force without the part along the velocity that accelerates the handle: the part shrinks from all at an excess of 1
+/// to nothing at 2. A request near the largest double that cannot be split yields zero.
 fn without_drive(force: DVec3, velocity: DVec3, excess: f64) -> DVec3 {
     let along = velocity.normalize_or_zero();
     let drive = force.dot(along).max(0.0);

@@ -1,6 +1,6 @@
-//! Everything that asks for a wrench: the models of each device, and the couplings between devices.
+//! Force sources: the models of each device, and the couplings between devices.
 //!
-//! The same code runs in the servo and in a replay; that is why a replay can be bit-exact.
+//! Servo and replay run the same code, so that a replay can be bit-exact.
 
 use super::Heartbeat;
 use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement};
@@ -14,31 +14,31 @@ use flotor_coupling::{
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
 
-/// What passes through the port of one device in a tick, device frame.
+/// State of one device in a tick, device frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Port {
-    /// Where the handle is, as last known.
+    /// Last valid state of the handle.
     pub state: DeviceState,
-    /// The wrench that is held since the last tick.
+    /// Command, held until the next tick.
     pub commanded: Wrench,
-    /// Outputs of models that reach the hand here.
+    /// Model outputs that reach the hand at this device.
     felt: Demand,
-    /// Outputs of models that were computed in this tick.
+    /// Model outputs computed in this tick.
     computed: Demand,
-    /// What models and couplings ask for, as far as it reaches the hand.
+    /// Request of models and couplings, as far as it reaches the hand.
     pub requested: Wrench,
-    /// Of this, what the models alone ask for.
+    /// Part of `requested` that the models alone request.
     by_models: Wrench,
-    /// Torque of the models that reaches no hand, N·m: for observers, where they asked for it.
+    /// Torque of the models that does not reach the hand, N·m; computed for observers that request it.
     unfelt_torque_nm: DVec3,
-    /// Energy stored in models and couplings, J, where it was computed.
+    /// Energy stored in models and couplings, J, if computed.
     energy_j: f64,
-    /// What has happened in this tick.
+    /// Events of this tick.
     pub events: Events,
 }
 
 impl Port {
-    /// A port at rest of a device where these outputs of models reach the hand ([`flotor_core::demand::felt_within`]).
+    /// Creates a port at rest; the outputs `felt` reach the hand ([`flotor_core::demand::felt_within`]).
     #[must_use]
     pub const fn at_rest(felt: Demand) -> Self {
         Self {
@@ -54,7 +54,7 @@ impl Port {
         }
     }
 
-    /// Outputs of models and couplings in this tick. Real-time: bounded, no allocation.
+    /// Returns the outputs of models and couplings in this tick. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn outputs(&self) -> ModelOutputs {
@@ -67,7 +67,7 @@ impl Port {
         ModelOutputs::new(wrench, *energy_j).limited_to(*computed)
     }
 
-    /// Takes what the models ask for: an output that observers alone asked for goes no further than their record.
+    /// Stores the request of the models; an output that only observers request goes no further than their record.
     #[inline]
     fn take(&mut self, demand: TickDemand, wrench: Wrench, energy_j: f64) {
         (self.by_models, self.unfelt_torque_nm) = if self.felt.contains(Demand::TORQUE) {
@@ -78,14 +78,14 @@ impl Port {
         (self.requested, self.energy_j, self.computed) = (self.by_models, energy_j, demand.computed());
     }
 
-    /// What is held for the couplings: all that is not the models'. Exact where a device has no models; where it has,
-    /// what the envelope takes away counts as taken from the coupling.
+    /// Returns the held wrench of the couplings: the command less the models' request. Exact for a device without models; with
+    /// models, a reduction by the envelope is attributed to the coupling.
     #[inline]
     fn held_for_couplings(&self) -> Wrench {
         self.commanded - self.by_models
     }
 
-    /// Adds what a coupling asks for.
+    /// Adds the pull of a coupling to the request.
     #[inline]
     fn add(&mut self, pull: &Pull) {
         self.requested = self.requested + pull.wrench;
@@ -96,39 +96,39 @@ impl Port {
     }
 }
 
-/// What becomes of a coupling in a run: for reports.
+/// Statistics of a coupling after a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingOutcome {
-    /// The energy tanks of both ends; that of an end on another host as received last.
+    /// Energy tanks of both ends; the tank of a remote end as last received.
     pub tanks: [TankState; 2],
-    /// How an end on another host was heard.
+    /// Link statistics of a remote end; `None` if both ends are on this host.
     pub hearing: Option<Hearing>,
 }
 
-/// A coupling and the devices of this run that it holds.
+/// Coupling with its devices in this run.
 pub enum Coupled {
-    /// Both ends are here.
+    /// Coupling with both ends on this host.
     Here {
-        /// Both ends.
+        /// State of the coupling.
         coupling: Box<Coupling>,
-        /// Numbers of the devices.
+        /// Device numbers of the ends.
         devices: [usize; 2],
-        /// What the ends ask for.
+        /// Pulls of the ends in the last step.
         pulls: [Pull; 2],
     },
-    /// The other end is on another host.
+    /// Coupling with a remote end.
     Remote {
-        /// The end here.
+        /// State of the end on this host.
         end: Box<RemoteEnd>,
-        /// Number of its device.
+        /// Device number of the end.
         device: usize,
-        /// What it asks for.
+        /// Pull of the end in the last step.
         pull: Pull,
     },
 }
 
 impl Coupled {
-    /// With the line for the peer state, if one end is on another host; `reach` is that of the device here. Not real-time.
+    /// Creates a coupling, with the line for the peer state if one end is remote; `reach` is the local device's. Not real-time.
     pub fn new(
         description: &CouplingDescription,
         period_s: f64,
@@ -150,7 +150,7 @@ impl Coupled {
         }
     }
 
-    /// Asks the coupling. Real-time: bounded, no allocation.
+    /// Computes the pulls of the coupling. Real-time: bounded, no allocation.
     #[inline]
     fn step(&mut self, tick: &Tick, ports: &[Port]) {
         let grip = |port: &'_ Port| (port.state, port.held_for_couplings());
@@ -168,7 +168,7 @@ impl Coupled {
         }
     }
 
-    /// Adds what it asked for. Real-time: bounded, no allocation.
+    /// Adds the pulls of the coupling to the ports. Real-time: bounded, no allocation.
     #[inline]
     fn add_to(&self, ports: &mut [Port]) {
         match self {
@@ -194,7 +194,7 @@ impl Coupled {
         }
     }
 
-    /// Not real-time.
+    /// Returns the statistics of the coupling. Not real-time.
     fn outcome(&self) -> CouplingOutcome {
         match self {
             Self::Here { coupling, .. } => {
@@ -208,24 +208,24 @@ impl Coupled {
     }
 }
 
-/// Which device a model is on, and which of the models there it is.
+/// Position of a model: its device, and its index in the device's stack.
 #[derive(Clone, Copy, Debug)]
 struct Whereabouts {
     device: usize,
     place: usize,
 }
 
-/// All models and couplings of a run.
+/// Models and couplings of a run.
 pub struct Forces {
     /// The models of each device.
     stacks: Box<[ModelStack]>,
-    /// By number of the model in the scene.
+    /// Positions of the models, by their number in the scene.
     models: Box<[Whereabouts]>,
     couplings: Box<[Coupled]>,
 }
 
 impl Forces {
-    /// `layers` are the scene's models, each with the device it is on. Not real-time.
+    /// Creates the force sources; `layers` are the scene's models, each with its device number. Not real-time.
     pub fn new(devices: usize, layers: Vec<(usize, Layer)>, couplings: Vec<Coupled>) -> Self {
         let mut on_device: Vec<Vec<(usize, Layer)>> =
             std::iter::repeat_with(Vec::new).take(devices).collect();
@@ -242,10 +242,10 @@ impl Forces {
         }
     }
 
-    /// Asks all of them at the states of the ports, one for each device; observers ask for the outputs `observed`. Real-time:
-    /// bounded by the models that are near, no allocation.
+    /// Steps all models and couplings at the states of the ports, one for each device; `observed` is the demand of observers.
+    /// Real-time: bounded by the models that are near, no allocation.
     pub fn step(&mut self, tick: &Tick, ports: &mut [Port], observed: Demand, heart: &Heartbeat) {
-        // The couplings first: what is held now is what they and the models asked for last.
+        // Couplings first: the held wrench is still the last request of couplings and models.
         self.couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
         for (stack, port) in self.stacks.iter_mut().zip(&mut *ports) {
             let demand = TickDemand::new(port.felt, observed.limited_to(stack.observable()));
@@ -255,7 +255,7 @@ impl Forces {
         self.couplings.iter().for_each(|coupled| coupled.add_to(ports));
     }
 
-    /// The models a model's number stands for, and its place among them.
+    /// Returns the stack of a model and the model's index in that stack.
     #[inline]
     fn stack_of(&mut self, model: usize) -> Option<(&mut ModelStack, usize)> {
         let Whereabouts { device, place } = *self.models.get(model)?;
@@ -278,14 +278,14 @@ impl Forces {
         }
     }
 
-    /// How often the model numbered `model` was replaced. Real-time: bounded, no allocation.
+    /// Returns the number of replacements of the model numbered `model`. Real-time: bounded, no allocation.
     #[inline]
     pub fn generation(&mut self, model: usize) -> Option<u16> {
         self.stack_of(model).and_then(|(stack, place)| stack.generation(place))
     }
 
-    /// Puts another model in place of one, faded in from this tick on. What it pushes out, because it was still
-    /// fading, is returned: dropping it is not for the loop.
+    /// Replaces a model; the new layer fades in from this tick on. Returns a layer that had to go before it had faded out; the
+    /// caller drops it outside the loop.
     ///
     /// Real-time: bounded by the objects of the model, no allocation.
     pub fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
@@ -296,36 +296,36 @@ impl Forces {
         }
     }
 
-    /// A layer that has faded out, and the number of its model. Real-time: bounded by the models, no allocation.
+    /// Removes a layer that has faded out; returns it with its model number. Real-time: bounded by the models, no allocation.
     #[inline]
     pub fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
         self.stacks.iter_mut().find_map(|stack| stack.take_faded(tick))
     }
 
-    /// Whether a layer is fading out. Real-time: bounded by the models, no allocation.
+    /// Returns true while a layer is fading out. Real-time: bounded by the models, no allocation.
     pub(crate) fn is_fading(&self) -> bool {
         self.stacks.iter().any(ModelStack::is_fading)
     }
 
-    /// What is known of every layer that is in place or fading out; `asks` hears of the model that is asked next what it
-    /// said last. Not real-time.
+    /// Returns reports on all layers in place or fading out; calls `asks` with the model number before it queries a model's last
+    /// message. Not real-time.
     pub fn reports(&mut self, asks: impl Fn(usize)) -> Vec<LayerReport> {
         self.stacks.iter_mut().flat_map(|stack| stack.reports(&asks)).collect()
     }
 
-    /// All layers, each with the number of its model. Not real-time.
+    /// Returns all layers, each with its model number. Not real-time.
     pub fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
         self.stacks.into_iter().flat_map(ModelStack::into_layers)
     }
 
-    /// Of every model, health and last words of the layer in place, in the scene's order. Not real-time.
+    /// Returns health and last message of the current layer of each model, in the scene's order. Not real-time.
     pub fn health(&mut self) -> Vec<(ModelHealth, String)> {
         let mut stacks: Vec<_> = self.stacks.iter_mut().map(|stack| stack.health().into_iter()).collect();
         let next = |at: &Whereabouts| stacks.get_mut(at.device).and_then(Iterator::next);
         self.models.iter().filter_map(next).collect()
     }
 
-    /// What has become of each coupling. Not real-time.
+    /// Returns the statistics of each coupling. Not real-time.
     pub fn coupling_outcomes(&self) -> Vec<CouplingOutcome> {
         self.couplings.iter().map(Coupled::outcome).collect()
     }

@@ -1,37 +1,37 @@
-//! How models come into a running loop and leave it: as owned boxes through wait-free queues, made and dropped elsewhere.
+//! Hot swap of models: owned boxes move into a running loop and back through wait-free queues, created and dropped outside.
 //!
-//! The loop takes a model out of a queue and puts it in place between two ticks; what it replaces fades out and goes
-//! back through another queue. Nothing in the loop allocates or frees.
+//! The loop takes a model out of a queue and puts it in place between two ticks; the replaced model fades out and returns through
+//! another queue. Nothing in the loop allocates or frees.
 
 use super::forces::Forces;
 use super::models::{Layer, Replacement};
 use flotor_hal::Tick;
 use rtrb::{Consumer, Producer, RingBuffer};
 
-/// A layer that is no longer needed, and the number of its model.
+/// Layer that is no longer needed, with its model number.
 pub(crate) type Retired = (u32, Box<Layer>);
 
-/// The loop's end.
+/// Loop side of the queues.
 pub struct LoopSwaps {
-    /// What the scene has scheduled, in order of time, ns; each place is emptied when its time comes.
+    /// Scheduled replacements in order of time, ns; each place is emptied when its time comes.
     schedule: Box<[(u64, Option<Replacement>)]>,
     next: usize,
     arriving: Consumer<Replacement>,
     retired: Producer<Retired>,
 }
 
-/// The other end.
+/// Host side of the queues.
 pub struct HostSwaps {
     /// Replacements for the loop.
     pub leaving_for_the_loop: Producer<Replacement>,
-    /// Layers the loop needs no longer.
+    /// Layers that the loop no longer needs.
     pub retired: Consumer<Retired>,
 }
 
-/// Both ends, for a number of models. Not real-time.
+/// Creates both sides for a number of models. Not real-time.
 pub fn swap_queues(models: usize, mut schedule: Vec<(u64, Replacement)>) -> (LoopSwaps, HostSwaps) {
     schedule.sort_by_key(|(time_ns, _)| *time_ns); // stable: equal times keep the scene's order
-    // One of each model may be on its way in; on the way out there may be that one, the one before, and the scheduled.
+    // One replacement of each model may be pending; on the way back there may be that one, the one before, and the scheduled ones.
     let (leaving_for_the_loop, arriving) = RingBuffer::new(models.max(1));
     let (retired, taken_back) = RingBuffer::new(2 * models + schedule.len() + 1);
     let schedule = schedule.into_iter().map(|(time_ns, replacement)| (time_ns, Some(replacement))).collect();
@@ -40,19 +40,19 @@ pub fn swap_queues(models: usize, mut schedule: Vec<(u64, Replacement)>) -> (Loo
 }
 
 impl LoopSwaps {
-    /// Whether a replacement is to be put in at this tick. Real-time: bounded, no allocation.
+    /// Returns true if a replacement is due at this tick. Real-time: bounded, no allocation.
     pub fn is_due(&self, tick: &Tick) -> bool {
         self.is_scheduled(tick) || !self.arriving.is_empty()
     }
 
-    /// Whether the time of the next scheduled replacement has come.
+    /// Returns true if the next scheduled replacement is due.
     fn is_scheduled(&self, tick: &Tick) -> bool {
         self.schedule.get(self.next).is_some_and(|(time_ns, _)| *time_ns <= tick.time_ns)
     }
 
-    /// Hands back what has faded out and puts in what is due; `report` hears of model and generation.
+    /// Returns faded layers to the host and applies the replacements that are due; calls `report` with model and generation.
     ///
-    /// Real-time: bounded by the models and what is scheduled, no allocation.
+    /// Real-time: bounded by the models and the schedule, no allocation.
     #[inline]
     pub fn apply_due(&mut self, tick: &Tick, models: &mut Forces, mut report: impl FnMut(u32, u16)) {
         while !self.retired.is_full()
@@ -60,7 +60,7 @@ impl LoopSwaps {
         {
             let _ = self.retired.push(faded); // there is room
         }
-        // Each replacement may push one out: it is only taken if that has somewhere to go.
+        // Each replacement may displace a layer: it is only taken if the queue has room for that layer.
         while !self.retired.is_full()
             && let Some(replacement) = self.due(tick)
         {
@@ -72,14 +72,14 @@ impl LoopSwaps {
         }
     }
 
-    /// What was not put in, each with the number of its model. Not real-time.
+    /// Returns the replacements that were not applied, each with its model number. Not real-time.
     pub fn into_layers(mut self) -> Vec<(usize, Box<Layer>)> {
         let scheduled = self.schedule.into_iter().filter_map(|(_, replacement)| replacement);
         let arriving = std::iter::from_fn(|| self.arriving.pop().ok());
         scheduled.chain(arriving).map(|replacement| (replacement.model as usize, replacement.layer)).collect()
     }
 
-    /// The next replacement whose time has come.
+    /// Takes the next replacement that is due.
     #[inline]
     fn due(&mut self, tick: &Tick) -> Option<Replacement> {
         if !self.is_scheduled(tick) {

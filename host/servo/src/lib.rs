@@ -1,10 +1,10 @@
-//! The real-time core: one tick after the other, at a rate that is kept, inside limits that no plugin can bypass.
+//! Real-time core: ticks at a fixed rate, inside limits that no plugin can bypass.
 //!
-//! - [`Servo`]: the tick; [`Clock`] decides when it happens, [`Envelope`] what may reach a hand.
-//! - [`last_stop`], [`watchdog_process`]: a process that dies takes the force along.
-//! - [`engine`]: where a model executes: in the loop, asynchronously at a rate of its own, or in a process of its own.
+//! - [`Servo`]: the tick; [`Clock`]: its time base; [`Envelope`]: limits of the wrench that reaches a hand.
+//! - [`last_stop`], [`watchdog_process`]: stop of the devices when the process dies.
+//! - [`engine`]: execution of a model: in the loop, asynchronously at its own rate, or in a worker process.
 //!
-//! Knows neither scenes nor files: the caller provides opened devices and prepared models.
+//! Independent of scenes and files: the caller provides opened devices and prepared models.
 #![cfg_attr(rtsan, feature(sanitize))] // the step `blocking` of .ci/full
 
 mod boundary;

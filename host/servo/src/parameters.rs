@@ -1,11 +1,11 @@
-//! Changes of parameters between two ticks: what other threads sent, and what the scene has scheduled.
+//! Parameter changes between two ticks, sent by other threads or scheduled by the scene.
 //!
-//! A change is applied at a tick boundary, before the device is read, so that every model of the tick sees it.
-//! Changes that were sent together are applied together. For each one a report goes out, ahead of the record of
-//! its tick; nothing is ever applied that could not be reported, so a recording holds every change.
+//! A change is applied at a tick boundary, before the device is read, so that every model of the tick uses it. Changes sent
+//! together are applied together. Each one is reported before the record of its tick; a change that could not be reported is not
+//! applied, so a recording holds every change.
 //!
-//! A number may be sent with a rate: it then moves to its new value over many ticks, because a hand feels a jump. Each step is
-//! a change with a report of its own, so a replay needs no rate.
+//! A number may be sent with a rate: it then moves to its new value over many ticks, because a hand feels a jump. Each step is a
+//! change with its own report, so a replay needs no rate.
 
 mod gradual;
 
@@ -18,43 +18,43 @@ use flotor_hal::abi::CallStatus;
 use gradual::Movements;
 use rtrb::{Consumer, Producer};
 
-/// Changes other threads may have waiting at a time.
+/// Capacity for pending changes from other threads.
 const WAITING_CHANGES: usize = 256;
 
-/// Stands for the weight of a model where a parameter is named.
+/// Parameter number that stands for the weight of a model.
 pub const WEIGHT: u32 = u32::MAX;
-/// Stands for the plugin itself where a parameter is named.
+/// Parameter number that stands for the plugin itself.
 pub const PLUGIN: u32 = u32::MAX - 1;
 
-/// A new value for a parameter. The numbers come from a schema: see `session::Controls`.
+/// New value of a parameter. The numbers come from a schema: see `session::Controls`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterChange {
     /// Number of the plugin in the run: the devices, then the models, both in the scene's order.
     pub plugin: u16,
-    /// How often the plugin was replaced when the change was made: a change is for what it was checked against.
+    /// Generation of the plugin that the change was checked against.
     pub generation: u16,
     /// Index into the plugin's schema, [`WEIGHT`], or in a report [`PLUGIN`].
     pub parameter: u32,
-    /// The value; for a choice, its index.
+    /// New value; for a choice, its index.
     pub value: f64,
-    /// How fast it gets there.
+    /// Pace of the change.
     pub pace: Pace,
 }
 
-/// What became of a change.
+/// Outcome of a change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChangeReport {
-    /// The tick it was applied before.
+    /// Tick before which the change was applied.
     pub tick: u64,
-    /// The time of that tick, ns.
+    /// Time of the tick, ns.
     pub time_ns: u64,
-    /// The change.
+    /// Reported change.
     pub change: ParameterChange,
-    /// What the plugin made of it.
+    /// Result of the plugin's call.
     pub outcome: ChangeOutcome,
 }
 
-/// What a call says about a change.
+/// Converts the status of a call to the outcome of a change.
 #[inline]
 fn outcome(status: CallStatus) -> ChangeOutcome {
     match status {
@@ -64,25 +64,25 @@ fn outcome(status: CallStatus) -> ChangeOutcome {
     }
 }
 
-/// A change at a time that was known beforehand.
+/// Change scheduled for a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduledChange {
-    /// Applied before the first tick at this time or later, ns.
+    /// Time of the change, ns; applied before the first tick at this time or later.
     pub time_ns: u64,
-    /// The change.
+    /// Change to apply.
     pub change: ParameterChange,
 }
 
-/// Where changes are sent in.
+/// Sender of changes to the loop.
 pub type ChangeSender = Producer<ParameterChange>;
-/// Where reports come out.
+/// Receiver of the loop's reports.
 pub type ReportReceiver = Consumer<ChangeReport>;
 
-/// The loop's end of it.
+/// Loop side of parameter changes.
 pub struct ParameterQueue {
-    /// In order of time.
+    /// Scheduled changes in order of time.
     schedule: Box<[ScheduledChange]>,
-    /// The next of the schedule.
+    /// Index of the next scheduled change.
     next: usize,
     sent: Consumer<ParameterChange>,
     movements: Movements,
@@ -90,28 +90,28 @@ pub struct ParameterQueue {
 }
 
 impl ParameterQueue {
-    /// A queue with a schedule; where changes are sent in, and where reports come out. Not real-time.
+    /// Creates a queue with a schedule; returns it with the sender of changes and the receiver of reports. Not real-time.
     ///
-    /// `replacements` is the number of reports beside those of the schedule that must find room.
+    /// `replacements` is the number of reports to reserve beside those of the schedule.
     pub fn new(
         mut schedule: Vec<ScheduledChange>,
         replacements: usize,
     ) -> (Self, ChangeSender, ReportReceiver) {
         schedule.sort_by_key(|scheduled| scheduled.time_ns); // stable: equal times keep the scene's order
         let (sender, sent) = queue(WAITING_CHANGES);
-        // Room for the whole schedule and for twice what may wait, so that what is scheduled is never delayed.
+        // Room for the whole schedule and twice the pending changes, so that a scheduled change is never delayed.
         let (reports, receiver) = queue(schedule.len() + replacements + 2 * WAITING_CHANGES);
         let movements = Movements::with_room(schedule.len() + WAITING_CHANGES);
         (Self { schedule: schedule.into(), next: 0, sent, movements, reports }, sender, receiver)
     }
 
-    /// How many changes wait at this moment. Real-time: bounded, no allocation.
+    /// Returns the number of pending changes. Real-time: bounded, no allocation.
     #[inline]
     pub fn waiting(&mut self) -> usize {
         self.sent.slots()
     }
 
-    /// Whether anything is to be applied at this tick. Real-time: bounded, no allocation.
+    /// Returns true if a change is due at this tick. Real-time: bounded, no allocation.
     pub fn is_due(&self, tick: &Tick) -> bool {
         let is_scheduled = self.schedule.get(self.next).is_some_and(|due| due.time_ns <= tick.time_ns);
         is_scheduled || self.movements.moving() > 0 || !self.sent.is_empty()
@@ -130,10 +130,10 @@ impl ParameterQueue {
         });
     }
 
-    /// Applies what is due at this tick, oldest first, and at most `waiting` of those that were sent, and moves numbers on
-    /// that have a rate; reports it; true if there was anything.
+    /// Applies the scheduled changes that are due, oldest first, and at most `waiting` of the sent ones, and advances gradual
+    /// changes. Reports each of them; returns true if there was any.
     ///
-    /// Real-time: bounded by the schedule, `waiting`, the numbers that move, and `apply`; no allocation.
+    /// Real-time: bounded by the schedule, `waiting`, the gradual changes, and `apply`; no allocation.
     #[inline]
     pub fn apply_due(
         &mut self,
@@ -146,7 +146,7 @@ impl ParameterQueue {
         let mut take = |reports: &mut Producer<ChangeReport>, change: ParameterChange| {
             any = true;
             let outcome = outcome(apply(&change));
-            // It fits: the queue has room for the schedule, and the rest is only looked at when all of it does.
+            // There is room: for the whole schedule always, and for sent changes by the check below.
             let _ = reports.push(ChangeReport { tick: tick.index, time_ns: tick.time_ns, change, outcome });
             outcome
         };
@@ -155,7 +155,7 @@ impl ParameterQueue {
             movements.note(&due.change, outcome);
             *next += 1;
         }
-        // The queue of reports must have room for what was sent; else that waits, and so do the numbers that move.
+        // Sent and gradual changes wait until the queue of reports has room for all of them.
         let left = schedule.len() - *next;
         if waiting > 0 && reports.slots() >= left + sent.buffer().capacity() {
             for change in (0..waiting).map_while(|_| sent.pop().ok()) {

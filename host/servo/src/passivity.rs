@@ -1,29 +1,29 @@
-//! The envelope's stage for energy: the energy balance of a device's port, and the passivity controller that a scene may add.
+//! Energy stage of the envelope: the energy balance of a device's port, and the optional passivity controller.
 //!
-//! The energy at a port, and the controller that ports and couplings share: [`flotor_coupling::port_energy`].
+//! Port energy and the controller that ports and couplings share: [`flotor_coupling::port_energy`].
 
 use flotor_core::coupling::PassivityMode;
 use flotor_coupling::port_energy::{Controller, Displacement};
 use flotor_hal::{DVec3, DeviceState, Twist, Wrench};
 
-/// Acceleration of a handle from rest that the reserve is for, m/s²: 40 N on 0.58 kg are 69 m/s², and a hand in between takes most of it.
+/// Acceleration of a handle from rest that the reserve covers, m/s²: 40 N on 0.58 kg are 69 m/s², of which a hand takes most.
 const RESERVE_ACCELERATION_M_PER_S2: f64 = 50.0;
-/// Stiffness that the reserve is for, N/m.
+/// Stiffness that the reserve covers, N/m.
 const RESERVE_STIFFNESS_N_PER_M: f64 = 100.0;
 
-/// Returns the energy that the port may give beyond what it received, J: that of a spring of 100 N/m over the way of a handle with 50
-/// m/s² in a period, `K a² T⁴ / 8`. With none at all, a port that is empty could never exert a force. Not real-time.
+/// Returns the energy that the port may give beyond the energy received, J: that of a spring of 100 N/m over the distance of a
+/// handle with 50 m/s² in a period, `K a² T⁴ / 8`. Without a reserve, an empty port could never exert a force. Not real-time.
 fn reserve_j(period_s: f64) -> f64 {
     let way_m = 0.5 * RESERVE_ACCELERATION_M_PER_S2 * period_s * period_s;
     0.5 * RESERVE_STIFFNESS_N_PER_M * way_m * way_m
 }
 
-/// Observes, and on request limits, the energy at one port.
+/// Observer, and on request limiter, of the energy at one port.
 pub(super) struct Passivity {
     mode: PassivityMode,
     controller: Controller,
     reserve_j: f64,
-    /// 1 for each axis of force and torque that is driven, 0 for the others.
+    /// 1 for each driven axis of force and torque, 0 for the others.
     driven: [DVec3; 2],
     energy_j: f64,
     /// Change of the last wrench by the controller.
@@ -31,15 +31,15 @@ pub(super) struct Passivity {
 }
 
 impl Passivity {
-    /// For a port at which at most this force and torque may be sent. Not real-time.
+    /// Creates the stage for a port with at most this force and torque. Not real-time.
     pub(super) fn new(mode: PassivityMode, controller: Controller, most: [DVec3; 2]) -> Self {
         let driven = most.map(|most| DVec3::select(most.cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO));
         let reserve_j = reserve_j(controller.period_s());
         Self { mode, controller, reserve_j, driven, energy_j: 0.0, change: None }
     }
 
-    /// Books the displacement since the last sample, while `held` was applied; the energy that the controller removed from the
-    /// port over it, J.
+    /// Records the displacement since the last sample, while `held` was applied; returns the energy that the controller removed
+    /// from the port, J.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -48,14 +48,14 @@ impl Passivity {
         self.change.take().map_or(0.0, |change| -moved.work_j(&change))
     }
 
-    /// Returns the energy that the hand has put into the port so far less what it has received, J. Real-time: bounded, no allocation.
+    /// Returns the energy that the hand has put into the port less the energy that it received, J. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn energy_j(&self) -> f64 {
         self.energy_j
     }
 
-    /// Returns the wrench changed so that the port gives no more energy than it has, with the reserve; `None` if the wrench may pass.
-    /// Only motion along driven axes counts: along the others a force damps nothing.
+    /// Returns a wrench with which the port gives no more energy than it has, the reserve included; `None` if the wrench may pass.
+    /// Only motion along driven axes counts: along the others no force can damp.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]

@@ -1,16 +1,16 @@
-//! Asks the system for a quiet place for the loop, and says aloud what it refused.
+//! Real-time privileges of threads: priority, core and locked memory, with a report on refusals.
 
 use crate::guest::is_guest;
 use crate::platform::scheduling::{
     self, CORE_ADVICE, Duty, MEMORY_ADVICE, MOST_CORES, NoSuchCore, THREAD_ADVICE, priority_advice,
 };
 
-/// A core of the machine, by the number the system gives it.
+/// Core of the machine, by its number in the system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Core(usize);
 
 impl Core {
-    /// The core of this number; `None` beyond what the system can name. Whether the machine has it shows when it is asked for.
+    /// Returns the core of this number; `None` beyond the system's range. A core that the machine lacks is found when pinning.
     #[must_use]
     pub const fn new(number: usize) -> Option<Self> {
         if number < MOST_CORES { Some(Self(number)) } else { None }
@@ -23,14 +23,14 @@ impl std::fmt::Display for Core {
     }
 }
 
-/// Whether the system granted something.
+/// Outcome of a request to the system.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Privilege {
-    /// Granted.
+    /// Granted by the system.
     Granted,
-    /// Refused: the system's reason.
+    /// Refused, with the system's reason.
     Refused(String),
-    /// Not asked for.
+    /// Not requested.
     NotAsked,
 }
 
@@ -43,25 +43,25 @@ impl Privilege {
     }
 }
 
-/// What the loop runs with.
+/// Real-time privileges of the loop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RealTimeReport {
     /// Real-time scheduling, [`PRIORITY_NAME`](crate::PRIORITY_NAME).
     pub fifo: Privilege,
     /// Memory locked against paging.
     pub memory_lock: Privilege,
-    /// The core that was named for the loop.
+    /// Pinning to the core named for the loop.
     pub core: Privilege,
 }
 
 impl RealTimeReport {
-    /// A loop that asks for nothing: on the virtual clock there is no time to keep.
+    /// Returns a report on a loop without requests, as on the virtual clock.
     #[must_use]
     pub fn not_asked() -> Self {
         Self { fifo: Privilege::NotAsked, memory_lock: Privilege::NotAsked, core: Privilege::NotAsked }
     }
 
-    /// One line per refusal: what, why, and how to allow it.
+    /// Returns one line per refusal: privilege, reason and remedy.
     #[must_use]
     pub fn advice(&self) -> Vec<String> {
         let mut lines = Vec::new();
@@ -80,10 +80,9 @@ impl RealTimeReport {
     }
 }
 
-/// Asks for real-time priority for the calling thread, and for a core if one is named, and locks the process's memory. Not
-/// real-time.
+/// Requests real-time priority for the calling thread, and a core if one is named, and locks the process's memory. Not real-time.
 pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
-    // The memory of another program is its own: locked, its next allocation might fail.
+    // The memory of a guest belongs to another program: locked, its next allocation might fail.
     let memory_lock = match is_guest() {
         true => Privilege::NotAsked,
         false => scheduling::lock_memory().map_or(Privilege::NotAsked, Privilege::of),
@@ -92,30 +91,30 @@ pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
     RealTimeReport { fifo: enter_priority(Duty::Loop), memory_lock, core }
 }
 
-/// Keeps the calling thread on one core; the process's other threads go where they did.
+/// Pins the calling thread to one core; other threads of the process are not affected.
 fn pin(Core(number): Core) -> Result<(), String> {
     scheduling::pin(number).map_err(|NoSuchCore| {
         format!("--core {number}: there is no such core, or this process may not use it")
     })
 }
 
-/// Asks for the priority of a worker for the calling thread. Not real-time; without it the worker is only slower.
+/// Requests the priority of a worker for the calling thread. Not real-time; without it the worker is only slower.
 pub fn enter_worker_priority() {
     let _ = scheduling::lock_memory();
     let _ = enter_priority(Duty::Worker);
 }
 
-/// Asks for the priority of who stops devices in the end, for the calling thread. Not real-time; without it, best effort.
+/// Requests the priority of a guard, which stops devices in the end, for the calling thread. Not real-time; best effort.
 pub fn enter_guard_priority() {
     let _ = enter_priority(Duty::Watchdog);
 }
 
-/// Asks for a priority for the calling thread. Not real-time.
+/// Requests a priority for the calling thread. Not real-time.
 fn enter_priority(duty: Duty) -> Privilege {
     Privilege::of(scheduling::enter_priority(duty))
 }
 
-/// Asks on a thread of its own, so that the caller's priority stays what it is. Not real-time.
+/// Probes the privileges on a thread of its own, so that the caller's priority does not change. Not real-time.
 pub fn probe_real_time() -> RealTimeReport {
     let asked = std::thread::Builder::new().spawn(|| {
         let report = enter_real_time(None);

@@ -1,4 +1,4 @@
-//! The loop: tick after tick until the duration is over, somebody stops it, or a device faults.
+//! The loop: ticks until the duration is over, a stop is requested, or a device faults.
 
 use crate::{
     Cause, EmergencySource, Heartbeat, PaceLost, Place, RunState, Schedule, Servo, StopSwitch, Stuck,
@@ -6,37 +6,37 @@ use crate::{
 use flotor_core::trace::TickRecord;
 use flotor_hal::{Fault, SampleWait};
 
-/// How a run ended.
+/// End of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunEnd {
     /// The duration is over.
     Finished,
-    /// Somebody asked it to stop.
+    /// A stop was requested.
     Stopped,
     /// The device faulted.
     DeviceFault(Fault),
     /// The emergency stop was pressed.
     EmergencyStop(EmergencySource),
-    /// The device sets the pace, and it is a faster one than the scene says: this many samples a second.
+    /// The device sets a faster pace than the scene declares: this many samples per second.
     TooFast(u32),
-    /// The scene asks the device to set the pace, and with its settings it sets none.
+    /// The scene requires the device to set the pace, but the device sets none with its settings.
     NotPaced,
-    /// A tick took so long that the watchdog stopped the device; then it came back.
+    /// A tick took so long that the watchdog stopped the device; the tick returned later.
     Watchdog(Stuck),
-    /// The force of a device swung between its limits, and went on when it was damped.
+    /// The force of a device oscillated between its limits, even after damping.
     Oscillation,
-    /// The watchdog process was gone, without which the scene does not run: it ended in order.
+    /// The required watchdog process exited; the run was stopped in order.
     Unguarded,
 }
 
 impl RunEnd {
-    /// Whether the run ended as it should: its time was over, or somebody stopped it. Real-time: bounded, no allocation.
+    /// Returns true if the run finished, or stopped on request. Real-time: bounded, no allocation.
     #[must_use]
     pub const fn is_in_order(self) -> bool {
         matches!(self, Self::Finished | Self::Stopped)
     }
 
-    /// What it means that a device does not set the pace it should.
+    /// Converts a lost pace to a `RunEnd`.
     fn without_pace(lost: PaceLost) -> Self {
         match lost {
             PaceLost::NotPaced => Self::NotPaced,
@@ -47,11 +47,11 @@ impl RunEnd {
         }
     }
 
-    /// What the last state of a run means for those who asked for it.
+    /// Converts the final run state to a `RunEnd`.
     fn of(run: RunState, heart: &Heartbeat) -> Self {
         match (run, heart.bitten()) {
             (RunState::Faulted(Cause::Device(fault)), _) => Self::DeviceFault(fault),
-            // One that was stopped with the whole process has not bitten.
+            // The watchdog has not fired if the whole process was suspended.
             (RunState::Faulted(Cause::Watchdog), stuck) => Self::Watchdog(stuck.unwrap_or(heart.now())),
             (RunState::Faulted(Cause::Oscillation), _) => Self::Oscillation,
             (RunState::EmergencyStopped(source), _) => Self::EmergencyStop(source),
@@ -60,31 +60,31 @@ impl RunEnd {
     }
 }
 
-/// The loop proper, the same for both clocks.
+/// Loop over a servo and its schedule, the same for both clocks.
 pub struct Loop {
     servo: Servo,
     schedule: Schedule,
     duration_ns: u64,
-    /// From when on force fades out because the duration will be over.
+    /// Time from which the force fades out before the end of the duration, ns.
     release_ns: u64,
     end: Option<RunEnd>,
 }
 
 impl Loop {
-    /// A loop before its first tick. Not real-time.
+    /// Creates a loop before its first tick. Not real-time.
     #[must_use]
     pub fn new(servo: Servo, schedule: Schedule, duration_ns: u64) -> Self {
         Self { servo, schedule, duration_ns, release_ns: u64::MAX, end: None }
     }
 
-    /// The same with an end that a hand can bear: force is gone when the duration is over, and does not drop then. On the
-    /// virtual clock there is no hand.
+    /// Fades the force out at the end of the duration, so that it does not drop abruptly. Unnecessary on the virtual clock, which
+    /// has no hand.
     #[must_use]
     pub fn releasing(self) -> Self {
         Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
     }
 
-    /// Waits for and runs the next tick, or sets `end`; `leave` gets what it leaves behind. Real-time: bounded, no allocation.
+    /// Waits for and runs the next tick, or sets `end`; passes the tick's records to `leave`. Real-time: bounded, no allocation.
     #[inline]
     pub fn advance(&mut self, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
         if self.schedule.next_time_ns() >= self.duration_ns {
@@ -92,7 +92,7 @@ impl Loop {
             return;
         }
         let Self { servo, schedule, release_ns, .. } = self;
-        // The first device sets the pace, if one does.
+        // Only the first device can set the pace.
         let next = schedule.next_index();
         let wait_for_sample = |timeout_ns| {
             servo.heart().enter(next, Place::DeviceWait(0));
@@ -114,24 +114,24 @@ impl Loop {
         servo.tick(&due, stop, leave);
         if servo.run().is_over() {
             let end = RunEnd::of(servo.run(), servo.heart());
-            // Lost samples end a release early; nobody has asked for one then.
+            // Lost samples end a fade-out early: without a stop request the run has finished.
             let is_time_up = end == RunEnd::Stopped && !stop.is_stop_asked();
             self.end = Some(if is_time_up { RunEnd::Finished } else { end });
         }
     }
 
-    /// How the loop ended, once it has.
+    /// Returns the end of the run; `None` while the loop runs.
     #[must_use]
     pub fn end(&self) -> Option<RunEnd> {
         self.end
     }
 
-    /// The tick, its devices and models.
+    /// Returns the servo with its devices and models.
     pub fn servo(&mut self) -> &mut Servo {
         &mut self.servo
     }
 
-    /// Waits for the end of the last tick's period: what is left of the servo, how it ended, and how long it ran, ns. Not real-time.
+    /// Waits for the end of the last tick's period; returns the servo, the end of the run and its duration, ns. Not real-time.
     #[must_use]
     pub fn finish(self) -> (Servo, RunEnd, u64) {
         (self.servo, self.end.unwrap_or(RunEnd::Stopped), self.schedule.finish())

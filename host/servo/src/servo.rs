@@ -1,9 +1,9 @@
-//! The servo: one tick after the other, `changes -> device -> mapping -> models -> envelope -> device`.
+//! The servo: runs the ticks, each `changes -> device -> mapping -> models -> envelope -> device`.
 //!
-//! A scene may have several devices: each has models and an envelope of its own, all share tick and state of the run.
+//! A scene may have several devices: each has its own models and envelope; all share the tick and the run state.
 //!
-//! Nothing in a tick allocates, locks, formats or waits on another thread. What a tick leaves behind is a
-//! [`TickRecord`]; whoever watches gets it through a queue, off the loop.
+//! Nothing in a tick allocates, locks, formats or waits on another thread. A tick produces a [`TickRecord`] for each device;
+//! clients get the records through a queue, off the loop.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -19,25 +19,25 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Tick, Wrench};
 
-/// What the run itself is told, beside device, models and envelope.
+/// Run-wide loop settings.
 #[derive(Clone, Copy, Debug)]
 pub struct RunConfig {
     /// Nominal time between ticks, ns.
     pub period_ns: u64,
     /// Time over which force fades in and out, ns.
     pub ramp_ns: u64,
-    /// Time without a tick after which the run ends: this process was stopped, and the hand is not where it was, ns.
+    /// Longest gap between two ticks, ns. After a longer one the run ends: the process was suspended while the hand moved.
     pub longest_gap_ns: u64,
-    /// Buttons of the device that are emergency stops, one bit each.
+    /// Bit mask of the buttons that are emergency stops.
     pub emergency_buttons: u32,
 }
 
-/// The loop's state: devices with their envelopes, and all that asks for a wrench.
+/// State of the loop: devices with their envelopes, models and couplings.
 pub struct Servo {
-    /// First: nothing of a loop that a plugin unwinds goes before its devices are stopped.
+    /// Dropped first: if a plugin unwinds the loop, the devices stop before anything else is dropped.
     _unwound: Option<Unwound>,
     stations: Box<[Station]>,
-    /// Of the devices, in the same order.
+    /// Ports of the devices, in the same order.
     ports: Box<[Port]>,
     forces: Forces,
     observers: ObserverDemand,
@@ -48,12 +48,12 @@ pub struct Servo {
     run: RunState,
     timing: Timing,
     stage_timer: StageTimer,
-    /// Last: a process may die of what closes devices and destroys models.
+    /// Dropped last: plugin code that closes devices or destroys models may end the process.
     _last_stop: Option<LastStop>,
 }
 
 impl Servo {
-    /// Not real-time.
+    /// Creates a servo without a last stop. Not real-time.
     pub fn new(
         stations: Vec<Station>,
         forces: Forces,
@@ -80,19 +80,18 @@ impl Servo {
         }
     }
 
-    /// This thread loops from now on, not the one that energised the devices. Not real-time.
+    /// Registers the calling thread as the loop thread, in place of the one that energised the devices. Not real-time.
     pub fn follow_here(&self) {
         self._last_stop.iter().for_each(LastStop::follow_here);
     }
 
-    /// The same, stopped if the process dies. Not real-time.
+    /// Attaches the last stop, which stops the devices if the process dies. Not real-time.
     pub(crate) fn guarded_by(mut self, last_stop: Option<(Unwound, LastStop)>) -> Self {
         (self._unwound, self._last_stop) = last_stop.unzip();
         self
     }
 
-    /// One tick; `leave` gets what it leaves behind, a record for each device. Real-time: bounded by devices and models,
-    /// no allocation.
+    /// Runs one tick and passes a record for each device to `leave`. Real-time: bounded by devices and models, no allocation.
     #[inline]
     #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
     pub fn tick(&mut self, due: &Due, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
@@ -100,7 +99,7 @@ impl Servo {
         self.leave_records(due, events, compute_ns, leave);
     }
 
-    /// A record of the tick for each device.
+    /// Passes a record of the tick for each device to `leave`.
     fn leave_records(
         &self,
         due: &Due,
@@ -131,7 +130,7 @@ impl Servo {
         }
     }
 
-    /// All of a tick but its records; what happened in the run, and how long it took, ns.
+    /// Runs the tick without its records; returns the events of the run and the compute time, ns.
     fn advance(&mut self, due: &Due, stop: &StopSwitch) -> (Events, u64) {
         let Due { tick, lateness_ns, missed, .. } = due;
         let started = self.stage_timer.now();
@@ -167,25 +166,25 @@ impl Servo {
         (events, compute_ns)
     }
 
-    /// Lets the force fade out from this tick on: the run will be over when it has. Real-time: bounded, no allocation.
+    /// Fades the force out from this tick on and then ends the run. Real-time: bounded, no allocation.
     pub fn release(&mut self, tick: &Tick) {
-        // Where there is no force the run just ends.
+        // While holding there is no force: the run ends without a fade.
         if self.run != RunState::Holding {
             self.change_state(RunEvent::StopAsked, tick);
         }
     }
 
-    /// Time over which force fades in and out, ns.
+    /// Returns the time over which force fades in and out, ns.
     pub fn ramp_ns(&self) -> u64 {
         self.config.ramp_ns
     }
 
-    /// What was to change before this tick does so now.
+    /// Applies the parameter changes and model replacements that are due.
     #[inline(never)] // seldom called; its instructions are counted: tests/instructions
     fn apply_changes(&mut self, tick: &Tick, events: &mut Events) {
         let Self { stations, forces, parameters, swaps, .. } = self;
         let devices = stations.len();
-        // Looked at before the replacements: whoever sent one of these after a replacement has sent that too.
+        // Counted before the replacements: a change sent after a replacement must not overtake it.
         let waiting = parameters.waiting();
         let mut replaced = false;
         swaps.apply_due(tick, forces, |model, generation| {
@@ -212,8 +211,8 @@ impl Servo {
         }
     }
 
-    /// Newest samples of all devices; what the worst of them means for the run (the hand is not to be trusted to feel
-    /// one device while another is lost), and the buttons of all.
+    /// Reads the newest samples of all devices. Returns the worst event (a hand must not feel one device while another is lost) and
+    /// the buttons of all devices.
     fn read(&mut self, tick: &Tick) -> (RunEvent, u32) {
         let (mut worst, mut buttons) = (RunEvent::SamplesBack, 0);
         for (device, (station, port)) in (0..).zip(self.stations.iter_mut().zip(&mut self.ports)) {
@@ -228,13 +227,13 @@ impl Servo {
         (worst, buttons)
     }
 
-    /// Sends what is to be sent to all devices.
+    /// Sends the commands to all devices.
     fn write(&mut self, tick: &Tick) {
         let Self { stations, ports, heart, run, config, .. } = self;
         for (device, (station, port)) in (0..).zip(stations.iter_mut().zip(ports)) {
             heart.enter(tick.index, Place::DeviceWrite(device));
             if heart.is_silenced() {
-                port.commanded = Wrench::ZERO; // by the stop
+                port.commanded = Wrench::ZERO; // zeroed by the safe stop
                 continue;
             }
             if let Some(failed) = station.write(tick, port) {
@@ -255,7 +254,7 @@ impl Servo {
         stop: &StopSwitch,
         events: &mut Events,
     ) {
-        // An active run with a sample goes on as it is.
+        // An active run with a valid sample stays active.
         if (self.run, sample) != (RunState::Active, RunEvent::SamplesBack) {
             self.change_state(RunEvent::Time, tick);
             self.change_state(sample, tick);
@@ -273,7 +272,7 @@ impl Servo {
         events.insert(self.run.events());
     }
 
-    /// Moves the run to its state after an event.
+    /// Updates the run state after an event.
     fn change_state(&mut self, event: RunEvent, tick: &Tick) {
         self.run = self.run.after(event, tick.time_ns, self.config.ramp_ns);
     }
@@ -288,7 +287,7 @@ impl Servo {
         }
     }
 
-    /// Ends the loop: what it was made of, and what was measured. No code of a plugin runs. Not real-time.
+    /// Ends the loop and returns its parts and measurements, without running plugin code. Not real-time.
     pub fn dismantle(self) -> Dismantled {
         let device = |station: Station| {
             let reported = station.reported();
@@ -303,17 +302,17 @@ impl Servo {
         }
     }
 
-    /// Where the run stands after the last tick.
+    /// Returns the run state after the last tick.
     pub fn run(&self) -> RunState {
         self.run
     }
 
-    /// What the watchdog listens to.
+    /// Returns the heartbeat that the watchdog reads.
     pub fn heart(&self) -> &Heartbeat {
         &self.heart
     }
 
-    /// The devices, in order, each with what the run knows of it.
+    /// Iterates over the devices in order, each with its report.
     pub fn devices(&mut self) -> impl Iterator<Item = (&mut ActiveDevice, Reported)> {
         self.stations.iter_mut().map(|station| {
             let reported = station.reported();
@@ -321,27 +320,27 @@ impl Servo {
         })
     }
 
-    /// All that asks for a wrench.
+    /// Returns the models and couplings.
     pub fn forces(&mut self) -> &mut Forces {
         &mut self.forces
     }
 }
 
-/// What is left of a servo. Dropping it runs code of its plugins.
+/// Parts of a stopped servo. Dropping them runs plugin code.
 pub struct Dismantled {
-    /// The devices, in order, still energised, each with what the run knows of it.
+    /// Devices in order, still energised, each with its report.
     pub devices: Vec<(ActiveDevice, Reported)>,
-    /// Stops the devices if the process dies of what closes them and frees the models.
+    /// Last stop, for plugin code that ends the process while devices are closed and models are freed.
     pub last_stop: Option<LastStop>,
-    /// All that asked for a wrench.
+    /// Models and couplings.
     pub forces: Forces,
-    /// Models that were on their way in.
+    /// Pending model replacements.
     pub swaps: LoopSwaps,
-    /// What was measured.
+    /// Timing statistics of the ticks.
     pub timing: Timing,
 }
 
-/// Which of two devices' samples decides: the higher.
+/// Ranks sample events: the highest of all devices decides the run state.
 const fn severity(sample: RunEvent) -> u8 {
     match sample {
         RunEvent::Failed(_) => 3,
@@ -351,7 +350,7 @@ const fn severity(sample: RunEvent) -> u8 {
     }
 }
 
-/// Times the stages of every [`STAGE_SAMPLING`]th tick.
+/// Stopwatch for the stages of every [`STAGE_SAMPLING`]th tick.
 struct StageWatch {
     last: Option<Moment>,
 }

@@ -1,14 +1,14 @@
-//! How long things take within a tick, from the processor's own counter of time.
+//! Timer for the stages of a tick, which reads the processor's time counter.
 //!
-//! The system's clock is read by an instruction that waits until all before it is done, and lets nothing after it begin:
-//! it costs a tick twice what the reading itself takes. The counter is read on the way. How fast it counts is measured once,
-//! against the system's clock; where a processor has none that is steady, the system's clock it is.
+//! Reading the system's clock waits for all earlier instructions and delays all later ones, which costs a tick twice the time of
+//! the reading. The counter is read without that. Its rate is measured once against the system's clock; a processor without a
+//! steady counter uses the system's clock.
 //!
-//! `quanta` measures that, too, but trusts its first pair of readings: a process put aside for 4 ms between the two is told
-//! times 2 % wrong as long as it lives. Here each reading of the counter lies between two of the clock, which says how far
-//! it is to be trusted, and the measurement goes on until that is far enough.
+//! `quanta` measures the rate, too, but trusts its first pair of readings: a process suspended for 4 ms between them gets times 2 %
+//! wrong as long as it lives. Here each reading of the counter lies between two of the clock, which bound its error, and the
+//! measurement continues until the bound is small enough.
 //!
-//! Deadlines and lateness are the system's clock's alone (`clock.rs`).
+//! Deadlines and lateness use the system's clock alone (`clock.rs`).
 
 use std::sync::OnceLock;
 
@@ -16,19 +16,19 @@ use quanta::Clock;
 
 use super::clock::monotonic_ns;
 
-/// A place on the counter.
+/// Reading of the counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Moment(u64);
 
-/// Reads the counter.
+/// Time counter with the length of its counts.
 pub(super) struct StageTimer {
     counter: Clock,
     count: CountLength,
 }
 
 impl StageTimer {
-    /// Not real-time: the first one of a process measures how fast the counter is. On an idle machine that takes two or three
-    /// milliseconds, on one that keeps the process from working 0.4 s at most, and its pauses.
+    /// Creates a timer. Not real-time: the first one of a process measures the rate of the counter, in two or three milliseconds on
+    /// an idle machine, and in 0.4 s at most, plus interruptions, on a busy one.
     pub(super) fn new() -> Self {
         static COUNT: OnceLock<CountLength> = OnceLock::new();
         let counter = Clock::new();
@@ -36,20 +36,20 @@ impl StageTimer {
         Self { counter, count }
     }
 
-    /// Real-time: bounded, no allocation.
+    /// Reads the counter. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn now(&self) -> Moment {
         Moment(self.counter.raw())
     }
 
-    /// Time from one moment to another, ns; 0 if the other was before it. Real-time: bounded, no allocation.
+    /// Returns the time from one moment to another, ns; 0 if the second was before the first. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn between_ns(&self, from: Moment, to: Moment) -> u64 {
         self.count.times_ns(to.0.saturating_sub(from.0))
     }
 }
 
-/// The counter, read between two readings of the clock.
+/// Reading of the counter between two readings of the clock.
 #[derive(Clone, Copy)]
 struct Look {
     before_ns: u64,
@@ -58,53 +58,53 @@ struct Look {
 }
 
 impl Look {
-    /// The longest step in which a clock or a counter moves, ns: between two steps it shows what has passed already. Hyper-V's
-    /// clock has 100 ns, a counter of 24 MHz 42 ns.
+    /// Longest step of a clock or a counter, ns: between two steps its time is in the past. Hyper-V's clock has 100 ns, a counter
+    /// of 24 MHz 42 ns.
     const STEP_NS: u64 = 100;
 
     fn at(counter: &Clock) -> Self {
         Self { before_ns: monotonic_ns(), count: counter.raw(), after_ns: monotonic_ns() }
     }
 
-    /// Within so many ns the clock's time at the count is unknown.
+    /// Returns the uncertainty of the clock's time at the count, ns.
     fn uncertainty_ns(self) -> u64 {
         self.after_ns - self.before_ns + Self::STEP_NS
     }
 }
 
-/// How long one count lasts.
+/// Length of one count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct CountLength {
-    /// In 2⁻³² ns: for a counter of 10 GHz still finer than it is measured.
+    /// Length in 2⁻³² ns: finer than the measurement even for a counter of 10 GHz.
     parts: u64,
 }
 
 impl CountLength {
     const PARTS_PER_NS_LOG2: u32 = 32;
-    /// The measurement ends where it can be wrong by so much, relative, against the clock as it runs meanwhile: a hundredth of
-    /// what the histograms distinguish (two digits, `timing.rs`). An idle machine gets there in two milliseconds.
+    /// Relative error at which the measurement ends, against the clock as it runs meanwhile: a hundredth of the histograms'
+    /// resolution (two digits, `timing.rs`). An idle machine gets there in two milliseconds.
     const ENOUGH: f64 = 100e-6;
-    /// Where it ends in any case, with the best there was, ns: as long as `quanta` takes at most.
+    /// Time after which the measurement ends in any case, with its best result, ns: the longest that `quanta` takes.
     const LONGEST_NS: u64 = 200_000_000;
-    /// Of so many looks at its beginning the one with the least uncertainty counts.
+    /// Number of first readings, of which the one with the least uncertainty counts.
     const FIRST_LOOKS: usize = 32;
 
-    /// Not real-time.
+    /// Measures the length of a count. Not real-time.
     fn measured(mut look: impl FnMut() -> Look) -> Self {
         let mut first = look();
         for _ in 1..Self::FIRST_LOOKS {
             let next = look();
             first = if next.uncertainty_ns() < first.uncertainty_ns() { next } else { first };
         }
-        // Of no length, should no count be seen to go up.
+        // Zero length, should the counter never advance.
         let (mut least_uncertainty, mut best) = (f64::INFINITY, Self { parts: 0 });
         loop {
             let last = look();
-            // From the middle of the one look to the middle of the other, twice.
+            // Twice the time from the middle of the one reading to the middle of the other.
             let twice_ns = (last.before_ns - first.before_ns) + (last.after_ns - first.after_ns);
             let uncertainty = (first.uncertainty_ns() + last.uncertainty_ns()) as f64 / twice_ns as f64;
-            // Counters of two cores may differ, and the process may have moved from the one to the other. Only a difference of
-            // more than what has passed shows.
+            // Counters of two cores may differ, and the process may have moved from the one to the other. Only a difference of more
+            // than the elapsed time is visible.
             if uncertainty < least_uncertainty && last.count > first.count {
                 (least_uncertainty, best) = (uncertainty, Self::of(twice_ns, 2 * (last.count - first.count)));
             }
@@ -114,13 +114,13 @@ impl CountLength {
         }
     }
 
-    /// So many counts in so many ns.
+    /// Returns the length of a count from so many counts in so many ns.
     #[allow(clippy::cast_possible_truncation)] // some 2³², or the counter is slower than a wall clock
     fn of(ns: u64, counts: u64) -> Self {
         Self { parts: ((u128::from(ns) << Self::PARTS_PER_NS_LOG2) / u128::from(counts)) as u64 }
     }
 
-    /// Real-time: bounded, no allocation.
+    /// Converts counts to ns. Real-time: bounded, no allocation.
     #[inline]
     #[allow(clippy::cast_possible_truncation)] // 2⁶⁴ ns are 584 years
     fn times_ns(self, counts: u64) -> u64 {

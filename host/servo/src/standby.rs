@@ -1,4 +1,4 @@
-//! Everything a servo is made of, its devices open and not yet energised.
+//! Parts of a servo, with devices open and not yet energised.
 
 use crate::{Envelope, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
 use flotor_core::demand::ObserverDemand;
@@ -6,18 +6,18 @@ use flotor_core::limits::Bound;
 use flotor_hal::abi::loader::{OpenedDevice, Stopper};
 use flotor_hal::{Capabilities, LoopConfig, Refusal};
 
-/// A device that is opened, not energised, and what guards it.
+/// Opened device, not energised, with its envelope.
 pub struct Guarded {
-    /// The device.
+    /// Opened device.
     pub device: OpenedDevice,
-    /// What it has said it can do: what its samples are checked against.
+    /// Declared capabilities, against which samples are checked.
     pub capabilities: Capabilities,
-    /// What nothing gets past on its way there.
+    /// Envelope for all commands to the device.
     pub envelope: Envelope,
 }
 
-/// What becomes a [`Servo`] right before its first tick: an energised device without commands removes its force, some
-/// after a few milliseconds.
+/// Servo in standby, which becomes a [`Servo`] right before its first tick: an energised device without commands removes its force,
+/// sometimes after a few milliseconds.
 pub struct Standby {
     devices: Vec<Guarded>,
     forces: Forces,
@@ -30,7 +30,7 @@ pub struct Standby {
 }
 
 impl Standby {
-    /// Not real-time.
+    /// Combines the parts of a servo. Not real-time.
     pub fn new(
         devices: Vec<Guarded>,
         forces: Forces,
@@ -43,17 +43,17 @@ impl Standby {
         Self { devices, forces, observers, parameters, swaps, config, run, heart }
     }
 
-    /// What the servo's watchdog will listen to.
+    /// Returns the heartbeat that the servo's watchdog will read.
     pub fn heart(&self) -> Heartbeat {
         self.heart.clone()
     }
 
-    /// Returns the place where observers ask for outputs of the models.
+    /// Returns the demand of observers for model outputs.
     pub fn observers(&self) -> ObserverDemand {
         self.observers.clone()
     }
 
-    /// The most that may reach a hand at any device: force (N), torque (N·m), each with the longest there is as its norm.
+    /// Returns the largest force (N) and torque (N·m) that may reach a hand at any device, per axis and as a norm.
     pub fn most(&self) -> [Bound; 2] {
         let most = self.devices.iter().map(|guarded| guarded.envelope.most());
         let larger = |a: Bound, b: Bound| {
@@ -65,24 +65,24 @@ impl Standby {
         })
     }
 
-    /// Puts other envelopes before the devices, in order; a device without another keeps its own. Not real-time.
+    /// Replaces the envelopes of the devices, in order; a device without a new one keeps its own. Not real-time.
     pub fn guard_with(&mut self, envelopes: Vec<Envelope>) {
         for (guarded, envelope) in self.devices.iter_mut().zip(envelopes) {
             guarded.envelope = envelope;
         }
     }
 
-    /// Stops any of the devices, from wherever.
+    /// Returns a stopper for each device, to be used from any thread.
     pub fn stoppers(&self) -> Vec<Stopper> {
         self.devices.iter().map(|guarded| guarded.device.stopper()).collect()
     }
 
-    /// Energises the devices, in order, on the thread that will loop. `names` are those of the devices, then of the models,
-    /// for whom it may concern if the process dies; `enters` hears of the number of each device before. Not real-time; may
-    /// block.
+    /// Energises the devices, in order, on the thread that will run the loop. `names` are those of the devices, then of the models,
+    /// for the message if the process dies; `enters` is called with each device's number before that device is energised. Not
+    /// real-time; may block.
     ///
     /// # Errors
-    /// The number of the device that says no, and why; then none stays energised.
+    /// Number and [`Refusal`] of the device that refused; then none stays energised.
     pub fn activate(self, names: Vec<String>, enters: impl Fn(usize)) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
         let last_stop = LastStop::arm(stoppers.clone(), names, self.heart());
@@ -90,7 +90,7 @@ impl Standby {
         let station = |(number, guarded): (usize, Guarded)| {
             let Guarded { mut device, capabilities, envelope } = guarded;
             enters(number);
-            // The loader refuses what is not what was told when the envelope was made.
+            // The loader rejects capabilities that differ from those the envelope was made for.
             device.capabilities().map_err(|refusal| (number, refusal))?;
             let device = device.activate(&config).map_err(|(_, refusal)| (number, refusal))?;
             Ok(Station::new(device, envelope, &capabilities, config.period_ns))

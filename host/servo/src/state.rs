@@ -1,4 +1,4 @@
-//! The state of a run: whether force may reach the hand, and what it takes to get there and back.
+//! State machine of a run, which decides how much force may reach the hand.
 //!
 //! ```text
 //!            ramp over            samples lost
@@ -19,37 +19,37 @@
 //!  Only an emergency stop leaves Faulted. Stopped and EmergencyStopped are final.
 //! ```
 //!
-//! While nobody knows where the hand is there is no force, and none to fade out: not the models', nor the boundary's.
+//! While the position of the hand is unknown there is no force, and none to fade out: neither the models' nor the boundary's.
 //!
-//! In the last three a run ends, and an emergency stop latches: force comes back only with a new run, which opens and
-//! activates the device anew. A fault may still become an emergency stop, never the other way round.
+//! A run ends in the last three states, and an emergency stop latches: force returns only with a new run, which opens and activates
+//! the device anew. A fault may still become an emergency stop, never the other way round.
 
 use flotor_core::trace::Events;
 use flotor_hal::Fault;
 
-/// Who pressed the emergency stop.
+/// Source of an emergency stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EmergencySource {
     /// A key of the terminal.
     Key,
-    /// The signal `SIGUSR1`, or a second one that asks for an end.
+    /// Signal `SIGUSR1`, or a second termination signal.
     Signal,
     /// The latch of the machine: the emergency stop of another run, or of the network.
     Latch,
-    /// A program that watches the run: the viewer.
+    /// Client that observes the run, such as the viewer.
     Watcher,
-    /// A button of the device that the scene names.
+    /// Button of the device, named in the scene.
     Button,
     /// The device's own emergency stop.
     Device,
 }
 
 impl EmergencySource {
-    /// All of them.
+    /// All sources, in the order of their codes.
     pub(crate) const ALL: [EmergencySource; 6] =
         [Self::Key, Self::Signal, Self::Latch, Self::Watcher, Self::Button, Self::Device];
 
-    /// For people.
+    /// Returns the source as text for users.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -63,82 +63,82 @@ impl EmergencySource {
     }
 }
 
-/// Why a run may give no force any more.
+/// Cause of a fault that ends a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The device said so.
+    /// Fault of the device.
     Device(Fault),
-    /// The loop had not finished a tick for too long, and the watchdog had stopped the device.
+    /// The loop did not finish a tick in time, and the watchdog stopped the device.
     Watchdog,
-    /// The force of a device swung between its limits, and went on when it was damped.
+    /// The force of a device oscillated between its limits, even after damping.
     Oscillation,
 }
 
-/// Where a run stands.
+/// State of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RunState {
-    /// The gate opens: the models' force fades in.
+    /// Start: the models' force fades in.
     Ramping {
-        /// When it began to, ns.
+        /// Start of the fade, ns.
         since_ns: u64,
     },
     /// The models' force reaches the hand.
     Active,
-    /// No usable sample for a while: no force until there is one.
+    /// No usable sample for a while: no force until one arrives.
     Holding,
-    /// Asked to stop: all force fades out.
+    /// Stop requested: all force fades out.
     Releasing {
-        /// When it began to, ns.
+        /// Start of the fade, ns.
         since_ns: u64,
-        /// How far the gate was open then, 0 to 1.
+        /// Opening of the gate at the start of the fade, 0 to 1.
         from: f64,
     },
     /// Ended in order.
     Stopped,
     /// Ended by a fault.
     Faulted(Cause),
-    /// Ended by somebody who pressed the emergency stop.
+    /// Ended by an emergency stop.
     EmergencyStopped(EmergencySource),
 }
 
-/// What can change the state of a run.
+/// Event that may change the state of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RunEvent {
-    /// Time goes on.
+    /// Time has advanced.
     Time,
-    /// There has been no usable sample for longer than a hand may be trusted to stay where it was.
+    /// No usable sample for longer than a hand may be trusted to stay in place.
     SamplesLost,
-    /// There is one again.
+    /// A usable sample has arrived.
     SamplesBack,
-    /// An orderly end is asked for.
+    /// An orderly end is requested.
     StopAsked,
-    /// The run can go no further.
+    /// The run cannot continue.
     Failed(Cause),
-    /// The emergency stop.
+    /// Emergency stop from this source.
     Emergency(EmergencySource),
 }
 
-/// How much of what is asked for may pass, 0 to 1.
+/// Fractions of the requested force that may pass, 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
-    /// For the models.
+    /// Fraction of the models' force.
     pub models: f64,
-    /// For the boundary, which stands at once and while the models fade in.
+    /// Fraction of the boundary's force, which acts at once, while the models fade in.
     pub boundary: f64,
 }
 
 impl Gate {
-    /// Everything.
+    /// Open gate: all force passes.
     pub const OPEN: Gate = Gate { models: 1.0, boundary: 1.0 };
-    /// Nothing.
+    /// Closed gate: no force passes.
     pub const SHUT: Gate = Gate { models: 0.0, boundary: 0.0 };
 }
 
 impl RunState {
-    /// Where a run begins.
+    /// First state of a run.
     pub const START: RunState = RunState::Ramping { since_ns: 0 };
 
-    /// The state after an event at a time. Real-time: bounded, no allocation.
+    /// Returns the state after an event at a time. Real-time: bounded, no allocation.
     #[must_use]
     pub fn after(self, event: RunEvent, now_ns: u64, ramp_ns: u64) -> Self {
         match (self, event) {
@@ -168,7 +168,7 @@ impl RunState {
         }
     }
 
-    /// How far the gate is open. Real-time: bounded, no allocation.
+    /// Returns the opening of the gate. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn gate(self, now_ns: u64, ramp_ns: u64) -> Gate {
@@ -185,7 +185,7 @@ impl RunState {
         }
     }
 
-    /// What a tick in this state leaves in its record. Real-time: bounded, no allocation.
+    /// Returns the events of this state for the record of a tick. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn events(self) -> Events {
@@ -198,7 +198,7 @@ impl RunState {
         }
     }
 
-    /// True where a run ends.
+    /// Returns true if the run has ended.
     #[inline]
     #[must_use]
     pub const fn is_over(self) -> bool {
@@ -210,7 +210,7 @@ fn elapsed(since_ns: u64, now_ns: u64) -> u64 {
     now_ns.saturating_sub(since_ns)
 }
 
-/// From 0 to 1 over `length_ns`, with zero slope at both ends.
+/// Returns a smooth step from 0 to 1 over `length_ns`, with zero slope at both ends.
 fn fade(elapsed_ns: u64, length_ns: u64) -> f64 {
     if elapsed_ns >= length_ns {
         return 1.0;

@@ -1,4 +1,4 @@
-//! One device of a loop, with the check of its samples and the envelope that guards it.
+//! One device of a loop with its sample check and safety envelope.
 
 use super::envelope::{Envelope, EnvelopeEffects};
 use super::forces::Port;
@@ -11,44 +11,44 @@ use flotor_core::trace::Events;
 use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, Demand, Fault, Tick};
 
-/// How much longer than samples a device may fail to take commands: what it was told last is on the hand meanwhile.
+/// Command timeout as a multiple of the sample timeout; the last command stays applied meanwhile.
 const UNTAKEN_TIMES: u32 = 10;
 
-/// A device, and what nothing gets past on its way there or back.
+/// Device with its sample check and safety envelope.
 pub struct Station {
     pub(super) device: ActiveDevice,
     pub(super) envelope: Envelope,
-    /// Outputs of models that reach the hand here.
+    /// Model outputs that reach the hand at this device.
     pub(super) felt: Demand,
     plausibility: PlausibilityCheck,
-    /// Stale ticks that are borne; without end where no hand is sensed that could be elsewhere by now.
+    /// Stale ticks tolerated; unlimited for a device that senses no axis.
     stale_ticks_limit: u32,
     stale_ticks: u32,
     untaken_ticks_limit: u32,
     untaken_ticks: u32,
     /// The first fault.
     fault: Option<Fault>,
-    /// Whether the device itself has said so.
+    /// True if the device itself reported the fault.
     is_own_fault: bool,
 }
 
-/// What a run knows of a device beside what the device says.
+/// Faults, implausible samples and envelope effects of a device in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reported {
-    /// The first fault, of the device or found by the host.
+    /// First fault, reported by the device or found by the host.
     pub fault: Option<Fault>,
-    /// Whether the device said so itself; if not, the numbers below are the reason.
+    /// True if the device reported the fault; if the host found it, the counts below give the reason.
     pub is_own_fault: bool,
-    /// Its samples that cannot be.
+    /// Implausible samples of the device.
     pub implausible: ImplausibleSamples,
-    /// Commands in a row that it had not taken at the end.
+    /// Consecutive commands not taken by the device at the end.
     pub untaken: u32,
     /// Effects of the envelope's passivity controller and slew limit.
     pub effects: EnvelopeEffects,
 }
 
 impl Reported {
-    /// What is wrong with its samples or with how it takes commands, for people; nothing if nothing is.
+    /// Describes a problem with the samples or commands of the device, for users; `None` without a problem.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         match (self.untaken, self.implausible.first_tick()) {
@@ -60,7 +60,7 @@ impl Reported {
 }
 
 impl Station {
-    /// A device in a loop of this period. Not real-time.
+    /// Creates the station of a device in a loop of this period. Not real-time.
     pub fn new(device: ActiveDevice, envelope: Envelope, told: &Capabilities, period_ns: u64) -> Self {
         let stale_ticks = stale_ticks_limit(period_ns);
         let [_, torque_nm] = envelope.most();
@@ -115,7 +115,7 @@ impl Station {
         }
     }
 
-    /// What it means for the run how far the device is believed by now.
+    /// Maps the trust in the device to a run event.
     #[inline]
     fn believed(&mut self, port: &mut Port) -> RunEvent {
         match self.plausibility.trust() {
@@ -125,13 +125,13 @@ impl Station {
         }
     }
 
-    /// What of the port's request may be sent. Real-time: bounded, no allocation.
+    /// Limits the port's request to the wrench that may be sent. Real-time: bounded, no allocation.
     pub(super) fn limit(&mut self, tick: &Tick, gate: Gate, port: &mut Port) {
         let Port { state, requested, commanded, events, .. } = port;
         *commanded = self.envelope.apply(requested, gate, state, tick, events);
     }
 
-    /// Sends it. What it means for the run, if anything. Real-time: bounded by the device, no allocation.
+    /// Sends the command; returns a run event on failure. Real-time: bounded by the device, no allocation.
     pub(super) fn write(&mut self, tick: &Tick, port: &mut Port) -> Option<RunEvent> {
         match self.device.write(tick, &port.commanded) {
             Cycle::Fresh => {
@@ -147,7 +147,7 @@ impl Station {
         }
     }
 
-    /// What is known of the device. Real-time: bounded, no allocation.
+    /// Returns a report on the device. Real-time: bounded, no allocation.
     pub(super) fn reported(&self) -> Reported {
         Reported {
             fault: self.fault,
@@ -158,7 +158,7 @@ impl Station {
         }
     }
 
-    /// The device has not said that it is faulty, but it is.
+    /// Records a fault that the host found and the device has not reported.
     #[inline(never)] // once in a run
     fn found_faulty(&mut self, fault: Fault, port: &mut Port) -> RunEvent {
         self.is_own_fault &= self.fault.is_some();

@@ -1,4 +1,4 @@
-//! How the rest of the process ends a run: in order, or at once.
+//! Stop switch, with which the rest of the process ends a run: in order, or at once.
 
 use super::platform::clock;
 use super::state::EmergencySource;
@@ -6,26 +6,26 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Ends a run from any thread or signal handler. Clones are the same switch.
+/// Switch that ends a run from any thread or signal handler. Clones share their state.
 ///
-/// It only ever closes: what has been asked for cannot be taken back.
+/// A request to stop cannot be taken back.
 #[derive(Clone, Debug, Default)]
 pub struct StopSwitch {
     in_order: Arc<AtomicBool>,
     by_signal: Arc<AtomicBool>,
-    /// First other source of the emergency stop: its place in [`EmergencySource::ALL`], from 1; 0: none.
+    /// First source of an emergency stop apart from the flag: its index in [`EmergencySource::ALL`] plus one; 0: none.
     pressed: Arc<AtomicU32>,
-    /// Time of that source on the monotonic clock, ns; 0: none.
+    /// Time of the first press on the monotonic clock, ns; 0: none.
     pressed_ns: Arc<AtomicU64>,
 }
 
 impl StopSwitch {
-    /// Asks for an orderly end: force fades out, files are closed. Real-time: bounded, no allocation.
+    /// Requests an orderly end: force fades out, files are closed. Real-time: bounded, no allocation.
     pub fn stop(&self) {
         self.in_order.store(true, Ordering::Relaxed);
     }
 
-    /// Presses the emergency stop and wakes the threads that wait for it. The first source stays known. Real-time: one system call,
+    /// Presses the emergency stop and wakes the threads that wait for it. The first source counts. Real-time: one system call,
     /// after the last tick.
     pub fn press(&self, source: EmergencySource) {
         let place = EmergencySource::ALL.iter().position(|other| *other == source);
@@ -38,19 +38,19 @@ impl StopSwitch {
     }
 
     /// Sleeps until [`StopSwitch::press`], or until the timeout. The flag of a signal handler does not end the sleep; the loop
-    /// presses in the tick that sees this flag. Not real-time.
+    /// presses the switch in the tick that reads this flag. Not real-time.
     pub fn sleep_until_pressed(&self, timeout: Duration) {
         clock::sleep_while_zero(&self.pressed, timeout);
     }
 
-    /// True if an orderly end is asked for. Real-time: bounded, no allocation.
+    /// Returns true if an orderly end is requested. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_stop_asked(&self) -> bool {
         self.in_order.load(Ordering::Relaxed)
     }
 
-    /// Who has pressed the emergency stop, if anybody. Real-time: bounded, no allocation.
+    /// Returns the source of the emergency stop; `None` if not pressed. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn emergency(&self) -> Option<EmergencySource> {
@@ -65,13 +65,13 @@ impl StopSwitch {
         Some(self.pressed_ns.load(Ordering::Relaxed)).filter(|pressed_ns| *pressed_ns > 0)
     }
 
-    /// The flag a signal handler sets for an orderly end.
+    /// Returns the flag that a signal handler sets for an orderly end.
     #[must_use]
     pub fn stop_flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.in_order)
     }
 
-    /// The flag a signal handler sets for an emergency stop.
+    /// Returns the flag that a signal handler sets for an emergency stop.
     #[must_use]
     pub fn emergency_flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.by_signal)

@@ -1,9 +1,9 @@
-//! How the loop keeps time: histograms of lateness and compute time, in fixed memory, always on.
+//! Timing statistics of the loop: histograms of lateness and compute time, in fixed memory, always on.
 
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-/// Longest time a histogram distinguishes, ns; longer ones count as this.
+/// Upper limit of a histogram, ns; longer times count as this one.
 const LONGEST_NS: u64 = 100_000_000_000;
 
 /// Two significant digits: a bin is at most 1 % wide, and the whole histogram is some 16 kB.
@@ -12,21 +12,21 @@ const DIGITS: u8 = 2;
 /// Percentiles of one histogram, ns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Percentiles {
-    /// Half of the ticks are below this.
+    /// Median.
     pub p50: u64,
-    /// 99 %.
+    /// 99th percentile.
     pub p99: u64,
-    /// 99.9 %.
+    /// 99.9th percentile.
     pub p999: u64,
-    /// The worst.
+    /// Largest value.
     pub max: u64,
 }
 
-/// A histogram of durations.
+/// Histogram of durations, ns.
 pub struct Durations(Histogram<u32>);
 
 impl Durations {
-    /// Allocates all it will ever need. Not real-time.
+    /// Creates an empty histogram with all its memory. Not real-time.
     #[must_use]
     pub fn new() -> Self {
         // The arguments are constants that satisfy the constructor's conditions (low >= 1, high >= 2 low, digits <= 5).
@@ -39,7 +39,7 @@ impl Durations {
         self.0.saturating_record(duration_ns.min(LONGEST_NS));
     }
 
-    /// Every bin that counted something: its duration, ns, and how often. Not real-time.
+    /// Returns the non-empty bins: duration, ns, and count. Not real-time.
     #[must_use]
     pub fn bins(&self) -> Vec<(u64, u64)> {
         self.0
@@ -48,7 +48,7 @@ impl Durations {
             .collect()
     }
 
-    /// The percentiles so far. Not real-time.
+    /// Returns the percentiles so far. Not real-time.
     #[must_use]
     pub fn percentiles(&self) -> Percentiles {
         Percentiles {
@@ -66,32 +66,32 @@ impl Default for Durations {
     }
 }
 
-/// Where the time of a tick goes.
+/// Stage of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Reading the device.
     Read,
     /// Mapping and stepping the models.
     Models,
-    /// Limiting.
+    /// Limiting the wrench.
     Envelope,
     /// Writing the device.
     Write,
 }
 
-/// Every how many ticks the stages are timed: four looks at the stage_timer cost as much as a stage.
+/// Sampling interval of the stages, ticks: four readings of the stage timer cost as much as a stage.
 pub(super) const STAGE_SAMPLING: u64 = 16;
 
-/// All that is measured of a loop.
+/// Timing statistics of a loop.
 #[derive(Default)]
 pub struct Timing {
-    /// Start of a tick after its deadline.
+    /// Delays of the ticks after their deadlines.
     pub lateness: Durations,
-    /// A whole tick.
+    /// Durations of whole ticks.
     pub compute: Durations,
-    /// Stages, in the order of [`Stage`].
+    /// Durations of the stages, in the order of [`Stage`].
     pub stages: [Durations; 4],
-    /// Ticks run.
+    /// Number of ticks.
     pub ticks: u64,
     /// Ticks that started later than a tenth of the period.
     pub late: u64,
@@ -100,7 +100,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Counts a stage. Real-time: bounded, no allocation.
+    /// Records the duration of a stage. Real-time: bounded, no allocation.
     #[inline]
     pub fn stage(&mut self, stage: Stage, duration_ns: u64) {
         if let Some(durations) = self.stages.get_mut(stage as usize) {

@@ -1,8 +1,7 @@
-//! The watchdog: a thread that stops all devices when the loop no longer ticks, and says where it got stuck.
+//! The watchdog: a thread that stops all devices when the loop no longer ticks, and reports the place where the loop is stuck.
 //!
-//! The loop leaves a heartbeat, one word that says which tick it is in and whose code is running. The watchdog
-//! looks at it a few times per limit. A word that stays the same for longer than the limit means that somebody
-//! does not come back; the devices are then stopped from here, without the loop's help.
+//! The loop writes a heartbeat, one word with the tick and the running code. The watchdog polls the word several times per limit. A word
+//! unchanged for longer than the limit means that a call does not return; the watchdog then stops the devices without the loop's help.
 
 use super::clock::{monotonic_ns, sleep_until};
 use super::last_stop::{SignalGuard, TakenSignals, end_dying, is_dying, take_sent};
@@ -15,31 +14,31 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
 use std::thread::JoinHandle;
 
-/// Whose code the loop is running.
+/// Code that the loop is running.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Between two ticks.
     Waiting,
-    /// The wait for the next sample of a device that sets the pace, by its number.
+    /// Wait for the next sample of a device that sets the pace, by device number.
     DeviceWait(u16),
-    /// The `read` of a device, by its number.
+    /// `read` of a device, by device number.
     DeviceRead(u16),
-    /// A model's `step`, by its place in the scene.
+    /// `step` of a model, by its place in the scene.
     Model(usize),
-    /// The host's own code.
+    /// Code of the host.
     Host,
-    /// The `write` of a device, by its number.
+    /// `write` of a device, by device number.
     DeviceWrite(u16),
 }
 
 impl Place {
-    /// Codes: 0 and 1, the waits for devices, their reads, their writes, the models.
+    /// Codes: 0 and 1, then the waits for devices, their reads, their writes, the models.
     const FIRST_WAIT: u64 = 2;
     const FIRST_READ: u64 = Self::FIRST_WAIT + MOST_DEVICES as u64;
     const FIRST_WRITE: u64 = Self::FIRST_READ + MOST_DEVICES as u64;
     const FIRST_MODEL: u64 = Self::FIRST_WRITE + MOST_DEVICES as u64;
 
-    /// The call that runs there, for people.
+    /// Returns the running call as text for users.
     #[must_use]
     pub const fn call(self) -> &'static str {
         match self {
@@ -52,7 +51,7 @@ impl Place {
         }
     }
 
-    /// Whether the code that runs there is a plugin's.
+    /// Returns true if the code belongs to a plugin.
     pub(crate) const fn is_a_plugins(self) -> bool {
         !matches!(self, Self::Waiting | Self::Host)
     }
@@ -84,7 +83,7 @@ impl Place {
     }
 }
 
-/// What the loop leaves for the watchdog. Clones are the same heart.
+/// Heartbeat of the loop, read by the watchdog. Clones share their state.
 #[derive(Clone, Debug, Default)]
 pub struct Heartbeat {
     shared: Arc<Shared>,
@@ -94,28 +93,28 @@ pub struct Heartbeat {
 struct Shared {
     /// Low 48 bits of the tick above 16 bits of the place.
     beat: AtomicU64,
-    /// The loop is over: no more beats are due.
+    /// True once the loop is over: no more beats are due.
     done: AtomicBool,
-    /// The beat at which the watchdog stopped the device, plus one; 0 if it has not.
+    /// Beat at which the watchdog stopped the device, plus one; 0: not stopped.
     bitten: AtomicU64,
-    /// Signals of the host that were taken away while the loop ran, one bit each.
+    /// Signals of the host that a plugin took while the loop ran, one bit each.
     taken: AtomicU64,
-    /// Another thread stops the devices: the loop commands nothing any more.
+    /// True once another thread stops the devices: the loop sends no more commands.
     silenced: AtomicBool,
 }
 
-/// Bits of a beat that tell the place.
+/// Number of bits of a beat for the place.
 const PLACE_BITS: u32 = 16;
 const PLACE_MASK: u64 = (1 << PLACE_BITS) - 1;
 
 impl Heartbeat {
-    /// Notes whose code runs next. Real-time: bounded, no allocation.
+    /// Records the code that runs next. Real-time: bounded, no allocation.
     #[inline]
     pub fn enter(&self, tick: u64, place: Place) {
         self.shared.beat.store(tick << PLACE_BITS | place.code() & PLACE_MASK, Ordering::Release);
     }
 
-    /// Where the loop was when the watchdog stopped the device, if it has. Real-time: bounded, no allocation.
+    /// Returns the place of the loop when the watchdog stopped the device; `None` if it has not. Real-time: bounded, no allocation.
     #[inline]
     pub fn bitten(&self) -> Option<Stuck> {
         match self.shared.bitten.load(Ordering::Acquire) {
@@ -124,16 +123,16 @@ impl Heartbeat {
         }
     }
 
-    /// Tells the watchdog that the loop is over.
+    /// Reports the end of the loop to the watchdog.
     pub fn finish(&self) {
         self.shared.done.store(true, Ordering::Release);
     }
 
-    /// Whoever stops the devices from another thread calls this before: the loop commands nothing from now on, so that no force comes
-    /// after a stop. Waits for a command that is under way, but not for one that hangs. Safe in a signal handler.
+    /// Ends the commands of the loop before another thread stops the devices, so that no force follows a stop. Waits for a command
+    /// in progress, but not for one that hangs. Safe in a signal handler.
     pub(crate) fn silence(&self) {
         self.shared.silenced.store(true, Ordering::Relaxed);
-        // The loop notes that it commands, then looks; here it is the other way round: one of both sees the other.
+        // The loop records its command, then reads the flag; here it is the other way round, so that one of both sees the other.
         fence(Ordering::SeqCst);
         let (beat, until_ns) = (self.beat(), monotonic_ns() + LONGEST_COMMAND_NS);
         let commands = matches!(Stuck::at(beat).place, Place::DeviceWrite(_));
@@ -142,20 +141,20 @@ impl Heartbeat {
         }
     }
 
-    /// Whether the loop, which has just noted that it commands, may not do so. Real-time: bounded, no allocation.
+    /// Returns true if the loop, which has just recorded a command, may not send it. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn is_silenced(&self) -> bool {
         fence(Ordering::SeqCst);
         self.shared.silenced.load(Ordering::Relaxed)
     }
 
-    /// Where the loop is. Real-time: bounded, no allocation.
+    /// Returns the current place of the loop. Real-time: bounded, no allocation.
     #[must_use]
     pub fn now(&self) -> Stuck {
         Stuck::at(self.beat())
     }
 
-    /// Signals that a plugin took away from the host while the loop ran, and that the watchdog has taken back.
+    /// Returns the signals of the host that a plugin took while the loop ran, and that the watchdog has restored.
     #[must_use]
     pub fn signals_taken(&self) -> TakenSignals {
         TakenSignals::from_bits(self.shared.taken.load(Ordering::Relaxed))
@@ -174,12 +173,12 @@ impl Heartbeat {
     }
 }
 
-/// Where a loop got stuck.
+/// Place where a loop got stuck.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stuck {
-    /// In which tick.
+    /// Index of the tick.
     pub tick: u64,
-    /// In whose code.
+    /// Running code.
     pub place: Place,
 }
 
@@ -189,26 +188,26 @@ impl Stuck {
     }
 }
 
-/// How often the watchdog looks within its limit.
+/// Polls of the watchdog per limit.
 const LOOKS: u64 = 8;
-/// Longest time between two looks, ns: an emergency stop is passed on within it even if the loop is stuck.
+/// Longest poll interval, ns: the delay of an emergency stop while the loop is stuck.
 const LONGEST_LOOK_NS: u64 = 1_000_000;
-/// Longest time a command to a device that does not hang takes, and the time between two looks at it, ns.
+/// Longest duration of a command to a device that does not hang, and the interval between two polls of it, ns.
 const LONGEST_COMMAND_NS: u64 = 1_000_000;
 const COMMAND_LOOK_NS: u64 = 20_000;
-/// Looks for which a process may be dying: half a second.
+/// Polls for which a process may be dying: half a second.
 const DYING_LOOKS: u32 = 500;
-/// Signs of life for the watchdog process within the limit: its patience ends when one is late by the limit.
+/// Heartbeats for the watchdog process per limit; its timeout expires when one is late by the limit.
 const SIGNS_OF_LIFE: u64 = 4;
-/// Looks between two at whether the signals are still the host's: a tenth of a second.
+/// Polls between two checks of the host's signals: a tenth of a second.
 const SIGNAL_LOOKS: u64 = 100;
 
-/// Starts the watchdog's thread: the `stoppers` of all devices are used when `heart` has not changed for `limit_ns`, or when the
-/// emergency stop is pressed. As long as the thread runs it gives the watchdog process, if there is one, `signs` of life. Not
+/// Starts the watchdog's thread, which uses the `stoppers` of all devices when `heart` has not changed for `limit_ns`, or when the
+/// emergency stop is pressed. While running, the thread sends heartbeats (`signs`) to the watchdog process, if there is one. Not
 /// real-time; ends with [`Heartbeat::finish`].
 ///
 /// # Errors
-/// What the system says if there can be no further thread.
+/// If the system cannot start a thread.
 pub fn start(
     heart: Heartbeat,
     stoppers: Vec<Stopper>,
@@ -218,7 +217,7 @@ pub fn start(
 ) -> std::io::Result<JoinHandle<()>> {
     let thread = std::thread::Builder::new().name("flotor-watchdog".to_owned());
     thread.spawn(move || {
-        // Above the loop, which may be what hogs the core. Without the right to it, best effort.
+        // Above the loop, which may be hogging the core. Best effort without the permission.
         enter_guard_priority();
         take_sent();
         let look_ns = (limit_ns / LOOKS).min(LONGEST_LOOK_NS);

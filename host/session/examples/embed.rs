@@ -1,4 +1,4 @@
-//! Flotor in a program of one's own: a scene in virtual time, every tick looked at, the spring made softer on the way.
+//! Flotor in a program: a scene in virtual time, every tick observed, the spring made softer during the run.
 //!
 //! `cargo run -p flotor-session --example embed`
 
@@ -24,7 +24,7 @@ at_s = 1.0
 weight = "spring=0.5"
 "#;
 
-/// Remembers the largest force on the hand, N.
+/// Observer of the largest force on the hand, N.
 struct Peak(f64);
 
 impl Observer for Peak {

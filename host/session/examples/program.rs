@@ -13,7 +13,7 @@ use std::path::Path;
 const SCENE: &str =
     "title = \"A wall drawn by a program\"\nduration_s = 2\n[device]\nplugin = \"simulated\"\n";
 
-/// Looks at nothing.
+/// Observer that ignores all records.
 struct Nobody;
 
 impl Observer for Nobody {
@@ -22,7 +22,7 @@ impl Observer for Nobody {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut scene = Scene::parse(Path::new("embedded scene"), SCENE)?;
-    // Each device gets a model whose wrench is what the port is told.
+    // Each device gets a model with the wrench that the port commands.
     let connected = program::connect(&mut scene);
     let registry = Registry::search(&[]).with_linked(&flotor_simulated::FLOTOR_ENTRY)?;
     let mut session = Session::prepare(&scene, &registry, &RunOptions { clock: Clock::Virtual, seed: 1 })?;

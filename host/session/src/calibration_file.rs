@@ -1,4 +1,4 @@
-//! The calibration file: TOML that people can read, checked when it is read.
+//! Calibration file: readable TOML, checked when loaded.
 //!
 //! ```toml
 //! format = 1
@@ -25,31 +25,31 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use toml::de::DeTable;
 
-/// The format this program writes and reads.
+/// Version of the format that this program writes and reads.
 pub const FORMAT: u32 = 1;
 
-/// A calibration as it is kept.
+/// Content of a calibration file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationFile {
     /// Version of the format.
     pub format: u32,
-    /// What was calibrated.
+    /// Calibrated device.
     pub device: CalibratedDevice,
-    /// The curve.
+    /// Curve of the vertical force.
     pub vertical: VerticalCurve,
-    /// How good it is.
+    /// Quality of the fit.
     #[serde(default)]
     pub quality: Quality,
-    /// Where it comes from.
+    /// Origin of the calibration.
     pub provenance: Provenance,
 }
 
-/// The piece of hardware a calibration is for.
+/// Device that a calibration is for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CalibratedDevice {
-    /// Id of its plugin.
+    /// Id of the plugin.
     pub plugin: String,
     /// Serial number; empty: fits every device of the plugin.
     #[serde(default)]
@@ -66,7 +66,7 @@ pub struct VerticalCurve {
     pub coefficients_per_mm: Vec<f64>,
 }
 
-/// What the fit and the check afterwards said. Absent where nobody measured.
+/// Quality of the fit and of the check afterwards; absent if not measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quality {
@@ -76,47 +76,47 @@ pub struct Quality {
     pub residual_n: Option<f64>,
     /// Half width of the 95 % band of the curve's shape, percent.
     pub band_95_percent: Option<f64>,
-    /// Unevenness before, percent, peak to peak.
+    /// Unevenness before the correction, percent, peak to peak.
     pub error_before_percent: Option<f64>,
-    /// Unevenness after, percent, peak to peak.
+    /// Unevenness after the correction, percent, peak to peak.
     pub error_after_percent: Option<f64>,
-    /// Weight of what moved in the rig, N.
+    /// Weight of the moving parts of the rig, N.
     pub weight_n: Option<f64>,
 }
 
-/// Where a calibration comes from.
+/// Origin of a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
-    /// Measured here or taken from elsewhere.
+    /// Measured or imported.
     pub source: Source,
-    /// Who wrote the file.
+    /// Program that wrote the file, with its version.
     pub program: String,
-    /// When.
+    /// Date of the calibration.
     pub date: Option<toml::value::Datetime>,
     /// Seed of a simulated rig.
     pub seed: Option<i64>,
-    /// Anything else worth knowing.
+    /// Free text.
     pub note: Option<String>,
 }
 
-/// Whether a calibration was measured.
+/// Source of the numbers of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
-    /// By `flotor calibrate vertical`.
+    /// Measured by `flotor calibrate vertical`.
     Measured,
-    /// Somebody else's numbers.
+    /// Imported from elsewhere.
     Imported,
 }
 
-/// Why a calibration file cannot be used.
+/// Reason why a calibration file cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{location}: {problem}")]
 pub struct CalibrationFileError {
-    /// The file, and the line if it is about one.
+    /// File, with the line of the problem if there is one.
     pub location: Location,
-    /// What is wrong and what would be right.
+    /// Problem and remedy.
     pub problem: String,
 }
 
@@ -129,7 +129,7 @@ impl CalibrationFileError {
 const MM: f64 = 1.0e-3;
 
 impl VerticalCurve {
-    /// The curve of a calibration, without the coefficients that are zero at its end.
+    /// Converts a calibration to a curve, without trailing zero coefficients.
     #[must_use]
     pub fn of(calibration: &VerticalCalibration) -> Self {
         let mut coefficients: Vec<f64> = Vec::new();
@@ -144,10 +144,10 @@ impl VerticalCurve {
         Self { range_mm: calibration.range_m().map(|height| height / MM), coefficients_per_mm: coefficients }
     }
 
-    /// The calibration a curve means.
+    /// Converts the curve to a calibration.
     ///
     /// # Errors
-    /// [`flotor_hal::InvalidCalibration`] if it means none.
+    /// [`flotor_hal::InvalidCalibration`] if the curve is not valid.
     pub fn calibration(&self) -> Result<VerticalCalibration, flotor_hal::InvalidCalibration> {
         let mut scale = 1.0;
         let powers = self.coefficients_per_mm.iter().map(|coefficient| {
@@ -159,7 +159,7 @@ impl VerticalCurve {
     }
 }
 
-/// Line of the value under these keys, from 1; 0 if there is none.
+/// Returns the line of the value under these keys, from 1; 0 without a value.
 fn line_of(text: &str, keys: &[&str]) -> usize {
     let Ok(root) = DeTable::parse(text) else { return 0 };
     let (mut table, mut start) = (Some(root.get_ref()), None);
@@ -183,7 +183,7 @@ impl CalibrationFile {
         Self::parse(&file, &text)
     }
 
-    /// Reads and checks a text; `file` is what complaints call it.
+    /// Parses and checks a text; `file` is its name in error messages.
     ///
     /// # Errors
     /// [`CalibrationFileError`].
@@ -216,17 +216,17 @@ impl CalibrationFile {
         Ok((read, calibration))
     }
 
-    /// The file as text, the same for the same content.
+    /// Returns the file as text, the same for the same content.
     ///
     /// # Errors
-    /// What the writer says; none is known.
+    /// Errors of the serialiser; none is known.
     pub fn to_text(&self) -> Result<String, toml::ser::Error> {
         const HEAD: &str = "# Vertical calibration of a haptic device: delivered over commanded force is\n\
                             # c0 + c1 z + c2 z² ..., z in mm above the centre of its range.\n";
         Ok(format!("{HEAD}{}", toml::to_string(self)?))
     }
 
-    /// Refuses a file for another device.
+    /// Checks that the file is for this device.
     ///
     /// # Errors
     /// [`CalibrationFileError`].
@@ -241,7 +241,7 @@ impl CalibrationFile {
     }
 }
 
-/// Today in universal time, as a date of TOML.
+/// Returns today's date in universal time, as a date of TOML.
 #[must_use]
 pub fn today() -> toml::value::Datetime {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
@@ -249,7 +249,7 @@ pub fn today() -> toml::value::Datetime {
     toml::value::Datetime { date: Some(toml::value::Date { year, month, day }), time: None, offset: None }
 }
 
-/// Year, month and day of a number of days since 1970, by counting whole years and months.
+/// Converts a number of days since 1970 to year, month and day, by counting whole years and months.
 fn civil_date(mut days: u64) -> (u16, u8, u8) {
     let mut year = 1970_u16;
     let leap = |year: u16| (year.is_multiple_of(4) && !year.is_multiple_of(100)) || year.is_multiple_of(400);

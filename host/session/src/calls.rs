@@ -1,8 +1,7 @@
-//! Calls of plugins outside the loop, each with a name and a time limit.
+//! Plugin calls outside the loop, each with a name and a time limit.
 //!
-//! No thread can be ended from outside while a plugin's code runs in it. Such a call therefore has a thread of its own; who
-//! needs the result waits no longer than a limit, and then leaves the thread behind and names the plugin. In the
-//! loop the watchdog does the same. Not real-time.
+//! A thread cannot be ended from outside while plugin code runs in it. Such a call therefore has a thread of its own; the caller waits no
+//! longer than a limit, then abandons the thread and names the plugin. In the loop the watchdog does the same. Not real-time.
 
 pub(crate) use end::{EndCalls, EndReserve};
 
@@ -20,45 +19,44 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Environment variable with the longest time a call may take before a run, in seconds.
+/// Environment variable with the time limit of a call before a run, in seconds.
 pub const LIMIT_VARIABLE: &str = "FLOTOR_CALL_LIMIT_S";
 
-/// Environment variable with the longest processor time of a step without a clock (virtual clock, `validate`, `stress`), in seconds.
+/// Environment variable with the processor time limit of a step without a clock (virtual clock, `validate`, `stress`), in seconds.
 pub const STEP_LIMIT_VARIABLE: &str = "FLOTOR_STEP_LIMIT_S";
 
-/// Time after which somebody who waits is told for whom, or half of a shorter limit.
+/// Delay before a "still waiting" notice, at most half of the limit.
 const TELL_AFTER: Duration = Duration::from_secs(5);
-/// The longest time a call may take before a run, or for a replacement during one, unless the user says so: large models
-/// compute tables.
+/// Default time limit of a call before a run, or for a replacement during one: large models compute tables.
 const DEFAULT_LIMIT: Duration = Duration::from_secs(60);
-/// The longest time a call may take after a run: the device is stopped, and nothing depends on it.
+/// Time limit of a call after a run: the device is stopped, and nothing depends on the call.
 const END_LIMIT: Duration = Duration::from_secs(5);
-/// How often somebody who waits looks at the time.
+/// Poll interval while waiting for a call.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// A call of a plugin outside the loop.
+/// Plugin call outside the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Call {
-    /// Its file is loaded, which runs its initialisers.
+    /// Loading the file, which runs its initialisers.
     Load,
-    /// A model is made.
+    /// Creating a model.
     Create,
-    /// A model gets ready for the loop.
+    /// Preparing a model for the loop.
     Prepare,
-    /// A device is opened, and says what it can do.
+    /// Opening a device and reading its capabilities.
     Open,
-    /// A device is energised.
+    /// Energising a device.
     Activate,
-    /// A device is told to stop at the end of a run.
+    /// Stopping a device at the end of a run.
     SafeStop,
-    /// A device ends its energy balance and is de-energised.
+    /// Ending the energy balance of a device and de-energising it.
     Deactivate,
-    /// It says why a call failed.
+    /// Reading the message about a failed call.
     LastMessage,
-    /// A model is freed.
+    /// Freeing a model.
     Destroy,
-    /// A device is closed.
+    /// Closing a device.
     Close,
 }
 
@@ -79,44 +77,44 @@ impl fmt::Display for Call {
     }
 }
 
-/// A call that did not return in time: its thread is left behind, and the process should end soon.
+/// Call that did not return in time: its thread is abandoned, and the process should end soon.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{who}` did not return from {call} within {} s; the host waits no longer (`{LIMIT_VARIABLE}` sets the limit)",
     limit.as_secs_f64()
 )]
 pub struct Unresponsive {
-    /// Name in the scene, or the file.
+    /// Name in the scene, or path of the file.
     pub who: String,
-    /// The call.
+    /// Call that did not return.
     pub call: Call,
-    /// How long it was waited for.
+    /// Time limit of the call.
     pub limit: Duration,
 }
 
-/// What a user may want to know at once.
+/// Notice for the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Notice {
     /// A call takes long.
     Waiting {
-        /// Name in the scene, or the file.
+        /// Name in the scene, or path of the file.
         who: String,
-        /// The call.
+        /// Call in progress.
         call: Call,
-        /// When the wait ends.
+        /// Time limit of the call.
         limit: Duration,
     },
-    /// It changed what belongs to the process.
+    /// A plugin changed the state of the process.
     Changed {
         /// Name in the scene.
         who: String,
-        /// Parts that it changed and the host has restored.
+        /// Changed parts, restored by the host.
         restored: Vec<&'static str>,
-        /// Environment variables that it changed: other threads may read them at any time, so they stay.
+        /// Changed environment variables, which stay: other threads may read them at any time.
         variables: Vec<String>,
     },
-    /// The watchdog process of a run has ended, and the run goes on.
+    /// The watchdog process has ended, and the run continues.
     Unguarded,
 }
 
@@ -152,19 +150,18 @@ static TELL: OnceLock<fn(&Notice)> = OnceLock::new();
 static STOP: OnceLock<StopSwitch> = OnceLock::new();
 static LEFT_BEHIND: AtomicBool = AtomicBool::new(false);
 
-/// Lets a program tell its user whose code is waited for, once a call has taken 5 s, what plugins change of the process, and that
-/// a watchdog process is gone.
-/// The first one set stays.
+/// Sets the callback for notices: calls that take 5 s or more, changes of the process by plugins, and the end of a watchdog
+/// process. Only the first callback counts.
 pub fn tell_notices(tell: fn(&Notice)) {
     let _ = TELL.set(tell);
 }
 
-/// Lets the user stop a process that waits for a call before a run: nothing is energised then. The first one set stays.
+/// Sets the switch that stops waiting for a call before a run, when nothing is energised. Only the first switch counts.
 pub fn stop_waits_with(stop: &StopSwitch) {
     let _ = STOP.set(stop.clone());
 }
 
-/// Nobody has asked for an end.
+/// Returns true unless a stop was requested.
 pub(crate) fn is_to_begin() -> bool {
     STOP.get().is_none_or(|stop| !stop.is_stop_asked() && stop.emergency().is_none())
 }
@@ -175,7 +172,7 @@ pub(crate) fn tell(notice: &Notice) {
     }
 }
 
-/// Makes something with the code of a plugin; what belongs to the process is then as it was before.
+/// Runs plugin code, `make`, and restores the state of the process afterwards.
 pub(crate) fn keeping_machine<T>(who: &str, make: impl FnOnce() -> T) -> T {
     let (before, variables) = (MachineState::now(), environment());
     let made = make();
@@ -186,7 +183,7 @@ pub(crate) fn keeping_machine<T>(who: &str, make: impl FnOnce() -> T) -> T {
     made
 }
 
-/// The variables of the environment, by name.
+/// Returns the environment variables by name.
 fn environment() -> BTreeMap<OsString, OsString> {
     std::env::vars_os().collect()
 }
@@ -201,40 +198,40 @@ fn changed_variables(
     changed.map(|name| name.display().to_string()).collect()
 }
 
-/// True if a call did not return and its thread still runs: what a process does at its end may wait for it.
+/// Returns true if a call did not return and its thread still runs: exit handlers of the process may wait for that thread.
 #[must_use]
 pub fn is_left_behind() -> bool {
     LEFT_BEHIND.load(Ordering::Relaxed)
 }
 
-/// A thread that runs code of a plugin is left to itself.
+/// Records that a thread with plugin code is abandoned.
 pub(crate) fn leave_behind() {
     LEFT_BEHIND.store(true, Ordering::Relaxed);
 }
 
-/// Returns the longest time a call may take before a run.
+/// Returns the time limit of a call before a run.
 pub(crate) fn limit() -> Duration {
     limit_of(LIMIT_VARIABLE).unwrap_or(DEFAULT_LIMIT)
 }
 
-/// Reads a limit from the environment.
+/// Reads a time limit from the environment.
 pub(crate) fn limit_of(variable: &str) -> Option<Duration> {
     let seconds = std::env::var(variable).ok()?.parse::<f64>().ok().filter(|seconds| *seconds > 0.0)?;
     Duration::try_from_secs_f64(seconds).ok()
 }
 
-/// The longest time a call may take after a run: no longer than before one.
+/// Returns the time limit of a call after a run: at most the one before a run.
 pub(crate) fn end_limit() -> Duration {
     END_LIMIT.min(limit())
 }
 
-/// What a thread of calls is at. Clones are the same.
+/// Progress of a call thread. Clones share their state.
 #[derive(Clone, Default)]
 pub(crate) struct Progress {
     now: Arc<Mutex<Option<Now>>>,
 }
 
-/// A call that runs.
+/// Running call.
 struct Now {
     who: String,
     call: Call,
@@ -247,19 +244,19 @@ impl Progress {
         self.now.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whose code runs from now on.
+    /// Marks the start of a plugin call.
     pub(crate) fn enter(&self, who: &str, call: Call) {
         enter_call(who, call);
         *self.lock() = Some(Now { who: who.to_owned(), call, since: Instant::now(), is_told: false });
     }
 
-    /// The host's own code runs from now on.
+    /// Marks the end of the plugin call.
     pub(crate) fn leave(&self) {
         *self.lock() = None;
         leave_call();
     }
 
-    /// Tells of a call that takes long; an error for one that takes longer than the limit.
+    /// Sends a notice about a call that takes long; returns an error for a call beyond the limit.
     pub(crate) fn look(&self, limit: Duration) -> Result<(), Unresponsive> {
         let mut now = self.lock();
         let Some(Now { who, call, since, is_told }) = &mut *now else { return Ok(()) };
@@ -276,7 +273,7 @@ impl Progress {
     }
 }
 
-/// Calls of plugins on a thread of their own, and their result.
+/// Plugin calls on a helper thread, with a time limit.
 pub(crate) struct Attended<T> {
     result: Receiver<std::thread::Result<T>>,
     progress: Progress,
@@ -284,10 +281,10 @@ pub(crate) struct Attended<T> {
 }
 
 impl<T: Send + 'static> Attended<T> {
-    /// Starts a thread for the calls; `body` notes each in the progress.
+    /// Starts a thread for the calls; `body` records each in the progress.
     ///
     /// # Errors
-    /// The system's, if there can be no thread.
+    /// If the system cannot start a thread.
     pub(crate) fn start(
         limit: Duration,
         body: impl FnOnce(&Progress) -> T + Send + 'static,
@@ -295,11 +292,11 @@ impl<T: Send + 'static> Attended<T> {
         Ok(CallThread::start()?.attend(limit, body))
     }
 
-    /// Returns the result, if it comes within `time`, or the call that does not return.
+    /// Waits up to `time` for the result; returns the result, or the call beyond its limit.
     pub(crate) fn look(&self, time: Duration) -> Option<Result<T, Unresponsive>> {
         match self.result.recv_timeout(time) {
             Ok(Ok(value)) => Some(Ok(value)),
-            // Only the host's own code panics here.
+            // Only host code panics here.
             Ok(Err(panic)) => std::panic::resume_unwind(panic),
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
                 self.progress.look(self.limit).err().map(Err)
@@ -307,10 +304,10 @@ impl<T: Send + 'static> Attended<T> {
         }
     }
 
-    /// Waits for the result, but no longer than the limit for each call, and only while `is_wanted`.
+    /// Waits for the result while `is_wanted`, no longer than the limit for each call.
     ///
     /// # Errors
-    /// Which call did not return; `None` if the result is not wanted any more.
+    /// Call that did not return; `None` if the result is not wanted any more.
     pub(crate) fn wait_while(self, is_wanted: impl Fn() -> bool) -> Result<T, Option<Unresponsive>> {
         while is_wanted() {
             if let Some(result) = self.look(LOOK) {
@@ -326,16 +323,16 @@ impl<T: Send + 'static> Attended<T> {
 
 type Job = Box<dyn FnOnce() + Send>;
 
-/// A thread for calls of plugins. It ends when this is dropped, after the calls that it has begun.
+/// Helper thread for plugin calls. It ends when the handle is dropped, after the calls that have begun.
 pub(super) struct CallThread {
     jobs: SyncSender<Job>,
 }
 
 impl CallThread {
-    /// Starts the thread, with the stack on which it would end the process.
+    /// Starts the thread, with the stack for crash handlers.
     ///
     /// # Errors
-    /// The system's, if there can be no thread.
+    /// If the system cannot start a thread.
     pub(super) fn start() -> std::io::Result<Self> {
         let (jobs, waiting) = sync_channel::<Job>(1);
         let thread = std::thread::Builder::new().name("flotor-calls".to_owned());
@@ -346,7 +343,7 @@ impl CallThread {
         Ok(Self { jobs })
     }
 
-    /// Executes calls on this thread, after those before; `body` notes each in the progress.
+    /// Queues calls on this thread; `body` records each in the progress.
     pub(super) fn attend<T: Send + 'static>(
         &self,
         limit: Duration,
@@ -358,7 +355,7 @@ impl CallThread {
         let job = move || {
             let value = catch_unwind(AssertUnwindSafe(|| body(&inside)));
             inside.leave();
-            // Nobody takes the value where nobody waits any more: it is dropped here.
+            // Without a receiver the value is dropped here.
             let _ = sender.send(value);
         };
         // The thread ends after this sender only.
@@ -367,10 +364,10 @@ impl CallThread {
     }
 }
 
-/// Runs calls of plugins, `body`, on a thread of their own, each for no longer than `limit`, and only while the result is wanted.
+/// Runs plugin calls, `body`, on a helper thread, each for no longer than `limit`, and only while the result is wanted.
 ///
 /// # Errors
-/// Which call did not return, or no thread.
+/// Call that did not return, stop request, or no thread.
 pub(crate) fn attended_while<T: Send + 'static>(
     limit: Duration,
     is_wanted: impl Fn() -> bool,
@@ -380,16 +377,16 @@ pub(crate) fn attended_while<T: Send + 'static>(
     calls.wait_while(is_wanted).map_err(|unresponsive| unresponsive.map_or(CallError::Stopped, Into::into))
 }
 
-/// Why there is no result of a call.
+/// Reason why a call has no result.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
-    /// It did not return.
+    /// The call did not return in time.
     #[error(transparent)]
     Unresponsive(#[from] Unresponsive),
-    /// The system has no thread for it.
+    /// The system has no thread for the call.
     #[error("cannot start a thread for the calls of a plugin; {THREAD_ADVICE}")]
     NoThread,
-    /// The run it was for was stopped or over before.
+    /// The run was stopped or over before the call returned.
     #[error("the run was stopped before `create`, `open` or the like returned")]
     Stopped,
 }

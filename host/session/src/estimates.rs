@@ -1,10 +1,10 @@
-//! Estimates by a model of its own error, before the first step: details that are named `..._error` and known before the first step.
+//! Error estimates of a model: details named `..._error` that are known before the first step.
 
 use flotor_hal::Detail;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 
-/// Name and value of each such detail. Not real-time.
+/// Returns the error estimates of a model, each with its detail. Not real-time.
 pub fn estimates(model: &mut Model) -> Vec<(Detail, f64)> {
     let details = model.details();
     let mut values = vec![f64::NAN; details.len()];

@@ -1,22 +1,22 @@
-//! Stiffness felt at the handle and settling time of a run, from its ticks.
+//! Felt stiffness and settling time of a run, from its tick records.
 
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Pose, rotation_vector};
 
-/// Way over which a change of force counts as stiffness, and within which a handle rests, m: beyond a step of a sensor, and far
-/// within a press of a hand.
+/// Distance over which a change of force counts as stiffness, and within which a handle is at rest, m: larger than a step of a
+/// sensor, and much smaller than a press of a hand.
 const WAY_M: f64 = 1.0e-4;
-/// Turn within which a handle rests, rad.
+/// Rotation within which a handle is at rest, rad.
 const TURN_RAD: f64 = 1.0e-3;
-/// Time for which a handle that moved has to rest, ns: more than a slow swing stays at its turning point.
+/// Time for which a handle that moved has to rest, ns: longer than a slow swing stays at its turning point.
 const REST_NS: u64 = 500_000_000;
 
-/// Sees the ticks of one device, in order. Needs no more memory after an hour than after a tick.
+/// Analysis of the ticks of one device, in order and in constant memory.
 #[derive(Debug, Default)]
 pub(crate) struct Feel {
-    /// Place and force of a tick less than a way ago, while nothing but the models made the force.
+    /// Position and force of an earlier tick within the distance, while the models alone made the force.
     before: Option<(DVec3, DVec3)>,
-    /// Where the handle rests, or will have left soon.
+    /// Pose at the start of the present rest.
     rest: Option<Pose>,
     peak_stiffness_n_per_m: f64,
     settled_ns: u64,
@@ -54,13 +54,13 @@ impl Feel {
         }
     }
 
-    /// Largest rise of the force against the handle over its way, 0.1 mm at a time, N/m; 0 where the force never rose so.
+    /// Returns the largest rise of the force against the handle over its displacement, 0.1 mm at a time, N/m; 0 if the force never rose.
     pub(crate) fn peak_stiffness_n_per_m(&self) -> f64 {
         self.peak_stiffness_n_per_m
     }
 
-    /// Time from which on the handle stayed within 0.1 mm and 1 mrad of one place, s; `None` for a handle that moved within the
-    /// last half second.
+    /// Returns the time from which on the handle stayed within 0.1 mm and 1 mrad of one pose, s; `None` for a handle that moved
+    /// within the last half second.
     pub(crate) fn settled_after_s(&self) -> Option<f64> {
         let never_moved = self.settled_ns == 0;
         let rests = never_moved || self.newest_ns.saturating_sub(self.settled_ns) >= REST_NS;

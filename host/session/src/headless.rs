@@ -1,4 +1,4 @@
-//! A scene in virtual time from start to end, with nobody watching: for sweeps, studies and other programs.
+//! Headless runs: a scene in virtual time from start to end, for sweeps, studies and other programs.
 
 use crate::registry::Registry;
 use crate::run_description::describe;
@@ -12,23 +12,23 @@ use flotor_record::{RecordError, Recorder, TraceDigest};
 use flotor_servo::{Clock, StopSwitch};
 use std::path::Path;
 
-/// Why a scene did not run, or its recording is not whole.
+/// Reason why a scene did not run, or was not recorded completely.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum HeadlessError {
-    /// It did not start.
+    /// The run failed.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// It ran, and could not be recorded.
+    /// The recording failed.
     #[error(transparent)]
     Record(#[from] RecordError),
 }
 
-/// Runs a scene as fast as it goes, with `demand` and what the recording stores asked of its models; equal scenes and seeds give
-/// equal digests. Not real-time.
+/// Runs a scene as fast as possible, with the model outputs of `demand` and of the recording; equal scenes and seeds give equal
+/// digests. Not real-time.
 ///
 /// # Errors
-/// [`HeadlessError`]. A device that faults is no error: the summary says so in `end`.
+/// [`HeadlessError`]. A device fault is no error: the summary reports it in `end`.
 pub fn run(
     scene: &Scene,
     registry: &Registry,
@@ -46,11 +46,11 @@ pub fn run(
     let ran = session.run(&mut watchers, &StopSwitch::default());
     let asked = watchers.demand();
     let Watchers { tally, digest, mut recording, .. } = watchers;
-    // Also that of a run which did not end well.
+    // The recording of a failed run is finished, too.
     let recorded = recording.finish(&[]);
     let mut outcome = ran?;
     recorded?;
-    // Nobody was there to be told before.
+    // The notices were not shown before the run.
     outcome.warnings.splice(0..0, notices);
     let facts = RunFacts {
         title: &scene.title,

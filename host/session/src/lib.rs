@@ -4,15 +4,15 @@
 //! file -> Scene -> Session (plugins loaded, settings checked, devices paired) -> run
 //! ```
 //!
-//! - [`scene`]: what is to be run, read from TOML.
-//! - [`registry`]: where plugins are.
-//! - [`Session`]: from a scene to a run.
-//! - [`program`]: the program itself as a source of force.
+//! - [`scene`]: description of a run, read from TOML.
+//! - [`registry`]: search for plugins.
+//! - [`Session`]: preparation and run of a scene.
+//! - [`program`]: the embedding program as a source of force.
 //! - [`headless`]: a whole run in virtual time, recorded and reported.
-//! - [`summary`]: what a run came to; [`run_description`]: all it takes to repeat it.
-//! - [`telemetry`]: a running session, for other programs to watch and change.
-//! - [`PluginProcess`]: a process for the code of plugins, which ends with its host.
-//! - [`calibration_file`]: the correction of a device's vertical force, as measured and kept.
+//! - [`summary`]: results of a run; [`run_description`]: all data to repeat the run.
+//! - [`telemetry`]: access of other programs to a running session.
+//! - [`PluginProcess`]: process for the code of plugins, which ends with its host.
+//! - [`calibration_file`]: measured correction of a device's vertical force.
 
 pub mod calibration_file;
 mod calls;

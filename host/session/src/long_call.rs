@@ -1,7 +1,7 @@
-//! Limits of a call that may not return: processor time, waiting time, and time after a request to stop.
+//! Limits of a call that may not return: processor time, waiting time, and time after a stop request.
 //!
-//! Time in which others have the processor is no fault of the call. So the limit is one of processor time, and, ten times as long,
-//! one of time in which its thread needs no processor.
+//! Time in which other threads have the processor is not the fault of the call. So one limit is on processor time, and another, ten
+//! times as long, on the time in which the call's thread needs no processor.
 
 use crate::calls::STEP_LIMIT_VARIABLE;
 use crate::platform::ThreadClock;
@@ -9,16 +9,16 @@ use flotor_servo::StopSwitch;
 use std::fmt;
 use std::time::{Duration, Instant};
 
-/// The longest processor time of a call, unless the user says so.
+/// Default limit of the processor time of a call.
 const DEFAULT_LIMIT: Duration = Duration::from_secs(1);
-/// How many times longer than the limit of its processor time a call may wait for something.
+/// Limit of the waiting time of a call, as a multiple of the limit of its processor time.
 const WAITS: u32 = 10;
-/// How long a call may last once the run is to stop.
+/// Grace period of a call once the run is to stop.
 const STOP_PATIENCE: Duration = Duration::from_secs(1);
-/// The longest interval between two looks that counts: a longer one shows that the watching thread had no processor either.
+/// Longest poll interval that counts: a longer one shows that the polling thread had no processor either.
 const LONGEST_LOOK: Duration = Duration::from_millis(100);
 
-/// Returns the longest processor time of a call in a loop without a clock. Not real-time.
+/// Returns the processor time limit of a call in a loop without a clock. Not real-time.
 #[must_use]
 pub fn step_limit() -> Duration {
     crate::calls::limit_of(STEP_LIMIT_VARIABLE).unwrap_or(DEFAULT_LIMIT)
@@ -30,13 +30,13 @@ const REMEDY: &str = "`FLOTOR_STEP_LIMIT_S` allows more";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Exceeded {
-    /// That of the watchdog, which has stopped the devices.
+    /// Limit of the watchdog, which has stopped the devices.
     Watchdog(Duration),
-    /// Of processor time.
+    /// Limit of processor time.
     Processor(Duration),
-    /// Of time in which its thread needed no processor.
+    /// Limit of the time in which the thread needed no processor.
     Waiting(Duration),
-    /// Of time after a request to stop.
+    /// Limit of the time after a stop request.
     Stop(Duration),
 }
 
@@ -57,7 +57,7 @@ impl fmt::Display for Exceeded {
     }
 }
 
-/// A call at a place, as another thread sees it at each look.
+/// Call at a place, polled from another thread.
 pub struct LongCall<P> {
     place: P,
     ran_before: Option<Duration>,
@@ -67,7 +67,7 @@ pub struct LongCall<P> {
 }
 
 impl<P: PartialEq> LongCall<P> {
-    /// A call that has just begun.
+    /// Starts the timing of a call that has just begun.
     pub fn new(place: P) -> Self {
         let (waited, lasted) = (Duration::ZERO, Duration::ZERO);
         Self { place, ran_before: None, waited, lasted, looked: Instant::now() }
@@ -78,7 +78,7 @@ impl<P: PartialEq> LongCall<P> {
         &self.place
     }
 
-    /// Looks at the thread of `clock`, which is at `place` now; returns the limit that the call has exceeded. Call it every few
+    /// Polls the thread of `clock`, which is at `place` now; returns the limit that the call has exceeded. Call it every few
     /// hundredths of a second. Not real-time.
     pub fn look(
         &mut self,

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! In a scene it is a model like any other (`plugin = "program"`): mapped, mixed, limited and recorded. A wrench is valid for a
-//! stated time after the tick that saw it first; then it fades to zero, which is counted. Force fades in when the program
-//! enables it. Neither side waits for the other.
+//! stated time after the first tick that reads it; then it fades to zero, which is counted. Force fades in when the program enables
+//! it. Neither side waits for the other.
 
 use crate::scene::{ModelUse, Scene};
 use flotor_core::mapping::Mapping;
@@ -20,27 +20,27 @@ use flotor_sync::{Observer, Publisher, Words, latest};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What scenes call the model.
+/// Plugin id of the model in scenes.
 pub const ID: &str = "program";
 
-/// The model, for a registry. Without a program that has made a [`Port`] it refuses to be made.
+/// Entry of the model, for a registry. Without a [`Port`] of a program, `create` refuses.
 pub static ENTRY: Entry = model_entry::<ProgramModel>();
 
-/// The model of a scene without one.
+/// Scene text with the model, for devices without one.
 const MODEL: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"program\"\n";
 
-/// Time in which force fades in unless a scene sets `ramp_ms`.
+/// Fade-in time unless a scene sets `ramp_ms`.
 const RAMP_MS: f64 = 200.0;
 
-/// What a program orders.
+/// Command from the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Order {
     wrench: Wrench,
-    /// So many so far: the same wrench again is valid anew.
+    /// Number of commands so far: the same wrench again is valid anew.
     commands: u64,
-    /// So many times enabled and disabled: odd if enabled.
+    /// Number of times enabled and disabled: odd if enabled.
     gate: u64,
-    /// Validity of its own, ns; 0: that of the scene.
+    /// Validity of the wrench, ns; 0: as in the scene.
     valid_ns: u64,
 }
 
@@ -62,14 +62,14 @@ impl Words<9> for Order {
 
 const NOTHING: Order = Order { wrench: Wrench::ZERO, commands: 0, gate: 0, valid_ns: 0 };
 
-/// What is counted of a program.
+/// Counters of a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ProgramCounts {
-    /// Wrenches it commanded.
+    /// Commanded wrenches.
     pub commands: u64,
-    /// Of these, refused because they were not finite.
+    /// Wrenches refused because of a number that is not finite.
     pub refused: u64,
-    /// How often a wrench expired and faded because no other came.
+    /// Wrenches that expired and faded because no other came.
     pub lapses: u64,
     /// Ticks in which an expired wrench faded or was gone.
     pub lapsed_ticks: u64,
@@ -81,7 +81,7 @@ struct Lapses {
     ticks: AtomicU64,
 }
 
-/// The model's end of a port, until a model takes it.
+/// Model side of a port, until a model takes it.
 struct ModelEnd {
     orders: Observer<Order, 9>,
     lapses: Arc<Lapses>,
@@ -100,7 +100,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 #[error("a wrench has a number that is not finite; the previous wrench stays until it expires")]
 pub struct NotFinite;
 
-/// The program's end: where it says what it wants the hand to feel, in the model's frame. Any thread may use it.
+/// Program side: takes the wrench that the hand is to feel, in the model's frame. Any thread may use it.
 #[derive(Debug)]
 pub struct Port {
     number: u32,
@@ -116,7 +116,7 @@ impl Default for Port {
 }
 
 impl Port {
-    /// A port that gives no force until it is enabled; the next model of this [number](Self::number) takes it. Not real-time.
+    /// Creates a port, disabled at first; the next model with this [number](Self::number) takes it. Not real-time.
     #[must_use]
     pub fn new() -> Self {
         let (publisher, orders) = latest(NOTHING);
@@ -125,17 +125,17 @@ impl Port {
         Self { number, orders: Mutex::new((NOTHING, publisher)), refused: AtomicU64::new(0), lapses }
     }
 
-    /// The value of the model's parameter `port` that means this one.
+    /// Returns the value of the model's parameter `port` for this port.
     #[must_use]
     pub fn number(&self) -> u32 {
         self.number
     }
 
-    /// What the hand is to feel from the next tick on, N and N·m on the hand, for as long as it is valid. Bounded; may wait
-    /// for another thread of the program that is in the same call.
+    /// Commands the wrench on the hand from the next tick on, N and N·m, until it expires. Bounded; may wait for another thread of
+    /// the program in the same call.
     ///
     /// # Errors
-    /// [`NotFinite`]; the wrench before stays until it expires.
+    /// [`NotFinite`]; the previous wrench stays until it expires.
     pub fn command(&self, wrench: &Wrench) -> Result<(), NotFinite> {
         if !wrench.is_finite() {
             self.refused.fetch_add(1, Ordering::Relaxed);
@@ -148,12 +148,12 @@ impl Port {
         Ok(())
     }
 
-    /// Lets force through, which fades in from the next tick on. Bounded, as [`Self::command`].
+    /// Enables the force, which fades in from the next tick on. Bounded, as [`Self::command`].
     pub fn enable(&self) {
         self.change(|order| order.gate += 1 - order.gate % 2);
     }
 
-    /// No force from the next tick on, whatever was commanded. Bounded, as [`Self::command`].
+    /// Disables the force from the next tick on, without a fade. Bounded, as [`Self::command`].
     pub fn disable(&self) {
         self.change(|order| {
             order.gate += order.gate % 2;
@@ -161,18 +161,18 @@ impl Port {
         });
     }
 
-    /// Whether force is let through.
+    /// Returns true if the force is enabled.
     #[must_use]
     pub fn is_enabled(&self) -> bool {
         lock(&self.orders).0.gate % 2 == 1
     }
 
-    /// For how long a wrench is valid, ns, instead of the model's `valid_ms`; 0: that.
+    /// Sets the validity of a wrench, ns, in place of the model's `valid_ms`; 0: as in `valid_ms`.
     pub fn keep_valid_for(&self, valid_ns: u64) {
         self.change(|order| order.valid_ns = valid_ns);
     }
 
-    /// What was counted so far.
+    /// Returns the counters so far.
     #[must_use]
     pub fn counts(&self) -> ProgramCounts {
         let refused = self.refused.load(Ordering::Relaxed);
@@ -192,27 +192,27 @@ impl Port {
     }
 }
 
-/// A port in a scene.
+/// Port connected to a device of a scene.
 #[derive(Debug)]
 pub struct Connected {
-    /// The program's end.
+    /// Program side of the port.
     pub port: Port,
-    /// Number of the device it is on.
+    /// Number of the device.
     pub device: u16,
-    /// Between the frame of the device and that of the program.
+    /// Mapping between the frame of the device and that of the program.
     pub mapping: Mapping,
-    /// Time in which force fades in once the program enables it, ns.
+    /// Fade-in time once the program enables the force, ns.
     pub ramp_ns: u64,
 }
 
-/// Gives each device of a scene a port: the first model `program` on it takes it; a device without one gets one that adds to its
-/// other models. In the scene's order. Not real-time.
+/// Connects each device of a scene to a port, in the scene's order: the first model `program` on the device takes the port; a
+/// device without one gets one in addition to its other models. Not real-time.
 #[must_use]
 pub fn connect(scene: &mut Scene) -> Vec<Connected> {
     let connect = |device: u16| {
         let is_ours = |model: &&mut ModelUse| model.plugin.plugin == ID && model.device == device;
         if !scene.models.iter_mut().any(|model| is_ours(&model)) {
-            // A text of our own, which a test reads.
+            // A built-in text, which a test reads.
             let added =
                 Scene::parse(std::path::Path::new("built-in program"), MODEL).map(|scene| scene.models);
             let named = scene.devices.get(usize::from(device)).map_or("", |device| device.name.as_str());
@@ -236,19 +236,19 @@ pub fn connect(scene: &mut Scene) -> Vec<Connected> {
     (0..devices).map(connect).collect()
 }
 
-/// Time in which the force of a model `program` fades in, ns, as its scene sets it. What is no number is refused with the scene.
+/// Returns the fade-in time of a model `program`, ns, as set in the scene. A value that is no number is rejected with the scene.
 fn ramp_ns(model: &ModelUse) -> u64 {
     let set = model.plugin.parameters.iter().rev().find(|parameter| parameter.key == "ramp_ms");
     set.and_then(|parameter| parameter.value.parse().ok()).map_or(nanoseconds(RAMP_MS), nanoseconds)
 }
 
-/// Converts ms of a parameter, at most a minute.
+/// Converts ms of a parameter, at most a minute, to ns.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn nanoseconds(time_ms: f64) -> u64 {
     (time_ms * 1.0e6).round() as u64
 }
 
-/// The force model. Times are those of ticks, so that a run on the virtual clock can be repeated.
+/// Force model with the wrench of a program. Times are those of ticks, so that a run on the virtual clock can be repeated.
 struct ProgramModel {
     end: ModelEnd,
     valid_ns: u64,
@@ -256,9 +256,9 @@ struct ProgramModel {
     ramp_ns: u64,
     order: Order,
     version: u64,
-    /// The tick that saw the newest wrench first, ns.
+    /// Time of the first tick with the newest wrench, ns.
     commanded_ns: u64,
-    /// From when on force fades in, ns, and for how long.
+    /// Start and duration of the fade-in, ns.
     since_ns: u64,
     rise_ns: u64,
     has_lapsed: bool,
@@ -334,7 +334,7 @@ impl ForceModel for ProgramModel {
 
     fn step(&mut self, input: &Input) -> Output {
         let now_ns = input.time_ns;
-        // One that is being written is seen in the next tick.
+        // A command that is being written is read in the next tick.
         if let Some((version, order)) = self.end.orders.read()
             && version != self.version
         {
@@ -371,7 +371,7 @@ impl ForceModel for ProgramModel {
 }
 
 impl ProgramModel {
-    /// What a new order means for the times.
+    /// Updates the times after a new command.
     fn follow(&mut self, order: Order, now_ns: u64) {
         if order.gate != self.order.gate {
             (self.since_ns, self.rise_ns, self.has_lapsed) = (now_ns, self.ramp_ns, false);
@@ -379,7 +379,7 @@ impl ProgramModel {
         }
         if order.commands != self.order.commands {
             if self.has_lapsed {
-                // It comes back as it went.
+                // Fade in over the time of the fade-out.
                 (self.since_ns, self.rise_ns, self.has_lapsed) = (now_ns, self.fade_ns, false);
             }
             self.commanded_ns = now_ns;
@@ -388,7 +388,7 @@ impl ProgramModel {
     }
 }
 
-/// From 0 to 1 over `length_ns`, with zero slope at both ends.
+/// Returns a smooth step from 0 to 1 over `length_ns`, with zero slope at both ends.
 fn smooth(elapsed_ns: u64, length_ns: u64) -> f64 {
     if elapsed_ns >= length_ns {
         return 1.0;

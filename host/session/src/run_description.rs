@@ -1,4 +1,4 @@
-//! What a prepared scene says about itself before it runs: the first message of a recording and of a live view.
+//! Description of a run before its start: the first message of a recording and of a live view.
 
 use crate::scene::{DeviceUse, ModelUse, PluginUse, Scene};
 use crate::{PluginReport, RunOptions};
@@ -7,7 +7,7 @@ use flotor_hal::ParameterKind;
 use flotor_record::{NamedFile, PluginDescription, Role, RunDescription};
 use std::path::PathBuf;
 
-/// Puts together what is known of a run before it begins. Not real-time.
+/// Creates the description of a run before it begins. Not real-time.
 ///
 /// `plugins` are those of the prepared scene: the devices, then the models, both in the scene's order.
 #[must_use]
@@ -61,7 +61,7 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
     }
 }
 
-/// Returns the parameters of a plugin that name files, each with its path; a name of something built in is none.
+/// Returns the parameters of a plugin that name files, each with its path; names of built-in data are left out.
 pub fn named_files(report: &PluginReport) -> impl Iterator<Item = (&'static str, PathBuf)> + '_ {
     let files = report.schema.iter().filter(|parameter| parameter.kind() == ParameterKind::File);
     files.filter_map(|parameter| {
@@ -71,8 +71,8 @@ pub fn named_files(report: &PluginReport) -> impl Iterator<Item = (&'static str,
     })
 }
 
-/// What a description of a run keeps of the files a plugin was told about: it belongs beside the plugin's
-/// parameters. Files that cannot be read any more are left out. Not real-time.
+/// Returns the contents of the files that a plugin's parameters name, as further parameters for the description. Files that cannot
+/// be read any more are left out. Not real-time.
 fn contents_of_files(report: &PluginReport) -> Vec<(String, String)> {
     let content = |(parameter, path): (&'static str, PathBuf)| {
         let file = NamedFile::read(&path).ok()?;

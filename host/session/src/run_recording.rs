@@ -1,4 +1,4 @@
-//! A recording beside a run: where it fails, the run goes on.
+//! Recording of a run, which continues if the recording fails.
 
 use crate::Observer;
 use flotor_core::Change;
@@ -6,7 +6,7 @@ use flotor_core::trace::TickRecord;
 use flotor_hal::Demand;
 use flotor_record::{Note, RecordError, Recorder};
 
-/// Records a run, if it is to be recorded at all. A failing disk ends the recording, not the run. Not real-time.
+/// Recording of a run, if one is requested. A failing disk ends the recording, not the run. Not real-time.
 #[derive(Default)]
 pub struct RunRecording {
     recorder: Option<Recorder>,
@@ -15,20 +15,20 @@ pub struct RunRecording {
 }
 
 impl RunRecording {
-    /// Into this file; without one nothing is recorded.
+    /// Creates the recording of a run; without a recorder nothing is recorded.
     #[must_use]
     pub fn new(recorder: Option<Recorder>) -> Self {
         Self { recorder, failure: None, has_ticks: false }
     }
 
-    /// Whether it has begun and is not finished.
+    /// Returns true while the recording is not finished.
     #[must_use]
     pub fn is_on(&self) -> bool {
         self.recorder.is_some()
     }
 
-    /// Finishes the recording with these notes. Removes the file where the run ended before its first tick: the next
-    /// run can then record under the same name.
+    /// Finishes the recording with these notes. Removes the file if the run ended before its first tick: the next run can then
+    /// record under the same name.
     ///
     /// # Errors
     /// The error that ended the recording, during the run or now.
@@ -57,7 +57,7 @@ impl Observer for RunRecording {
         self.write(|recorder| recorder.change(change));
     }
 
-    /// All that a recording stores, while it is on.
+    /// Returns all outputs that a recording stores, until it fails or ends.
     fn demand(&self) -> Demand {
         if self.is_on() && self.failure.is_none() { Demand::ALL } else { Demand::FORCE }
     }

@@ -1,4 +1,4 @@
-//! What a run says about itself: numbers for machines, a page for people.
+//! Summary of a run: numbers for machines, a page for users.
 
 use crate::feel::Feel;
 use crate::scene::Isolation;
@@ -15,13 +15,13 @@ use flotor_servo::{
 };
 use serde::Serialize;
 
-/// Collects over a run what can only be seen tick by tick.
+/// Observer that collects the tick statistics of a run.
 #[derive(Default)]
 pub struct Tally {
-    /// By number of the device.
+    /// Statistics of each device, by number.
     devices: Vec<DeviceTally>,
     event_ticks: [u64; Events::NAMES.len()],
-    /// Events of the tick that is being told, at any device.
+    /// Events of the present tick, at any device.
     events: Events,
     generated_peak_j: f64,
     port_lowest_j: f64,
@@ -29,7 +29,7 @@ pub struct Tally {
     not_computed: NotComputed,
 }
 
-/// The same of one device.
+/// Tick statistics of one device.
 #[derive(Default)]
 struct DeviceTally {
     peak_force_n: f64,
@@ -87,25 +87,25 @@ impl LoopBalance {
 }
 
 impl Tally {
-    /// Ticks in which each event happened, at any device.
+    /// Returns the number of ticks with each event, at any device.
     fn event_ticks(&self) -> [u64; Events::NAMES.len()] {
         std::array::from_fn(|bit| self.event_ticks[bit] + u64::from(self.events.bits() >> bit & 1))
     }
 
-    /// Time of the last tick, ns.
+    /// Returns the time of the last tick, ns.
     #[must_use]
     pub fn last_ns(&self) -> u64 {
         let last = |device: &DeviceTally| device.last.as_ref().map(|record| record.time_ns);
         self.devices.iter().filter_map(last).max().unwrap_or(0)
     }
 
-    /// The largest energy that the loops of all devices together have generated, J, if it is known to the end.
+    /// Returns the largest energy that the loops of all devices together have generated, J; `None` if not known to the end.
     fn generated_peak_j(&self) -> Option<f64> {
         let is_known = self.devices.iter().all(|device| device.balance.generated_j.is_some());
         is_known.then_some(self.generated_peak_j)
     }
 
-    /// Largest of a number of all devices.
+    /// Returns the largest value over all devices.
     fn largest(&self, number: impl Fn(&DeviceTally) -> f64) -> f64 {
         self.devices.iter().map(number).fold(0.0, f64::max)
     }
@@ -147,7 +147,7 @@ impl NotComputed {
         self.energy |= record.model.energy_j().is_none();
     }
 
-    /// Adds the outputs that only clients asked for: the summary does not depend on clients.
+    /// Adds the outputs that only clients requested: the summary does not depend on clients.
     fn beyond(&self, needed: Demand) -> Self {
         let is_absent = |absent: bool, output| absent || !needed.contains(output);
         Self {
@@ -167,80 +167,78 @@ impl NotComputed {
 pub struct RunSummary {
     /// Title of the scene.
     pub title: String,
-    /// "finished", "stopped", "device_fault", "emergency_stop" or "watchdog".
+    /// End: "finished", "stopped", "device_fault", "emergency_stop", "too_fast", "not_paced", "watchdog", "oscillation" or "unguarded".
     pub end: &'static str,
     /// "real" or "virtual".
     pub clock: &'static str,
     /// Seed of the run.
     pub seed: u64,
-    /// Rate asked for, Hz.
+    /// Requested rate, Hz.
     pub rate_hz: f64,
-    /// Ticks run.
+    /// Number of ticks.
     pub ticks: u64,
     /// Ticks that started later than a tenth of the period.
     pub late_ticks: u64,
-    /// Ticks skipped.
+    /// Number of skipped ticks.
     pub missed_ticks: u64,
     /// Time from the first deadline to the end of the last period, s.
     pub elapsed_s: f64,
-    /// Start of a tick after its deadline.
+    /// Delays of the ticks after their deadlines.
     pub lateness_ns: Percentiles,
-    /// A whole tick.
+    /// Durations of whole ticks.
     pub compute_ns: Percentiles,
-    /// Parts of a tick, sampled.
+    /// Durations of the stages of a tick, sampled.
     pub stages_ns: StageSummary,
     /// Largest force sent, N.
     pub peak_force_n: f64,
     /// Largest torque sent, N·m.
     pub peak_torque_nm: f64,
-    /// Largest rise of the force against a handle over its way, 0.1 mm at a time, while no limit and no ramp changed the force, N/m.
+    /// Largest rise of the force against a handle over its displacement, 0.1 mm at a time, without a limit or ramp in action, N/m.
     pub peak_stiffness_n_per_m: f64,
-    /// Time from which on the handles stayed within 0.1 mm and 1 mrad of one place, s; `None` where one moved within the last
-    /// half second.
+    /// Time from which on the handles stayed within 0.1 mm and 1 mrad of one pose, s; `None` if one moved within the last half second.
     pub settled_after_s: Option<f64>,
-    /// Energy tanks, all devices together.
+    /// Energy balance, all devices together.
     pub energy: EnergySummary,
     /// Effects of the envelope's passivity controller and slew limit, all devices together.
     pub envelope: EnvelopeSummary,
-    /// Each device.
+    /// Summary of each device.
     pub devices: Vec<DeviceSummary>,
-    /// Each coupling between devices.
+    /// Summary of each coupling between devices.
     pub couplings: Vec<CouplingSummary>,
-    /// Ticks in which each event happened, only those that did.
+    /// Number of ticks with each event that happened.
     pub events: std::collections::BTreeMap<&'static str, u64>,
     /// Digest of the trace without measured times: equal digests, equal runs.
     pub trace_digest: String,
-    /// Outputs of the models that were not computed in every tick, because nobody asked for them or a model gives none: "torque",
-    /// "energy".
+    /// Model outputs that were not computed in every tick, because they were not requested or a model has none: "torque", "energy".
     pub not_computed: Vec<&'static str>,
     /// Records lost because an observer was too slow.
     pub dropped_records: u64,
     /// Wall-clock time, s.
     pub wall_s: f64,
-    /// What people should know, a sentence each.
+    /// Warnings for users, a sentence each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
-    /// The plugins and every parameter in force.
+    /// Plugins with the values of all parameters.
     pub plugins: Vec<PluginSummary>,
-    /// The models in force at the end in place of those of the scene, after a hot swap; not those that the seed chose.
+    /// Models in place of those of the scene at the end, after a hot swap; not those that the seed chose.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub replacements: Vec<PluginSummary>,
 }
 
-/// Parts of a tick.
+/// Durations of the stages of a tick.
 #[derive(Clone, Debug, Serialize)]
 pub struct StageSummary {
     /// Reading the device.
     pub read: Percentiles,
     /// Mapping and models.
     pub models: Percentiles,
-    /// Limiting.
+    /// Limiting the wrench.
     pub envelope: Percentiles,
     /// Writing the device.
     pub write: Percentiles,
 }
 
-/// One device of a run.
+/// Summary of one device of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct DeviceSummary {
     /// Name in the scene.
@@ -249,11 +247,11 @@ pub struct DeviceSummary {
     pub peak_force_n: f64,
     /// Largest torque sent, N·m.
     pub peak_torque_nm: f64,
-    /// Lowest energy at its port, J; below zero where another device drives it.
+    /// Lowest energy at the device's port, J; below zero if another device drives this one.
     pub port_lowest_j: f64,
-    /// Energy at its port at the end, J.
+    /// Energy at the device's port at the end, J.
     pub port_end_j: f64,
-    /// Effects of its passivity controller and slew limit.
+    /// Effects of the device's passivity controller and slew limit.
     pub envelope: EnvelopeSummary,
     /// Time from the request of the emergency stop to the device without force, ms; absent without one, and on the virtual clock.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -293,7 +291,7 @@ impl EnvelopeSummary {
         }
     }
 
-    /// Returns the effect of each stage that was active, for people.
+    /// Returns the effect of each active stage as text for users.
     fn rows(&self) -> impl Iterator<Item = (&'static str, String)> {
         let Self { passivity_active_s, passivity_removed_j, slew_active_s, slew_generated_j } = *self;
         let removed_mj = passivity_removed_j * 1.0e3;
@@ -312,111 +310,111 @@ impl EnvelopeSummary {
     }
 }
 
-/// One coupling of a run: the energy tanks of its ends, in the frame they share.
+/// Summary of one coupling: the energy tanks of its ends, in their common frame.
 #[derive(Clone, Debug, Serialize)]
 pub struct CouplingSummary {
     /// Name in the scene.
     pub name: String,
     /// Largest ratio of the energy that one hand gets to the energy that the other puts in, by the scales of the ends.
     pub energy_gain: f64,
-    /// The lowest the tank of each end ever was, J: below zero, more has come out there than this end had and was told of. That of an
-    /// end on another host is what that host says of itself, and proves nothing.
+    /// Lowest energy of the tank of each end, J: below zero, more came out there than this end had and received. The number of a
+    /// remote end is a claim of its host, and proves nothing.
     pub lowest_j: [f64; 2],
-    /// What the hand at each end has put in altogether less what came out, J.
+    /// Total energy that the hand at each end put in less the energy that came out, J.
     pub gone_in_j: [f64; 2],
-    /// What has turned to heat at each end, J.
+    /// Energy dissipated at each end, J.
     pub given_up_j: [f64; 2],
-    /// The way to the second end, if that is on another host; its numbers above are those it told last.
+    /// Link to a remote second end, whose numbers above are as last received.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<LinkSummary>,
 }
 
-/// How messages crossed the way between two hosts.
+/// Link statistics between two hosts.
 #[derive(Clone, Debug, Serialize)]
 pub struct LinkSummary {
     /// Ticks in which a message arrived.
     pub heard_ticks: u64,
-    /// How often there was none for as long as the watchdog waits: the coupling removed its force.
+    /// Number of times without a message for the watchdog's timeout: the coupling removed its force.
     pub silences: u64,
-    /// The longest wait for a message, ms; always less than the watchdog waits.
+    /// Longest wait for a message, ms; always less than the watchdog's timeout.
     pub longest_wait_ms: f64,
-    /// Messages with a pose or a velocity that cannot be: they were not used.
+    /// Messages with an implausible pose or velocity, which were not used.
     pub implausible: u64,
     /// Counts of messages.
     pub carried: LinkCounts,
-    /// The partner's run, as text: when it began, ns since 1970; empty without one.
+    /// Run of the partner, by its start in ns since 1970, as text; empty without a partner.
     pub partner: String,
-    /// The energy that was believed of the partner, J: no more than this and what the hand here had put in came out here.
+    /// Energy accepted from the partner, J: no more than this and the input of the local hand came out here.
     pub believed_j: f64,
-    /// Energy it claimed beyond what can be checked here, J.
+    /// Claimed energy beyond the part that can be checked here, J.
     pub cut_j: f64,
-    /// Way it claimed beyond what a hand can do, m.
+    /// Claimed travel beyond the plausible limit, m.
     pub cut_path_m: f64,
-    /// Turn it claimed beyond what a hand can do, rad.
+    /// Claimed rotation beyond the plausible limit, rad.
     pub cut_turn_rad: f64,
-    /// Ticks in which a claim was not believed, or a place beyond the range of the device here.
+    /// Ticks with a rejected claim, or with a place beyond the range of the local device.
     pub cut_ticks: u64,
-    /// The runs that were let go because of their claims, as text.
+    /// Partner runs rejected for implausible claims, as text.
     pub let_go: Vec<String>,
 }
 
 /// Energy balance of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct EnergySummary {
-    /// What the device's own energy balance fails to explain, over its peak energy; absent without one.
+    /// Unexplained part of the device's own energy balance, relative to its peak energy; absent without a balance.
     pub device_residual_relative: Option<f64>,
     /// Largest mechanical energy of the device, J; absent without a balance.
     pub device_peak_j: Option<f64>,
-    /// Largest energy the sampled loop has put out beyond what the models had stored, J: a hold leaks. Absent where torque or
-    /// energy of the models was not computed in every tick, or was not finite.
+    /// Largest energy that the sampled loop has put out beyond the energy stored in the models, J: a zero-order hold leaks. Absent
+    /// if torque or energy of the models was not computed in every tick, or was not finite.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loop_generated_j: Option<f64>,
-    /// Lowest energy at the ports of the devices together, J: how much more has come out at some time than had ever gone in.
+    /// Lowest energy at the ports of the devices together, J: below zero, more came out at some time than had gone in.
     pub port_lowest_j: f64,
-    /// Energy at the ports at the end, J: what the hands have put in altogether.
+    /// Energy at the ports at the end, J: the total input of the hands.
     pub port_end_j: f64,
 }
 
-/// A plugin of a run.
+/// Summary of a plugin of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct PluginSummary {
     /// Name in the scene.
     pub name: String,
-    /// Id.
+    /// Id of the plugin.
     pub id: String,
     /// "model" or "device".
     pub kind: &'static str,
-    /// Version.
+    /// Version of the plugin.
     pub version: String,
-    /// File it was loaded from.
+    /// File of the plugin.
     pub file: String,
-    /// Of a model: "process" if it runs in a process of its own, "none" if in the loop, as `isolation` of a scene.
+    /// Isolation of a model, as `isolation` of a scene: "process" for a worker process, "none" for the loop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub isolation: Option<&'static str>,
-    /// "ok", or what happened to it.
+    /// "ok", or the problem.
     pub health: String,
-    /// Every parameter with the value in force.
+    /// Every parameter with its value.
     pub parameters: std::collections::BTreeMap<String, String>,
-    /// What a model says of its own error, by the names of its details.
+    /// Error estimates of a model, by the names of its details.
     #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
     pub estimates: std::collections::BTreeMap<String, f64>,
 }
 
-/// What a summary is made of, beyond the outcome.
+/// Inputs of a summary, beyond the outcome.
 pub struct RunFacts<'a> {
     /// Title of the scene.
     pub title: &'a str,
     /// "real" or "virtual".
     pub clock: &'static str,
-    /// Seed.
+    /// Seed of the run.
     pub seed: u64,
-    /// Rate asked for, Hz.
+    /// Requested rate, Hz.
     pub rate_hz: f64,
-    /// Plugins.
+    /// Plugins of the run.
     pub plugins: &'a [PluginReport],
-    /// Outputs of the models that the run's own observer asked for; clients that watched are left out.
+    /// Model outputs that the run's own observer requested, without those of clients.
     pub asked: Demand,
-    /// What holds devices together.
+    /// Couplings between devices.
     pub couplings: &'a [CouplingDescription],
     /// Counts of messages between hosts, by name of the coupling.
     pub carried: &'a [(String, LinkCounts)],
@@ -425,7 +423,7 @@ pub struct RunFacts<'a> {
 }
 
 impl LinkSummary {
-    /// For people.
+    /// Formats the link statistics for users.
     fn to_text(&self) -> String {
         let Self { heard_ticks, silences, longest_wait_ms, implausible, carried, .. } = self;
         let LinkCounts { lost, overtaken, refused, others, .. } = carried;
@@ -465,7 +463,7 @@ impl LinkSummary {
     }
 }
 
-/// Returns why a run ended, for people.
+/// Returns the cause of the end of a run, as text for users.
 #[must_use]
 pub fn end_cause(end: &RunEnd) -> String {
     match end {
@@ -483,7 +481,7 @@ pub fn end_cause(end: &RunEnd) -> String {
 }
 
 impl RunSummary {
-    /// Puts together everything known after a run.
+    /// Creates the summary of a run.
     #[must_use]
     pub fn new(facts: RunFacts<'_>, outcome: &Outcome, tally: &Tally) -> Self {
         let Timing { ticks, late, missed, lateness, compute, stages: [read, models, envelope, write] } =
@@ -561,7 +559,7 @@ impl RunSummary {
         }
     }
 
-    /// The same with what a plugin did that ended the run.
+    /// Sets the health of the plugin that ended the run.
     #[must_use]
     pub fn blaming(mut self, name: &str, what: &str) -> Self {
         let cause = self.plugins.iter_mut().filter(|plugin| plugin.name == name);
@@ -569,7 +567,7 @@ impl RunSummary {
         self
     }
 
-    /// The run in one line, under the title of a picture.
+    /// Returns the run in one line, for the title of a picture.
     #[must_use]
     pub fn one_line(&self) -> String {
         let plugins: Vec<&str> = self.plugins.iter().map(|plugin| plugin.id.as_str()).collect();
@@ -580,7 +578,7 @@ impl RunSummary {
         )
     }
 
-    /// The page for people.
+    /// Formats the summary for users.
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut lines = Vec::new();
@@ -664,7 +662,7 @@ impl RunSummary {
     }
 }
 
-/// What a device's own energy balance fails to explain, over its peak energy.
+/// Returns the unexplained part of a device's own energy balance, relative to its peak energy.
 fn relative_residual(ledger: EnergyLedger) -> f64 {
     if ledger.peak_j > 0.0 { ledger.residual_j() / ledger.peak_j } else { ledger.residual_j() }
 }
@@ -718,7 +716,7 @@ fn coupling_summary(
     }
 }
 
-/// What has happened to a model; "ok" if nothing.
+/// Returns the problem of a model as text; "ok" without one.
 fn health_words(health: &ModelHealth, words: &str) -> String {
     let us = |ns: u64| ns as f64 * 1.0e-3;
     if let Some(tick) = health.panicked_at {
@@ -751,7 +749,7 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
     )
 }
 
-/// The devices of a run come first.
+/// Returns the summary of a plugin; the devices of a run come first.
 fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
     let device = outcome.devices.get(number);
     let float_changes = device.map_or(0, |device| device.float_changes);
@@ -764,12 +762,12 @@ fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> Pl
     summary_of(plugin, problem.or(float_changes).or(model).unwrap_or_else(|| "ok".to_owned()))
 }
 
-/// A plugin that was put in while the run was on.
+/// Returns the summary of a replacement with faults.
 fn misbehaved_summary(Misbehaved { plugin, health, words }: &Misbehaved) -> PluginSummary {
     summary_of(plugin, health_words(health, words))
 }
 
-/// A plugin that a hot swap put there, in force at the end.
+/// Returns the summary of a replacement in place at the end.
 fn replacement(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
     let same = |known: &&Misbehaved| {
         known.plugin.name == plugin.name && known.plugin.metadata.path == plugin.metadata.path

@@ -14,7 +14,7 @@ pub(super) const BRIDGE: SeparateProgram<'static> = SeparateProgram {
 /// Prefix of the names of remote sessions.
 const REMOTE: &str = "zenoh/";
 
-/// How to reach a remote session.
+/// Options for reaching a remote session.
 #[derive(Args)]
 pub(super) struct Way {
     /// With zenoh/NAME: Zenoh configuration with keys, see `flotor bridge keys`
@@ -26,7 +26,7 @@ pub(super) struct Way {
 }
 
 impl Way {
-    /// Arguments of the bridge for a command on a remote session.
+    /// Returns the arguments of the bridge for a command on a remote session.
     pub(super) fn arguments(&self, command: &str, name: &OsStr) -> Vec<OsString> {
         let mut arguments = vec![command.into(), name.to_owned()];
         arguments.extend(self.config.iter().flat_map(|file| ["--config".into(), file.into()]));
@@ -35,7 +35,7 @@ impl Way {
     }
 }
 
-/// Whether a text names a remote session.
+/// Returns true if a text is the name of a remote session.
 pub(super) fn is_remote(text: &OsStr) -> bool {
     text.to_str().is_some_and(|text| text.starts_with(REMOTE))
 }

@@ -1,4 +1,4 @@
-//! `flotor doctor`: the real-time configuration of this machine, or why a device does not start, and how to improve it.
+//! `flotor doctor`: diagnosis of the real-time configuration of this machine or of a device that does not start, with remedies.
 
 mod device;
 
@@ -27,7 +27,7 @@ pub(crate) struct DoctorArguments {
     /// Parameter with which the device is opened (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "device")]
     sets: Vec<KeyValue>,
-    /// Folder that is looked at as the root of the machine's files
+    /// Folder used as the root of the machine's files
     #[arg(long, value_name = "DIR", default_value = "/", hide = true)]
     root: PathBuf,
     #[command(flatten)]
@@ -36,7 +36,7 @@ pub(crate) struct DoctorArguments {
     plugin_path: PluginPathOption,
 }
 
-/// How serious a finding is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Grade {
@@ -45,7 +45,7 @@ pub(crate) enum Grade {
     Bad,
 }
 
-/// One finding.
+/// Finding of the diagnosis.
 #[derive(Debug, Serialize)]
 pub(crate) struct Diagnosis {
     pub(crate) what: &'static str,
@@ -63,7 +63,7 @@ impl Diagnosis {
         Self { what, grade: Grade::Note, found: found.into(), remedy: Some(remedy.into()) }
     }
 
-    /// Bad, and what was found says what to do.
+    /// Creates a bad finding whose text contains the remedy.
     pub(crate) fn told(what: &'static str, found: impl Into<String>) -> Self {
         Self { what, grade: Grade::Bad, found: found.into(), remedy: None }
     }
@@ -114,7 +114,7 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     verdict
 }
 
-/// The real-time configuration.
+/// Diagnoses the real-time configuration.
 fn machine(registry: &Registry, root: &Path) -> Vec<Diagnosis> {
     let mut diagnoses = vec![cores(root)];
     diagnoses.extend(of_the_system(root));

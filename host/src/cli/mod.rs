@@ -1,6 +1,6 @@
-//! The `flotor` command: arguments in, exit code out.
+//! The `flotor` command: parses arguments, runs commands and returns exit codes.
 //!
-//! What the servo loop does not need is carried out by separate programs beside this one: a first build stays short.
+//! Commands without a servo loop are separate programs beside this one, which shortens a first build.
 
 mod bridge;
 pub(crate) mod doctor;
@@ -26,7 +26,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
-/// The version, and the commit in a release: `.ci/archive` sets the variable. Other builds have none, so that a new
+/// Version, and the commit in a release: `.ci/archive` sets the variable. Other builds have none, so that a new
 /// commit does not force a rebuild.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let commit = option_env!("FLOTOR_COMMIT").map(|commit| format!(" ({commit})")).unwrap_or_default();
@@ -48,28 +48,28 @@ struct Arguments {
     command: Option<Command>,
 }
 
-/// Measures plugins, loops and recordings.
+/// Program that measures plugins, loops and recordings.
 const LAB: SeparateProgram<'static> =
     SeparateProgram { program: "flotor-lab", built: Built::WithThis, build: "cargo build --release" };
-/// Perception experiments.
+/// Program for perception experiments.
 const STUDY: SeparateProgram<'static> =
     SeparateProgram { program: "flotor-study", built: Built::WithThis, build: "cargo build --release" };
-/// Calibration of devices.
+/// Program for the calibration of devices.
 const CALIBRATION: SeparateProgram<'static> =
     SeparateProgram { program: "flotor-calibration", built: Built::WithThis, build: "cargo build --release" };
 
-/// Scenes with expectations.
+/// Program that tests scenes with expectations.
 const TEST: SeparateProgram<'static> =
     SeparateProgram { program: "flotor-test", built: Built::WithThis, build: "cargo build --release" };
 
-/// Sweeps into tables; its own workspace, because it brings Parquet.
+/// Program that sweeps parameters into tables; in its own workspace, because it depends on Parquet.
 const SWEEP: SeparateProgram<'static> = SeparateProgram {
     program: "flotor-sweep",
     built: Built::OwnWorkspace("sweep"),
     build: "cargo build --release --manifest-path interop/sweep/Cargo.toml --target-dir target/sweep",
 };
 
-/// What a command takes that a separate program carries out.
+/// Arguments of a command that a separate program carries out.
 #[derive(Args)]
 #[command(disable_help_flag = true, disable_version_flag = true)]
 struct Separate {
@@ -146,13 +146,13 @@ enum Command {
     },
 }
 
-/// The commands with their arguments. Not real-time.
+/// Returns the parser of all commands. Not real-time.
 #[must_use]
 pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// Names of the commands that the help lists, in its order. Not real-time.
+/// Returns the names of the commands that the help lists, in its order. Not real-time.
 #[must_use]
 pub fn command_names() -> Vec<String> {
     let command = command();
@@ -171,7 +171,7 @@ pub fn main() -> ExitCode {
     {
         end_with_parent();
     }
-    // The others run no code of plugins in this process.
+    // Other commands run no code of plugins in this process.
     match matches!(command, Command::Run(_) | Command::Doctor(_)) {
         true => supervised(|| carry_out(command)),
         false => exit_code_of(carry_out(command)),
@@ -209,7 +209,7 @@ fn carry_out(command: Command) -> Result<(), CommandError> {
         Command::Worker(arguments) => worker::run(arguments),
         Command::Watchdog(arguments) => watchdog::run(arguments),
         Command::Completions { shell } => {
-            // Into memory first: the generator panics where its reader goes away.
+            // Into memory first: the generator panics if its output is closed.
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut script);
             say!("{}", String::from_utf8_lossy(&script).trim_end());

@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Of two plugins with one id only the first found is used: the new one would be hidden, or hide the other.
+/// Rejects an id that another plugin has: only the first plugin found is used, and would hide the other.
 fn refuse_an_id_in_use(name: &PluginName) -> Result<(), CommandError> {
     let registry = Registry::search(&[]);
     let Some(known) = registry.found().iter().find(|known| known.id == name.id()) else { return Ok(()) };

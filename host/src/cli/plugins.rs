@@ -1,4 +1,4 @@
-//! `flotor plugins`: the installed plugins, read from their files without running any of them.
+//! `flotor plugins`: lists the installed plugins from their files, without running any of them.
 
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, PluginPathOption, settings};
@@ -22,7 +22,7 @@ use std::time::Instant;
 pub(crate) struct PluginsArguments {
     /// Id of a plugin: show its parameters (this loads the plugin)
     id: Option<String>,
-    /// Setting with which the model's own error and its time are told (repeatable)
+    /// Setting with which the model's error estimate and time per tick are measured (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "id", conflicts_with = "json")]
     sets: Vec<KeyValue>,
     #[command(flatten)]
@@ -138,10 +138,10 @@ fn describe(registry: &Registry, id: &str, sets: &[KeyValue], json: &JsonOption)
     Ok(())
 }
 
-/// Ticks at home whose time is told.
+/// Number of ticks at home for the median time.
 const TIMED_TICKS: usize = 1000;
 
-/// What a model says of its own error with some settings, and the time of a tick: where it estimates one, or settings are
+/// Prints the error estimates of a model with some settings and the time of a tick, if the model has estimates or settings are
 /// given.
 fn print_certificate(plugin: &Plugin, sets: &[KeyValue]) -> Result<(), CommandError> {
     let settings = settings(plugin, "--set", sets)?;
@@ -149,7 +149,7 @@ fn print_certificate(plugin: &Plugin, sets: &[KeyValue]) -> Result<(), CommandEr
     let id = &plugin.metadata().id;
     let mut model = match while_preparing(id, || plugin.create_model(&settings)) {
         Ok(model) => model,
-        Err(_) if sets.is_empty() => return Ok(()), // not without settings
+        Err(_) if sets.is_empty() => return Ok(()), // requires settings
         Err(error) => return Err(error.into()),
     };
     let ready_s = started.elapsed().as_secs_f64();

@@ -1,4 +1,4 @@
-//! `flotor record`: a recording of a running session, local or remote.
+//! `flotor record`: records a running session, local or remote.
 
 use super::bridge::{BRIDGE, Way, is_remote};
 use clap::Args;
@@ -12,7 +12,7 @@ use flotor_servo::StopSwitch;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// How long to wait for an event before checking the stop switch.
+/// Poll interval of the stop switch, while no event arrives.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
 /// Attach to a running session and record it until it ends.
@@ -78,7 +78,7 @@ struct Kept {
     end: RecordingEnd,
 }
 
-/// How the recording of a session ends, with the text to print.
+/// Kind of end of a recording, with the text to print.
 enum RecordingEnd {
     /// The run is over, or the user stopped the recording.
     Complete(String),
@@ -93,7 +93,7 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
     let mut kept = Kept { ticks: 0, dropped: 0, end: RecordingEnd::Complete("stopped recording".to_owned()) };
     while !stop.is_stop_asked() {
         match client.next(LOOK_PERIOD) {
-            // There is only the request to watch.
+            // The only request is that to watch.
             Ok(Some(Event::Answer(Answer { refused: Some(reason), .. }))) => {
                 recorder.discard();
                 return Err(CommandError::Failed(reason));
@@ -116,7 +116,7 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
                 kept.end = RecordingEnd::Complete(end.words);
                 break;
             }
-            // The recorded ticks are valid; the note says that the host failed.
+            // The recorded ticks are valid; the message reports that the connection was lost.
             Err(error) => {
                 kept.end = RecordingEnd::Cut(error.to_string());
                 break;

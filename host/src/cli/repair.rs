@@ -1,4 +1,4 @@
-//! `flotor repair`: a truncated recording as a whole file.
+//! `flotor repair`: completes a truncated recording in a new file.
 
 use clap::Args;
 use flotor_command::options::mcap_file;

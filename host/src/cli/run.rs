@@ -1,4 +1,4 @@
-//! `flotor run`: a scene in the servo loop, with its observers.
+//! `flotor run`: runs a scene in the servo loop, with its observers.
 
 use crate::peak_bounds::PeakBound;
 use crate::platform::most_open_files;
@@ -86,13 +86,13 @@ pub(crate) struct RunArguments {
 }
 
 impl RunArguments {
-    /// Whether `flotor lend` has started this run, with which it ends: nobody else would end it.
+    /// Returns true if `flotor lend` has started this run: the run then ends with that process, as nothing else would end it.
     pub(crate) fn is_lent(&self) -> bool {
         self.ml_api.is_some()
     }
 }
 
-/// `--compute`
+/// Model output for `--compute`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum OutputOption {
     /// Torque, where the device gives none
@@ -110,12 +110,12 @@ impl OutputOption {
     }
 }
 
-/// The scene of that model, with a device that stands for the first one.
+/// Scene with the model for `--ml-api`; its device is a placeholder, because a scene must have one.
 const ML_API: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"ml-api\"\n";
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
-    // First of all: a signal during loading ends the run, too. One that serves a program ends with a summary, however short the
-    // program was.
+    // First, so that a signal during loading ends the run, too. With `--ml-api`, every signal ends the run in order, so that a summary is
+    // always printed, even after a very short program.
     let stop = if arguments.is_lent() { stop_on_signals()? } else { stop_run_on_signals()? };
     stop_waits_with(&stop);
     if arguments.json.is_on_standard_output() {
@@ -218,7 +218,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         trace_digest: digest.finish(),
     };
     let summary = RunSummary::new(facts, &outcome, &tally);
-    // Before anything else that can fail: the recording cannot be repeated.
+    // Before any other step that can fail: the recording cannot be repeated.
     let recorded = recording.finish(&notes(&outcome, &summary)).map_err(Into::into);
     let drawn = match (&arguments.plot, plot) {
         (Some(path), Some(plot)) => std::fs::write(path, plot.into_svg(&summary.one_line(), &outcome.timing))
@@ -231,7 +231,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     outcome.later_warnings().iter().for_each(note);
     latch.and_then(|latch| stop_note(outcome.end, &latch)).into_iter().for_each(note);
     let verdict = verdict(&outcome, &plugins, &summary);
-    // Last of all: the code of a plugin may hang, or end the process.
+    // Last, because the code of a plugin may hang, or end the process.
     let Outcome { unresponsive, remains, .. } = outcome;
     let freed = remains.free();
     let freed = unresponsive.map_or(freed, Err).map_err(|hung| CommandError::PluginRefused(hung.to_string()));
@@ -239,7 +239,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     first_error([verdict, freed, recorded, drawn, printed])
 }
 
-/// Notes for readers of the recording: why the run ended, which plugins failed, which ticks are missing.
+/// Returns notes for readers of the recording: reason of the end, failed plugins, missing ticks.
 fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
     let note = |severity, source: &str, text: String| Note {
         time_ns: outcome.elapsed_ns,
@@ -260,7 +260,7 @@ fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
     notes
 }
 
-/// Reports what an emergency stop of this run has reached, or who pressed that of another.
+/// Describes the reach of an emergency stop of this run, or the source of another run's.
 fn stop_note(end: RunEnd, latch: &LatchGuard) -> Option<String> {
     match end {
         RunEnd::EmergencyStop(EmergencySource::Latch) => latch.check().err().map(|error| error.to_string()),
@@ -268,7 +268,7 @@ fn stop_note(end: RunEnd, latch: &LatchGuard) -> Option<String> {
     }
 }
 
-/// What the end of the run means for the exit code.
+/// Converts the end of the run to the result of the command.
 fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) -> Result<(), CommandError> {
     match outcome.end {
         RunEnd::DeviceFault(fault) => {
@@ -289,10 +289,10 @@ fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) ->
     }
 }
 
-/// Files a run in real time has open at most, with a margin: plugins, recording, socket, sixteen watchers.
+/// Largest number of open files of a run in real time, with a margin: plugins, recording, socket, sixteen clients.
 const OPEN_FILES: u64 = 64;
 
-/// A run that finds no descriptor has no signal handlers, no recording or no socket, while a hand is at the device.
+/// Checks the limit of open files: without descriptors a run lacks signal handlers, recording or socket, while a hand is at the device.
 fn enough_files() -> Result<(), CommandError> {
     match most_open_files() {
         Some(most) if most < OPEN_FILES => Err(CommandError::Usage(format!(
@@ -302,7 +302,7 @@ fn enough_files() -> Result<(), CommandError> {
     }
 }
 
-/// The scene with everything the command line says on top.
+/// Loads the scene and applies the options of the command line.
 fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
     let scene = match &arguments.scene {
         Some(path) => Scene::load(path),
@@ -345,12 +345,12 @@ fn peer_links(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLi
     lines.into_iter().map(link).collect()
 }
 
-/// Whether a run ended as it should, for its clients.
+/// Returns the kind of end of a run, for its clients.
 fn end_kind(end: RunEnd) -> EndKind {
     if end.is_in_order() { EndKind::InOrder } else { EndKind::Failed }
 }
 
-/// How a run ended, for its clients.
+/// Describes the end of a run, for its clients.
 fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
     match outcome.end {
         RunEnd::Finished => "the run finished".to_owned(),
@@ -371,10 +371,10 @@ fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
     }
 }
 
-/// A model that failed, or a device that changed how the host computes, is a refused plugin, reported in the exit code as well,
-/// for scripts.
+/// Returns the error of a broken plugin for the exit code: a model that failed, or a device that changed the floating-point
+/// environment.
 fn broken_plugins(outcome: &Outcome, summary: &RunSummary) -> Result<(), CommandError> {
-    // The devices come first. One that failed has ended the run; what was borne of its samples is in the summary.
+    // The devices come first. A failed one has ended the run; tolerated faults of its samples are in the summary.
     let is_borne =
         |number: usize| outcome.devices.get(number).is_some_and(|device| device.float_changes == 0);
     let mut plugins = summary.plugins.iter().enumerate();
@@ -388,18 +388,18 @@ fn broken_plugins(outcome: &Outcome, summary: &RunSummary) -> Result<(), Command
     })
 }
 
-/// The observers of every tick of a run.
+/// Observers of every tick of a run.
 struct Watchers {
     tally: Tally,
     digest: TraceDigest,
     recording: RunRecording,
     plot: Option<RunPicture>,
-    /// Outputs of the models that the command line asks for.
+    /// Outputs of the models that the command line requests.
     compute: Demand,
     progress: ProgressBar,
 }
 
-/// How many ticks pass between two updates of the progress line, at 1 kHz thirty a second.
+/// Interval between updates of the progress line, ticks; at 1 kHz thirty updates a second.
 const PROGRESS_TICKS: u64 = 33;
 
 impl Observer for Watchers {
@@ -431,7 +431,7 @@ impl Observer for Watchers {
     }
 }
 
-/// Height of the handle as a bar, and the force on the hand.
+/// Formats the height of the handle as a bar, and the force on the hand.
 fn live_line(record: &TickRecord) -> String {
     const COLUMNS: usize = 21;
     let z_mm = record.pose.position().z * 1.0e3;

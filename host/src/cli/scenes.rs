@@ -1,4 +1,4 @@
-//! `flotor scenes`: Flotor's own scenes, which `flotor run NAME` runs.
+//! `flotor scenes`: lists and prints Flotor's own scenes, which `flotor run NAME` runs.
 
 use clap::Args;
 use flotor_command::options::JsonOption;
@@ -20,7 +20,7 @@ pub(crate) struct ScenesArguments {
     json: JsonOption,
 }
 
-/// A row of the list.
+/// Row of the list.
 #[derive(Serialize)]
 struct Listed {
     name: &'static str,

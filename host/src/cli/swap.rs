@@ -1,4 +1,4 @@
-//! `flotor swap`: hot swap of a model in a running session of this machine.
+//! `flotor swap`: swaps a model of a running session of this machine.
 
 use clap::Args;
 use flotor_command::CommandError;
@@ -9,9 +9,9 @@ use flotor_session::scene::is_named;
 use std::path::MAIN_SEPARATOR;
 use std::time::{Duration, Instant};
 
-/// Time limit for the host to create the model.
+/// Timeout of the host for creating the model.
 const CREATION_LIMIT: Duration = Duration::from_secs(60);
-/// Time limit for the loop to swap it in and to report that.
+/// Timeout of the loop for swapping the model and reporting the swap.
 const SWAP_LIMIT: Duration = Duration::from_secs(5);
 
 /// Hot-swap a model of a running session, without a jump in the force.
@@ -66,7 +66,7 @@ pub(crate) fn run(arguments: &SwapArguments) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// A plugin as the host finds it, which may have been started in another folder: a file by its whole path.
+/// Converts the name of a plugin for the host, which may run in another folder: a file to its absolute path.
 fn for_host(plugin: &str) -> Result<String, CommandError> {
     if !plugin.contains(MAIN_SEPARATOR) {
         return Ok(plugin.to_owned());
@@ -79,7 +79,7 @@ fn for_host(plugin: &str) -> Result<String, CommandError> {
         .map_err(|path| CommandError::Usage(format!("`{}`: the path is not valid UTF-8", path.display())))
 }
 
-/// Requests the swap and waits for its result: the change in the loop, or nothing if the loop does not report it in time.
+/// Requests the swap and waits for its result: the change in the loop, or `None` if the loop does not report it in time.
 fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMessage>, CommandError> {
     let lost = |error: LiveError| CommandError::Failed(error.to_string());
     let asked = client.asker().ask(ask).map_err(lost)?;
@@ -102,7 +102,7 @@ fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMe
                 is_answered = true;
                 until = Instant::now() + SWAP_LIMIT;
             }
-            // The loop may be faster than the answer.
+            // The change may arrive before the answer.
             Some(Event::Change(told)) if told.subject == Subject::Plugin && is_named(&told.plugin, model) => {
                 change = Some(told);
             }

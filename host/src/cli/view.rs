@@ -106,7 +106,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     }
     let registry = arguments.plugin_path.registry();
     if let Some(file) = file {
-        // Opened here as well: an error in the file is reported before another program starts.
+        // Opened here as well, so that an error in the file is reported before another program starts.
         let recording = Recording::open(file)?;
         plugin_files(&recording, &registry).into_iter().for_each(|plugin| add("--plugin", plugin.into()));
         let written =
@@ -118,7 +118,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
             Recording::open(second)?;
         }
     } else {
-        // The window may open a recording of any of them.
+        // The window may open a recording with any of these plugins.
         registry.found().iter().for_each(|plugin| add("--plugin", plugin.path.clone().into()));
     }
     let options = [
@@ -156,7 +156,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     }
 }
 
-/// The bridge republishes the session here, and the viewer shows that one; the bridge reports loss and reconnection on the terminal.
+/// Shows a remote session: the bridge republishes it here for the viewer, and reports loss and reconnection on the terminal.
 fn view_remote(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result<(), CommandError> {
     let (mut viewer, mut bridge) = (SeparateProgram::VIEWER.command()?, BRIDGE.command()?);
     let cannot = |program: &str, cause| CommandError::file(program.as_ref(), "cannot be started", cause);
@@ -173,7 +173,7 @@ fn view_remote(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result
     std::process::exit(shown.code().unwrap_or(1));
 }
 
-/// What a running session cannot be asked for.
+/// Returns the first option that requires a recording.
 fn of_recordings_only(arguments: &ViewArguments) -> Option<&'static str> {
     let all = [
         (arguments.screenshot.is_some(), "a picture of a moment"),
@@ -185,7 +185,7 @@ fn of_recordings_only(arguments: &ViewArguments) -> Option<&'static str> {
     all.into_iter().find_map(|(is_wanted, what)| is_wanted.then_some(what))
 }
 
-/// Neither in a picture of a moment nor in a file of traces can it be seen whether the recording is whole.
+/// Prints a note on a damaged recording, because neither a picture nor a file of traces shows the damage.
 fn tell_damage(file: &Path, mut recording: Recording, what: &str) {
     let broken = recording.by_ref().find_map(Result::err);
     let damage = match (broken, recording.ending()) {
@@ -196,7 +196,7 @@ fn tell_damage(file: &Path, mut recording: Recording, what: &str) {
     note(format_args!("{damage}; {what} what can be read"));
 }
 
-/// Files of the plugins of a recording that were found; the viewer reports the missing ones.
+/// Returns the files of the recording's plugins that were found; the viewer reports the missing ones.
 fn plugin_files(recording: &Recording, registry: &Registry) -> Vec<PathBuf> {
     let plugins = recording.run().plugins.iter();
     let found = plugins.filter_map(|plugin| registry.found().iter().find(|known| known.id == plugin.id));

@@ -13,7 +13,7 @@ pub(super) struct WatchdogArguments {
 }
 
 pub(super) fn run(arguments: WatchdogArguments) -> Result<(), CommandError> {
-    // Whoever signals all processes of a run ends the host; this one has to be there then.
+    // A signal to all processes of a run ends the host; this process must survive to stop the devices.
     stopping::outlive_signals();
     let refused =
         |error| CommandError::Usage(format!("`flotor watchdog` is started by `flotor run`: {error}"));

@@ -1,4 +1,4 @@
-//! `flotor worker`: the process that holds one force model, started by `flotor run`.
+//! `flotor worker`: the process of one isolated force model, started by `flotor run`.
 
 use clap::Args;
 use flotor_command::CommandError;
@@ -26,7 +26,7 @@ pub(super) struct WorkerArguments {
 }
 
 pub(super) fn run(arguments: WorkerArguments) -> Result<(), CommandError> {
-    // Signals end it as they end any process: a terminal's do not come here, because it is of a group of its own.
+    // Signals end a worker like any process; those of a terminal do not reach its separate process group.
     let WorkerArguments { plugin, host, period_ns, seed, sets } = arguments;
     process::serve(&process::WorkerArguments { plugin, host, period_ns, seed, sets }, load_file)
         .map_err(|error| CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}")))

@@ -1,8 +1,8 @@
-//! What differs between systems for the `flotor` command. Each system has one module with the same items:
-//! - `doctor`, `usb`: what the system tells of itself and of devices on USB;
+//! Platform layer of the `flotor` command. Each system has one module with the same items:
+//! - `doctor`, `usb`: diagnosis of the system and of USB devices;
 //! - `lend`: programs of other makers;
 //! - `most_open_files`, `end_with_parent`: the process;
-//! - `C_COMPILER`, `canonical`: what builds a plugin in C, where it is not `cc`, and a path that cargo reads.
+//! - `C_COMPILER`, `canonical`: command that builds a plugin in C, if other than `cc`, and a path in cargo's form.
 
 #[cfg(not(windows))]
 mod linux;

@@ -1,17 +1,17 @@
-//! Windows: neither programs of other makers nor the state of devices on USB yet.
+//! Windows: neither programs of other makers nor diagnosis of USB devices yet.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What builds a plugin in C: the compiler of MinGW-w64.
+/// Command that builds a plugin in C: the compiler of MinGW-w64.
 pub(crate) const C_COMPILER: Option<&str> =
     Some("gcc -std=c11 -O2 -Wall -Wextra -shared -o your_name.dll plugin.c");
 
-/// A path from the root, without links; as people and cargo write it: without the prefix that the system puts before it, and with
-/// slashes instead of backslashes, which would begin something else in a manifest. Not real-time.
+/// Returns an absolute path without links, in the form for people and cargo: without the prefix that the system puts before it, and with
+/// slashes, because backslashes are escapes in a manifest. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the system.
 pub(crate) fn canonical(path: &Path) -> io::Result<PathBuf> {
     let whole = path.canonicalize()?;
     let Some(text) = whole.to_str() else { return Ok(whole) };
@@ -22,35 +22,35 @@ pub(crate) fn canonical(path: &Path) -> io::Result<PathBuf> {
     Ok(PathBuf::from(text.replace('\\', "/")))
 }
 
-/// How many files this process may have open: as many as it likes.
+/// Returns the largest number of open files of this process: unlimited.
 pub(crate) fn most_open_files() -> Option<u64> {
     None
 }
 
-/// From now on this process ends with the one that started it: only `flotor lend` needs that.
+/// Does nothing: only `flotor lend` starts processes that end with their parent.
 pub(crate) fn end_with_parent() {}
 
 pub(crate) mod doctor {
-    //! What `flotor doctor` finds in the system.
+    //! Findings of `flotor doctor` about the system.
 
     use crate::cli::doctor::Diagnosis;
     use std::path::Path;
 
-    /// Returns how a user gets a priority.
+    /// Returns the remedy for missing priority.
     pub(crate) fn priority_remedy(_: &Path) -> String {
         "start the program with normal priority".to_owned()
     }
 
-    /// Returns how a user gets a second core.
+    /// Returns the remedy for a missing second core.
     pub(crate) fn core_remedy(_: &Path) -> String {
         "use a machine with two cores or more".to_owned()
     }
 
-    /// How a user gets locked memory.
+    /// Remedy for missing locked memory.
     pub(crate) const MEMORY_REMEDY: &str =
         "Windows locks the memory of no whole program; keep some memory free";
 
-    /// Returns the findings beside cores and privileges.
+    /// Returns the findings other than cores and privileges.
     pub(crate) fn of_the_system(_: &Path) -> Vec<Diagnosis> {
         vec![Diagnosis::note(
             "system",
@@ -61,23 +61,23 @@ pub(crate) mod doctor {
 }
 
 pub(crate) mod usb {
-    //! The connection of a device on USB.
+    //! USB connection of a device.
 
     use crate::cli::doctor::Diagnosis;
     use flotor_hal::UsbKind;
     use std::path::Path;
 
-    /// What the machine says of its devices: it is not asked yet.
+    /// Placeholder for the files of a machine, which are not read yet.
     pub(crate) struct Machine;
 
     impl Machine {
-        /// Of the machine itself.
+        /// Returns the placeholder.
         pub(crate) fn at(_: &Path) -> Self {
             Self
         }
     }
 
-    /// What is known of the connection of a device of these kinds.
+    /// Returns a note that the connection of a device of these kinds is not diagnosed; nothing if the device is open.
     pub(crate) fn connection(_: &Machine, kinds: &[UsbKind], is_open: bool) -> Vec<Diagnosis> {
         if kinds.is_empty() || is_open {
             return Vec::new();
@@ -100,7 +100,7 @@ pub(crate) mod lend {
     /// Run an unmodified program, written for another maker's device (on Linux only)
     #[derive(Args)]
     pub(crate) struct LendArguments {
-        /// What is given on Linux
+        /// Arguments of the command on Linux
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
         _arguments: Vec<OsString>,
     }

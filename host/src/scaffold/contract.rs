@@ -1,36 +1,36 @@
-//! Where a new plugin has the crate `flotor-hal` from: the registry, the sources of the running program, or a copy of its own.
+//! Source of the crate `flotor-hal` for a new plugin: the registry, the sources of the running program, or a copy.
 
 use super::ScaffoldError;
 use super::vendor::{write_copy, write_file};
 use crate::platform::canonical;
 use std::path::{Path, PathBuf};
 
-/// Where this program's own sources were when it was built.
+/// Folder of the contract when this program was built.
 const BUILT_FROM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../hal");
-/// Where an installation has the contract, below its prefix.
+/// Folder of the contract in an installation, below its prefix.
 const INSTALLED: &str = "share/flotor/hal";
-/// Folder of a copy, in that of the plugin.
+/// Folder of a copy, in the folder of the plugin.
 const COPY: &str = "flotor-hal";
-/// Where cargo is told on one machine what the registry does not have; git ignores it.
+/// Configuration of cargo for one machine, with the replacement for the registry; git ignores it.
 const CONFIG: &str = ".cargo/config.toml";
 
-/// Where the sources of the contract come from.
+/// Source of the contract's crate.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Contract {
-    /// The registry has this version.
+    /// This version from the registry.
     Published,
-    /// A folder of this machine stands in for the registry.
+    /// A folder of this machine in place of the registry.
     Patched(ContractFolder),
-    /// The plugin gets a copy.
+    /// A copy in the plugin's folder.
     Vendored(ContractFolder),
 }
 
 impl Contract {
-    /// The sources of this installation, in place of the registry; or the registry, if the installation has none and the user names
-    /// none. Not real-time.
+    /// Selects the sources of this installation, in place of the registry; or the registry, if the installation has none and the user
+    /// names none. Not real-time.
     ///
     /// # Errors
-    /// [`ScaffoldError::NoContract`] if the named folder has none.
+    /// [`ScaffoldError::NoContract`] if the named folder does not contain the contract.
     pub fn of_installation(named: Option<&Path>) -> Result<Self, ScaffoldError> {
         match ContractFolder::found(named) {
             Ok(folder) => Ok(Self::Patched(folder)),
@@ -39,7 +39,7 @@ impl Contract {
         }
     }
 
-    /// A copy for the plugin. Not real-time.
+    /// Selects a copy for the plugin. Not real-time.
     ///
     /// # Errors
     /// [`ScaffoldError::NoContract`] if there are no sources.
@@ -47,7 +47,7 @@ impl Contract {
         ContractFolder::found(named).map(Self::Vendored)
     }
 
-    /// The dependency on it, for a manifest.
+    /// Returns the dependency on the contract, for a manifest.
     pub(super) fn dependency(&self) -> String {
         let version = env!("CARGO_PKG_VERSION");
         match self {
@@ -64,7 +64,7 @@ impl Contract {
         }
     }
 
-    /// Writes what a crate needs beside its manifest, and returns the files and folders.
+    /// Writes the files that a crate needs beside its manifest; returns their paths.
     pub(super) fn write_beside(&self, plugin: &Path) -> Result<Vec<String>, ScaffoldError> {
         match self {
             Self::Published => Ok(Vec::new()),
@@ -86,7 +86,7 @@ impl Contract {
         }
     }
 
-    /// Whether the workspace of the contract would take every new folder in `parent` as a member.
+    /// Returns true if the workspace of the contract would include every new folder in `parent` as a member.
     pub(super) fn has_as_member(&self, parent: &Path) -> bool {
         let (Self::Patched(folder) | Self::Vendored(folder)) = self else { return false };
         let (Some(workspace), Ok(parent)) = (folder.0.parent(), canonical(parent)) else { return false };
@@ -94,13 +94,13 @@ impl Contract {
     }
 }
 
-/// The folder of `flotor-hal`: manifest, sources and C header.
+/// Folder of `flotor-hal`: manifest, sources and C header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ContractFolder(PathBuf);
 
 impl ContractFolder {
-    /// The folder a user names; else `hal/` or that of an installation in a folder above the program; else where the program was
-    /// built.
+    /// Finds the folder: the one that the user names; else `hal/` or that of an installation in a folder above the program; else the one
+    /// at build time.
     fn found(named: Option<&Path>) -> Result<Self, ScaffoldError> {
         let own = std::env::current_exe().unwrap_or_default();
         let above = own.ancestors().skip(1).flat_map(|folder| [folder.join("hal"), folder.join(INSTALLED)]);
@@ -118,15 +118,15 @@ impl ContractFolder {
         })
     }
 
-    /// The path, for cargo.
+    /// Returns the path as text, for cargo.
     fn as_text(&self) -> Result<&str, ScaffoldError> {
-        // Quotes and backslashes would end the text that cargo has it in.
+        // Quotes and backslashes would end the string in cargo's configuration.
         let text = self.0.to_str().filter(|text| !text.contains(['"', '\\', '\n']));
         text.ok_or_else(|| ScaffoldError::NotText(self.0.clone()))
     }
 
-    /// The versions the contract was built with, so that a plugin needs nothing that is not there already: the lock file of a
-    /// package, or that of the workspace.
+    /// Copies the lock file of the contract's package or workspace, so that a plugin builds with the versions that are already
+    /// there.
     fn copy_lock_file(&self, plugin: &Path) -> Result<(), ScaffoldError> {
         let places = [Some(self.0.as_path()), self.0.parent()].into_iter().flatten();
         let lock = places
@@ -136,7 +136,7 @@ impl ContractFolder {
     }
 }
 
-/// Without `..`, for people.
+/// Resolves `..` in a path, for people.
 fn plain(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for part in path.components() {

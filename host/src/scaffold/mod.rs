@@ -1,9 +1,9 @@
 //! `flotor new`: a new plugin crate that builds, validates and runs unchanged.
 //!
 //! The templates are whole files that compile once `your-name` (the id), `your_name` (in symbols), `YourName` (the
-//! type), `Your name` (for people) and what differs by language and place are replaced. A crate that is made lies
-//! anywhere, and travels: it depends on a version of the contract, it has a workspace of its own, and what belongs to this machine is
-//! in a file that git ignores. A plugin in C has the header beside it.
+//! type), `Your name` (for people) and placeholders for language and place are replaced. A new crate builds in any
+//! folder and on any machine: it depends on a version of the contract, it has a workspace of its own, and settings of this machine
+//! are in a file that git ignores. A plugin in C has a copy of the header.
 
 mod contract;
 mod name;
@@ -27,84 +27,84 @@ pub enum Language {
     C,
 }
 
-/// Why no plugin was created.
+/// Reason why no plugin was created.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScaffoldError {
     /// The name cannot be used.
     #[error(transparent)]
     Name(#[from] NameError),
-    /// The type would have the name of a type that the template uses.
+    /// The plugin's type would have the name of a type that the template uses.
     #[error("type `{type_name}` of plugin `{id}` clashes with a type of the contract; use `my-{id}`")]
     Clash {
-        /// The name.
+        /// Id of the plugin.
         id: String,
-        /// The name of the type.
+        /// Name of the type.
         type_name: String,
     },
-    /// There is something of this name already.
+    /// A file or folder of this name exists.
     #[error("{} exists; move it or choose another name", .0.display())]
     Exists(PathBuf),
-    /// The folder belongs to a cargo workspace that takes every folder in it as a member.
+    /// The folder belongs to a cargo workspace that includes every folder in it as a member.
     #[error(
         "{} belongs to Flotor's own workspace, whose plugins use `flotor-hal.workspace = true` (see \
          ARCHITECTURE.md, Adding a plugin); change to a folder outside it",
         .0.display()
     )]
     InsideWorkspace(PathBuf),
-    /// The contract's sources are not where this program was built.
+    /// The contract's sources were not found.
     #[error(
         "the sources of the contract (`hal/`, `share/flotor/hal/`) are neither in a folder above this program nor at {}; give \
          their folder with --hal PATH",
         .0.display()
     )]
     NoContract(PathBuf),
-    /// A copy of the contract cannot have its manifest.
+    /// The manifest of the contract cannot be copied.
     #[error("{}: {reason}; give the folder of whole sources with --hal PATH", path.display())]
     Manifest {
-        /// The manifest.
+        /// Path of the manifest.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Reason, for people.
         reason: String,
     },
     /// A path that cannot be written into a manifest.
     #[error("{}: the path is not valid UTF-8, or has quotes or backslashes; use another folder", .0.display())]
     NotText(PathBuf),
-    /// The system reports an error.
+    /// A file cannot be read.
     #[error("{}: cannot read: {cause}", path.display())]
     Read {
-        /// What was to be read.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         cause: std::io::Error,
     },
-    /// The system reports an error.
+    /// A file or folder cannot be written.
     #[error("{}: cannot write: {cause}", path.display())]
     Write {
-        /// What was to be written.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         cause: std::io::Error,
     },
 }
 
-/// A plugin that was created.
+/// Created plugin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scaffold {
-    /// Its folder.
+    /// Path of its folder.
     pub folder: PathBuf,
-    /// Its files, relative to the folder, the one to edit first.
+    /// Paths of its files, relative to the folder; the first is the one to edit.
     pub files: Vec<String>,
-    /// The command that builds it, in its folder.
+    /// Command that builds it, in its folder.
     pub build: String,
-    /// The built library, relative to the folder.
+    /// Path of the built library, relative to the folder.
     pub library: String,
 }
 
-/// Makes the plugin `parent/NAME`. Not real-time.
+/// Creates the plugin `parent/NAME`. Not real-time.
 ///
 /// # Errors
-/// [`ScaffoldError`]; where there is something already, nothing is touched.
+/// If the name clashes, the folder exists (which is not changed), or a file cannot be read or written.
 pub fn scaffold(
     parent: &Path,
     name: &PluginName,
@@ -139,7 +139,7 @@ pub fn scaffold(
     })
 }
 
-/// The files of a plugin: path and template, the one to edit first.
+/// Returns the files of a plugin: path and template, the one to edit first.
 fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'static str)] {
     const IGNORE: (&str, &str) = (".gitignore", "/target\n/ANY_LIBRARY\n/.cargo/config.toml\n");
     const HEADER: (&str, &str) = ("flotor.h", C_HEADER);
@@ -172,10 +172,10 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
     }
 }
 
-/// Stands for the command that builds a plugin.
+/// Placeholder for the command that builds a plugin.
 const BUILD: &str = "BUILD_COMMAND";
 
-/// What stands in the templates, and what comes instead; also in what came for those before.
+/// Placeholders of the templates with their values, which may contain later placeholders.
 struct Placeholders([(&'static str, String); 9]);
 
 impl Placeholders {
@@ -204,7 +204,7 @@ impl Placeholders {
         self.0.iter().fold(template.to_owned(), |text, (placeholder, value)| text.replace(placeholder, value))
     }
 
-    /// Whether the Rust template uses a type that the plugin's own would hide.
+    /// Returns true if the Rust template uses a type that the plugin's own type would hide.
     fn clashes_with(&self, template: &str) -> bool {
         let [_, _, _, _, _, _, (_, type_name), ..] = &self.0;
         let code = template.lines().filter(|line| !line.trim_start().starts_with("//"));

@@ -1,41 +1,41 @@
-//! The name of a new plugin: checked once, then written in the ways a crate, a type and a person need it.
+//! Name of a new plugin: checked once, then converted to the forms for crate, type and people.
 
-/// Names cargo or the compiler keep for themselves (Rust reference, "Keywords"; `cargo new` refuses the rest).
+/// Names reserved by cargo or the compiler (Rust reference, "Keywords"; `cargo new` rejects the rest).
 const TAKEN: [&str; 47] = [
     "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn",
     "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop",
     "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self", "static",
     "struct", "super", "trait", "true", "try", "type", "unsafe", "use", "where", "while",
 ];
-/// Crates every build has, and what cargo builds beside a crate.
+/// Crates of every build, and folders that cargo creates beside a crate.
 const CRATES: [&str; 7] = ["alloc", "core", "proc-macro", "std", "test", "build", "deps"];
-/// Longer names make unreadable lists.
+/// Largest length of a name: longer ones make lists unreadable.
 const LONGEST: usize = 32;
 
-/// A valid name of a folder, a crate, a type and an id.
+/// Valid name of a folder, a crate, a type and an id.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PluginName(String);
 
-/// Why a name is invalid.
+/// Reason why a name is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NameError {
-    /// It has characters that cannot stand in a crate's name, or stands them wrongly.
+    /// The name has characters that a crate's name cannot have, or has them in wrong positions.
     #[error("invalid plugin name `{name}`: use lower-case letters, digits and single hyphens between \
         them, a letter first, at most {LONGEST} characters{}",
         nearest.as_ref().map_or(String::new(), |nearest| format!("; use `{nearest}`")))]
     Form {
-        /// The name.
+        /// Given name.
         name: String,
-        /// A good name made of the same letters.
+        /// Valid name with the same letters, if there is one.
         nearest: Option<String>,
     },
-    /// It is reserved.
+    /// The name is reserved.
     #[error("`{name}` is reserved by {owner}; use `my-{name}`")]
     Taken {
-        /// The name.
+        /// Given name.
         name: String,
-        /// By whom.
+        /// Tool or project that reserves the name.
         owner: &'static str,
     },
 }
@@ -44,7 +44,7 @@ impl PluginName {
     /// Checks a name. Not real-time.
     ///
     /// # Errors
-    /// [`NameError`] with a name that would do.
+    /// [`NameError`] with a suggestion.
     pub fn new(name: &str) -> Result<Self, NameError> {
         if !well_formed(name) {
             let nearest = Some(tidied(name)).filter(|tidied| well_formed(tidied));
@@ -59,25 +59,25 @@ impl PluginName {
         }
     }
 
-    /// `soft-wall`: the id in scenes, the folder, the crate.
+    /// Returns the id in scenes, folder and crate: `soft-wall`.
     #[must_use]
     pub fn id(&self) -> &str {
         &self.0
     }
 
-    /// `soft_wall`: in file names and symbols.
+    /// Returns the name in files and symbols: `soft_wall`.
     #[must_use]
     pub fn symbol(&self) -> String {
         self.0.replace('-', "_")
     }
 
-    /// `SoftWall`: the type.
+    /// Returns the name of the type: `SoftWall`.
     #[must_use]
     pub fn type_name(&self) -> String {
         self.0.split('-').map(capitalised).collect()
     }
 
-    /// `Soft wall`: for people.
+    /// Returns the name for people: `Soft wall`.
     #[must_use]
     pub fn title(&self) -> String {
         capitalised(&self.0.replace('-', " "))
@@ -90,7 +90,7 @@ fn well_formed(name: &str) -> bool {
     characters && hyphens && name.starts_with(|c: char| c.is_ascii_lowercase()) && name.len() <= LONGEST
 }
 
-/// The letters and digits of a name, in lower case, with one hyphen where there was anything else.
+/// Returns the letters and digits of a name, in lower case, with one hyphen in place of other characters.
 fn tidied(name: &str) -> String {
     let mut words: Vec<String> = vec![String::new()];
     let mut after_lower = false;

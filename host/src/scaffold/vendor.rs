@@ -1,4 +1,4 @@
-//! A copy of the contract's sources that builds without the workspace they come from.
+//! Copy of the contract's sources that builds without their workspace.
 
 use super::ScaffoldError;
 use std::fs::File;
@@ -6,13 +6,13 @@ use std::io::Write;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// What of the contract's folder a build needs, and its licences.
+/// Files and folders of the contract that a build needs, and its licences.
 const COPIED: [&str; 5] = ["src", "include", "README.md", "LICENSE-MIT", "LICENSE-APACHE"];
 
 /// Writes a copy of the contract in `from` to the new folder `to`.
 ///
 /// # Errors
-/// [`ScaffoldError::Write`] with the file, [`ScaffoldError::Manifest`].
+/// If a file cannot be read or written, or the manifest cannot be converted.
 pub(super) fn write_copy(from: &Path, to: &Path) -> Result<(), ScaffoldError> {
     let manifest = read(&from.join("Cargo.toml"))?;
     let workspace = from.parent().and_then(|above| read(&above.join("Cargo.toml")).ok()).unwrap_or_default();
@@ -25,7 +25,7 @@ pub(super) fn write_copy(from: &Path, to: &Path) -> Result<(), ScaffoldError> {
         .try_for_each(|name| copy(&from.join(name), &to.join(name)))
 }
 
-/// Writes a new file, and the folders above it.
+/// Writes a new file, and creates the folders above it.
 pub(super) fn write_file(path: &Path, text: &str) -> Result<(), ScaffoldError> {
     let above = path.parent().map_or(Ok(()), std::fs::create_dir_all);
     let written =
@@ -49,11 +49,11 @@ fn copy(from: &Path, to: &Path) -> Result<(), ScaffoldError> {
     Ok(())
 }
 
-/// A manifest with what it takes from its workspace written out.
+/// Replaces references of a manifest to its workspace by their values.
 fn standalone(manifest: &str, workspace: &str) -> Result<String, String> {
     let parsed = |text: &str| text.parse::<Table>().map_err(|error| error.to_string());
     let (mut manifest, workspace) = (parsed(manifest)?, parsed(workspace)?);
-    // For those who change the contract.
+    // These sections serve the development of the contract only.
     manifest.remove("lints");
     manifest.remove("example");
     let shared = |section: &str| workspace.get("workspace")?.get(section)?.as_table();
@@ -61,7 +61,7 @@ fn standalone(manifest: &str, workspace: &str) -> Result<String, String> {
         let Some(entries) = manifest.get_mut(section).and_then(Value::as_table_mut) else { continue };
         write_out(entries, shared(section))?;
     }
-    // What one system needs alone.
+    // Dependencies of single systems.
     let systems = manifest.get_mut("target").and_then(Value::as_table_mut).into_iter().flatten();
     for (_, system) in systems {
         let Some(entries) = system.get_mut("dependencies").and_then(Value::as_table_mut) else { continue };
@@ -70,7 +70,7 @@ fn standalone(manifest: &str, workspace: &str) -> Result<String, String> {
     Ok(manifest.to_string())
 }
 
-/// Replaces what entries take from their workspace by what stands there.
+/// Replaces entries that refer to their workspace by its entries.
 fn write_out(entries: &mut Table, shared: Option<&Table>) -> Result<(), String> {
     for (name, value) in entries {
         let Some(own) = value.as_table_mut().filter(|own| own.contains_key("workspace")) else {
@@ -84,7 +84,7 @@ fn write_out(entries: &mut Table, shared: Option<&Table>) -> Result<(), String> 
     Ok(())
 }
 
-/// An entry of the workspace with what a member adds to it: its features are more features.
+/// Merges an entry of the workspace with the additions of a member; features are united.
 fn with(theirs: &Value, mut own: Table) -> Value {
     if own.is_empty() {
         return theirs.clone();

@@ -1,9 +1,9 @@
 //! The latest-value cell: one writer, any number of readers, only the newest value counts.
 //!
-//! It is a sequence lock. The writer makes the sequence odd, writes the words, and makes it even again. A
-//! reader notes the sequence, copies the words, and looks at the sequence once more: even and unchanged means
-//! that no write ran in between, so the copy is whole. The writer never looks at the readers and so never
-//! waits for them; a reader that was overtaken tries again, a few times.
+//! The cell is a sequence lock. The writer makes the sequence odd, writes the words, and makes the sequence even again. A
+//! reader notes the sequence, copies the words, and loads the sequence once more: even and unchanged means
+//! that no write ran in between, so the copy is whole. The writer never reads the readers' state and so never
+//! waits for them; a reader that was overtaken retries, a few times.
 //!
 //! Source: H.-J. Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012
 //! (the variant with atomic data and fences).
@@ -13,14 +13,14 @@ use std::marker::PhantomData;
 use crate::shim::{Arc, AtomicU64, Ordering, fence};
 use crate::words::{AtomicWords, Words};
 
-/// Attempts of one read, a count. A copy takes tens of nanoseconds and the servo publishes at most every
-/// 100 µs, so a second attempt is rare and a third means that the writer was suspended in the middle of a
+/// Attempts per read. A copy takes tens of nanoseconds and the servo publishes at most every
+/// 100 µs, so a second attempt is rare, and a third means that the writer was suspended during a
 /// publish: more would be spinning. Under loom one: its models read several times themselves, and each
 /// attempt multiplies the interleavings without adding a new kind.
 const READ_ATTEMPTS: usize = if cfg!(loom) { 1 } else { 3 };
 
-/// What both ends share. Aligned to two 64-byte cache lines, which x86 prefetches as a pair (and which are
-/// one line on some aarch64 cores), so that no neighbour on the heap shares a line with it.
+/// State shared by both ends. Aligned to two 64-byte cache lines, which x86 prefetches as a pair (and which are
+/// one line on some aarch64 cores), so that no neighbour on the heap shares a line with the cell.
 #[derive(Debug)]
 #[repr(align(128))]
 struct Cell<const N: usize> {
@@ -29,7 +29,7 @@ struct Cell<const N: usize> {
     words: AtomicWords<N>,
 }
 
-/// A latest-value cell that holds `initial` as version 0. Not real-time: allocates, once.
+/// Creates a latest-value cell that holds `initial` as version 0. Not real-time: allocates, once.
 #[must_use]
 pub fn latest<T: Words<N>, const N: usize>(initial: T) -> (Publisher<T, N>, Observer<T, N>) {
     let words = AtomicWords::new(initial.to_words());
@@ -38,22 +38,22 @@ pub fn latest<T: Words<N>, const N: usize>(initial: T) -> (Publisher<T, N>, Obse
     (publisher, Observer { cell, record: PhantomData })
 }
 
-/// The writing end. There is one: it cannot be cloned, and publishing takes it mutably.
+/// Writing end of a cell. There is only one: it is not `Clone`, and publishing takes it mutably.
 #[derive(Debug)]
 pub struct Publisher<T, const N: usize> {
     cell: Arc<Cell<N>>,
-    /// The cell's sequence, known without a load: nobody else writes it. Always even here.
+    /// Sequence of the cell, known without a load because only this end writes it. Always even here.
     sequence: u64,
     record: PhantomData<fn(&T)>,
 }
 
 impl<T: Words<N>, const N: usize> Publisher<T, N> {
-    /// Makes `value` the newest value. Wait-free: readers cannot delay it.
+    /// Publishes `value` as the newest value. Wait-free: readers cannot delay it.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
     pub fn publish(&mut self, value: &T) {
-        // Before the sequence turns odd, so that a panic in there could not leave it odd.
+        // Before the sequence turns odd, because a panic in `to_words` would leave the sequence odd.
         let words = value.to_words();
         let writing = self.sequence.wrapping_add(1);
         self.sequence = self.sequence.wrapping_add(2);
@@ -70,7 +70,7 @@ impl<T: Words<N>, const N: usize> Publisher<T, N> {
     }
 }
 
-/// A reading end; clone it for more readers.
+/// Reading end of a cell; clone it for more readers.
 #[derive(Debug)]
 pub struct Observer<T, const N: usize> {
     cell: Arc<Cell<N>>,
@@ -78,10 +78,10 @@ pub struct Observer<T, const N: usize> {
 }
 
 impl<T: Words<N>, const N: usize> Observer<T, N> {
-    /// The newest value and its version: the number of values published so far. For one reader versions never
+    /// Returns the newest value and its version: the number of values published so far. For one reader versions never
     /// go back; an unchanged version means an unchanged value.
     ///
-    /// `None` if a publish was under way in each of a few attempts; then ask again later.
+    /// Returns `None` if a publish was under way in each of a few attempts; retry later.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -90,7 +90,7 @@ impl<T: Words<N>, const N: usize> Observer<T, N> {
         (0..READ_ATTEMPTS).find_map(|_| self.attempt())
     }
 
-    /// One copy, if no write touched it.
+    /// Copies the value once; returns `None` if a write ran meanwhile.
     #[inline]
     fn attempt(&self) -> Option<(u64, T)> {
         // Acquire, pairs with the release store that ends a publish: the words read below are at least as new
@@ -109,7 +109,7 @@ impl<T: Words<N>, const N: usize> Observer<T, N> {
     }
 }
 
-/// By hand: derived, it would ask for `T: Clone`.
+/// Implemented by hand, because a derive would require `T: Clone`.
 impl<T, const N: usize> Clone for Observer<T, N> {
     fn clone(&self) -> Self {
         Self { cell: Arc::clone(&self.cell), record: PhantomData }

@@ -1,7 +1,7 @@
-//! The newest value of something, from one thread to others, without either waiting.
+//! Wait-free passing of the newest value from one thread to others.
 //!
-//! The servo runs a thousand times a second or more and may not be delayed: not by a mutex another thread
-//! holds, not by the allocator, not by the kernel. [`latest`] makes a latest-value cell: a reader that is slow misses
+//! The servo runs a thousand times a second or more and must not be delayed: not by a mutex another thread
+//! holds, not by the allocator, not by the kernel. [`latest`] makes a latest-value cell: a slow reader misses
 //! values, never the newest. Where every record counts (ticks for the recorder, commands for the servo) the host uses a
 //! bounded queue of the crate `rtrb`.
 //!
@@ -35,24 +35,24 @@
 //! assert_eq!(viewer.read(), Some((100, Sample { tick: 100, force_n: 0.5 })));
 //! ```
 //!
-//! # Why it is right
+//! # Memory ordering
 //!
 //! One atomic word is never torn, but neither the compiler nor the processor promises that another core sees
 //! *several* words change in the order in which they were written. Two tools restore just as much order as
 //! is needed:
 //!
-//! - A **release** store is a signature: whoever sees the signed value with an **acquire** load also sees
-//!   everything the signer wrote before it, and comes after everything the signer read before it.
+//! - A **release** store publishes: a thread that sees the stored value with an **acquire** load also sees
+//!   everything the writer wrote before it, and comes after everything the writer read before it.
 //! - A release or acquire **fence** does the same for all relaxed accesses on its far side, not for one word.
 //!
-//! Everything else is *relaxed*: atomic, and free. Each place where order matters says in a comment what
-//! would go wrong without it. On x86-64 all of these are ordinary moves; on aarch64 they cost an acquire
+//! All other accesses are *relaxed*: atomic, and free. Each place where order matters has a comment with the
+//! error that would occur without it. On x86-64 all of these are ordinary moves; on aarch64 they cost an acquire
 //! load, a release store or a barrier. Nothing is sequentially consistent: no decision here rests on the
 //! order of two words that different threads write.
 //!
-//! That the comments are true is not left to reading: `tests/loom.rs` runs them all under [loom],
+//! A test checks these comments: `tests/loom.rs` runs the cell under [loom],
 //! which tries every interleaving, and every stale value a core may still see in each. Each ordering was
-//! weakened in turn, and loom objected each time. Run it with
+//! weakened in turn, and loom failed each time. Run it with
 //!
 //! ```text
 //! RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom

@@ -1,4 +1,4 @@
-//! The atomics: the standard library's, or loom's when the interleavings are checked (`--cfg loom`).
+//! Atomics of the standard library, or of loom when the interleavings are checked (`--cfg loom`).
 
 #[cfg(not(loom))]
 pub(crate) use std::sync::{

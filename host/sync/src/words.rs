@@ -1,23 +1,23 @@
-//! Records as 64-bit words.
+//! Encoding of records as 64-bit words.
 //!
-//! Two threads may touch a record at the same moment only if every piece of it is atomic. Hardware does that
-//! for 64 bits at a time, so a record travels as words; that also keeps this crate free of `unsafe`.
+//! Two threads may access a record at the same moment only if every part of it is atomic. Hardware provides that
+//! for 64 bits at a time, so a record is stored as words; that also makes `unsafe` unnecessary in this crate.
 
 use crate::shim::{AtomicU64, Ordering};
 
-/// A plain record that can be written as `N` words and read back: numbers, bit patterns, flags.
+/// Plain record that can be encoded as `N` words and decoded again: numbers, bit patterns, flags.
 ///
 /// `from_words(&r.to_words())` must give `r` again. Both run in real-time code: keep them bounded, without
 /// allocation, and free of panics. `f64::to_bits` and `f64::from_bits` carry a float without loss.
 pub trait Words<const N: usize>: Sized {
-    /// The record as words.
+    /// Encodes the record as words.
     fn to_words(&self) -> [u64; N];
 
-    /// The record those words came from.
+    /// Decodes a record from words.
     fn from_words(words: &[u64; N]) -> Self;
 }
 
-/// Words as they are.
+/// Identity: words encode themselves.
 impl<const N: usize> Words<N> for [u64; N] {
     #[inline]
     fn to_words(&self) -> [u64; N] {
@@ -30,19 +30,19 @@ impl<const N: usize> Words<N> for [u64; N] {
     }
 }
 
-/// Room for one record. All accesses are relaxed: the owner's sequence says when they count.
+/// Storage of one record. All accesses are relaxed: the owner's sequence decides whether they count.
 #[derive(Debug)]
 pub(crate) struct AtomicWords<const N: usize> {
     words: [AtomicU64; N],
 }
 
 impl<const N: usize> AtomicWords<N> {
-    /// Not real-time.
+    /// Creates the storage with these words. Not real-time.
     pub(crate) fn new(words: [u64; N]) -> Self {
         Self { words: words.map(AtomicU64::new) }
     }
 
-    /// Real-time: bounded, no allocation.
+    /// Stores a record. Real-time: bounded, no allocation.
     // Out of line: inlined, the compiler loads a whole record before the first store and spills what the
     // registers cannot hold. For 38 words that is three times the code and a sixth slower.
     #[inline(never)]
@@ -52,7 +52,7 @@ impl<const N: usize> AtomicWords<N> {
         }
     }
 
-    /// Real-time: bounded, no allocation.
+    /// Loads the record. Real-time: bounded, no allocation.
     #[inline(never)] // for the same reason
     pub(crate) fn load(&self) -> [u64; N] {
         let mut words = [0; N];

@@ -1,4 +1,4 @@
-//! What differs between systems for a command: what asks a run to end, the terminal, standard output, other programs.
+//! Platform layer of commands: requests to end a run, the terminal, standard output, other programs.
 //!
 //! Each system has one module with the same items.
 
@@ -18,11 +18,11 @@ pub(crate) use system::{
     outlive_requests, results_apart, stack_limit_bytes,
 };
 
-/// What asks a run to end.
+/// Request to end a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Request {
-    /// In order, unless it is repeated.
+    /// Orderly end; repeated, an emergency stop.
     End,
-    /// At once.
+    /// Emergency stop.
     Emergency,
 }

@@ -31,22 +31,22 @@ pub const INTERRUPTED: i32 = 130;
 /// watchdog together, with the last force held.
 const ENDING: [i32; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP];
 
-/// Signals that suspend a process in the background which writes to its terminal or reads from it, the loop and its watchdog
-/// together: nobody takes them, so that the progress line is written, and a read fails.
+/// Signals that suspend a background process which writes to its terminal or reads from it, the loop and its watchdog
+/// together. They are blocked and never taken, so that the progress line is written, and a read fails.
 const SUSPENDING: [i32; 2] = [SIGTTIN, SIGTTOU];
 
-/// Signals that ask this process for something.
+/// Receiver of the signals that request an end.
 pub(crate) struct Requests {
     signals: Vec<i32>,
 }
 
 impl Requests {
-    /// Takes them from now on, in this thread and all that it starts. Not real-time.
+    /// Blocks and collects the signals from now on, in this thread and all that it starts. Not real-time.
     ///
     /// # Errors
-    /// What the system says.
+    /// Errors of the system.
     pub(crate) fn listen(stop: &StopSwitch) -> io::Result<Self> {
-        // Started with `nohup`, a run is to outlive its terminal.
+        // Started with `nohup`, a run must outlive its terminal.
         let signals: Vec<i32> = ENDING
             .into_iter()
             .filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP))
@@ -55,7 +55,7 @@ impl Requests {
         block_signals(&[&signals[..], &SUSPENDING].concat())?;
         // This thread may wait for a processor while a plugin in the loop keeps it busy.
         leave_sent_signals_to_the_loop()?;
-        // A thread that does not block them, because a library has unblocked them, does no harm when it takes one.
+        // A thread in which a library has unblocked the signals sets these flags when it takes one.
         for signal in &signals {
             let flag = if *signal == SIGUSR1 { stop.emergency_flag() } else { stop.stop_flag() };
             flag::register(*signal, flag)?;
@@ -65,28 +65,28 @@ impl Requests {
         Ok(Self { signals })
     }
 
-    /// The next one; `None` after `patience`. Not real-time.
+    /// Waits for the next request; `None` after `patience`. Not real-time.
     pub(crate) fn next(&self, patience: Duration) -> Option<Request> {
         let signal = wait_for_signal(&self.signals, patience)?;
         Some(if signal == SIGUSR1 { Request::Emergency } else { Request::End })
     }
 }
 
-/// From now on nothing asks this process to end, in this thread and all that it starts. Not real-time.
+/// Blocks all requests to end this process, in this thread and all that it starts. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the system.
 pub(crate) fn outlive_requests() -> io::Result<()> {
     let signals = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGXFSZ];
     block_signals(&[&ENDING[..], &SUSPENDING, &signals].concat())
 }
 
-/// Returns the limit of the first thread's stack; none where it has none.
+/// Returns the limit of the first thread's stack, bytes; `None` if it is unlimited.
 pub(crate) fn stack_limit_bytes() -> Option<u64> {
     getrlimit(Resource::Stack).current
 }
 
-/// Whether this process was started with a signal ignored.
+/// Returns true if this process was started with a signal ignored.
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
@@ -94,13 +94,13 @@ fn is_ignored(signal: i32) -> bool {
     (ignored >> (signal - 1)) & 1 == 1 // the lowest bit is signal 1
 }
 
-/// The terminal, which gives keys without a line end while this lives.
+/// Terminal in a mode that delivers keys without a line end, until this is dropped.
 pub(crate) struct KeyTerminal {
     before: Termios,
 }
 
 impl KeyTerminal {
-    /// `None` where there is no terminal: in a pipe, in the background.
+    /// Switches the terminal to single keys; `None` without a terminal: in a pipe, in the background.
     pub(crate) fn take() -> Option<Self> {
         let terminal = stdin();
         // In the background the terminal is another program's.
@@ -124,27 +124,27 @@ impl Drop for KeyTerminal {
     }
 }
 
-/// Whether the terminal's keys go to this process.
+/// Returns true if the terminal's keys go to this process.
 fn is_in_foreground() -> bool {
     tcgetpgrp(stdin()).is_ok_and(|group| group == getpgrp())
 }
 
-/// Standard output, kept for the caller alone: who writes there from now on writes to standard error. Not real-time.
+/// Returns standard output for the caller alone, and redirects all other output there to standard error. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the system.
 pub(crate) fn results_apart() -> io::Result<File> {
     let own = rustix::io::fcntl_dupfd_cloexec(io::stdout(), 3)?;
     rustix::stdio::dup2_stdout(io::stderr())?;
     Ok(File::from(own))
 }
 
-/// Replaces this process by a program; why it could not.
+/// Replaces this process by a program; returns only on an error.
 pub(crate) fn become_program(command: &mut Command) -> io::Error {
     command.exec()
 }
 
-/// Asks a process to end in order.
+/// Sends a process the request to end in order.
 pub(crate) fn ask_to_end(child: &mut Child) {
     let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
     let _ = process.map(|process| kill_process(process, Signal::TERM));

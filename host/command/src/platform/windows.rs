@@ -17,7 +17,7 @@ use windows_sys::Win32::System::Console::{
     SetConsoleMode, SetStdHandle,
 };
 
-/// Returns the limit of the first thread's stack: none, the program's file has its size.
+/// Returns the limit of the first thread's stack: none, because the program file defines its size.
 pub(crate) fn stack_limit_bytes() -> Option<u64> {
     None
 }
@@ -39,31 +39,31 @@ pub(crate) fn is_orphaned() -> bool {
     false
 }
 
-/// Ends this process, which no signal does here.
+/// Ends this process; Windows has no signal for that.
 pub(crate) fn die_by(_: i32) -> ! {
     std::process::exit(INTERRUPTED)
 }
 
-/// Exit code after a third request, when nothing else has ended the process: that of a program that Ctrl-C has ended
+/// Exit code after a third request, when nothing else has ended the process: that of a program ended by Ctrl-C
 /// (`STATUS_CONTROL_C_EXIT`).
 pub const INTERRUPTED: i32 = 0xc000_013a_u32.cast_signed();
 
-/// How long a console that closes waits: the system ends the process 5 s after it asked.
+/// Time that a closing console waits: the system ends the process 5 s after the event.
 const CLOSING: Duration = Duration::from_secs(5);
 
-/// Who is told what the console sends.
+/// Sender of the console's events.
 static TOLD: Mutex<Option<Sender<Request>>> = Mutex::new(None);
 
-/// Events of the console that ask this process for something.
+/// Receiver of the console's events that request an end.
 pub(crate) struct Requests {
     events: Receiver<Request>,
 }
 
 impl Requests {
-    /// Takes them from now on. Not real-time.
+    /// Collects the events from now on. Not real-time.
     ///
     /// # Errors
-    /// What the system says.
+    /// Errors of the system.
     pub(crate) fn listen(_: &StopSwitch) -> io::Result<Self> {
         let (tell, events) = channel();
         *TOLD.lock().unwrap_or_else(PoisonError::into_inner) = Some(tell);
@@ -71,7 +71,7 @@ impl Requests {
         Ok(Self { events })
     }
 
-    /// The next one; `None` after `patience`. Not real-time.
+    /// Waits for the next request; `None` after `patience`. Not real-time.
     pub(crate) fn next(&self, patience: Duration) -> Option<Request> {
         self.events.recv_timeout(patience).ok()
     }
@@ -87,7 +87,7 @@ fn handle(handler: Handler) -> io::Result<()> {
     }
 }
 
-/// Called in a thread of its own. The answer 1: nobody else has to know.
+/// Handles a console event, in a thread of its own; returns 1, so that no other handler runs.
 unsafe extern "system" fn on_event(event: u32) -> i32 {
     let request = if event == CTRL_BREAK_EVENT { Request::Emergency } else { Request::End };
     if let Some(tell) = &*TOLD.lock().unwrap_or_else(PoisonError::into_inner) {
@@ -104,21 +104,21 @@ unsafe extern "system" fn on_event_of_others(_: u32) -> i32 {
     1
 }
 
-/// From now on nothing that the console sends ends this process. Not real-time.
+/// Ignores all events of the console that would end this process. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the system.
 pub(crate) fn outlive_requests() -> io::Result<()> {
     handle(on_event_of_others)
 }
 
-/// The console, which gives keys without a line end while this lives.
+/// Console in a mode that delivers keys without a line end, until this is dropped.
 pub(crate) struct KeyTerminal {
     before: CONSOLE_MODE,
 }
 
 impl KeyTerminal {
-    /// `None` where there is no console: in a pipe.
+    /// Switches the console to single keys; `None` without a console: in a pipe.
     pub(crate) fn take() -> Option<Self> {
         if !stdin().is_terminal() {
             return None;
@@ -142,11 +142,11 @@ fn set_mode(mode: CONSOLE_MODE) -> bool {
     unsafe { SetConsoleMode(GetStdHandle(STD_INPUT_HANDLE), mode) != 0 }
 }
 
-/// Standard output, kept for the caller alone: who writes there from now on writes to standard error. A C library that has
-/// taken the handle before keeps it. Not real-time.
+/// Returns standard output for the caller alone, and redirects all other output there to standard error. A C library that has
+/// read the handle before still writes to it. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the system.
 pub(crate) fn results_apart() -> io::Result<File> {
     let own = io::stdout().as_handle().try_clone_to_owned()?;
     // SAFETY: a handle of this process, which stays open as long as it lives.
@@ -156,9 +156,9 @@ pub(crate) fn results_apart() -> io::Result<File> {
     }
 }
 
-/// Runs a program in place of this one, which waits, and ends with its exit code; why it could not.
+/// Runs a program in place of this one, which waits, and ends with its exit code; returns only on an error.
 pub(crate) fn become_program(command: &mut Command) -> io::Error {
-    // What the console sends is the program's affair.
+    // Events of the console are for the program.
     let ran = handle(on_event_of_others).and_then(|()| command.status());
     match ran {
         Ok(status) => std::process::exit(status.code().unwrap_or(1)),
@@ -166,7 +166,7 @@ pub(crate) fn become_program(command: &mut Command) -> io::Error {
     }
 }
 
-/// Ends a process: it cannot be asked.
+/// Kills a process: Windows has no request to end.
 pub(crate) fn ask_to_end(child: &mut Child) {
     let _ = child.kill();
 }

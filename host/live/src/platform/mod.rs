@@ -1,4 +1,4 @@
-//! What differs between systems: the sockets of a run, who may enter their folder, and which socket is dead.
+//! Platform layer of the live protocol: the sockets of a run, permissions of their folder, and detection of closed sockets.
 //!
 //! Each system has one module with the same items.
 

@@ -12,16 +12,16 @@ use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Where a datagram comes from.
+/// Sender of a datagram.
 pub(crate) use std::os::unix::net::SocketAddr as Address;
 use std::os::unix::net::UnixListener;
-/// A connection.
+/// Connection between client and host.
 pub(crate) use std::os::unix::net::UnixStream as Stream;
 
-/// Nobody but the owner.
+/// Mode of a folder that only its owner may enter.
 const PRIVATE: u32 = 0o700;
 
-/// The folder of the runs of this user, where the system names none.
+/// Returns the folder for the runs of this user, if the system defines none.
 pub(crate) fn run_folder() -> PathBuf {
     std::env::temp_dir().join(format!("flotor-{}", getuid().as_raw()))
 }
@@ -31,30 +31,30 @@ pub(crate) fn is_out_of_descriptors(cause: &io::Error) -> bool {
     matches!(Errno::from_io_error(cause), Some(Errno::MFILE | Errno::NFILE))
 }
 
-/// Makes a folder that only this user may enter, if it is not there.
+/// Creates a folder that only this user may enter, if necessary.
 pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
     DirBuilder::new().recursive(true).mode(PRIVATE).create(path)
 }
 
-/// Whether this is a folder of this user.
+/// Returns true for a folder of this user.
 pub(crate) fn is_ours(attributes: &Metadata) -> bool {
     attributes.is_dir() && attributes.uid() == getuid().as_raw()
 }
 
-/// Whether this is a folder that only this user may enter.
+/// Returns true for a folder that only this user may enter.
 pub(crate) fn is_ours_alone(attributes: &Metadata) -> bool {
     is_ours(attributes) && attributes.mode() & 0o077 == 0
 }
 
-/// A file that is made will be this user's alone.
+/// Restricts a file to be created to this user.
 pub(crate) fn private_file(options: &mut OpenOptions) -> &mut OpenOptions {
     options.mode(0o600)
 }
 
-/// Removes the file of a socket that no process has open; true if there was none. A process number says nothing: containers that
-/// share the folder each have their own.
+/// Removes the file of a socket that no process has open; returns true if so. The process id is not used: containers that
+/// share the folder have separate ids.
 pub(crate) fn remove_if_dead(path: &Path) -> bool {
-    // Finds the socket whatever its type, and makes no connection to one that listens.
+    // Works for sockets of any type, and makes no connection to one that listens.
     let probed = UnixDatagram::unbound().and_then(|probe| probe.connect(path));
     let is_dead = probed.is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused);
     if is_dead {
@@ -63,27 +63,27 @@ pub(crate) fn remove_if_dead(path: &Path) -> bool {
     is_dead
 }
 
-/// Reads from a place of a file; what is beyond its end stays as it was.
+/// Reads from an offset of a file; bytes beyond its end are not changed.
 pub(crate) fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<usize> {
     FileExt::read_at(file, bytes, offset)
 }
 
-/// Overwrites a place of a file.
+/// Overwrites bytes at an offset of a file.
 pub(crate) fn write_all_at(file: &File, bytes: &[u8], offset: u64) -> io::Result<()> {
     FileExt::write_all_at(file, bytes, offset)
 }
 
-/// Whether both are one file.
+/// Returns true if both are the same file.
 pub(crate) fn is_same_file(one: &Metadata, other: &Metadata) -> bool {
     (one.dev(), one.ino()) == (other.dev(), other.ino())
 }
 
-/// Connects to the run behind a file.
+/// Connects to the run of a socket file.
 pub(crate) fn connect(path: &Path) -> io::Result<Stream> {
     Stream::connect(path)
 }
 
-/// The same without waiting for a run that accepts nothing; the connection waits for nothing either.
+/// Connects without waiting for a run that accepts no connections; the connection is non-blocking.
 pub(crate) fn connect_now(path: &Path) -> io::Result<Stream> {
     let socket = rustix::net::socket(AddressFamily::UNIX, SocketType::STREAM, None)?;
     let stream = Stream::from(socket);
@@ -92,19 +92,19 @@ pub(crate) fn connect_now(path: &Path) -> io::Result<Stream> {
     Ok(stream)
 }
 
-/// Accepts the connections of clients until it is closed.
+/// Listening socket that accepts connections of clients until it is closed.
 #[derive(Debug)]
 pub(crate) struct Listening {
     socket: UnixListener,
-    /// Readable once it is closed.
+    /// End of a pair that becomes readable on [`close`](Self::close).
     closed: Stream,
     close: Stream,
-    /// Reserves a descriptor for a client of a process that has none left.
+    /// Descriptor reserved for a client of a process without free ones.
     spare: Mutex<Option<UnixListener>>,
 }
 
 impl Listening {
-    /// Makes the socket and its file.
+    /// Creates the socket and its file.
     pub(crate) fn bind(path: &Path) -> io::Result<Self> {
         let (closed, close) = Stream::pair()?;
         let socket = UnixListener::bind(path)?;
@@ -133,7 +133,7 @@ impl Listening {
             match self.socket.accept() {
                 Ok((stream, _)) => return stream.set_nonblocking(false).map(|()| Some(stream)),
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-                // Again with the descriptor that was reserved.
+                // Retries with the descriptor that was reserved.
                 Err(_) if spare.take().is_some() => {}
                 Err(error) => return Err(error),
             }
@@ -141,28 +141,28 @@ impl Listening {
     }
 }
 
-/// Whether the client has closed its end without a request.
+/// Returns true if the client has closed its end without a request.
 pub(crate) fn has_left(stream: &Stream) -> bool {
     let peeked = recv(stream, &mut [0; 1], RecvFlags::PEEK | RecvFlags::DONTWAIT);
     peeked.is_ok_and(|(_, available)| available == 0)
 }
 
-/// A socket for datagrams, with the name of a file.
+/// Datagram socket with the name of a file.
 #[derive(Debug)]
 pub(crate) struct Datagrams(UnixDatagram);
 
 impl Datagrams {
-    /// Makes it. It waits for nothing, both ways: the system's time-outs are some milliseconds long, whatever is asked for.
+    /// Creates a non-blocking socket: timeouts of the system last some milliseconds at least.
     pub(crate) fn bind(path: &Path) -> io::Result<Self> {
         UnixDatagram::bind(path).and_then(|socket| socket.set_nonblocking(true).map(|()| Self(socket)))
     }
 
-    /// Sends to the socket of another name.
+    /// Sends a datagram to the socket with this path.
     pub(crate) fn send_to(&self, bytes: &[u8], path: &Path) -> io::Result<usize> {
         self.0.send_to(bytes, path)
     }
 
-    /// The next datagram: its length, and where it comes from.
+    /// Receives the next datagram; returns its length and sender.
     pub(crate) fn recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, Address)> {
         self.0.recv_from(buffer)
     }

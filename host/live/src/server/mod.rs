@@ -1,12 +1,12 @@
-//! The serving end: lets other programs on this machine watch a run and ask for changes.
+//! Server: lets other programs on this machine observe a run and request changes.
 //!
 //! ```text
 //!  Publication::observe -> outbox of each watcher -> its writer thread -> socket -> watcher
 //!  Serve::serve         <-                           its reader thread <- socket <- watcher
 //! ```
 //!
-//! Nothing here makes the caller wait: an outbox that is full drops what is new and counts it, but keeps the newest change of
-//! each parameter. While nobody watches, a tick costs one look at a number. Not real-time.
+//! The caller never waits: a full outbox drops new frames and counts them, except the newest change of
+//! each parameter. Without clients, a tick costs one load of a number. Not real-time.
 
 mod outbox;
 mod watcher;
@@ -30,71 +30,71 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use watcher::Watcher;
 
-/// Programs that watch one run at a time: every one costs two threads and a queue.
+/// Largest number of programs that watch one run: each costs two threads and a queue.
 const MOST_WATCHERS: usize = 16;
-/// Connections at a time. There is always one that does not watch: the one that was silent for longest makes room for a new
-/// one, so that an emergency stop finds a place whoever is connected.
+/// Largest number of connections. At least one of them does not watch: the one silent for longest is closed in favour of a new
+/// one, so that an emergency stop always finds a place.
 const MOST_CONNECTIONS: usize = MOST_WATCHERS + 4;
-/// Connections beyond those whose threads may be ending at a time.
+/// Largest number of further connections whose threads are ending.
 const MOST_CLOSING: usize = MOST_CONNECTIONS / 2;
-/// Stack of the threads here, bytes. With locked memory every page of it is real.
+/// Stack size of the threads of the server, bytes: small, because locked memory makes every page of it resident.
 const STACK_BYTES: usize = 256 * 1024;
-/// Time for a client to read the end of a run, and for its requests to be answered.
+/// Grace period for a client to read the end of a run, and for its requests to be answered.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// Limit on the end of all connections together, beyond the time of the clients.
+/// Timeout of the end of all connections together, beyond the grace period of the clients.
 const END_WAIT: Duration = Duration::from_millis(1000);
-/// Pause after a connection that failed for lack of something (descriptors, mostly), and the longest wait for threads to end.
+/// Pause after a connection that failed for want of resources (mostly descriptors), and longest wait for threads to end.
 const BREATH: Duration = Duration::from_millis(10);
 
-/// Why a run cannot be watched.
+/// Reason why other programs cannot observe a run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PublishError {
-    /// There is no place for the socket.
+    /// The socket cannot be created.
     #[error(transparent)]
     Directory(#[from] DirectoryError),
-    /// No thread, or no second handle to the socket.
+    /// A thread or a second handle to the socket is refused.
     #[error("cannot start the telemetry threads: {0}")]
     Thread(#[from] io::Error),
 }
 
-/// Who does what watchers ask for: the host itself, or somebody who carries it there.
+/// Handler of clients' requests: the host itself, or a proxy that forwards them.
 pub trait Serve: Send + Sync {
-    /// Does it, or passes it on; called from the thread of the watcher, who alone waits for it. Watching itself is never asked
-    /// of it.
+    /// Carries out a request, or passes it on; called in the thread of the client, who alone waits for it. [`Ask::Watch`] and
+    /// [`Ask::LookAway`] are never passed.
     ///
     /// # Errors
-    /// What is wrong, and why not in words for people.
+    /// Kind of reason for a rejection, and the reason in words for people.
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)>;
 }
 
-/// A run that others may watch; over when dropped.
+/// Publication of a run to other programs; ends when dropped.
 pub struct Publication {
     shared: Arc<Shared>,
     acceptor: Option<JoinHandle<()>>,
     listener: Listener,
 }
 
-/// What all threads of a publication know.
+/// State shared by all threads of a publication.
 struct Shared {
     watchers: Mutex<Vec<Watcher>>,
-    /// Clients that left or were evicted, until their threads have ended.
+    /// Clients that have disconnected or were evicted, until their threads have ended.
     closing: Mutex<Vec<Watcher>>,
-    /// How many watchers want ticks: all that is looked at in a tick.
+    /// Number of clients that watch: all that a tick reads without any.
     watching: AtomicUsize,
     greeting: Mutex<Greeting>,
     run: Vec<u8>,
     host: Arc<dyn Serve>,
-    /// Where clients that watch ask for the outputs that they are shown.
+    /// Demand for the outputs that watching clients are shown.
     demand: ObserverDemand,
     started: Instant,
 }
 
 impl Publication {
-    /// Lets a run be found and watched. While a client watches, all outputs of the models are asked for at `demand`.
+    /// Publishes a run. While a client watches, it requests all outputs of the models at `demand`.
     ///
     /// # Errors
-    /// [`PublishError`]; the run goes on without.
+    /// If the socket or a thread cannot be created; the run goes on without.
     pub fn open(
         directory: &Directory,
         greeting: Greeting,
@@ -118,13 +118,13 @@ impl Publication {
         Ok(Self { shared, acceptor: Some(acceptor), listener })
     }
 
-    /// The socket others connect to.
+    /// Returns the socket that clients connect to.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.listener.path()
     }
 
-    /// One tick, in order. Does not wait for anybody.
+    /// Sends a tick to the watching clients, in order. Does not wait.
     pub fn observe(&self, record: &TickRecord) {
         if self.shared.watching.load(Ordering::Relaxed) == 0 {
             return;
@@ -134,7 +134,7 @@ impl Publication {
         }
     }
 
-    /// A parameter that changed, before the tick that saw it first. Does not wait for anybody.
+    /// Sends a change to all clients, before the first tick that uses it. Does not wait.
     pub fn change(&self, change: &Change) {
         let message = ChangeMessage::from(change);
         self.shared.greeting().keep(&message);
@@ -175,7 +175,7 @@ impl Shared {
         self.greeting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Time since the publication began, ms.
+    /// Returns the time since the publication began, ms.
     fn now_ms(&self) -> u64 {
         u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
@@ -194,12 +194,12 @@ impl Shared {
         }
     }
 
-    /// Keeps a client until its threads have ended.
+    /// Stores a client until its threads have ended.
     fn close(&self, watcher: Watcher) {
         self.closing.lock().unwrap_or_else(PoisonError::into_inner).push(watcher);
     }
 
-    /// Lets one more watch, unless too many do.
+    /// Starts sending ticks to one more client, unless too many watch.
     fn admit(&self, outbox: &Outbox, every: u32) -> Result<(), String> {
         let watchers = self.watchers();
         if !outbox.wants_ticks() && self.watching.load(Ordering::Relaxed) >= MOST_WATCHERS {
@@ -210,14 +210,14 @@ impl Shared {
         Ok(())
     }
 
-    /// Counts who wants ticks, after somebody changed their mind or left.
+    /// Updates the number of watching clients, after one has started, stopped or disconnected.
     fn count(&self, watchers: &[Watcher]) {
         let watching = watchers.iter().filter(|watcher| watcher.outbox.wants_ticks()).count();
         self.watching.store(watching, Ordering::Relaxed);
     }
 }
 
-/// Lets watchers in until the run is over.
+/// Accepts clients until the run is over.
 fn accept(socket: &Listening, shared: &Arc<Shared>) {
     loop {
         match socket.accept() {
@@ -225,7 +225,7 @@ fn accept(socket: &Listening, shared: &Arc<Shared>) {
             Ok(Some(stream)) => welcome(stream, shared),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(_) => {
-                // A client that asks for nothing may hold the descriptor that is missing.
+                // A client without requests may hold the descriptor that is missing.
                 if shared.has_room_to_close() {
                     evict_longest_silent(&mut shared.watchers(), shared);
                 }
@@ -235,7 +235,7 @@ fn accept(socket: &Listening, shared: &Arc<Shared>) {
     }
 }
 
-/// Serves a connection, or closes it where threads or places are missing.
+/// Serves a connection, or closes it if threads or places are missing.
 fn welcome(stream: Stream, shared: &Arc<Shared>) {
     if has_left(&stream) || !shared.has_room_to_close() {
         return;
@@ -250,7 +250,7 @@ fn welcome(stream: Stream, shared: &Arc<Shared>) {
     let Ok(greeting) = serde_json::to_vec(&*shared.greeting()) else { return };
     outbox.push(frame(Kind::Greeting, &greeting));
     outbox.push(frame(Kind::Run, &shared.run));
-    // With the list locked, so that no change is told between greeting and list.
+    // With the list locked, so that no change is sent between greeting and list.
     watchers.extend(Watcher::start(stream, outbox, shared));
 }
 
@@ -262,7 +262,7 @@ fn evict_longest_silent(watchers: &mut Vec<Watcher>, shared: &Shared) -> bool {
     evicted.inspect(Watcher::evict).map(|watcher| shared.close(watcher)).is_some()
 }
 
-/// Waits for the end of a thread until then; one that goes on is left to itself.
+/// Waits for the end of a thread until the deadline, then detaches it.
 fn join_until(thread: JoinHandle<()>, until: Instant) {
     while !thread.is_finished() && Instant::now() < until {
         std::thread::sleep(Duration::from_millis(1));
@@ -272,7 +272,7 @@ fn join_until(thread: JoinHandle<()>, until: Instant) {
     }
 }
 
-/// A thread of this module.
+/// Returns a builder for a thread of the server.
 fn thread(name: &str) -> std::thread::Builder {
     std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_BYTES)
 }

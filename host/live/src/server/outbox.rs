@@ -1,4 +1,4 @@
-//! What waits to be sent to one watcher: a queue of fixed length that drops and counts.
+//! Outbox of one client: a queue of fixed length that drops and counts.
 
 use crate::{ChangeMessage, Kind, frame, ticks_to_payload};
 use flotor_core::demand::DemandRequest;
@@ -7,10 +7,10 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Ticks that wait at most: four seconds at 1 kHz.
+/// Largest number of pending ticks: four seconds at 1 kHz.
 const MOST_TICKS: usize = 4096;
-/// Everything else that waits at most, but for the newest change of each parameter. A watcher who asks this often and reads nothing gets
-/// no answer.
+/// Largest number of other pending frames, except the newest change of each parameter. A client that sends this many requests and reads
+/// nothing gets no more answers.
 const MOST_FRAMES: usize = 256;
 
 #[derive(Default)]
@@ -19,36 +19,36 @@ pub(super) struct Outbox {
     changed: Condvar,
 }
 
-/// A frame that waits among the ticks.
+/// Pending frame between ticks.
 struct WaitingFrame {
-    /// How many of the ticks that wait go out before it.
+    /// Number of pending ticks that are sent before it.
     ticks_before: usize,
-    /// What it says, if it is a change.
+    /// Content, if it is a change.
     change: Option<Arc<ChangeMessage>>,
     bytes: Vec<u8>,
 }
 
 #[derive(Default)]
 struct State {
-    /// In order.
+    /// Pending ticks, in order.
     ticks: Vec<TickRecord>,
-    /// In the order in which they came: a change goes out before the tick that saw it first, and after the one before. Apart from the
-    /// ticks, which are many, so that the earlier change of the same is found without looking through them.
+    /// Other pending frames, in order: a change is sent before the first tick that uses it, and after the tick before. Separate from
+    /// the many ticks, so that an earlier change of the same parameter is found without searching them.
     frames: VecDeque<WaitingFrame>,
     dropped: u64,
-    /// What goes out after everything else.
+    /// Last frame, sent after all others.
     last: Option<Vec<u8>>,
-    /// One tick in so many; none while 0.
+    /// Interval of sent ticks, in ticks; 0 for none.
     every: u32,
-    /// Asks for the outputs of models while ticks are wanted.
+    /// Request for the outputs of models, while the client watches.
     request: Option<DemandRequest>,
-    /// What happened in the ticks between.
+    /// Events of the ticks skipped since the last sent one.
     passed: Events,
     is_closed: bool,
 }
 
 impl State {
-    /// A frame after all that waits.
+    /// Appends a frame after all pending ones.
     fn append(&mut self, change: Option<Arc<ChangeMessage>>, bytes: Vec<u8>) {
         let ticks_before = self.ticks.len();
         self.frames.push_back(WaitingFrame { ticks_before, change, bytes });
@@ -60,14 +60,14 @@ impl Outbox {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes one tick in `every` from now on, with the outputs of models that `request` asks for.
+    /// Sends one tick in `every` from now on, and holds the `request` for outputs of models.
     pub(super) fn want_ticks(&self, every: u32, request: DemandRequest) {
         let mut state = self.lock();
         (state.every, state.request) = (every, Some(request));
         state.ticks.reserve_exact(MOST_TICKS);
     }
 
-    /// Takes no tick from now on, and asks for no output of models.
+    /// Sends no more ticks, and withdraws the request for outputs of models.
     pub(super) fn want_no_ticks(&self) {
         let mut state = self.lock();
         (state.every, state.request) = (0, None);
@@ -77,7 +77,7 @@ impl Outbox {
         self.lock().every > 0
     }
 
-    /// A tick, if it is wanted and there is room.
+    /// Appends a tick, if it is wanted and there is room.
     pub(super) fn tick(&self, record: &TickRecord) {
         let mut state = self.lock();
         if state.every == 0 || state.is_closed {
@@ -97,8 +97,8 @@ impl Outbox {
         self.changed.notify_one();
     }
 
-    /// A change; without room, in the place of the earliest one of the same that waits. One of each is never dropped, so that a watcher
-    /// who reads nothing for a while knows afterwards what is in force.
+    /// Appends a change; without room, in place of the earliest pending one of the same parameter. One of each is never dropped, so
+    /// that a client which reads nothing for a while knows the present values afterwards.
     pub(super) fn change(&self, message: Arc<ChangeMessage>, frame: Vec<u8>) {
         let mut state = self.lock();
         if state.is_closed {
@@ -117,7 +117,7 @@ impl Outbox {
         self.changed.notify_one();
     }
 
-    /// A frame that is neither tick nor change, if there is room.
+    /// Appends a frame that is neither tick nor change, if there is room.
     pub(super) fn push(&self, frame: Vec<u8>) {
         let mut state = self.lock();
         if state.frames.len() < MOST_FRAMES && !state.is_closed {
@@ -127,7 +127,7 @@ impl Outbox {
         self.changed.notify_one();
     }
 
-    /// The last frame of all; nothing is taken in after it.
+    /// Appends the last frame of all and closes the outbox.
     pub(super) fn last(&self, frame: Vec<u8>) {
         let mut state = self.lock();
         if !state.is_closed {
@@ -138,7 +138,7 @@ impl Outbox {
         self.changed.notify_one();
     }
 
-    /// Takes nothing in any more; what waits may still go out.
+    /// Rejects all further frames; pending ones may still be sent.
     pub(super) fn close(&self) {
         self.lock().is_closed = true;
         self.changed.notify_one();
@@ -148,13 +148,13 @@ impl Outbox {
         self.lock().is_closed
     }
 
-    /// Waits for this long, or until it is closed.
+    /// Waits for this long, or until the outbox is closed.
     pub(super) fn pause(&self, period: Duration) {
         let state = self.lock();
         let _ = self.changed.wait_timeout_while(state, period, |state| !state.is_closed);
     }
 
-    /// Waits for something to send, and takes all of it; `None` when closed and empty.
+    /// Waits for pending frames and takes all of them; `None` when closed and empty.
     pub(super) fn take(&self) -> Option<Vec<u8>> {
         let mut state = self.lock();
         while state.ticks.is_empty() && state.frames.is_empty() {
@@ -164,10 +164,10 @@ impl Outbox {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         let mut batch = Batch::new(state.dropped);
-        // The room for ticks stays where it is.
+        // The queue of ticks retains its capacity.
         let ticks: Vec<TickRecord> = state.ticks.drain(..).collect();
         let frames = std::mem::take(&mut state.frames);
-        // Whoever brings the next tick does not wait for this one to be written down.
+        // The caller with the next tick does not wait for the encoding of this one.
         drop(state);
         let mut ticks = ticks.into_iter();
         let mut sent = 0;
@@ -181,7 +181,7 @@ impl Outbox {
     }
 }
 
-/// Frames being put together: ticks share one for as long as nothing else comes between them.
+/// Encoder of pending frames: ticks share a frame as long as no other frame is between them.
 struct Batch {
     bytes: Vec<u8>,
     ticks: Vec<TickRecord>,
@@ -189,7 +189,7 @@ struct Batch {
 }
 
 impl Batch {
-    /// Ticks in a frame.
+    /// Largest number of ticks in a frame.
     const MOST_IN_A_FRAME: usize = 1024;
 
     fn new(dropped: u64) -> Self {

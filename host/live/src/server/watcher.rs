@@ -1,4 +1,4 @@
-//! One watcher: a thread that writes what waits, a thread that reads what is asked for.
+//! Connection of one client: a thread that writes pending frames, and a thread that reads requests.
 
 use super::outbox::Outbox;
 use super::{PATIENCE, Shared, join_until, thread};
@@ -11,25 +11,25 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Pause between two batches: a watcher draws at most a hundred pictures a second.
+/// Pause between two batches: a client draws at most a hundred pictures a second.
 const BATCH_PERIOD: Duration = Duration::from_millis(10);
-/// How long a write may wait before the writer looks whether the run is over.
+/// Timeout of a write, after which the writer checks whether the run is over.
 const WRITE_WAIT: Duration = Duration::from_millis(100);
-/// Pause after each request: a flood is throttled to a thousand a second and holds up only its sender.
+/// Pause after each request: limits a flood to a thousand a second, and delays only its sender.
 const REQUEST_PERIOD: Duration = Duration::from_millis(1);
 
 pub(super) struct Watcher {
     pub(super) outbox: Arc<Outbox>,
-    /// Shared with its threads: one descriptor for each client.
+    /// Connection, shared with its threads: one descriptor for each client.
     stream: Arc<Stream>,
     writer: JoinHandle<()>,
     reader: JoinHandle<()>,
-    /// When it came or asked for something last, ms.
+    /// Time of the connection or the last request, ms.
     heard_ms: Arc<AtomicU64>,
 }
 
 impl Watcher {
-    /// Serves a connection; `None` if there is no thread to be had.
+    /// Serves a connection; `None` if the system refuses a thread.
     pub(super) fn start(stream: Stream, outbox: Arc<Outbox>, shared: &Arc<Shared>) -> Option<Self> {
         stream.set_write_timeout(Some(WRITE_WAIT)).ok()?;
         let stream = Arc::new(stream);
@@ -40,7 +40,7 @@ impl Watcher {
         let heard = Arc::clone(&heard_ms);
         let reader = thread("flotor-live-in").spawn(move || {
             read(&to_read, &for_reader, &of_run, &heard);
-            // The watcher has gone or talks nonsense: the writer ends, too.
+            // The client has closed the connection or sends malformed frames: the writer ends, too.
             for_reader.want_no_ticks();
             for_reader.close();
             of_run.count(&of_run.watchers());
@@ -54,22 +54,22 @@ impl Watcher {
         }
     }
 
-    /// True if nobody is at the other end any more.
+    /// Returns true if the client has closed its end.
     pub(super) fn is_gone(&self) -> bool {
         self.outbox.is_closed()
     }
 
-    /// When it came or asked for something last, ms since the publication began.
+    /// Returns the time of the connection or the last request, ms since the publication began.
     pub(super) fn heard_ms(&self) -> u64 {
         self.heard_ms.load(Ordering::Relaxed)
     }
 
-    /// Takes no further request; its threads end by themselves, after those that have arrived are answered.
+    /// Reads no further request; the threads end after the requests that have arrived are answered.
     pub(super) fn evict(&self) {
         let _ = self.stream.shutdown(Shutdown::Read);
     }
 
-    /// Whether both threads are at their end.
+    /// Returns true if both threads have ended.
     pub(super) fn has_ended(&self) -> bool {
         self.writer.is_finished() && self.reader.is_finished()
     }
@@ -80,16 +80,16 @@ impl Watcher {
         let _ = self.reader.join();
     }
 
-    /// Sends what waits to a client that reads it within [`PATIENCE`], and closes the connection.
+    /// Sends pending frames to a client that reads them within [`PATIENCE`], and closes the connection.
     pub(super) fn finish(self, until: Instant) {
         join_until(self.writer, until);
         let _ = self.stream.shutdown(Shutdown::Both);
-        // It may be at a request whose answer takes its time.
+        // The reader may be at a request whose answer takes a while.
         join_until(self.reader, until.min(Instant::now() + PATIENCE));
     }
 }
 
-/// Writes until the outbox is closed and empty, or nobody reads.
+/// Writes frames until the outbox is closed and empty, or the client has closed its end.
 fn write(stream: &Stream, outbox: &Outbox) {
     while let Some(bytes) = outbox.take() {
         if !write_whole(stream, &bytes, outbox) {
@@ -98,11 +98,11 @@ fn write(stream: &Stream, outbox: &Outbox) {
         outbox.pause(BATCH_PERIOD);
     }
     outbox.want_no_ticks();
-    // A reader sees the end when it has read all of it.
+    // The client sees the end of the stream after all frames.
     let _ = stream.shutdown(Shutdown::Write);
 }
 
-/// True when all is written; a frozen watcher is waited for as long as the run lasts, and a little longer.
+/// Returns true when all is written; waits for a frozen client as long as the run lasts, and for [`PATIENCE`] after.
 fn write_whole(mut stream: &Stream, mut bytes: &[u8], outbox: &Outbox) -> bool {
     let mut closed_since: Option<Instant> = None;
     while !bytes.is_empty() {
@@ -120,7 +120,7 @@ fn write_whole(mut stream: &Stream, mut bytes: &[u8], outbox: &Outbox) -> bool {
     true
 }
 
-/// Does what is asked for until the watcher goes.
+/// Answers requests until the client closes the connection.
 fn read(mut stream: &Stream, outbox: &Outbox, shared: &Shared, heard_ms: &AtomicU64) {
     let mut frames = Frames::default();
     loop {

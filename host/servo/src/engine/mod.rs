@@ -1,4 +1,4 @@
-//! Where a model runs: in the loop, asynchronously, or in a worker of its own.
+//! Execution of a model: in the loop, asynchronously, or in a worker process.
 
 pub mod asynchronous;
 pub mod process;
@@ -11,34 +11,33 @@ use flotor_hal::{
 };
 use process::{Reply, Worker};
 
-/// A model, wherever it runs.
+/// Model with its kind of execution.
 pub enum Engine {
-    /// In the loop: fastest, and what breaks the model may break the process.
+    /// In the loop thread: fastest, no crash isolation.
     Here(Model),
-    /// In a process of its own.
+    /// In a worker process.
     Process(Worker),
-    /// Asynchronously; the loop evaluates its local linear model.
+    /// Asynchronous; the loop evaluates a local linear model.
     Asynchronous(Box<AsynchronousModel>),
 }
 
-/// What came of a step.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stepped {
-    /// There is an answer, not looked at yet.
+    /// Answered; the output is not validated yet.
     Answered,
-    /// None in time; there may be one in a later tick.
+    /// No answer in time; one may come in a later tick.
     Late,
-    /// None for so long that what it answered before does not hold any more.
+    /// No answer for longer than the last one stays valid.
     Silent,
-    /// The model broke: it panicked, or answered outside the contract.
+    /// The model panicked or violated the contract.
     Broken,
-    /// Its process has ended.
+    /// The worker process has ended.
     Gone,
 }
 
 impl Engine {
-    /// One step; `output` is only meaningful for [`Stepped::Answered`]. Real-time: bounded by the model or its patience, no
-    /// allocation.
+    /// Steps the model; `output` is only valid for [`Stepped::Answered`]. Real-time: bounded by the model or its timeout, no allocation.
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let answered = |status| match status {
             CallStatus::Ok => Stepped::Answered,
@@ -58,25 +57,25 @@ impl Engine {
         }
     }
 
-    /// True if a step may come back without an answer and have one in a later tick.
+    /// Returns true if a step may return without an answer that then comes in a later tick.
     pub fn may_be_late(&self) -> bool {
         !matches!(self, Self::Here(_))
     }
 
-    /// Changes a live parameter at a tick boundary. Real-time: bounded by the model or its patience, no allocation.
+    /// Changes a live parameter at a tick boundary. Real-time: bounded by the model or its timeout, no allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         match self {
             Self::Here(model) => model.set_parameter(index, value),
             Self::Process(worker) => match worker.set_parameter(index, value) {
                 Reply::Answered(status) => status,
-                // Not now: the next step tells whether it is late or gone.
+                // Not applied: the next step reports a late or ended worker.
                 Reply::Late | Reply::Gone => CallStatus::Unsupported,
             },
             Self::Asynchronous(model) => model.set_parameter(index, value),
         }
     }
 
-    /// The value in force of a parameter before the loop starts; NaN if it has none. Not real-time.
+    /// Returns the value of a parameter before the loop starts; NaN for a parameter without one. Not real-time.
     pub fn parameter(&mut self, index: usize) -> f64 {
         match self {
             Self::Here(model) => model.parameter(index),
@@ -85,7 +84,7 @@ impl Engine {
         }
     }
 
-    /// Which demands the model can serve.
+    /// Returns the outputs that the model can compute.
     pub fn serves(&self) -> Demand {
         match self {
             Self::Here(model) => model.serves(),
@@ -94,20 +93,20 @@ impl Engine {
         }
     }
 
-    /// Forgets history. Real-time: bounded by the model or its patience, no allocation.
+    /// Clears the history of the model. Real-time: bounded by the model or its timeout, no allocation.
     pub fn reset(&mut self) -> CallStatus {
         match self {
             Self::Here(model) => model.reset(),
             Self::Process(worker) => match worker.reset() {
                 Reply::Answered(status) => status,
-                // The next step tells whether it is late or gone.
+                // The next step reports a late or ended worker.
                 Reply::Late | Reply::Gone => CallStatus::Ok,
             },
             Self::Asynchronous(model) => model.reset(),
         }
     }
 
-    /// Where the model can act; an asynchronous one is always stepped. Real-time: bounded, no allocation.
+    /// Returns the active region of the model; everywhere for an asynchronous model. Real-time: bounded, no allocation.
     pub fn active_region(&mut self) -> ActiveRegion {
         match self {
             Self::Here(model) => model.active_region(),
@@ -116,7 +115,7 @@ impl Engine {
         }
     }
 
-    /// Where the model ends; an asynchronous one has no end. Real-time: bounded, no allocation.
+    /// Returns the workspace bounds of the model; unbounded for an asynchronous model. Real-time: bounded, no allocation.
     pub fn workspace_bounds(&mut self) -> WorkspaceBounds {
         match self {
             Self::Here(model) => model.workspace_bounds(),
@@ -125,7 +124,7 @@ impl Engine {
         }
     }
 
-    /// Whether it has a linear field. Not real-time.
+    /// Returns true if the model has a linear field. Not real-time.
     pub fn has_linear_field(&self) -> bool {
         match self {
             Self::Here(model) => model.has_linear_field(),
@@ -134,7 +133,7 @@ impl Engine {
         }
     }
 
-    /// The field at an input; `field` is only meaningful for [`Stepped::Answered`]. Not real-time.
+    /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Not real-time.
     pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
         let answered = |status| match status {
             CallStatus::Ok => Stepped::Answered,
@@ -154,7 +153,7 @@ impl Engine {
         }
     }
 
-    /// Last chance for the model to allocate; one in a process of its own had it there. Not real-time.
+    /// Prepares the model, its last chance to allocate; a worker or asynchronous model is already prepared. Not real-time.
     ///
     /// # Errors
     /// The model's [`Refusal`].
@@ -165,7 +164,7 @@ impl Engine {
         }
     }
 
-    /// Whether the answer depends on the path.
+    /// Returns the model's dependence on the path of the handle.
     pub fn memory(&self) -> Memory {
         match self {
             Self::Here(model) => model.memory(),
@@ -174,8 +173,8 @@ impl Engine {
         }
     }
 
-    /// Calls so far that left the floating-point environment of the loop's thread changed; what a model changes elsewhere
-    /// stays there. Real-time: bounded, no allocation.
+    /// Returns the number of calls that changed the floating-point environment of the loop thread; 0 for a model elsewhere.
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub fn float_changes(&self) -> u64 {
         match self {
@@ -184,7 +183,7 @@ impl Engine {
         }
     }
 
-    /// What the model said last. Not real-time.
+    /// Returns the last message of the model. Not real-time.
     pub fn last_message(&mut self) -> String {
         match self {
             Self::Here(model) => model.last_message(),

@@ -1,10 +1,10 @@
-//! The envelope's last stage: a limit of the change of force and torque from tick to tick.
+//! Slew limit, the last stage of the envelope: limits the change of force and torque from tick to tick.
 //!
-//! A limited force lags behind the requested one: it brakes a moving handle too little and would push it back with all of the
-//! requested force, a loop that generates energy. So the part of a force that accelerates the handle falls as fast as the device
-//! permits, and the stage keeps a ledger: the energy that the requested force would have taken from the hand, and how much less the limited
-//! force took. Until the difference is paid back, a force along the motion is scaled by the ratio of what was taken to what would
-//! have been, so that a spring returns exactly what it received.
+//! A limited force lags behind the requested one: it brakes a moving handle too little, and would then push back with the whole
+//! requested force, which generates energy. So the part of a force that accelerates the handle falls as fast as the device permits,
+//! and a ledger records the energy that the requested force would have taken from the hand, and how much less the limited force
+//! took. Until the difference is paid back, a force along the motion is scaled by the ratio of the energy taken to the energy
+//! requested, so that a spring returns exactly the energy that it received.
 
 use flotor_core::limits::Limits;
 use flotor_core::region::Region;
@@ -15,12 +15,12 @@ use flotor_hal::{Capabilities, DVec3, Twist, Wrench};
 pub(super) struct SlewLimit {
     force: Side,
     torque: Side,
-    /// The wrench that was requested last, if the hand got another one.
+    /// Last requested wrench, if another one was applied.
     requested: Option<Wrench>,
 }
 
 impl SlewLimit {
-    /// The limits of the scene and those of the device. Not real-time.
+    /// Creates the limit of scene and device; the smaller rate applies. Not real-time.
     pub(super) fn new(limits: &Limits, device: &Capabilities) -> Self {
         let side = |scene: f64, device: f64| Side {
             most_per_s: scene.min(device),
@@ -34,7 +34,7 @@ impl SlewLimit {
         }
     }
 
-    /// Books the displacement since the last sample, while `held` was applied; the energy that the limit generated, J.
+    /// Records the displacement since the last sample, while `held` was applied; returns the energy that the limit generated, J.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -47,8 +47,8 @@ impl SlewLimit {
             + self.torque.ledger.book(requested.torque(), held.torque(), moved.angular)
     }
 
-    /// Moves force and torque, within the regions of both, from those that are held no farther in `dt_s` seconds than the limits
-    /// allow; `None` if the request is within them and nothing is to be paid back. Held and request are within the regions.
+    /// Moves force and torque from `held` towards the request, no farther in `dt_s` seconds than the limits allow, within the
+    /// regions of both; `None` if the request may pass and nothing is to be paid back. `held` and `request` are within the regions.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -69,7 +69,7 @@ impl SlewLimit {
         self.limit_fast(request, held, twist, dt_s, [forces, torques])
     }
 
-    /// Limits a change that is too fast for one side, or while energy is to be paid back.
+    /// Limits a change that is too fast, or any change while energy is to be paid back.
     #[cold]
     fn limit_fast(
         &mut self,
@@ -92,9 +92,9 @@ impl SlewLimit {
 
 /// The limit of force or torque.
 struct Side {
-    /// Norm of the fastest change, per second.
+    /// Fastest change (norm), per second.
     most_per_s: f64,
-    /// The same with a fall of the part that accelerates the handle: what the device can do.
+    /// Fastest change that the device permits, for the part that accelerates the handle, per second.
     most_fall_per_s: f64,
     ledger: Ledger,
 }
@@ -105,7 +105,7 @@ impl Side {
         self.ledger.generated_j <= 0.0
     }
 
-    /// Returns whether the change is slow enough, with nothing to be paid back.
+    /// Returns true if the change is slow enough and nothing is to be paid back.
     #[inline]
     fn allows(&self, request: DVec3, held: DVec3, dt_s: f64) -> bool {
         let most = self.most_per_s * dt_s;
@@ -129,26 +129,26 @@ impl Side {
         let allowed = drive * self.ledger.share();
         let target = request - along * (drive - allowed);
         let fallen = held - along * (held.dot(along) - allowed).max(0.0);
-        // A force without its part along the motion may be outside of the region; a shorter one of its direction is a fall, too.
+        // Without its part along the motion a force may be outside of the region; a shorter one in its direction is a fall, too.
         let wanted = region.shrink(step_short_of(fallen, target, most).unwrap_or(target));
         let sent = step_short_of(held, wanted, self.most_fall_per_s * dt_s).unwrap_or(wanted);
         (sent != request).then_some(sent)
     }
 }
 
-/// Energies since the limited force last differed from the requested one for nothing.
+/// Energies since the ledger was last settled.
 struct Ledger {
     /// Energy that the requested force would have taken from the hand, J.
     requested_j: f64,
-    /// How much less the limited force took, J: the limit generated it.
+    /// Energy that the limited force took less, J: the limit generated it.
     generated_j: f64,
 }
 
 impl Ledger {
-    /// Nothing to be paid back.
+    /// Ledger with nothing to be paid back.
     const SETTLED: Self = Self { requested_j: 0.0, generated_j: 0.0 };
 
-    /// Books a displacement; the energy that the limit generated over it, J.
+    /// Records a displacement; returns the energy that the limit generated over it, J.
     fn book(&mut self, requested: DVec3, held: DVec3, moved: DVec3) -> f64 {
         let generated_j = (held - requested).dot(moved);
         self.generated_j += generated_j;
@@ -159,7 +159,7 @@ impl Ledger {
         generated_j
     }
 
-    /// Returns the share of a force along the motion that gives the hand no more than the limited force took, 0 to 1.
+    /// Returns the factor for a force along the motion that gives the hand no more energy than the limited force took, 0 to 1.
     fn share(&self) -> f64 {
         if self.generated_j <= 0.0 {
             return 1.0;
@@ -168,7 +168,7 @@ impl Ledger {
     }
 }
 
-/// The point `most` from `from` on the way to `to`; `None` if `to` is no farther than that.
+/// Returns the point at distance `most` from `from` towards `to`; `None` if `to` is no farther.
 fn step_short_of(from: DVec3, to: DVec3, most: f64) -> Option<DVec3> {
     let way = to - from;
     if way.length_squared() <= most * most {

@@ -1,27 +1,27 @@
-//! The end report of a process, in memory that its supervisor reads: without one another cause than the host ended the process.
+//! End report of a process, in memory that its supervisor reads; no report means that the host did not end the process.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// The memory that the supervisor reads; none in a process without a supervisor.
+/// Memory that the supervisor reads; unset in a process without a supervisor.
 static WORD: OnceLock<&'static AtomicU32> = OnceLock::new();
 
-/// Bit of a report with an exit code, which is in the lowest byte.
+/// Flag of a report with an exit code in the lowest byte.
 const CODE: u32 = 0x100;
 /// Report of a process that ends by a signal.
 const SIGNAL: u32 = 0x200;
 
-/// End of a process as the process itself reports it.
+/// End of a process, as reported by the process itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReportedEnd {
-    /// This exit code; result and errors are written.
+    /// Exit code; result and errors are written.
     Code(u8),
-    /// A signal that asks a process to end; the message is written.
+    /// Termination signal; the message is written.
     Signal,
 }
 
 impl ReportedEnd {
-    /// Returns the end report in a word; `None` if there is none yet.
+    /// Returns the end report in a word; `None` if none was set.
     #[must_use]
     pub fn read(word: &AtomicU32) -> Option<Self> {
         match word.load(Ordering::Acquire) {
@@ -32,7 +32,7 @@ impl ReportedEnd {
     }
 }
 
-/// Writes the end report of this process to `word` from now on. Once for a process. Not real-time.
+/// Sets the word for the end report of this process. To be called once per process. Not real-time.
 pub fn report_end_to(word: &'static AtomicU32) {
     let _ = WORD.set(word);
 }

@@ -1,9 +1,9 @@
-//! A line of text that needs no memory of its own.
+//! Line of text without heap memory.
 
-/// Bytes of a line, the end included: names are short, and the end of what is longer is cut off.
+/// Capacity of a line with its newline, bytes; a longer text is truncated.
 const BYTES: usize = 512;
 
-/// A line that is being written.
+/// Line under construction.
 #[derive(Clone, Copy)]
 pub(super) struct Line {
     bytes: [u8; BYTES],
@@ -11,16 +11,16 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Nothing yet.
+    /// Empty line.
     pub(super) const EMPTY: Self = Self { bytes: [0; BYTES], len: 0 };
 
-    /// The line so far, without a character that was cut.
+    /// Returns the text so far, without a truncated character.
     pub(super) fn text(&self) -> &str {
         let written = self.bytes.get(..self.len).unwrap_or_default();
         written.utf8_chunks().next().map_or("", |chunk| chunk.valid())
     }
 
-    /// The line with its end.
+    /// Returns the line with its newline.
     pub(super) fn as_bytes(&mut self) -> &[u8] {
         let len = self.len.min(BYTES - 1);
         if let Some(end) = self.bytes.get_mut(len) {
@@ -33,7 +33,7 @@ impl Line {
 impl std::fmt::Write for Line {
     fn write_str(&mut self, text: &str) -> std::fmt::Result {
         for byte in text.bytes() {
-            // A name is a plugin's, and the terminal is not.
+            // The name of a plugin must not control the terminal.
             let byte = if byte.is_ascii_control() { b'?' } else { byte };
             match self.bytes.get_mut(self.len) {
                 Some(place) if self.len < BYTES - 1 => *place = byte,

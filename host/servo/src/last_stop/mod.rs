@@ -1,11 +1,11 @@
 //! Stops all energised devices before this process ends by a signal, by `exit`, or by the end of the loop's thread.
 //!
-//! A device keeps its last command, some of them for ever. So as long as a run has energised devices, signals that would
-//! end the process, and `exit`, come here first: every device's `safe_stop` is called, by contract possible from any
-//! thread without lock or allocation; one line says whose code it was; the process ends with code 3.
+//! A device holds its last command, some of them for ever. So while a run has energised devices, fatal signals and `exit` are
+//! handled here first: every device's `safe_stop` is called, by contract possible from any thread without lock or allocation; one
+//! line names the code at fault; the process ends with code 3.
 //!
-//! What nobody can catch (`_exit`, `exec`, SIGKILL, a stack that overflows in a thread without an alternate one) is left to
-//! a process of its own: [`crate::watchdog_process`].
+//! Ends that cannot be caught (`_exit`, `exec`, SIGKILL, a stack overflow in a thread without an alternate stack) are handled by a
+//! separate process: [`crate::watchdog_process`].
 
 mod call;
 mod end_report;
@@ -26,52 +26,52 @@ use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
-/// Exit code of a process whose devices were stopped here: that of a plugin that failed.
+/// Exit code after the devices were stopped here: the one of a failed plugin.
 const ENDED: i32 = 3;
-/// Runs of one process that can be armed at a time; further ones, of simulations side by side, are not.
+/// Most runs of one process that are armed at a time; further ones, of parallel simulations, are not.
 const MOST_RUNS: usize = 256;
-/// Looks of a second thread that dies at whether the first one has ended the process, and the time between two, ns.
+/// Number of polls of a second dying thread for the end of the process by the first one, and the poll interval, ns.
 const LOOKS: u32 = 50;
 const LOOK_NS: u64 = 10_000_000;
 
 /// A run whose devices are energised.
 struct Armed {
     stoppers: Box<[Stopper]>,
-    /// Of the devices, then of the models, as the scene has them.
+    /// Names of the devices, then of the models, in the scene's order.
     names: Box<[String]>,
     heart: Heartbeat,
-    /// Number that the system gives the loop's thread.
+    /// Id of the loop's thread.
     thread: AtomicI32,
 }
 
-/// The runs of this process. Locked for a few instructions by whoever begins or ends a run, and only tried by who dies: what
-/// cannot be locked has no energised device yet, or none any more.
+/// Runs of this process. Locked for a few instructions to begin or end a run; a dying thread only tries the lock: a locked run has
+/// no energised device yet, or none any more.
 static RUNS: [Mutex<Option<Arc<Armed>>>; MOST_RUNS] = [const { Mutex::new(None) }; MOST_RUNS];
-/// Whether there has ever been a run.
+/// True once a run was armed.
 static WAS_ARMED: AtomicBool = AtomicBool::new(false);
-/// Number of the thread in which this process dies; 0: it does not.
+/// Id of the thread in which this process dies; 0: none.
 static DYING: AtomicI32 = AtomicI32::new(0);
-/// The next device to be stopped, counted through all runs: a stop that dies itself is not tried again.
+/// Next device to stop, counted through all runs: a stop that crashes is not retried.
 static NEXT: AtomicUsize = AtomicUsize::new(0);
 
-/// How a process dies.
+/// Cause of the end of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Death {
-    /// A signal, and the process that sent it, if one did.
+    /// Signal, with its sender if another process sent it.
     Signal { signal: i32, sender: Option<i32> },
-    /// Somebody called `exit`.
+    /// Call of `exit`.
     Exit,
-    /// The loop's thread was ended, as by `pthread_exit`.
+    /// End of the loop's thread, as by `pthread_exit`.
     Thread,
 }
 
-/// True while a run has energised devices. Takes no lock that is held, allocates nothing.
+/// Returns true while a run has energised devices. Waits for no lock, allocates nothing.
 #[must_use]
 pub fn is_armed() -> bool {
     RUNS.iter().filter_map(glance).any(|run| run.as_ref().is_some_and(|run| !run.is_over()))
 }
 
-/// True once a run has energised devices.
+/// Returns true once a run has had energised devices.
 #[must_use]
 pub fn was_armed() -> bool {
     WAS_ARMED.load(Ordering::Acquire)
@@ -86,7 +86,7 @@ pub fn stop_all() {
     }
 }
 
-/// Returns the plugin that each loop of this process is executing, and where. Not real-time.
+/// Returns the running plugin of each loop of this process, with tick and place. Not real-time.
 #[must_use]
 pub fn calls() -> Vec<(String, Stuck)> {
     let runs = RUNS.iter().filter_map(|run| lock(run).clone()).filter(|run| !run.is_over());
@@ -94,8 +94,7 @@ pub fn calls() -> Vec<(String, Stuck)> {
     calls.filter(|(_, at)| at.place.is_a_plugins()).collect()
 }
 
-/// The runs there are, for one who dies: they are never let go again, because what closes a device allocates, and the
-/// allocator may be what died.
+/// Returns the runs to a dying thread, without ever freeing them: closing a device allocates, and the allocator may have crashed.
 fn runs() -> impl Iterator<Item = ManuallyDrop<Arc<Armed>>> {
     RUNS.iter().filter_map(|run| glance(run)?.clone()).map(ManuallyDrop::new)
 }
@@ -112,18 +111,18 @@ fn lock(run: &Mutex<Option<Arc<Armed>>>) -> MutexGuard<'_, Option<Arc<Armed>>> {
     run.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps a run armed as long as it lives: until its devices are closed and its models gone.
+/// Guard that arms a run until its devices are closed and its models freed.
 pub struct LastStop {
     place: usize,
 }
 
-/// Stops the devices when a plugin ends the loop's thread. A loop drops this before its devices and models: if neither its
-/// end nor a panic is the reason, a plugin called something like `pthread_exit`.
+/// Guard that stops the devices when a plugin ends the loop's thread. A loop drops it before devices and models: if neither the
+/// loop's end nor a panic is the reason, a plugin called something like `pthread_exit`.
 pub struct Unwound(Arc<Armed>);
 
 impl LastStop {
-    /// Arms a run on the thread that will loop: its devices are stopped when the process dies. `names` are those of the
-    /// devices, in the order of `stoppers`, then of the models. Not real-time.
+    /// Arms a run on the thread that will run the loop: its devices stop when the process dies. `names` are those of the devices,
+    /// in the order of `stoppers`, then of the models. `None` if too many runs are armed. Not real-time.
     #[must_use]
     pub fn arm(stoppers: Vec<Stopper>, names: Vec<String>, heart: Heartbeat) -> Option<(Unwound, Self)> {
         let thread = AtomicI32::new(system::thread_number());
@@ -140,7 +139,7 @@ impl LastStop {
         None
     }
 
-    /// From now on the loop of the run is this thread, which energised nothing itself. Not real-time.
+    /// Registers the calling thread as the loop's thread of the run. Not real-time.
     pub(crate) fn follow_here(&self) {
         if let Some(run) = RUNS.get(self.place).and_then(|run| lock(run).clone()) {
             run.thread.store(system::thread_number(), Ordering::Release);
@@ -171,7 +170,7 @@ impl Drop for Unwound {
 }
 
 impl Armed {
-    /// Its loop has ended, or the watchdog has stopped its devices: nothing of it is energised.
+    /// Returns true once the loop has ended or the watchdog has stopped the devices: nothing is energised.
     fn is_over(&self) -> bool {
         self.heart.is_done() || self.heart.bitten().is_some()
     }
@@ -188,53 +187,52 @@ impl Armed {
     }
 }
 
-/// Reports this exit code and ends the process at once: nothing of what a process does at its end is done. Real-time: never
-/// returns.
+/// Reports this exit code and ends the process at once, without exit handlers. Real-time: never returns.
 pub fn leave_process(code: i32) -> ! {
     report_end(ReportedEnd::Code(u8::try_from(code & 0xff).unwrap_or(u8::MAX)));
     system::leave_process(code)
 }
 
-/// Called in a signal handler or in `exit`: no lock, no allocation. Returns if no run is energised.
+/// Stops the devices and ends the process; returns if no run is energised. For a signal handler or `exit`: no lock, no allocation.
 pub(crate) fn end_if_armed(death: Death) {
     if is_armed() {
         die(death);
     }
 }
 
-/// The same; returns if the calling thread is in no call of a plugin outside the loop.
+/// Ends the process; returns if the calling thread is in no plugin call outside the loop. No lock, no allocation.
 pub(crate) fn end_if_in_call(death: Death) {
     if is_in_call() {
         die(death);
     }
 }
 
-/// True if the calling thread is in a call of a plugin outside the loop. As safe as the two above.
+/// Returns true if the calling thread is in a plugin call outside the loop. No lock, no allocation.
 pub(crate) fn is_in_call() -> bool {
     call::current().is_some()
 }
 
-/// Whether this process is dying: somebody stops its devices, and will end it.
+/// Returns true while a thread stops the devices to end this process.
 pub(crate) fn is_dying() -> bool {
     DYING.load(Ordering::Acquire) != 0
 }
 
-/// Ends a process that has been dying for too long, because a device's stop does not come back: the other devices are stopped.
+/// Ends a process that dies for too long because a device's stop does not return; stops the other devices.
 pub(crate) fn end_dying() -> ! {
     stop_the_rest();
     system::say(b"error: the process was ended, and a device did not come back from `safe_stop`\n");
     leave_process(ENDED)
 }
 
-/// Stops everything, says so, and ends the process.
+/// Stops all devices, prints the message, and ends the process.
 fn die(death: Death) -> ! {
     let own = system::thread_number();
     match DYING.compare_exchange(0, own, Ordering::AcqRel, Ordering::Acquire) {
         Ok(_) => {}
-        // A stop that died: on with the next device.
+        // A stop that crashed: continue with the next device.
         Err(first) if first == own => {}
         Err(_) => {
-            // The first one is at it, and will not come back from here; unless a device's stop does not come back to it.
+            // The first thread stops the devices and ends the process, unless a device's stop does not return.
             for _ in 0..LOOKS {
                 crate::sleep_until(crate::monotonic_ns() + LOOK_NS);
             }
@@ -248,11 +246,11 @@ fn die(death: Death) -> ! {
     system::end_by(death, ENDED)
 }
 
-/// Stops each device of each run that nobody has begun to stop.
+/// Stops each device of each run whose stop has not begun.
 fn stop_the_rest() {
     let (own, mut first) = (system::thread_number(), 0);
     for run in runs() {
-        // A loop that dies itself commands nothing any more.
+        // A loop that dies itself sends no more commands.
         if run.thread.load(Ordering::Acquire) != own {
             run.heart.silence();
         }
@@ -266,7 +264,7 @@ fn stop_the_rest() {
     }
 }
 
-/// One line: what it was, in which tick, in whose code.
+/// Describes the end in one line: cause, tick and running code.
 fn describe(line: &mut Line, death: Death, own: i32) {
     use std::fmt::Write;
     if let Some(call) = call::current() {
@@ -286,7 +284,7 @@ fn describe(line: &mut Line, death: Death, own: i32) {
     let Stuck { tick, place } = run.heart.now();
     let in_loop = is_own(&run);
     let culprit = in_loop && place.is_a_plugins();
-    // What is cut off a line that is too long is its end.
+    // A line that is too long loses its end.
     let _ = match (culprit, in_loop) {
         (true, _) => write!(line, "error: `{}` ended the process in {}", run.name(place), place.call()),
         (false, true) => write!(line, "error: the process was ended in {}", place.call()),

@@ -1,27 +1,27 @@
-//! Which models can act where the handle is: a uniform grid over the regions they have declared.
+//! Broad phase: finds the models that can act at the handle, with a uniform grid over their active regions.
 //!
 //! A model declares its active region ([`flotor_hal::ActiveRegion`]); elsewhere its wrench is zero and it is not
 //! stepped. The grid is built before the loop starts, over the box around all regions, with cells about twice the size
 //! of a usual region, so that a region lies in a few cells and a cell holds a few regions. A tick looks up one cell
 //! and compares the handle with the boxes of the objects in it; what lies elsewhere costs nothing.
 //!
-//! Objects do not move (their mapping is fixed); a live parameter may change a region, and then the object is looked
-//! at in every tick from there on ([`BroadPhase::watch_always`]).
+//! Objects do not move (their mapping is fixed); an object whose region is changed by a live parameter is checked in every tick
+//! from then on ([`BroadPhase::watch_always`]).
 //!
 //! Source: C. Ericson, "Real-Time Collision Detection", 2005, section 7.1 (uniform grids).
 
 use flotor_hal::{DVec3, math};
 
-/// Cells an object's box may lie in before it is looked at in every tick instead.
+/// Most cells that an object's box may overlap; a larger object is checked in every tick instead.
 const MOST_CELLS_OF_AN_OBJECT: usize = 64;
-/// Cells along an axis at most.
+/// Most cells along an axis.
 const MOST_CELLS_OF_AN_AXIS: f64 = 128.0;
-/// Side of a cell over the median side of the boxes.
+/// Ratio of a cell's side to the median side of the boxes.
 const CELL_OVER_BOX: f64 = 2.0;
-/// What a box is larger than the region it holds, m: more than the way here from the model's frame has rounded.
+/// Margin of a box around its region, m: larger than the rounding of the mapping from the model's frame.
 const ROUNDING_M: f64 = 1.0e-9;
 
-/// A box in the device frame that holds an object's region, m.
+/// Box in the device frame around an object's region, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bounds {
     low_m: DVec3,
@@ -29,46 +29,46 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// A box about `center_m` with these half sides, and room for rounding.
+    /// Creates a box about `center_m` with these half sides and a margin for rounding.
     pub(super) fn about(center_m: DVec3, half_sides_m: DVec3) -> Self {
         let half_sides_m = half_sides_m + ROUNDING_M;
         Self { low_m: center_m - half_sides_m, high_m: center_m + half_sides_m }
     }
 
-    /// The box that holds both. Real-time: bounded, no allocation.
+    /// Returns the box around both boxes. Real-time: bounded, no allocation.
     pub(super) fn with(self, other: Self) -> Self {
         Self { low_m: self.low_m.min(other.low_m), high_m: self.high_m.max(other.high_m) }
     }
 
-    /// True if the handle is inside. Real-time: bounded, no allocation.
+    /// Returns true if the handle is inside. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn contains(&self, position_m: DVec3) -> bool {
         self.low_m.cmple(position_m).all() && position_m.cmple(self.high_m).all()
     }
 }
 
-/// Objects by where they are. All memory is allocated when it is built.
+/// Objects by position. Allocates at construction only.
 pub(super) struct BroadPhase {
-    /// Box of each object; `None` for one that may act anywhere.
+    /// Box of each object; `None` for an object that can act anywhere.
     bounds: Box<[Option<Bounds>]>,
-    /// Objects to look at in every tick, in order; never more than there are.
+    /// Objects to check in every tick, in order, without duplicates.
     always: Vec<u32>,
     grid: Grid,
 }
 
-/// Cells side by side, and the objects in each.
+/// Uniform grid with the objects of each cell.
 struct Grid {
     origin_m: DVec3,
     /// Cells per metre, along each axis.
     per_m: DVec3,
     /// Cells along each axis.
     counts: [usize; 3],
-    /// Objects of each cell, in order; empty if no cell has any.
+    /// Objects of each cell, in order; empty if all cells are.
     objects: Box<[Box<[u32]>]>,
 }
 
 impl BroadPhase {
-    /// Sorts objects, each with the box it can act in, or none if that is everywhere. Not real-time.
+    /// Sorts objects into the grid, each with the box in which it can act; `None` for everywhere. Not real-time.
     #[allow(clippy::indexing_slicing)] // the cells of a box are cells of the grid
     pub(super) fn new(bounds: Vec<Option<Bounds>>) -> Self {
         let boxed: Vec<Bounds> = bounds.iter().copied().flatten().collect();
@@ -89,8 +89,8 @@ impl BroadPhase {
         Self { bounds: bounds.into(), always, grid }
     }
 
-    /// Shows `meet` those of all `objects` that can act with the handle at `position_m`, in order of their numbers: sums do
-    /// not depend on who sleeps.
+    /// Calls `meet` with those of all `objects` that can act with the handle at `position_m`, in order of their numbers: sums do
+    /// not depend on the inactive ones.
     ///
     /// Real-time: bounded by the objects that are near or may act anywhere; no allocation.
     #[inline]
@@ -113,7 +113,7 @@ impl BroadPhase {
                     *number
                 }
                 ([a, after_a @ ..], [b, after_b @ ..]) => {
-                    // One that is looked at always may be in the cell, too.
+                    // An object that is always checked may be in the cell, too.
                     in_cell = if a <= b { after_a } else { in_cell };
                     always = if b <= a { after_b } else { always };
                     *a.min(b)
@@ -128,7 +128,7 @@ impl BroadPhase {
         }
     }
 
-    /// A live parameter has changed where an object can act: it is looked at in every tick from now on.
+    /// Changes the box of an object after a live parameter has; the object is checked in every tick from now on.
     ///
     /// Real-time: bounded by the number of objects, no allocation.
     pub(super) fn watch_always(&mut self, object: usize, bounds: Option<Bounds>) {
@@ -139,7 +139,7 @@ impl BroadPhase {
         }
     }
 
-    /// The box any object can act in; `None` if one can act everywhere, or there is none.
+    /// Returns the box around all objects' boxes; `None` if an object can act everywhere, or there is no object.
     ///
     /// Real-time: bounded by the number of objects, no allocation.
     pub(super) fn hull(&self) -> Option<Bounds> {
@@ -148,14 +148,14 @@ impl BroadPhase {
         boxes.try_fold(first, |hull, bounds| Some(hull.with(bounds?)))
     }
 
-    /// The box an object can act in; `None` if that is everywhere. Real-time: bounded, no allocation.
+    /// Returns the box in which an object can act; `None` for everywhere. Real-time: bounded, no allocation.
     pub(super) fn bounds(&self, object: usize) -> Option<Bounds> {
         self.bounds.get(object).copied().flatten()
     }
 }
 
 impl Grid {
-    /// A grid over all boxes, without objects. Not real-time.
+    /// Creates a grid over all boxes, without objects. Not real-time.
     #[allow(clippy::indexing_slicing)] // three axes
     fn over(boxed: &[Bounds]) -> Self {
         let hull = boxed.iter().copied().reduce(Bounds::with);
@@ -179,7 +179,7 @@ impl Grid {
         Self { origin_m: hull.low_m, per_m: DVec3::from_array(per_m), counts, objects: Box::default() }
     }
 
-    /// Numbers of the cells a box lies in. Not real-time.
+    /// Returns the numbers of the cells that a box overlaps. Not real-time.
     fn cells_of(&self, bounds: &Bounds) -> impl Iterator<Item = usize> + use<> {
         let [_, y_cells, z_cells] = self.counts;
         let [[x0, y0, z0], [x1, y1, z1]] =
@@ -189,7 +189,7 @@ impl Grid {
         })
     }
 
-    /// Which cell a position is in along each axis; outside the grid, the nearest.
+    /// Returns the cell of a position along each axis; the nearest one outside the grid.
     #[inline]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `as` takes NaN and below 0 to 0
     fn coordinates(&self, position_m: DVec3) -> [usize; 3] {
@@ -198,7 +198,7 @@ impl Grid {
         [x.min(x_cells - 1), y.min(y_cells - 1), z.min(z_cells - 1)]
     }
 
-    /// The objects of the cell at a position. Outside the grid the nearest cell: its objects' boxes are then compared.
+    /// Returns the objects of the cell at a position, or of the nearest cell: the objects' boxes are then compared.
     #[inline]
     fn objects_at(&self, position_m: DVec3) -> &[u32] {
         if self.objects.is_empty() {

@@ -1,19 +1,18 @@
-//! The wall where a model ends: spring and damper that bring back a handle which is beyond it, and never pull.
+//! Wall at the workspace bounds of a model: spring and damper that push the handle back, and never pull.
 //!
-//! It belongs to the model's share: it fades, yields and goes with the model. The [boundary](crate) of the device
-//! stands beside it; whichever is nearer is felt first.
+//! The wall is part of the model's contribution: it fades, yields and goes with the model. The [boundary](crate) of the device acts
+//! as well; the nearer of both is felt first.
 
 use flotor_core::mapping::Mapping;
 use flotor_hal::{DVec3, Damper, Pose, SampledLoop, Twist, WorkspaceBounds, Wrench};
 
-/// Damping of the wall, N·s/m: that of the device's own boundary mode (client program of the University of Utah).
+/// Damping of the wall, N·s/m, as in the device's own boundary mode (client program of the University of Utah).
 const DAMPING_NS_PER_M: f64 = 15.0;
 
-/// Largest stiffness of the wall, N/m: that of the [boundary](flotor_core::limits::Boundary) at 1 kHz.
+/// Largest stiffness of the wall, N/m, as of the [boundary](flotor_core::limits::Boundary) at 1 kHz.
 const MOST_STIFFNESS_N_PER_M: f64 = 7_500.0;
 
-/// True if a wall at the end of a model in this place would push a handle at the home of its device. Real-time: bounded, no
-/// allocation.
+/// Returns true if a wall at these bounds would push a handle at the home of its device. Real-time: bounded, no allocation.
 #[must_use]
 pub fn pushes_at_home(bounds: &WorkspaceBounds, mapping: &Mapping) -> bool {
     bounds.is_bounded() && bounds.beyond(mapping.pose_to_model(&Pose::HOME).position()) != DVec3::ZERO
@@ -26,7 +25,7 @@ pub(super) struct EndWall {
 }
 
 impl EndWall {
-    /// A wall as stiff as the loop allows; `None` for a model that has no end. Not real-time.
+    /// Creates a wall as stiff as the loop allows; `None` for a model without bounds. Not real-time.
     pub(super) fn new(bounds: &WorkspaceBounds, mapping: &Mapping, sampled: &SampledLoop) -> Option<Self> {
         // The damping of the device is not known.
         let stable_n_per_m = sampled.largest_stiffness(0.0, Damper::OneWay(DAMPING_NS_PER_M));
@@ -38,15 +37,14 @@ impl EndWall {
         })
     }
 
-    /// The model ends elsewhere now, or nowhere; an end that would push at the home of the device is none. Real-time:
-    /// bounded, no allocation.
+    /// Moves the wall to new bounds; removes a wall that would push at the home of the device. Real-time: bounded, no allocation.
     pub(super) fn move_to(&mut self, bounds: &WorkspaceBounds, mapping: &Mapping) {
         let is_wall = bounds.is_bounded() && !pushes_at_home(bounds, mapping);
         self.bounds = if is_wall { *bounds } else { WorkspaceBounds::UNBOUNDED };
     }
 
-    /// Its push in the device frame on a handle at a pose in the model's frame that moves so in the device's; `None` within
-    /// bounds. Real-time: bounded, no allocation.
+    /// Returns the push in the device frame on a handle at `pose` in the model's frame, with `twist` in the device frame; `None`
+    /// within bounds. Real-time: bounded, no allocation.
     pub(super) fn push(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
         let beyond_m = self.bounds.beyond(pose.position());
         if beyond_m == DVec3::ZERO || !beyond_m.is_finite() {
@@ -55,7 +53,7 @@ impl EndWall {
         let beyond_m = mapping.vector_to_device(beyond_m);
         let depth_m = beyond_m.length();
         let outward = beyond_m / depth_m;
-        // Damping acts outwards only, as that of the boundary.
+        // Damping acts outwards only, as in the boundary.
         let leaving_m_per_s = twist.linear().dot(outward).max(0.0);
         let push_n = self.stiffness_n_per_m * depth_m + DAMPING_NS_PER_M * leaving_m_per_s;
         Some(Wrench::from_force(outward * -push_n))

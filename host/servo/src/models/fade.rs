@@ -1,25 +1,24 @@
-//! A weight that moves to where it was told, at a steady rate.
+//! Weight that moves to its target at a constant rate.
 
-/// A weight from 0 to 1. It is a function of time alone: nobody has to advance it, and one who looks late sees the
-/// same as one who looked all along.
+/// Weight from 0 to 1. A function of time alone: it needs no updates, and rare queries return the same as frequent ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fade {
     from: f64,
     target: f64,
-    /// When it left `from`, ns.
+    /// Start of the movement, ns.
     since_ns: u64,
     /// Change per nanosecond; infinite for a step.
     rate_per_ns: f64,
 }
 
 impl Fade {
-    /// A weight that rests at `at` and will take `fade_s` from 0 to 1.
+    /// Creates a weight at rest at `at` that takes `fade_s` from 0 to 1.
     pub(super) fn new(at: f64, fade_s: f64) -> Self {
         let at = at.clamp(0.0, 1.0);
         Self { from: at, target: at, since_ns: 0, rate_per_ns: 1.0e-9 / fade_s }
     }
 
-    /// Sends it somewhere from where it is now. Real-time: bounded, no allocation.
+    /// Sets the target of the weight, to be approached from its present value. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn set_target(&mut self, target: f64, now_ns: u64) {
         let target = target.clamp(0.0, 1.0);
@@ -28,7 +27,7 @@ impl Fade {
         }
     }
 
-    /// The weight at a time. Real-time: bounded, no allocation.
+    /// Returns the weight at a time. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn at(&self, now_ns: u64) -> f64 {
         if self.from == self.target {
@@ -36,11 +35,11 @@ impl Fade {
         }
         let way = self.target - self.from;
         let moved = self.rate_per_ns * now_ns.saturating_sub(self.since_ns) as f64;
-        // An infinite rate times no time is NaN, which is not below the way: a step comes at once.
+        // An infinite rate times zero time is NaN, which is not below the distance: a step takes effect at once.
         if moved < way.abs() { self.from + moved.copysign(way) } else { self.target }
     }
 
-    /// True if it is 0 now and from now on. Real-time: bounded, no allocation.
+    /// Returns true if the weight is 0 and stays so. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn is_silent(&self, now_ns: u64) -> bool {
         self.target == 0.0 && self.at(now_ns) == 0.0

@@ -1,4 +1,4 @@
-//! One force model in all the places it is put: the unit that is mixed, faded and replaced.
+//! One force model with all its instances: the unit that is mixed, faded and replaced.
 
 use super::broad_phase::{Bounds, BroadPhase};
 use super::end_wall::EndWall;
@@ -12,33 +12,33 @@ use flotor_hal::{
     DVec3, Demand, DeviceState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick, Wrench,
 };
 
-/// How a plugin swapped in for a model has behaved so far, in all its places.
+/// Health counters of a model, over all its instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ModelHealth {
-    /// The tick at which it first panicked; from then on the instance that did is out.
+    /// Tick of the first panic; the instance is disabled from then on.
     pub panicked_at: Option<u64>,
-    /// Ticks with an answer that was not finite or outside the contract; each counted as no force.
+    /// Ticks with an answer that was not finite or violated the contract; each counted as no force.
     pub rejected_ticks: u64,
-    /// The first of them.
+    /// First rejected tick.
     pub first_rejected: Option<u64>,
-    /// The tick at which its process was found to have ended; from then on it is out.
+    /// Tick at which the process of an instance was found to have ended; the instance is disabled from then on.
     pub lost_at: Option<u64>,
-    /// Ticks in which an asynchronous model had not answered for too long.
+    /// Ticks in which the last field of an asynchronous model was too old.
     pub late_ticks: u64,
-    /// The first of them.
+    /// First late tick.
     pub first_late: Option<u64>,
-    /// Ticks without an answer in time from a process of its own. Alone they are no fault: its time budget says how many are borne.
+    /// Ticks without a reply in time from a worker process. Not a fault by themselves: the time budget limits them.
     pub late_answers: u64,
-    /// How it was too slow, if it was taken out for that.
+    /// Overrun for which the model was disabled.
     pub overrun: Option<Overrun>,
-    /// Ticks after which the floating-point environment was another; it was put back each time.
+    /// Ticks in which the model changed the floating-point environment; the host restored it each time.
     pub float_changes: u64,
-    /// The first of them.
+    /// First tick with a changed floating-point environment.
     pub first_float_change: Option<u64>,
 }
 
 impl ModelHealth {
-    /// True if there is nothing to be said.
+    /// Returns true if there is no problem to report; late replies alone are none.
     #[must_use]
     pub fn is_good(&self) -> bool {
         *self == Self { late_answers: self.late_answers, ..Self::default() }
@@ -61,50 +61,50 @@ impl ModelHealth {
     }
 }
 
-/// One instance of a model in one place.
+/// One instance of a model with its mapping.
 struct Object {
     model: Engine,
     mapping: Mapping,
-    /// The wall where the model ends, if it does.
+    /// Wall at the bounds of the model, if it has any.
     end: Option<EndWall>,
-    /// The answer of the tick before, in its own frame, if it could be used and the next one may be late.
+    /// Usable answer of the last tick, in the model's frame, if the next one may be late.
     last: Option<Output>,
-    /// The tick it was stepped at last.
+    /// Tick of the last step.
     stepped_at: Option<u64>,
-    /// Its calls that changed the floating-point environment, as far as they are counted.
+    /// Calls counted so far that changed the floating-point environment.
     float_changes: u64,
-    /// It panicked, or its process has ended: it is never called again.
+    /// True after a panic or process exit: the model is not called any more.
     is_out: bool,
 }
 
-/// What a layer asks for in a tick. An output that was not computed is NaN.
+/// Wrench and energy of one layer in a tick. An output that was not computed is NaN.
 #[derive(Clone, Copy)]
 pub(super) struct Share {
-    /// In the device frame, not weighted; its torque is NaN where only an observer asks for it and it is not finite.
+    /// Wrench in the device frame, unweighted; the torque is NaN if it is not finite and only an observer requests it.
     pub(super) wrench: Wrench,
     /// Stored energy scaled to the device, J; NaN where it is not finite.
     pub(super) energy_j: f64,
 }
 
 impl Share {
-    /// Nothing.
+    /// No wrench and no energy.
     pub(super) const NONE: Share = Share { wrench: Wrench::ZERO, energy_j: 0.0 };
 
-    /// This part of it. Real-time: bounded, no allocation.
+    /// Scales the contribution. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn times(self, part: f64) -> Self {
         Self { wrench: self.wrench * part, energy_j: self.energy_j * part }
     }
 
-    /// Both together. Real-time: bounded, no allocation.
+    /// Adds two contributions. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn plus(self, other: Self) -> Self {
         Self { wrench: self.wrench + other.wrench, energy_j: self.energy_j + other.energy_j }
     }
 }
 
-/// Returns the answer with NaN in place of each output that was not asked for, or that is not finite and reaches an observer
-/// alone; `None` if what reaches the hand is not finite, or the status is unknown. Real-time: bounded, no allocation.
+/// Returns the answer with NaN in place of each output that was not requested, or that is not finite and reaches an observer alone;
+/// `None` if an output that reaches the hand is not finite, or the status is unknown. Real-time: bounded, no allocation.
 #[inline(always)] // in the middle of a tick
 fn usable(demand: TickDemand, mut output: Output) -> Option<Output> {
     output.status()?;
@@ -126,39 +126,39 @@ fn usable(demand: TickDemand, mut output: Output) -> Option<Output> {
     Some(output)
 }
 
-/// A model in all its places.
+/// Force model with all its instances.
 pub struct Layer {
     objects: Box<[Object]>,
     broad: BroadPhase,
-    /// Outputs that its model can give.
+    /// Outputs that the model can compute.
     serves: Demand,
     memory: Memory,
     budget: TimeBudget,
-    /// What it asked for last: it fades if the model took too long too often.
+    /// Last contribution, which fades out after too many overruns.
     last: Share,
     blend: Blend,
-    /// It stays with the layer: the replacement is not the cause.
+    /// Health of this layer alone; a replacement starts anew.
     health: ModelHealth,
-    /// How often its model had been replaced when it was put in.
+    /// Number of replacements of the model when the layer was put in.
     pub(super) generation: u16,
 }
 
-/// What is known of a layer when its time is over.
+/// Report on a layer after its use.
 pub struct LayerReport {
-    /// Number of its model in the scene.
+    /// Number of the model in the scene.
     pub model: usize,
-    /// Which of those that had that place it was.
+    /// Generation of the layer among those of the model.
     pub generation: u16,
-    /// How it behaved.
+    /// Health counters of the layer.
     pub health: ModelHealth,
-    /// What it said last, if it did not behave; may be empty.
+    /// Last message of an unhealthy model; may be empty.
     pub words: String,
 }
 
 impl Layer {
-    /// A model's instances, each with its mapping, and the time they may take together. Not real-time.
+    /// Creates a layer from a model's instances, each with its mapping, and their common time budget. Not real-time.
     ///
-    /// Where a model ends, there is a wall as stiff as the loop allows.
+    /// A model with workspace bounds gets a wall there, as stiff as the loop allows.
     pub fn new(
         instances: Vec<(Engine, Mapping)>,
         blend: &Blend,
@@ -186,31 +186,31 @@ impl Layer {
         }
     }
 
-    /// How often its model had been replaced when it was put in.
+    /// Returns the number of replacements of the model when the layer was put in.
     pub fn generation(&self) -> u16 {
         self.generation
     }
 
-    /// Outputs that its model can give.
+    /// Returns the outputs that the model can compute.
     pub(super) fn serves(&self) -> Demand {
         self.serves
     }
 
-    /// How it is mixed with the others.
+    /// Returns weight, priority and fade time of the layer.
     pub(super) fn blend(&self) -> &Blend {
         &self.blend
     }
 
-    /// The box in the device frame in which any of its objects can act; `None` if that is everywhere. Real-time.
+    /// Returns the box in the device frame in which any object can act; `None` for everywhere. Real-time.
     pub(super) fn bounds(&self) -> Option<Bounds> {
         self.broad.hull()
     }
 
-    /// What its objects ask for at a state of the device. A model that took too long too often is not asked any more:
-    /// what it asked for last fades.
+    /// Returns the contribution of all objects at a state of the device. A model with too many overruns is not stepped any more:
+    /// its last contribution fades out.
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
-    #[inline(always)] // 3 ns: its share stays in registers
+    #[inline(always)] // 3 ns: the result stays in registers
     pub(super) fn step(
         &mut self,
         tick: &Tick,
@@ -244,7 +244,7 @@ impl Layer {
         }
     }
 
-    /// Asks all objects that can act where the handle is; the others are not called.
+    /// Steps all objects that can act at the handle; the others are not called.
     #[inline]
     fn ask(&mut self, tick: &Tick, state: &DeviceState, demand: TickDemand, events: &mut Events) -> Share {
         let Self { objects, broad, serves, memory, health, .. } = self;
@@ -269,7 +269,7 @@ impl Layer {
         share
     }
 
-    /// Changes a live parameter of all its objects. Real-time: bounded by their number, no allocation.
+    /// Changes a live parameter of all objects. Real-time: bounded by their number, no allocation.
     pub(super) fn set_parameter(&mut self, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
         let mut worst = CallStatus::Ok;
         for (index, object) in self.objects.iter_mut().enumerate() {
@@ -295,13 +295,13 @@ impl Layer {
         worst
     }
 
-    /// How it has behaved so far.
+    /// Returns the health counters so far.
     pub(super) fn health(&self) -> ModelHealth {
         self.health
     }
 
-    /// What is known of it, in place of the model numbered `model`. Only one that did not behave is asked what it said, and
-    /// `asks` hears of it before. Not real-time.
+    /// Returns a report on the layer as model number `model`. Queries the last message of an unhealthy model only, and calls `asks`
+    /// before. Not real-time.
     pub fn report(&mut self, model: usize, asks: impl FnOnce()) -> LayerReport {
         let Self { generation, health, .. } = *self;
         let words = if health.is_good() {
@@ -313,7 +313,7 @@ impl Layer {
         LayerReport { model, generation, health, words }
     }
 
-    /// What the first instance that has anything to say said last. Not real-time.
+    /// Returns the first non-empty last message of the instances. Not real-time.
     pub(super) fn last_message(&mut self) -> String {
         let mut messages = self.objects.iter_mut().map(|object| object.model.last_message());
         messages.find(|message| !message.is_empty()).unwrap_or_default()
@@ -321,7 +321,7 @@ impl Layer {
 }
 
 impl Object {
-    /// The box in the device frame in which it can act; `None` if that is everywhere. Real-time: bounded, no allocation.
+    /// Returns the box in the device frame in which the object can act; `None` for everywhere. Real-time: bounded, no allocation.
     fn bounds(&mut self) -> Option<Bounds> {
         let region = self.model.active_region();
         let half_sides_m = match region.shape() {
@@ -332,8 +332,7 @@ impl Object {
         Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
     }
 
-    /// Asks the model: its answer in its own frame, if there is one that can be used. What is wrong with one that cannot is
-    /// booked in the health.
+    /// Steps the model. Returns the answer in the model's frame if it is usable; otherwise counts the problem in the health.
     #[inline(always)] // with the three of `Mapping` and `limit_wrench` 22 ns a tick
     fn answer(
         &mut self,
@@ -346,7 +345,7 @@ impl Object {
         if self.is_out {
             return None;
         }
-        // Where it was not stepped it has no history: it starts anew.
+        // A model that was not stepped in the last tick has no history and is reset.
         let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
         if was_inactive && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
             return self.fail(input.tick, health);
@@ -372,7 +371,7 @@ impl Object {
                 }
                 usable
             }
-            // One tick may pass with the answer before; a second one in a row finds none.
+            // The last answer replaces one late answer; a second one in a row gets none.
             Stepped::Late => {
                 events.insert(Events::MODEL_OVERRUN);
                 health.late_answers += 1;

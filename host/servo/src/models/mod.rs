@@ -1,8 +1,8 @@
-//! All force models of a device: who is asked, and how the answers are put together.
+//! Force models of a device: selects the active ones and adds up their wrenches.
 //!
-//! A scene's models are *layers*. Their wrenches add up, each by its weight; a layer that pushes silences those of
-//! lower priority; weights move at a steady rate, so that nothing jumps when one model gives way to another. A layer
-//! whose objects cannot act where the handle is, or whose weight is 0, is not asked at all.
+//! A scene's models are *layers*. Their wrenches add up, each by its weight; a layer that pushes silences those of lower priority;
+//! weights move at a constant rate, so that the force does not jump when one model yields to another. A layer whose objects cannot
+//! act at the handle, or whose weight is 0, is not stepped.
 
 mod broad_phase;
 mod end_wall;
@@ -24,30 +24,30 @@ use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
 use layer::Share;
 use slot::Slot;
 
-/// Time in which a layer of higher priority silences the others, s: a hand's reaction takes longer, the slew limit
-/// need not act.
+/// Time in which a layer of higher priority silences the others, s: shorter than a hand's reaction, and long enough that the slew
+/// limit need not act.
 const SILENCE_S: f64 = 0.02;
 
-/// All models of a device.
+/// Models of a device.
 pub(crate) struct ModelStack {
     slots: Box<[Slot]>,
     broad: BroadPhase,
-    /// Ascending; none if all layers have one priority, for then nobody is silenced.
+    /// Levels by ascending priority; none if all layers have one priority: then no layer is silenced.
     levels: Box<[Level]>,
     observable: Demand,
 }
 
-/// A model on its way into a running loop.
+/// Replacement of a model in a running loop.
 pub struct Replacement {
-    /// Number of the model it replaces.
+    /// Number of the model to replace.
     pub model: u32,
-    /// What changes of its parameters name it by.
+    /// Generation of the new layer, named in changes of its parameters.
     pub generation: u16,
-    /// What takes its place.
+    /// New layer.
     pub layer: Box<Layer>,
 }
 
-/// Outputs that a sum over these models has: it has no energy if a part is unknown.
+/// Returns the outputs of the sum of these models: no energy if one part is unknown.
 fn observable(slots: &[Slot]) -> Demand {
     if slots.iter().all(Slot::gives_energy) { Demand::ALL } else { Demand::WRENCH }
 }
@@ -56,14 +56,12 @@ fn observable(slots: &[Slot]) -> Demand {
 struct Level {
     priority: u8,
     gain: Fade,
-    /// A layer of it pushed in this tick.
+    /// True if a layer of this priority pushed in this tick.
     pushes: bool,
 }
 
 impl ModelStack {
-    /// Not real-time.
-    ///
-    /// Each layer comes with the number of its model in the scene.
+    /// Creates the stack; each layer comes with the number of its model in the scene. Not real-time.
     pub(crate) fn new(layers: Vec<(usize, Layer)>) -> Self {
         let slots: Box<[Slot]> = layers.into_iter().map(|(number, layer)| Slot::new(number, layer)).collect();
         let broad = BroadPhase::new(slots.iter().map(Slot::bounds).collect());
@@ -78,14 +76,14 @@ impl ModelStack {
         Self { slots, broad, levels: priorities.into_iter().map(level).collect(), observable }
     }
 
-    /// Outputs of the models together that exist: no energy if one of them does not give its own. Real-time: bounded, no allocation.
+    /// Returns the outputs of the sum of the models: no energy if one model has none. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn observable(&self) -> Demand {
         self.observable
     }
 
-    /// Returns the wrench of the models together at a state of the device, in the device frame, and the energy they store, J. A
-    /// part that nobody asked for is undefined, one that an observer alone asked for NaN where it is not finite.
+    /// Returns the summed wrench of the models in the device frame, and their stored energy, J. An output without demand is
+    /// undefined; one that only an observer demands is NaN where it is not finite.
     ///
     /// Real-time: bounded by the models that are near, no allocation.
     #[inline]
@@ -146,14 +144,14 @@ impl ModelStack {
         CallStatus::Ok
     }
 
-    /// How often the model in place `model` was replaced. Real-time: bounded, no allocation.
+    /// Returns the number of replacements of the model in place `model`. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn generation(&self, model: usize) -> Option<u16> {
         self.slots.get(model).map(Slot::generation)
     }
 
-    /// Puts another model in place of one, faded in from this tick on. What it pushes out, because it was still
-    /// fading, is returned: dropping it is not for the loop.
+    /// Replaces a model; the new layer fades in from this tick on. Returns a layer that had to go before it had faded out; the
+    /// caller drops it outside the loop.
     ///
     /// Real-time: bounded by the objects of the model, no allocation.
     pub(crate) fn replace(
@@ -170,19 +168,19 @@ impl ModelStack {
         pushed_out
     }
 
-    /// A layer that has faded out, and the number of its model in the scene. Real-time: bounded by the models, no allocation.
+    /// Removes a layer that has faded out; returns it with its model number. Real-time: bounded by the models, no allocation.
     #[inline]
     pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
         let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
         self.slots.iter_mut().find_map(take)
     }
 
-    /// Whether a layer is fading out. Real-time: bounded by the models, no allocation.
+    /// Returns true while a layer is fading out. Real-time: bounded by the models, no allocation.
     pub(crate) fn is_fading(&self) -> bool {
         self.slots.iter().any(Slot::is_fading)
     }
 
-    /// A layer may act elsewhere now.
+    /// Updates the bounds of a layer in the broad phase.
     fn rebound(&mut self, model: usize) {
         let bounds = self.slots.get(model).and_then(Slot::bounds);
         if bounds != self.broad.bounds(model) {
@@ -190,23 +188,23 @@ impl ModelStack {
         }
     }
 
-    /// Of every model, health and last words of the layer in place. Not real-time.
+    /// Returns health and last message of the current layer of each model. Not real-time.
     pub(crate) fn health(&mut self) -> Vec<(ModelHealth, String)> {
         self.slots.iter_mut().map(Slot::health).collect()
     }
 
-    /// What is known of every layer that is here. Not real-time.
+    /// Returns reports on all layers; calls `asks` before it queries a model's last message. Not real-time.
     pub(crate) fn reports(&mut self, asks: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
         self.slots.iter_mut().flat_map(|slot| slot.reports(asks))
     }
 
-    /// All layers, each with the number of its model. Not real-time.
+    /// Returns all layers, each with its model number. Not real-time.
     pub(crate) fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
         self.slots.into_iter().flat_map(Slot::into_layers)
     }
 }
 
-/// True if a part of the wrench that reaches the hand is not zero.
+/// Returns true if the wrench has a nonzero part that reaches the hand.
 #[inline]
 fn is_felt(wrench: &Wrench, felt: Demand) -> bool {
     wrench.force() != DVec3::ZERO || felt.contains(Demand::TORQUE) && wrench.torque() != DVec3::ZERO

@@ -1,8 +1,8 @@
-//! The place of one model in a scene: who answers there now, and who answered before.
+//! Slot of one model in a scene: its current layer, and the layer that fades out.
 //!
-//! A model is replaced while the loop runs by putting another layer in its place. The two are mixed until the new one
-//! has faded in; then the old one is handed back, to be dropped off the loop. If a third one comes before that, the
-//! oldest goes at once, and what it asked for last fades in its stead: nothing jumps however soon they follow.
+//! A model is replaced while the loop runs by putting another layer into its slot. Both layers are mixed until the new one has
+//! faded in; then the old one is returned, to be dropped outside the loop. If a third layer comes before that, the oldest is
+//! removed at once and its last contribution fades instead: the force does not jump however soon they follow.
 
 use super::broad_phase::Bounds;
 use super::fade::Fade;
@@ -13,16 +13,16 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, DeviceState, Tick};
 
 pub(super) struct Slot {
-    /// Of the model in the scene.
+    /// Number of the model in the scene.
     pub(super) number: usize,
     current: Box<Layer>,
-    /// How far the current layer has come in.
+    /// Weight of the current layer while the old one fades out.
     presence: Fade,
-    /// The layer before, until then.
+    /// Old layer, while it fades out.
     leaving: Option<Box<Layer>>,
-    /// What is missing since a layer went before it had faded out: it fades with the one that leaves.
+    /// Contribution of a layer removed before it had faded out; fades with `leaving`.
     rest: Option<Share>,
-    /// What all that leaves asked for more than the current layer, and in which tick that was.
+    /// Tick of the last step, and the difference between the old contributions and the current one then.
     gap: Option<(u64, Share)>,
     pub(super) weight: Fade,
     pub(super) priority: u8,
@@ -30,7 +30,7 @@ pub(super) struct Slot {
 }
 
 impl Slot {
-    /// Not real-time.
+    /// Creates a slot with its first layer. Not real-time.
     pub(super) fn new(number: usize, layer: Layer) -> Self {
         let blend = *layer.blend();
         Self {
@@ -46,14 +46,13 @@ impl Slot {
         }
     }
 
-    /// How often a layer was put in: a change of a parameter names the layer it is for. Real-time: bounded, no
-    /// allocation.
+    /// Returns the generation of the current layer, named in changes of its parameters. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn generation(&self) -> u16 {
         self.current.generation
     }
 
-    /// Puts a layer in, which fades in from now on; the one that was still fading out comes back.
+    /// Puts a layer in, which fades in from now on; returns the one that was still fading out.
     ///
     /// Real-time: bounded, no allocation.
     pub(super) fn put(&mut self, mut layer: Box<Layer>, generation: u16, tick: &Tick) -> Option<Box<Layer>> {
@@ -66,8 +65,8 @@ impl Slot {
         self.leaving.replace(before)
     }
 
-    /// What would be missing from this tick on if what leaves went now and the current layer were all there is: as it
-    /// was a tick ago. Nothing if nobody leaves, or nobody was asked then.
+    /// Returns the contribution that would be missing without the leaving layer, as of the last tick; `None` if no layer is
+    /// leaving, or none was stepped then.
     fn missing_without_leaving(&self, tick: &Tick) -> Option<Share> {
         let (asked_at, gap) = self.gap?;
         let absence = 1.0 - self.presence.at(tick.time_ns);
@@ -75,12 +74,12 @@ impl Slot {
         is_felt.then(|| gap.times(absence))
     }
 
-    /// Whether a layer is fading out. Real-time: bounded, no allocation.
+    /// Returns true while a layer is fading out. Real-time: bounded, no allocation.
     pub(super) fn is_fading(&self) -> bool {
         self.leaving.is_some()
     }
 
-    /// The layer that has faded out, if there is one. Real-time: bounded, no allocation.
+    /// Removes the layer that has faded out, if there is one. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn take_faded(&mut self, tick: &Tick) -> Option<Box<Layer>> {
         if self.leaving.is_none() || self.presence.at(tick.time_ns) < 1.0 {
@@ -90,15 +89,15 @@ impl Slot {
         self.leaving.take()
     }
 
-    /// True if the current model gives its stored energy.
+    /// Returns true if the current model computes its stored energy.
     pub(super) fn gives_energy(&self) -> bool {
         self.current.serves().contains(Demand::ENERGY)
     }
 
-    /// The box in the device frame in which its objects can act; `None` if that is everywhere. Real-time: bounded by
-    /// their number, no allocation.
+    /// Returns the box in the device frame in which the objects can act; `None` for everywhere. Real-time: bounded by their number,
+    /// no allocation.
     pub(super) fn bounds(&self) -> Option<Bounds> {
-        // What fades of one that has gone does so wherever the handle is.
+        // The contribution of a removed layer fades wherever the handle is.
         if self.rest.is_some() {
             return None;
         }
@@ -106,7 +105,7 @@ impl Slot {
         self.leaving.as_ref().map_or(Some(current), |leaving| Some(current.with(leaving.bounds()?)))
     }
 
-    /// What it asks for at a state of the device. Real-time: bounded by the objects that are near, no allocation.
+    /// Returns the contribution at a state of the device. Real-time: bounded by the objects that are near, no allocation.
     #[inline]
     pub(super) fn step(
         &mut self,
@@ -117,7 +116,7 @@ impl Slot {
     ) -> Share {
         let share = self.current.step(tick, state, demand, events);
         let Some(leaving) = &mut self.leaving else { return share };
-        // The current layer mixed with the one that leaves.
+        // Mix of the current layer and the leaving one.
         let presence = self.presence.at(tick.time_ns);
         let mut before = leaving.step(tick, state, demand, events);
         if let Some(rest) = self.rest {
@@ -132,12 +131,12 @@ impl Slot {
         self.current.set_parameter(tick, parameter, value)
     }
 
-    /// How the current layer has behaved, and what it said last. Not real-time.
+    /// Returns health and last message of the current layer. Not real-time.
     pub(super) fn health(&mut self) -> (ModelHealth, String) {
         (self.current.health(), self.current.last_message())
     }
 
-    /// What is known of all its layers. Not real-time.
+    /// Returns reports on all layers of the slot. Not real-time.
     pub(super) fn reports(&mut self, asks: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
         let Self { number, current, leaving, .. } = self;
         let number = *number;
@@ -145,7 +144,7 @@ impl Slot {
         layers.map(move |layer| layer.report(number, || asks(number)))
     }
 
-    /// All its layers, each with the number of the model. Not real-time.
+    /// Returns all layers of the slot, each with the model's number. Not real-time.
     pub(super) fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
         let Self { number, current, leaving, .. } = self;
         leaving.into_iter().chain(std::iter::once(current)).map(move |layer| (number, layer))

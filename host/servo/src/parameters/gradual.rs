@@ -1,39 +1,39 @@
-//! Numbers that move to a new value at a rate: a person at a slider must not make the force jump.
+//! Numbers that move to a new value at a rate, so that a user's slider does not make the force jump.
 
 use super::ParameterChange;
 use flotor_core::ChangeOutcome;
 use flotor_hal::Tick;
 
-/// The longest step in time that a number is moved by at a tick, ns: a tick after missed ones does not make up for them.
+/// Longest time step of a movement in a tick, ns: missed ticks are not caught up.
 const LONGEST_STEP_NS: u64 = 10_000_000;
-/// How long a plugin may refuse the next value before the number stays where it is, ns: the orders of a slow asynchronous
-/// model are full for a while, and two numbers may have to move together.
+/// Time for which a plugin may refuse the next value before the movement ends, ns: the queue of an asynchronous model may be full
+/// for a while, and two numbers may have to move together.
 const PATIENCE_NS: u64 = 1_000_000_000;
 
-/// How fast a number gets to a new value.
+/// Pace of a change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
     /// Before the next tick.
     AtOnce,
-    /// At a rate, from the value in force.
+    /// At a rate, from the current value.
     Gradual {
-        /// The value when the plugin was created, in the parameter's unit: where a number begins that has not changed since.
+        /// Value when the plugin was created, in the parameter's unit: start of a number that has not changed since.
         from: f64,
-        /// The parameter's unit per second.
+        /// Rate in the parameter's unit per second.
         per_s: f64,
     },
 }
 
-/// A number the loop knows the value of.
+/// Number with its value and movement.
 #[derive(Clone, Copy, Debug)]
 struct Known {
     plugin: u16,
     generation: u16,
     parameter: u32,
     value: f64,
-    /// Where it is to be, and how fast it gets there, per second.
+    /// Target value and rate per second.
     goal: Option<(f64, f64)>,
-    /// For how long its next value has been refused, ns.
+    /// Time for which the next value has been refused, ns.
     refused_ns: u64,
 }
 
@@ -42,7 +42,7 @@ impl Known {
         (self.plugin, self.generation, self.parameter) == (change.plugin, change.generation, change.parameter)
     }
 
-    /// The value after a time, s.
+    /// Returns the value after a time, s; `None` without a target.
     fn after(&self, dt_s: f64) -> Option<f64> {
         let (goal, per_s) = self.goal?;
         let (way, step) = (goal - self.value, per_s * dt_s);
@@ -51,32 +51,32 @@ impl Known {
     }
 }
 
-/// The numbers that were changed, with those that move.
+/// Numbers that were changed, moving ones included.
 pub(super) struct Movements {
     known: Vec<Known>,
     moving: usize,
 }
 
 impl Movements {
-    /// For at most so many parameters. Not real-time.
+    /// Creates room for this many parameters. Not real-time.
     pub(super) fn with_room(parameters: usize) -> Self {
         Self { known: Vec::with_capacity(parameters), moving: 0 }
     }
 
-    /// How many numbers move. Real-time: bounded, no allocation.
+    /// Returns the number of movements. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn moving(&self) -> usize {
         self.moving
     }
 
-    /// A change without a rate: a movement of this number ends. Real-time: bounded, no allocation.
+    /// Records a change without a rate, which ends a movement of the number. Real-time: bounded, no allocation.
     pub(super) fn note(&mut self, change: &ParameterChange, outcome: ChangeOutcome) {
         if outcome == ChangeOutcome::Applied {
             self.keep(change, change.value, None);
         }
     }
 
-    /// A number has a new goal; false if there is no room to remember it. Real-time: bounded, no allocation.
+    /// Starts a movement; returns false if there is no room. Real-time: bounded, no allocation.
     pub(super) fn begin(&mut self, change: &ParameterChange, from: f64, per_s: f64) -> bool {
         self.keep(change, from, Some((change.value, per_s)))
     }
@@ -98,8 +98,8 @@ impl Movements {
         true
     }
 
-    /// Moves every number that has a goal by a tick: `apply` makes the change, `report` hears of every one that was made and
-    /// of a movement that ended short of its goal. Real-time: bounded by the numbers and `apply`, no allocation.
+    /// Advances all movements by a tick: `apply` makes each change; `report` receives each change made, and each movement that
+    /// ended short of its target. Real-time: bounded by the numbers and `apply`, no allocation.
     pub(super) fn advance(
         &mut self,
         tick: &Tick,
@@ -129,7 +129,7 @@ impl Movements {
         self.count();
     }
 
-    /// A plugin was replaced: what is known of the one before is no longer so. Real-time: bounded, no allocation.
+    /// Drops the numbers of a plugin's other generations after a replacement. Real-time: bounded, no allocation.
     pub(super) fn forget_others(&mut self, plugin: u16, generation: u16) {
         self.known.retain(|known| known.plugin != plugin || known.generation == generation);
         self.count();

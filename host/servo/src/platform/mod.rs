@@ -1,11 +1,11 @@
-//! What differs between systems in the real-time core. Each system has one module with the same items:
+//! Platform layer of the real-time core. Each system has one module with the same items:
 //! - `clock`: the monotonic clock, and sleeping on it;
 //! - `scheduling`: priorities, cores, locked memory;
-//! - `last_stop`: what is done with a process that dies;
-//! - `shared_memory`, `processes`: what a model in a process of its own shares with the loop;
-//! - `watchdog_process`: what stops devices whose host is gone.
+//! - `last_stop`: handling of a dying process;
+//! - `shared_memory`, `processes`: resources shared by the loop and worker processes;
+//! - `watchdog_process`: process that stops devices whose host has ended.
 //!
-//! Signals are Linux's alone; what hears them, in another crate, is of that system as well.
+//! Signals exist on Linux only, and so does the code in another crate that receives them.
 
 #[cfg(not(windows))]
 mod linux;

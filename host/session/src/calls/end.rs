@@ -1,12 +1,12 @@
-//! Calls of plugins at the end of a run. Thread and memory for them exist before anything is energised: a limit of the
-//! machine, reached during the run, refuses both at its end.
+//! Plugin calls at the end of a run. Their thread and memory are reserved before anything is energised: a limit of the machine,
+//! reached during the run, would refuse both at its end.
 
 use super::{CallError, CallThread, Progress};
 use std::time::Duration;
 
-/// Bytes held for the end of a run: last messages, summary, index of the recording.
+/// Memory reserved for the end of a run, bytes: last messages, summary, index of the recording.
 const RESERVE_BYTES: usize = 1 << 20;
-/// Bytes of one block: small enough to come from the heap, to which a freed block returns.
+/// Size of one block, bytes: small enough to come from the heap, to which a freed block returns.
 const BLOCK_BYTES: usize = 1 << 16;
 
 /// Thread and memory for the end of a run; the default reserves nothing.
@@ -17,33 +17,33 @@ pub(crate) struct EndReserve {
 }
 
 impl EndReserve {
-    /// Starts the thread and takes the memory. Not real-time.
+    /// Starts the thread and reserves the memory. Not real-time.
     ///
     /// # Errors
-    /// The system's, if there can be no thread.
+    /// If the system cannot start a thread.
     pub(crate) fn take() -> std::io::Result<Self> {
-        // Written, so that the system has given each page.
+        // Written to, so that the system allocates each page.
         let block = || vec![1; BLOCK_BYTES].into_boxed_slice();
         let memory = std::iter::repeat_with(block).take(RESERVE_BYTES / BLOCK_BYTES).collect();
         Ok(Self { thread: Some(CallThread::start()?), memory })
     }
 
-    /// Begins the end: frees the memory for it.
+    /// Frees the memory and returns the thread for the calls.
     pub(crate) fn begin(self) -> EndCalls {
         drop(self.memory);
         EndCalls { thread: self.thread }
     }
 }
 
-/// Executes the calls at the end of a run on one thread, as long as each returns.
+/// Executor of the calls at the end of a run: one thread, as long as each call returns.
 #[derive(Default)]
 pub(crate) struct EndCalls {
     thread: Option<CallThread>,
 }
 
 impl EndCalls {
-    /// Executes calls of plugins, `body`, each for no longer than `limit`. A call that does not return keeps the thread, and the
-    /// next needs a new one.
+    /// Executes plugin calls, `body`, each for no longer than `limit`. A call that does not return occupies the thread, and the
+    /// next one needs a new thread.
     ///
     /// # Errors
     /// The call that did not return, or no new thread.

@@ -1,10 +1,10 @@
-//! What differs between systems around a session. Each system has one module with the same items:
-//! - `MachineState`: what of the process any plugin can change;
-//! - `identity`, `changed`, `is_same_file`: which file a path leads to, and whether it is still the one that was read;
-//! - `NOT_CAUGHT`: what ends the process without a stop of the devices;
-//! - `ThreadClock`: what a thread uses of the processors;
-//! - `process_group`: a process that ends with its parent, and the processes that it starts;
-//! - `user_folder`, `distrust`: where a user keeps plugins, and which folders are not searched.
+//! Platform layer of a session. Each system has one module with the same items:
+//! - `MachineState`: state of the process that any plugin can change;
+//! - `identity`, `changed`, `is_same_file`: identity of a file, and detection of changes;
+//! - `NOT_CAUGHT`: warning about ends of the process that stop no device;
+//! - `ThreadClock`: processor use of a thread;
+//! - `process_group`: process that ends with its parent, with the processes that it starts;
+//! - `user_folder`, `distrust`: plugin folder of the user, and folders that are not searched.
 
 #[cfg(not(windows))]
 mod linux;

@@ -1,4 +1,4 @@
-//! Where plugins are, and which one an id means. Files are read, not run, until a scene needs one.
+//! Plugin registry: finds plugins and resolves their ids. Files are read, not run, until a scene needs one.
 
 #![allow(unsafe_code)] // `load_file`; listed in tests/tests/system/architecture.rs
 
@@ -17,17 +17,17 @@ use std::sync::{Mutex, PoisonError};
 /// Environment variable with further plugin folders, separated like `PATH`.
 pub const PATH_VARIABLE: &str = "FLOTOR_PLUGIN_PATH";
 
-/// A folder that was not searched, and why.
+/// Folder that was not searched, with the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SkippedFolder {
-    /// The folder.
+    /// Path of the folder.
     pub folder: PathBuf,
-    /// Why, and what to do.
+    /// Reason and remedy.
     pub reason: String,
 }
 
-/// Plugins found, in search order: of two folders with a plugin of one id the first wins; two files with one id in one folder
-/// are refused.
+/// Plugins found, in search order: of two folders with a plugin of one id the first one counts; two files with one id in one folder
+/// are rejected.
 pub struct Registry {
     linked: Vec<Plugin>,
     found: Vec<Metadata>,
@@ -42,26 +42,26 @@ pub struct Registry {
     loaded: Mutex<Vec<Loaded>>,
 }
 
-/// A file that was loaded, as it was then.
+/// Loaded file, in its state at that time.
 struct Loaded {
     path: PathBuf,
     stamp: FileStamp,
-    /// xxh3-64 of its bytes: a file that was built anew is another one.
+    /// xxh3-64 of the bytes, which distinguishes a rebuilt file.
     hash: u64,
     plugin: Plugin,
 }
 
-/// The place of a plugin.
+/// Location of a plugin.
 enum Located<'a> {
-    /// This program.
+    /// Linked into this program.
     Linked(&'a Plugin),
     /// A file of a searched folder.
     Found(&'a Metadata),
-    /// A file that was named by its path.
+    /// File given by its path.
     Given(&'a Path),
 }
 
-/// Why no plugin answers to an id.
+/// Reason why an id resolves to no plugin.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LookupError {
@@ -71,29 +71,29 @@ pub enum LookupError {
         nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
         hint.as_ref().map_or(String::new(), |hint| format!(" ({hint})")))]
     Unknown {
-        /// The id.
+        /// Requested id.
         id: String,
-        /// Model or device, if it matters.
+        /// Requested kind; `None` for any.
         kind: Option<PluginKind>,
         /// The most similar id of that kind.
         nearest: Option<String>,
-        /// A file of that name, and why it is not meant or cannot be read as a plugin; or a folder of the scene without a plugin.
+        /// Hint about a file of that name, with the reason why it is not used, or about a folder of the scene without a plugin.
         hint: Option<String>,
     },
     /// Two files of one folder have the id.
     #[error("`{id}` is the id of two plugins in one folder: `{}` and `{}`; remove one of them", one.display(), other.display())]
     Ambiguous {
-        /// The id.
+        /// Requested id.
         id: String,
-        /// One file.
+        /// First file.
         one: PathBuf,
-        /// The other.
+        /// Second file.
         other: PathBuf,
     },
-    /// The plugin was found and refused.
+    /// The plugin was found and rejected.
     #[error(transparent)]
     Refused(#[from] LoadError),
-    /// Its initialisers do not return.
+    /// The initialisers of the plugin do not return.
     #[error(transparent)]
     Calls(#[from] CallError),
 }
@@ -110,7 +110,7 @@ impl Registry {
         folders.extend(own_folders());
         folders.extend(user_folder());
         let mut registry = Self {
-            // Part of the host; it says itself that it needs a program.
+            // Part of the host; refuses itself without a program.
             linked: Plugin::in_process(&crate::program::ENTRY).into_iter().collect(),
             found: Vec::new(),
             shadowed: Vec::new(),
@@ -127,8 +127,8 @@ impl Registry {
         registry
     }
 
-    /// The same with a plugin that is linked into this program, which answers to its id before any file does: for
-    /// instruments of the host, and for debuggers and sanitizers, which see through no library. Not real-time.
+    /// Adds a plugin that is linked into this program, which takes precedence over files: for instruments of the host, and for
+    /// debuggers and sanitizers, which cannot inspect libraries. Not real-time.
     ///
     /// # Errors
     /// [`LoadError`], as for a file.
@@ -153,77 +153,76 @@ impl Registry {
             match read_metadata(&file) {
                 Ok(metadata) => match self.found.iter().find(|known| known.id == metadata.id) {
                     None => self.found.push(metadata),
-                    // Cargo links what it builds into two folders: one file under two names hides nothing.
+                    // Cargo links its output into two folders: one file under two names hides nothing.
                     Some(known) if is_same_file(&known.path, &metadata.path) => {}
                     Some(known) if known.path.parent() == metadata.path.parent() => {
                         self.ambiguous.push((known.clone(), metadata));
                     }
                     Some(_) => self.shadowed.push(metadata),
                 },
-                // Other libraries may lie beside plugins; only files that claim to be one are worth a word.
+                // Other libraries may lie beside plugins; only files that claim to be one are reported.
                 Err(LoadError::NotAPlugin { .. }) => {}
                 Err(error) => self.broken.push(error),
             }
         }
     }
 
-    /// Plugins found, in search order.
+    /// Returns the plugins found, in search order.
     #[must_use]
     pub fn found(&self) -> &[Metadata] {
         &self.found
     }
 
-    /// Plugins hidden by one with the same id found earlier.
+    /// Returns the plugins hidden by an earlier one with the same id.
     #[must_use]
     pub fn shadowed(&self) -> &[Metadata] {
         &self.shadowed
     }
 
-    /// Pairs of files with one id in one folder. A scene that names the id is refused.
+    /// Returns pairs of files with one id in one folder. A scene that names the id is rejected.
     #[must_use]
     pub fn ambiguous(&self) -> &[(Metadata, Metadata)] {
         &self.ambiguous
     }
 
-    /// Files that look like plugins and cannot be read as one.
+    /// Returns the files that look like plugins and cannot be read as one.
     #[must_use]
     pub fn broken(&self) -> &[LoadError] {
         &self.broken
     }
 
-    /// Folders that were not searched, and why.
+    /// Returns the folders that were not searched, with the reasons.
     #[must_use]
     pub fn skipped(&self) -> &[SkippedFolder] {
         &self.skipped
     }
 
-    /// Folders in search order, whether they exist or not.
+    /// Returns the folders in search order, existing or not.
     #[must_use]
     pub fn folders(&self) -> &[PathBuf] {
         &self.folders
     }
 
-    /// Loads the plugin an id (or a path to a file) means. Not real-time; runs the plugin's code.
+    /// Loads the plugin of an id (or a path to a file). Not real-time; runs the plugin's code.
     ///
     /// # Errors
-    /// [`LookupError`]: unknown, with the nearest known id, or refused, with the reason.
+    /// [`LookupError`]: unknown, with the closest known id, or rejected, with the reason.
     pub fn load(&self, id: &str, kind: PluginKind) -> Result<Plugin, LookupError> {
         self.find(id, Some(kind))
     }
 
-    /// Loads the plugin an id (or a path to a file) means, whatever it is a plugin for. Not real-time; runs the plugin's
-    /// code.
+    /// Loads the plugin of an id (or a path to a file), of any kind. Not real-time; runs the plugin's code.
     ///
     /// # Errors
-    /// [`LookupError`]: unknown, with the nearest known id, or refused, with the reason.
+    /// [`LookupError`]: unknown, with the closest known id, or rejected, with the reason.
     pub fn load_any(&self, id: &str) -> Result<Plugin, LookupError> {
         self.find(id, None)
     }
 
-    /// Checks that a plugin answers to an id (or a path to a file), and runs no code of it. Not real-time.
+    /// Checks that an id (or a path to a file) resolves to a plugin, without running its code. Not real-time.
     ///
     /// # Errors
-    /// [`LookupError`]: unknown, with the nearest known id, or no plugin of this kind.
+    /// [`LookupError`]: unknown, with the closest known id, or no plugin of this kind.
     pub fn check(&self, id: &str, kind: PluginKind) -> Result<(), LookupError> {
         match self.locate(id, Some(kind))? {
             Located::Linked(_) | Located::Found(_) => Ok(()),
@@ -260,7 +259,7 @@ impl Registry {
         Ok(Located::Found(found))
     }
 
-    /// That no plugin (of a kind) has an id, with the nearest that one has.
+    /// Returns the error about an unknown id, with the closest known one.
     fn unknown(&self, id: &str, kind: Option<PluginKind>) -> LookupError {
         let candidates = self.found.iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
         let unknown_program = || installation_is_unknown().map(str::to_owned);
@@ -276,7 +275,7 @@ impl Registry {
         }
     }
 
-    /// Returns the advice to build, if a folder of the scene contains no plugin.
+    /// Returns advice to build, if a folder of the scene contains no plugin.
     fn unbuilt(&self) -> Option<String> {
         let holds_plugin = |folder: &Path| self.found.iter().any(|known| known.path.parent() == Some(folder));
         let mut of_scene = self.folders.iter().take(self.of_scene);
@@ -284,11 +283,11 @@ impl Registry {
         Some(format!("`{}` contains no plugin: build it first", empty.display()))
     }
 
-    /// Loads a file, or gives what was loaded before if the file is unchanged: libraries are never unloaded, and a
-    /// thousand models of one plugin share one mapping of it.
+    /// Loads a file, or returns the plugin loaded before if the file is unchanged: libraries are never unloaded, and a thousand
+    /// models of one plugin share one mapping of the file.
     fn open(&self, path: &Path) -> Result<Plugin, LookupError> {
-        // Taken before the bytes are read: whoever writes meanwhile is noticed the next time.
-        let Ok(stamp) = FileStamp::of(path) else { return load_in_time(path) }; // it says what is wrong
+        // Taken before the bytes are read: a write meanwhile is noticed the next time.
+        let Ok(stamp) = FileStamp::of(path) else { return load_in_time(path) }; // reports the error
         let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = loaded.iter().find(|known| known.path == path && known.stamp.is_same_as(&stamp))
         {
@@ -305,24 +304,24 @@ impl Registry {
     }
 }
 
-/// Returns the cause where the system does not tell the place of this program: plugins beside it are not found then.
+/// Returns the reason why plugins beside this program are not found, if the system does not report the program's path.
 #[must_use]
 pub fn installation_is_unknown() -> Option<&'static str> {
     own_folders().is_empty().then_some(UNKNOWN_PROGRAM)
 }
 
-/// Where the plugins of this installation are: beside the program, or where its archive puts them.
+/// Returns the plugin folders of this installation: beside the program, or as in its archive.
 fn own_folders() -> Vec<PathBuf> {
     let program = flotor_servo::guest::program().cloned().or_else(|| std::env::current_exe().ok());
     let Some(own) = program.as_deref().and_then(Path::parent) else { return Vec::new() };
     // `deps` before the folder itself: `cargo run` refreshes only `deps`, and an older copy may lie above it.
     let beside = ["deps", "", "plugins", "../lib/flotor/plugins"];
     let folder = |name: &str| if name.is_empty() { own.to_path_buf() } else { own.join(name) };
-    // Without `bin/..` in what the summary of a run prints.
+    // Without `bin/..` in the summary of a run.
     beside.map(folder).map(|folder| folder.canonicalize().unwrap_or(folder)).to_vec()
 }
 
-/// Whether a plugin belongs to this installation: it is linked into the program, or lies beside it or in
+/// Returns true if a plugin belongs to this installation: linked into the program, or located beside it or in
 /// `../lib/flotor/plugins`. Not real-time.
 pub(crate) fn is_installed(plugin: &Path) -> bool {
     let Ok(file) = plugin.canonicalize() else { return plugin.as_os_str().is_empty() };
@@ -330,7 +329,7 @@ pub(crate) fn is_installed(plugin: &Path) -> bool {
     own_folders().iter().any(|own| own.canonicalize().is_ok_and(|own| Some(own.as_path()) == folder))
 }
 
-/// Loads a plugin file, but waits no longer than a limit for its initialisers.
+/// Loads a plugin file, with a time limit for its initialisers.
 fn load_in_time(path: &Path) -> Result<Plugin, LookupError> {
     let path = path.to_path_buf();
     let loaded = attended_while(calls::limit(), calls::is_to_begin, move |progress| {
@@ -340,7 +339,7 @@ fn load_in_time(path: &Path) -> Result<Plugin, LookupError> {
     Ok(loaded??)
 }
 
-/// Loads a plugin file. The one place of the host that does. Not real-time; runs the plugin's code.
+/// Loads a plugin file; the only place of the host that does. Not real-time; runs the plugin's code.
 ///
 /// # Errors
 /// [`LoadError`], with file, cause and remedy.
@@ -350,7 +349,7 @@ pub fn load_file(path: &Path) -> Result<Plugin, LoadError> {
     unsafe { Plugin::load(path) }
 }
 
-/// Refuses a plugin of the other kind.
+/// Rejects a plugin of the other kind.
 fn check_kind(plugin: &Metadata, kind: Option<PluginKind>) -> Result<(), LoadError> {
     let Some(kind) = kind.filter(|kind| *kind != plugin.kind) else { return Ok(()) };
     let Metadata { path, id, kind: found, .. } = plugin.clone();

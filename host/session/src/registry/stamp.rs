@@ -1,4 +1,4 @@
-//! Whether a file is still the one that was read.
+//! File stamps, which show if a file has changed since it was read.
 
 use crate::platform;
 use std::fs::File;
@@ -6,23 +6,23 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 use xxhash_rust::xxh3::Xxh3Default;
 
-/// A change this soon after another may leave a file's time as it was: file systems count in ticks of the kernel
-/// (10 ms at most), some in seconds (FAT in two).
+/// Coarsest resolution of file times: a change this soon after another may leave the time unchanged. File systems count in ticks of
+/// the kernel (10 ms at most), some in seconds (FAT in two).
 const COARSEST_FILE_TIME: Duration = Duration::from_secs(2);
 
-/// What the file system says of a file, and when it was asked.
+/// Identity and state of a file, as reported by the file system.
 #[derive(Clone, Debug)]
 pub(super) struct FileStamp {
     identity: [u64; 2],
     length_bytes: u64,
-    /// When it changed last, s and ns since 1970.
+    /// Time of the last change, s and ns since 1970.
     changed: (i64, i64),
-    /// Long enough before it was asked that a later change has another time.
+    /// True if the last change was so long before the stamp that a later change has another time.
     settled: bool,
 }
 
 impl FileStamp {
-    /// Not real-time.
+    /// Takes the stamp of a file. Not real-time.
     pub(super) fn of(path: &Path) -> std::io::Result<Self> {
         let file = std::fs::metadata(path)?;
         let changed = platform::changed(&file);
@@ -34,7 +34,7 @@ impl FileStamp {
         })
     }
 
-    /// Whether the contents read when this stamp was taken are those of a file with that one: a no means to look.
+    /// Returns true if the contents are the same for both stamps; false means that they have to be compared.
     pub(super) fn is_same_as(&self, other: &Self) -> bool {
         let what = |stamp: &Self| (stamp.identity, stamp.length_bytes, stamp.changed);
         self.settled && what(self) == what(other)
@@ -49,7 +49,7 @@ fn is_settled((seconds, nanoseconds): (i64, i64), now: SystemTime) -> bool {
     now.duration_since(changed).is_ok_and(|age| age > COARSEST_FILE_TIME)
 }
 
-/// xxh3-64 of a file's bytes, however many. Not real-time.
+/// Returns the xxh3-64 of a file's bytes. Not real-time.
 pub(super) fn hash_of(path: &Path) -> std::io::Result<u64> {
     if !std::fs::metadata(path)?.is_file() {
         return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file"));

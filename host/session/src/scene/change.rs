@@ -1,56 +1,56 @@
-//! `[[change]]`: what changes while a scene runs.
+//! `[[change]]`: scheduled changes of a running scene.
 
 use super::reader::{Location, SceneError, Section, Value};
 use super::{ParameterText, PluginKeyValue};
 
-/// What changes at a time known beforehand.
+/// Scheduled change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChangeUse {
-    /// Applied before the first tick at this time or later, s since the start of the loop.
+    /// Time since the start of the loop, s; applied before the first tick at this time or later.
     pub at_s: f64,
-    /// What changes.
+    /// Kind of the change.
     pub what: ChangeWhat,
-    /// Where it was written.
+    /// Location in the scene.
     pub location: Location,
 }
 
-/// What changes.
+/// Kind of a change.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ChangeWhat {
-    /// A parameter gets a new value.
+    /// New value of a parameter.
     Set {
         /// `device`, the name of a model in the scene, or a plugin's id.
         plugin: String,
-        /// The parameter and its value.
+        /// Parameter with its value.
         parameter: ParameterText,
     },
-    /// Another plugin, or the same one built anew, takes the place of a model.
+    /// Replacement of a model by another plugin, or by the same one built anew.
     Swap {
-        /// The name of a model in the scene, or a plugin's id.
+        /// Name of a model in the scene, or id of a plugin.
         model: String,
-        /// What comes; of several, the seed of the run chooses one. Never empty.
+        /// Alternatives for the model; of several, the seed of the run chooses one. Never empty.
         by: Vec<Alternative>,
     },
-    /// A model is felt more or less: its weight moves there at the rate of its fade.
+    /// New weight of a model, approached at the rate of its fade.
     Weight {
-        /// The name of a model in the scene, or a plugin's id.
+        /// Name of a model in the scene, or id of a plugin.
         model: String,
-        /// The part of its wrench that is felt, 0 to 1.
+        /// Fraction of the wrench that is felt, 0 to 1.
         weight: f64,
     },
 }
 
-/// What may take the place of a model.
+/// Alternative plugin for a model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Alternative {
-    /// Id or file of the plugin; none: the one the scene names.
+    /// Id or file of the plugin; `None`: as named in the scene.
     pub plugin: Option<String>,
-    /// What is set for it.
+    /// Parameters of the plugin.
     pub parameters: Vec<ParameterText>,
 }
 
 impl Alternative {
-    /// `plugin` and `parameters` of a table.
+    /// Takes `plugin` and `parameters` of a table.
     fn take(section: &mut Section<'_>) -> Result<Self, SceneError> {
         let plugin = section.take("plugin").map(Value::text).transpose()?;
         let parameters =
@@ -62,7 +62,7 @@ impl Alternative {
 /// Longest time, s: a year, as for a run.
 const LATEST_S: f64 = 31_536_000.0;
 
-/// Every change of every table, in the order written; those of one table come before the same tick.
+/// Reads all changes in the order written; those of one table come before the same tick.
 pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneError> {
     let mut changes = Vec::new();
     for mut section in sections {
@@ -109,10 +109,10 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
     Ok(changes)
 }
 
-/// What a text of a change means, and where it was written.
+/// Reader of a change from its text and location.
 type Read = fn(&str, &Location) -> Result<ChangeWhat, SceneError>;
 
-/// `PLUGIN.KEY=VALUE`
+/// Reads `PLUGIN.KEY=VALUE`.
 fn parameter(text: &str, location: &Location) -> Result<ChangeWhat, SceneError> {
     let setting = text.parse::<PluginKeyValue>();
     let setting = setting.map_err(|problem| location.problem(format!("`change.set`: {problem}")))?;
@@ -120,7 +120,7 @@ fn parameter(text: &str, location: &Location) -> Result<ChangeWhat, SceneError> 
     Ok(ChangeWhat::Set { plugin, parameter: ParameterText { key, value, location: location.clone() } })
 }
 
-/// `MODEL=WEIGHT`
+/// Reads `MODEL=WEIGHT`.
 fn weight_of(text: &str, location: &Location) -> Result<ChangeWhat, SceneError> {
     let parts = text.split_once('=').and_then(|(model, weight)| {
         let weight = weight.trim().parse::<f64>().ok().filter(|weight| (0.0..=1.0).contains(weight))?;

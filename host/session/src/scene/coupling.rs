@@ -8,7 +8,7 @@ use flotor_core::coupling::{
 };
 use flotor_core::mapping::MappingConfig;
 
-/// Every coupling, in the order written.
+/// Reads every coupling, in the order written.
 pub(super) fn read(
     sections: Vec<Section<'_>>,
     devices: &[DeviceUse],
@@ -102,16 +102,16 @@ fn coupling(
     Ok(CouplingDescription { name, config, ends })
 }
 
-/// Where the other end is.
+/// Location of the other end.
 #[derive(Clone, Copy)]
 enum Partner {
     /// In this scene.
     Here,
-    /// In one on another host.
+    /// In a scene on another host.
     Elsewhere,
 }
 
-/// Whether a name can be a part of a network's key.
+/// Returns true if a name can be a part of a network's key.
 fn is_key(name: &str) -> bool {
     let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     (1..=40).contains(&name.len()) && name.chars().all(legal)
@@ -120,7 +120,7 @@ fn is_key(name: &str) -> bool {
 fn end(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<CouplingEnd, SceneError> {
     let device = devices::number(devices, section.require("device")?)?;
     let mapping = match section.section("mapping")? {
-        // No torque scale: energy must come out in the measure in which it went in.
+        // No torque scale: both ends must measure energy alike.
         Some(mut mapping) => {
             let config = frame_and_scales(&mut mapping)?;
             mapping.finish()?;

@@ -1,25 +1,25 @@
-//! The devices of a scene, and which of them a model is on.
+//! Devices of a scene, and assignment of models to devices.
 
 use super::reader::{Location, SceneError, Section, Value, did_you_mean};
 use super::{CalibrationUse, ModelUse, PluginUse, plugin_use};
 use flotor_core::MOST_DEVICES;
 use std::collections::BTreeSet;
 
-/// Stands between the name of a model and that of its device where a model is on several.
+/// Separator between the names of a model and of its device, for a model on several devices.
 const ON: char = '@';
 
 /// A device in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeviceUse {
-    /// What `--set NAME.KEY=VALUE` and reports call it; "device" unless said otherwise.
+    /// Name in `--set NAME.KEY=VALUE` and reports; "device" by default.
     pub name: String,
-    /// The plugin.
+    /// Plugin of the device.
     pub plugin: PluginUse,
-    /// The calibration file it corrects its vertical force by, if any.
+    /// Calibration file of the vertical force, if any.
     pub calibration: Option<CalibrationUse>,
 }
 
-/// The devices, each with a name of its own.
+/// Reads the devices, each with a unique name.
 pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError> {
     let missing = root.missing("device");
     let sections = root.sections("device")?;
@@ -55,7 +55,7 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
     Ok(devices)
 }
 
-/// A name that can be told from that of a model on a device.
+/// Reads a name that differs from that of any model on a device.
 pub(super) fn name(value: Value<'_>) -> Result<String, SceneError> {
     let wrong =
         value.problem(format!("a name must not contain `{ON}`, which separates a model from its device"));
@@ -63,7 +63,7 @@ pub(super) fn name(value: Value<'_>) -> Result<String, SceneError> {
     if name.contains(ON) { Err(wrong) } else { Ok(name) }
 }
 
-/// The number of the device of a name.
+/// Returns the number of the device with this name.
 pub(super) fn number(devices: &[DeviceUse], value: Value<'_>) -> Result<u16, SceneError> {
     let location = value.location.clone();
     find(devices, &value.text()?, &location)
@@ -77,7 +77,7 @@ fn find(devices: &[DeviceUse], name: &str, location: &Location) -> Result<u16, S
     })
 }
 
-/// The devices a model is on: those it names, or the only one.
+/// Returns the devices of a model: the named ones, or the only one.
 pub(super) fn of_model(
     devices: &[DeviceUse],
     named: Option<Value<'_>>,
@@ -100,18 +100,18 @@ pub(super) fn of_model(
     names.iter().map(|name| find(devices, name, &location)).collect()
 }
 
-/// What a model on one of several devices is called.
+/// Returns the name of a model on one of several devices.
 pub(super) fn name_on(model: &str, device: &DeviceUse) -> String {
     format!("{model}{ON}{}", device.name)
 }
 
-/// True if `asked` names this model: it alone, or on all the devices it is on.
+/// Returns true if `asked` names this model, alone or together with its copies on other devices.
 #[must_use]
 pub fn is_named(name: &str, asked: &str) -> bool {
     name == asked || without_device(name) == asked
 }
 
-/// The name of a model, without the device it is on.
+/// Returns the name of a model without its device.
 #[must_use]
 pub fn without_device(name: &str) -> &str {
     name.split_once(ON).map_or(name, |(model, _)| model)

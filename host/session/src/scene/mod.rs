@@ -1,4 +1,4 @@
-//! A scene: which devices, which models, how they are mapped and limited. A TOML file; unknown keys are errors.
+//! Scene: devices, models, their mapping and limits. A TOML file; unknown keys are errors.
 
 mod change;
 mod coupling;
@@ -26,63 +26,63 @@ use reader::{Section, Source, Value};
 pub use reader::{did_you_mean, nearest};
 use std::path::{Path, PathBuf};
 
-/// The scene `flotor` runs when none is named: spring 1 on the simulated flotor, held by a hand.
+/// Scene that `flotor` runs if none is named: spring 1 on the simulated flotor, held by a hand.
 pub const DEMO: &str = include_str!("../../scenes/demo.toml");
 
 /// The scene of experiments: a spring to be judged, on the simulated flotor.
 pub const STUDY: &str = include_str!("../../scenes/study.toml");
 
-/// A scene as read: complete, checked against itself, not yet against the plugins it names.
+/// Scene as read: complete and consistent, not yet checked against the plugins that it names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// What stands in the title of a report.
+    /// Title of a report.
     pub title: String,
-    /// The text it was read from, for recordings.
+    /// Text of the scene, for recordings.
     pub text: String,
     /// Loop rate, Hz.
     pub rate_hz: f64,
-    /// Who decides when a tick begins (real clock).
+    /// Time base of the ticks (real clock).
     pub pacing: Pacing,
-    /// How long to run, s.
+    /// Duration of the run, s.
     pub duration_s: f64,
     /// Folders with plugins, searched first; relative to the scene's file.
     pub plugin_folders: Vec<PathBuf>,
     /// The devices, one at least.
     pub devices: Vec<DeviceUse>,
-    /// The force models; their wrenches add up. One that is on several devices is here for each.
+    /// Force models, whose wrenches add up. A model on several devices has an entry for each.
     pub models: Vec<ModelUse>,
-    /// What holds devices together.
+    /// Couplings between devices.
     pub couplings: Vec<CouplingDescription>,
     /// Limits, tighter than or equal to what the device declares.
     pub limits: Limits,
-    /// Where the handle is pushed back.
+    /// Boundary where the handle is pushed back.
     pub boundary: Boundary,
-    /// What changes while the scene runs, in the order written.
+    /// Scheduled changes, in the order written.
     pub changes: Vec<ChangeUse>,
 }
 
-/// A plugin and what it is told.
+/// Plugin with its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PluginUse {
     /// Id of the plugin.
     pub plugin: String,
-    /// Where it was named.
+    /// Location in the scene.
     pub location: Location,
     /// Parameters as written, checked later against the plugin's schema.
     pub parameters: Vec<ParameterText>,
 }
 
-/// A calibration file as named.
+/// Calibration file named in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationUse {
-    /// The file; relative to the scene's.
+    /// Path, relative to the scene's file.
     pub file: PathBuf,
-    /// Where it was named.
+    /// Location in the scene.
     pub location: Location,
 }
 
 impl CalibrationUse {
-    /// The file, from where this process runs.
+    /// Returns the path from the working folder of this process.
     #[must_use]
     pub fn path(&self) -> PathBuf {
         match self.location.file.parent() {
@@ -92,52 +92,51 @@ impl CalibrationUse {
     }
 }
 
-/// One parameter as written.
+/// Parameter as written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterText {
     /// Id of the parameter.
     pub key: String,
-    /// Its value, as text.
+    /// Value as text.
     pub value: String,
-    /// Where it was written.
+    /// Location in the scene.
     pub location: Location,
 }
 
 /// A force model in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelUse {
-    /// What `--set NAME.KEY=VALUE` and reports call it; the plugin's id unless said otherwise.
+    /// Name in `--set NAME.KEY=VALUE` and reports; the plugin's id by default.
     pub name: String,
-    /// The plugin.
+    /// Plugin of the model.
     pub plugin: PluginUse,
-    /// Number of the device it is on.
+    /// Number of the model's device.
     pub device: u16,
-    /// From device to model and back.
+    /// Mapping from device to model and back.
     pub mapping: MappingConfig,
-    /// Where its homes are in the device frame, m: one instance of the model for each.
+    /// Homes of the model in the device frame, m: one instance for each.
     pub places_m: Vec<[f64; 3]>,
-    /// How it is mixed with the other models.
+    /// Weight, priority and fade time.
     pub blend: Blend,
-    /// Where it runs.
+    /// Isolation of the model from the host.
     pub isolation: Isolation,
-    /// When it is computed, if asynchronously; the loop evaluates its local linear model.
+    /// Timing of an asynchronous model, whose local linear model the loop evaluates; `None` in the loop.
     pub field: Option<FieldTiming>,
-    /// Longest time a step may take, s; `None`: half a period in real time, anything on the virtual clock.
+    /// Time limit of a step, s; `None`: half a period in real time, none on the virtual clock.
     pub budget_s: Option<f64>,
-    /// Latency that its device declares, s; 0 until a session has opened the device.
+    /// Latency declared by the model's device, s; 0 until a session has opened the device.
     pub latency_s: f64,
 }
 
-/// What stands between a model and the host.
+/// Isolation of a model from the host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Isolation {
-    /// What its origin asks for: a process of its own for a model from outside the installation where a hand is, that is on a
-    /// real device in real time; else nothing.
+    /// By the model's origin: a worker process for a model from outside the installation on a real device in real time, otherwise none.
     #[default]
     ByOrigin,
-    /// Nothing: the model runs in the loop's own thread.
+    /// No isolation: the model runs in the loop's own thread.
     None,
-    /// A process of its own, which may hang or crash.
+    /// Worker process, which may hang or crash.
     Process,
 }
 
@@ -153,8 +152,8 @@ impl Isolation {
 }
 
 impl ModelUse {
-    /// The same place with another plugin, or with none named the same one. Another plugin starts from its own
-    /// defaults; `settings` come on top.
+    /// Returns a copy with another plugin, or with the same one for `None`. Another plugin starts from its own defaults; `settings`
+    /// are added.
     #[must_use]
     pub fn replaced_by(&self, plugin: Option<&str>, settings: &[(&str, &str)]) -> Self {
         let mut other = self.clone();
@@ -175,7 +174,7 @@ impl Scene {
     /// Duration of a run without `duration_s`, s.
     pub const DURATION_S: f64 = 10.0;
 
-    /// The built-in demo.
+    /// Reads the built-in demo.
     ///
     /// # Errors
     /// None in practice: a test reads it.
@@ -183,8 +182,7 @@ impl Scene {
         Self::parse(Path::new("built-in demo"), DEMO)
     }
 
-    /// The built-in scene of experiments; for another model than the spring, that model in the spring's place, at its
-    /// natural scale.
+    /// Reads the built-in scene of experiments; a model other than the spring takes the spring's place, at its natural scale.
     ///
     /// # Errors
     /// None in practice: a test reads it.
@@ -218,7 +216,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Reads a scene from text; `file` is what complaints call it.
+    /// Reads a scene from text; `file` is its name in error messages.
     ///
     /// # Errors
     /// [`SceneError`] with file, line, key and remedy.
@@ -226,11 +224,10 @@ impl Scene {
         Self::read(&Source::new(file, text))
     }
 
-    /// Takes another rate than the scene was read with; `place` is what complaints call where it was said. Not
-    /// real-time.
+    /// Sets another rate than that of the scene; `place` is the location in error messages. Not real-time.
     ///
     /// # Errors
-    /// [`SceneError`]: a limit that fits the old rate does not fit this one.
+    /// [`SceneError`] if a limit does not fit the new rate.
     pub fn set_rate(&mut self, rate_hz: f64, place: &str) -> Result<(), SceneError> {
         let place = Location { file: PathBuf::from(place), line: 0 };
         legal_watchdog_s(self.limits.watchdog_s, rate_hz, place)?;
@@ -276,12 +273,12 @@ impl Scene {
     }
 }
 
-/// Who decides when a tick begins.
+/// Time base of the ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pacing {
-    /// The host's clock; `read` gives the newest sample, whenever it was taken.
+    /// Clock of the host; `read` returns the newest sample of any age.
     Host,
-    /// The first device; its next sample is waited for before each `read`.
+    /// Samples of the first device; the loop waits for the next one before each `read`.
     Device,
 }
 
@@ -289,7 +286,7 @@ fn pacing(value: Value<'_>) -> Result<Pacing, SceneError> {
     value.one_of(&[("host", Pacing::Host), ("device", Pacing::Device)])
 }
 
-/// A model, once for each device it is on.
+/// Reads a model, once for each of its devices.
 fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse>, SceneError> {
     let plugin = plugin_use(&mut section)?;
     let name = section.take("name").map(devices::name).transpose()?;
@@ -325,14 +322,14 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
     Ok(on.into_iter().map(on_device).collect())
 }
 
-/// When an asynchronous model is computed.
+/// Reads the timing of an asynchronous model.
 fn field(mut section: Section<'_>) -> Result<FieldTiming, SceneError> {
     let rate_hz = section.require("rate_hz")?.number(1.0..=10_000.0)?;
     let period_s = 1.0 / rate_hz;
     let latency_s =
         section.number("latency_ms", 0.0..=period_s * 1.0e3)?.map(|milliseconds| milliseconds * 1.0e-3);
     section.finish()?;
-    // A model that takes all the time it has.
+    // By default the model needs its whole period.
     Ok(FieldTiming { rate_hz, latency_s: latency_s.unwrap_or(period_s) })
 }
 
@@ -355,7 +352,7 @@ fn plugin_use(section: &mut Section<'_>) -> Result<PluginUse, SceneError> {
     Ok(PluginUse { plugin: plugin.text()?, location, parameters })
 }
 
-/// Scales, rotation and places of a model.
+/// Reads scales, rotation and places of a model.
 fn mapping(mut section: Section<'_>) -> Result<(MappingConfig, Vec<[f64; 3]>), SceneError> {
     let torque_scale = section.number("torque_scale", SCALE)?;
     let mapping = MappingConfig { torque_scale, ..frame_and_scales(&mut section)? };
@@ -364,7 +361,7 @@ fn mapping(mut section: Section<'_>) -> Result<(MappingConfig, Vec<[f64; 3]>), S
     Ok((mapping, places_m))
 }
 
-/// Rotation and scales, all but that of torque.
+/// Reads rotation and scales, without the torque scale.
 fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneError> {
     let default = MappingConfig::default();
     let rotation =
@@ -387,28 +384,28 @@ fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneErr
     })
 }
 
-/// A scale of zero would make a device move nothing or feel nothing; a million is a unit mistaken.
+/// Legal scales: zero would suppress motion or force; a million is a wrong unit.
 const SCALE: std::ops::RangeInclusive<f64> = 1.0e-6..=1.0e6;
 
 /// Largest number of models, each on one device: their calls alone take a millisecond.
 const MOST_MODELS: usize = 4096;
 
-/// Longest time a watchdog may wait, ms.
+/// Longest timeout of a watchdog, ms.
 const LONGEST_WATCHDOG_MS: f64 = 60_000.0;
 
-/// Periods a watchdog waits at least: one passes between two ticks of a loop that is well, a tick that begins
-/// late makes it two, and the watchdog's own looks come late as well.
+/// Shortest timeout of a watchdog, in periods: one passes between two ticks of a healthy loop, a late tick makes it two, and the
+/// watchdog's own polls are late as well.
 const WATCHDOG_PERIODS: f64 = 3.0;
 
-/// The time, if a loop that is well at this rate ticks more often; `place` is where it was said.
+/// Returns the timeout if a healthy loop at this rate ticks more often; `place` is the location in error messages.
 fn legal_watchdog_s(watchdog_s: f64, rate_hz: f64, place: Location) -> Result<f64, SceneError> {
     let least_ms = WATCHDOG_PERIODS * 1.0e3 / rate_hz;
-    // To a microsecond: milliseconds that were seconds in between are a rounding off.
+    // To a microsecond: milliseconds that were seconds in between have a rounding error.
     let watchdog_ms = (watchdog_s * 1.0e6).round() / 1.0e3;
     if watchdog_ms > least_ms - 1.0e-3 {
         return Ok(watchdog_s);
     }
-    // Upwards, so that what the message names is legal.
+    // Upwards, so that the value in the message is legal.
     let least_ms = (least_ms * 100.0).ceil() / 100.0;
     let problem = format!(
         "`limits.watchdog_ms` = {watchdog_ms}: at {rate_hz} Hz it must be {least_ms} to {LONGEST_WATCHDOG_MS}, \
@@ -451,7 +448,7 @@ fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> 
     Ok(limits)
 }
 
-/// Reads a key that is false where it is absent.
+/// Reads a key that is false by default.
 fn truth(section: &mut Section<'_>, key: &'static str) -> Result<bool, SceneError> {
     section.take(key).map_or(Ok(false), |value| value.truth())
 }

@@ -1,4 +1,4 @@
-//! Flotor's own scenes, by name. They are part of the program: no file has to be found.
+//! Flotor's own scenes, by name, as a part of the program.
 
 use super::{Scene, SceneError, did_you_mean};
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 /// One of Flotor's own scenes.
 #[derive(Clone, Copy, Debug)]
 pub struct OwnScene {
-    /// Name: that of its file, without the extension.
+    /// Name: that of the file, without the extension.
     pub name: &'static str,
     /// TOML text.
     pub text: &'static str,
@@ -38,7 +38,7 @@ pub const OWN_SCENES: &[OwnScene] = own![
 ];
 
 impl OwnScene {
-    /// Returns the scene that a command line names, unless a file has that path. Not real-time.
+    /// Returns the own scene with this name, unless a file has that path. Not real-time.
     #[must_use]
     pub fn named(path: &Path) -> Option<Self> {
         if path.exists() && !path.is_dir() {
@@ -56,7 +56,7 @@ impl OwnScene {
     }
 }
 
-/// Advice for a scene that does not exist: the nearest name, and the command that lists all. Not real-time.
+/// Returns advice for a missing scene: the closest name, and the command that lists all. Not real-time.
 pub(super) fn advice(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let near = did_you_mean(&stem, OWN_SCENES.iter().map(|scene| scene.name));

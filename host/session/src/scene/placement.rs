@@ -1,13 +1,13 @@
-//! Where a model is put: in one place, in several, or in all points of a grid.
+//! Placement of a model: in one place, in several, or in all points of a grid.
 
 use super::reader::{SceneError, Section};
 
-/// Places of one model at most: each is an instance of the model, with memory of its own.
+/// Most places of one model: each is an instance of the model, with its own memory.
 const MOST_PLACES: usize = 1_000_000;
-/// Farthest place along an axis, mm: beyond, somebody has mistaken a unit.
+/// Farthest place along an axis, mm: a farther one is a wrong unit.
 const FARTHEST_MM: f64 = 1.0e4;
 
-/// The places of a model in the device frame, m: `position_mm`, `positions_mm` or a `grid` about `position_mm`.
+/// Reads the places of a model in the device frame, m: `position_mm`, `positions_mm` or a `grid` about `position_mm`.
 pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
     let centre_mm = mapping.three("position_mm", -FARTHEST_MM..=FARTHEST_MM)?.unwrap_or_default();
     let list = mapping.take("positions_mm");
@@ -27,7 +27,7 @@ pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneErro
     Ok(places_mm.into_iter().map(from_centre).collect())
 }
 
-/// The points of a grid about its centre, x fastest, mm.
+/// Returns the points of a grid about its centre, x fastest, mm.
 fn points_of(mut grid: Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
     let count_value = grid.require("count")?;
     let too_many = count_value.problem(format!("a grid has at most {MOST_PLACES} points"));

@@ -1,7 +1,7 @@
-//! Reads TOML tables key by key, so that every complaint has a file, a line, a key and a way out.
+//! Reader of TOML tables, key by key, so that every error names file, line, key and remedy.
 //!
-//! serde would know the line of an unknown key but not the closest valid one; here each key is taken by name
-//! and what is left over at the end is unknown.
+//! serde would report the line of an unknown key but not the closest valid one; here each key is taken by name, and keys left over
+//! at the end are unknown.
 
 use super::ParameterText;
 use flotor_core::limits::Bound;
@@ -13,23 +13,23 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Where in which file something was said.
+/// Location of a text: a line of a file, or an option of a command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Location {
-    /// The file, or what stands for it ("built-in demo", "--set").
+    /// File, or its substitute ("built-in demo", "--set").
     pub file: PathBuf,
-    /// Line, from 1; 0 where lines mean nothing.
+    /// Line, from 1; 0 without lines.
     pub line: usize,
 }
 
 impl Location {
-    /// True if it was said in a line of a file, not on a command line. Not real-time.
+    /// Returns true for a line of a file, false for a command line. Not real-time.
     #[must_use]
     pub fn is_in_a_file(&self) -> bool {
         self.line > 0
     }
 
-    /// That what was said here is wrong. Not real-time.
+    /// Returns an error at this location. Not real-time.
     pub(crate) fn problem(&self, problem: impl Into<String>) -> SceneError {
         SceneError { location: self.clone(), problem: problem.into() }
     }
@@ -44,43 +44,43 @@ impl std::fmt::Display for Location {
     }
 }
 
-/// What is wrong with a scene: where, which key, what, and what would be right. One line.
+/// Error in a scene, in one line: location, key, problem and remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{location}: {problem}")]
 pub struct SceneError {
-    /// Where.
+    /// Location of the problem.
     pub location: Location,
-    /// Which key, what is wrong, and what would be right.
+    /// Key, problem and remedy.
     pub problem: String,
 }
 
-/// The text of a scene, with what is needed to name a line in it.
+/// Text of a scene, with an index of its lines.
 pub(super) struct Source<'t> {
     file: &'t Path,
     text: &'t str,
-    /// Places of the line ends, so that the line of a place is found without counting through the text.
+    /// Positions of the line ends, for a lookup of lines without counting through the text.
     line_ends: Vec<usize>,
-    /// The keys that were looked for in each table that was read to its end.
+    /// Keys looked up in each table that was read to its end.
     seen: RefCell<Vec<(String, Vec<Known>)>>,
-    /// The values that were looked for above all tables.
+    /// Keys looked up above all tables.
     above: RefCell<Vec<&'static str>>,
 }
 
-/// A key that is looked for, and what it takes.
+/// Key that is looked up, with the type of its value.
 #[derive(Clone, Debug)]
 pub(super) struct Known {
     pub(super) key: &'static str,
     pub(super) takes: Takes,
 }
 
-/// What a key takes, as far as looking for it says.
+/// Type of a key's value, as far as the lookup determines it.
 #[derive(Clone, Debug)]
 pub(super) enum Takes {
-    /// What its chapter says.
+    /// Value described in the book only.
     Value,
     /// A number in a range.
     Number(RangeInclusive<f64>),
-    /// Three of them, or one for all.
+    /// Three numbers, or one for all.
     Three(RangeInclusive<f64>),
     /// One number, a norm; three, one for each axis; or a table with both.
     Bound(RangeInclusive<f64>),
@@ -100,7 +100,7 @@ impl<'t> Source<'t> {
         self.text
     }
 
-    /// The tables that were read to their end, by name, with the keys that were looked for in each.
+    /// Returns the tables that were read to their end, by name, with the keys looked up in each.
     pub(super) fn into_seen(self) -> Vec<(String, Vec<Known>)> {
         self.seen.into_inner()
     }
@@ -136,12 +136,12 @@ impl<'t> Source<'t> {
     }
 }
 
-/// Whether a text, which ends up on a terminal, does nothing to it.
+/// Returns true if a text cannot control the terminal on which it is shown.
 fn is_for_people(text: &str) -> bool {
     text.chars().all(|character| !character.is_control() || matches!(character, '\n' | '\t'))
 }
 
-/// One table of a scene; keys are taken out of it until none is left.
+/// Table of a scene, whose keys are taken until none is left.
 pub(super) struct Section<'t> {
     source: &'t Source<'t>,
     name: String,
@@ -150,7 +150,7 @@ pub(super) struct Section<'t> {
     known: Vec<Known>,
 }
 
-/// A value taken from a section, with the place it came from.
+/// Value taken from a section, with its location.
 pub(super) struct Value<'t> {
     pub(super) location: Location,
     key: String,
@@ -158,7 +158,7 @@ pub(super) struct Value<'t> {
 }
 
 impl<'t> Section<'t> {
-    /// Takes a key, if it is there.
+    /// Takes a key, if present.
     pub(super) fn take(&mut self, key: &'static str) -> Option<Value<'t>> {
         self.take_as(key, Takes::Value)
     }
@@ -173,18 +173,18 @@ impl<'t> Section<'t> {
         Some(Value { location, key: self.path(key), value: value.into_inner() })
     }
 
-    /// Where the table begins.
+    /// Returns the location of the table.
     pub(super) fn location(&self) -> Location {
         self.source.location(&self.span)
     }
 
-    /// Takes a key that must be there.
+    /// Takes a required key.
     pub(super) fn require(&mut self, key: &'static str) -> Result<Value<'t>, SceneError> {
         let missing = self.missing(key);
         self.take(key).ok_or(missing)
     }
 
-    /// That a key is not there, or what was written in its place.
+    /// Returns the error about a missing key, or about a similar one in its place.
     pub(super) fn missing(&self, key: &str) -> SceneError {
         let alike = nearest(key, self.table.keys().map(|written| &**written.get_ref()));
         if let Some(written) = self.table.keys().find(|written| Some(&**written.get_ref()) == alike) {
@@ -193,7 +193,7 @@ impl<'t> Section<'t> {
         self.location().problem(format!("`{}` is missing", self.path(key)))
     }
 
-    /// Takes a number, if it is there, and checks that it lies in `range`.
+    /// Takes a number, if present, and checks that it lies in `range`.
     pub(super) fn number(
         &mut self,
         key: &'static str,
@@ -202,7 +202,7 @@ impl<'t> Section<'t> {
         Ok(self.number_and_place(key, range)?.map(|(number, _)| number))
     }
 
-    /// The same, with the place to complain about if something else in the scene makes it wrong.
+    /// Takes a number as [`Self::number`], with its location for errors that depend on other keys.
     pub(super) fn number_and_place(
         &mut self,
         key: &'static str,
@@ -213,7 +213,7 @@ impl<'t> Section<'t> {
         Ok(Some((value.number(range)?, place)))
     }
 
-    /// Takes three numbers (or one for all three), if there, and checks that they lie in `range`.
+    /// Takes three numbers (or one for all three), if present, and checks that they lie in `range`.
     pub(super) fn three(
         &mut self,
         key: &'static str,
@@ -222,8 +222,8 @@ impl<'t> Section<'t> {
         self.take_as(key, Takes::Three(range.clone())).map(|value| value.three(range)).transpose()
     }
 
-    /// Takes the bound of a vector, if it is there, and checks that its numbers lie in `range`: a norm, a number for each
-    /// axis, or a table with both.
+    /// Takes the bound of a vector, if present, and checks that its numbers lie in `range`: a norm, a number for each axis, or a
+    /// table with both.
     pub(super) fn bound(
         &mut self,
         key: &'static str,
@@ -245,7 +245,7 @@ impl<'t> Section<'t> {
         }
     }
 
-    /// Takes a sub-table, if it is there.
+    /// Takes a sub-table, if present.
     pub(super) fn section(&mut self, key: &'static str) -> Result<Option<Section<'t>>, SceneError> {
         let source = self.source;
         self.known.push(Known { key, takes: Takes::Table });
@@ -253,7 +253,7 @@ impl<'t> Section<'t> {
         Section::from_value(source, self.path(key), value).map(Some)
     }
 
-    /// Takes a list of tables (`[[key]]`); none is an empty list.
+    /// Takes a list of tables (`[[key]]`); empty if absent.
     pub(super) fn sections(&mut self, key: &'static str) -> Result<Vec<Section<'t>>, SceneError> {
         let source = self.source;
         self.known.push(Known { key, takes: Takes::Tables });
@@ -278,11 +278,11 @@ impl<'t> Section<'t> {
         }
     }
 
-    /// All keys with their values as text: for parameters, whose keys only the plugin knows.
+    /// Returns all keys with their values as text: for parameters, whose keys only the plugin defines.
     pub(super) fn into_texts(self) -> Result<Vec<ParameterText>, SceneError> {
         let source = self.source;
         let mut entries: Vec<_> = self.table.into_iter().collect();
-        entries.sort_by_key(|(key, _)| key.span().start); // as written: the order plugins see
+        entries.sort_by_key(|(key, _)| key.span().start); // as written: the order for plugins
         let text = |(key, value): (Spanned<Cow<'t, str>>, Spanned<DeValue<'t>>)| {
             let location = source.location(&value.span());
             let text = match value.into_inner() {
@@ -307,14 +307,14 @@ impl<'t> Section<'t> {
             self.source.seen.borrow_mut().push((self.name, self.known));
             return Ok(());
         };
-        // TOML has no way back to the keys above the first table.
+        // TOML cannot return to the keys above the first table.
         if let Some(above) = self.source.above.borrow().iter().find(|above| **above == &**key.get_ref()) {
             return Err(self.unknown(key, &format!("; `{above}` belongs above all tables")));
         }
         Err(self.unknown(key, &did_you_mean(key.get_ref(), self.known.iter().map(|known| known.key))))
     }
 
-    /// That nobody takes a key, and what may help.
+    /// Returns the error about an unknown key, with a hint.
     fn unknown(&self, key: &Spanned<Cow<'t, str>>, hint: &str) -> SceneError {
         let location = self.source.location(&key.span());
         location.problem(format!("unknown key `{}`{hint}", self.path(key.get_ref())))
@@ -359,7 +359,7 @@ impl Value<'_> {
         }
     }
 
-    /// `true` or `false`.
+    /// Returns a Boolean value.
     pub(super) fn truth(self) -> Result<bool, SceneError> {
         match self.value {
             DeValue::Boolean(truth) => Ok(truth),
@@ -371,7 +371,7 @@ impl Value<'_> {
         }
     }
 
-    /// One of a few words, each of which means something.
+    /// Returns the meaning of one of a few words.
     pub(super) fn one_of<T: Copy>(self, words: &[(&str, T)]) -> Result<T, SceneError> {
         let legal: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
         let wrong = self.problem(format!("`{}` must be one of: {}", self.key, legal.join(", ")));
@@ -390,7 +390,7 @@ impl Value<'_> {
         texts.collect()
     }
 
-    /// One text, or a list of them.
+    /// Returns one text or several.
     pub(super) fn one_or_more_texts(self) -> Result<Vec<String>, SceneError> {
         match self.value {
             DeValue::Array(_) => self.texts(),
@@ -421,7 +421,7 @@ impl Value<'_> {
         Ok(numbers)
     }
 
-    /// A number in `range` for each axis.
+    /// Returns a number in `range` for each axis.
     fn axes(self, range: RangeInclusive<f64>) -> Result<[f64; 3], SceneError> {
         let axes = self.numbers::<3>().map_err(|_| self.no_bound())?;
         axes.iter().try_for_each(|axis| self.in_range(*axis, &range).map(drop))?;
@@ -435,7 +435,7 @@ impl Value<'_> {
         ))
     }
 
-    /// A whole number in `range`.
+    /// Returns a whole number in `range`.
     pub(super) fn whole(self, range: RangeInclusive<u32>) -> Result<u32, SceneError> {
         let wrong = self.problem(format!(
             "`{}` must be a whole number from {} to {}",
@@ -449,7 +449,7 @@ impl Value<'_> {
         if number.fract() == 0.0 { Ok(number as u32) } else { Err(wrong) }
     }
 
-    /// A list of lists of three numbers in `range`.
+    /// Returns a list of points, each three numbers in `range`.
     pub(super) fn points(
         self,
         range: RangeInclusive<f64>,
@@ -491,7 +491,7 @@ impl Value<'_> {
     }
 }
 
-/// A range as an error or the reference says it.
+/// Formats a range for an error or the reference.
 pub(super) fn legal(range: &RangeInclusive<f64>) -> String {
     let (least, most) = (range.start(), range.end());
     if most.is_finite() { format!("{least} to {most}") } else { format!("{least} or more") }
@@ -505,7 +505,7 @@ fn parse_number(value: &DeValue<'_>) -> Option<f64> {
     }
 }
 
-/// A hint at the known word most like `word`, to stand behind a complaint; empty if none is like it. Not real-time.
+/// Returns a hint at the closest known word, to append to an error; empty without a similar word. Not real-time.
 pub fn did_you_mean<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> String {
     nearest(word, known).map_or_else(String::new, |near| format!("; did you mean `{near}`?"))
 }

@@ -1,10 +1,10 @@
-//! Every key a scene may have, as the reader itself looks for them: for the book, and for editors.
+//! Reference of every key of a scene, from the reader's own lookups: for the book, and for editors.
 
 use super::Scene;
 use super::reader::{Known, SceneError, Source, Takes, legal};
 use std::path::Path;
 
-/// A scene with every table there is, so that the reader looks for every key.
+/// Scene with every table, so that the reader looks up every key.
 const EVERY_TABLE: &str = r#"
 [[device]]
 plugin = "device"
@@ -37,22 +37,22 @@ set = "left.key=0"
 /// A table of a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SectionReference {
-    /// Its name as in a headline, empty for what stands above all tables.
+    /// Name as in a headline; empty for the keys above all tables.
     pub name: String,
-    /// What it may hold, in the order the reader looks for it.
+    /// Keys in the order of their lookup.
     pub keys: Vec<KeyReference>,
 }
 
 /// A key of a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeyReference {
-    /// The key.
+    /// Name of the key.
     pub key: &'static str,
-    /// What it takes, for people; empty where only its chapter says.
+    /// Type and range as text; empty if only the book describes them.
     pub takes: String,
 }
 
-/// Every table of a scene with every key, as the reader looks for them. Not real-time.
+/// Returns every table of a scene with every key. Not real-time.
 ///
 /// # Errors
 /// None in practice: a test reads it.
@@ -60,7 +60,7 @@ pub fn reference() -> Result<Vec<SectionReference>, SceneError> {
     let source = Source::new(Path::new("every table"), EVERY_TABLE);
     Scene::read(&source)?;
     let mut sections: Vec<SectionReference> = source.into_seen().into_iter().map(section).collect();
-    // Outer tables are finished after inner ones: by name, the outermost first, and what there is twice once.
+    // Outer tables are finished after inner ones: sorted by name, the outermost first, and without duplicates.
     sections.sort_by(|a, b| a.name.cmp(&b.name));
     sections.dedup_by(|a, b| a.name == b.name);
     Ok(sections)

@@ -1,11 +1,11 @@
-//! Settings on top of a scene, as people write them: `spring.variant=energy`.
+//! Settings on top of a scene, in the notation of users: `spring.variant=energy`.
 
 use super::{DeviceUse, Location, ModelUse, ParameterText, Scene, did_you_mean, is_named, without_device};
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// `KEY=VALUE`
+/// Setting `KEY=VALUE`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeyValue {
     key: String,
@@ -32,27 +32,27 @@ impl fmt::Display for KeyValue {
 }
 
 impl KeyValue {
-    /// Key and value, as written.
+    /// Returns key and value, as written.
     #[must_use]
     pub fn pair(&self) -> (&str, &str) {
         (&self.key, &self.value)
     }
 
-    /// Returns the setting without the name of a part before its key: `device.address=usb` of a scene is `address=usb` of its device.
+    /// Returns the setting without a part before its key: `device.address=usb` of a scene becomes `address=usb` of its device.
     #[must_use]
     pub fn within(&self, part: &str) -> Self {
         let inner = self.key.strip_prefix(part).and_then(|key| key.strip_prefix('.'));
         Self { key: inner.unwrap_or(&self.key).to_owned(), value: self.value.clone() }
     }
 
-    /// As a parameter of a plugin.
+    /// Converts the setting to a parameter of a plugin.
     pub fn parameter(&self) -> ParameterText {
         let location = Location { file: PathBuf::from(format!("--set {}", self.key)), line: 0 };
         ParameterText { key: self.key.clone(), value: self.value.clone(), location }
     }
 }
 
-/// `PLUGIN.KEY=VALUE`
+/// Setting `PLUGIN.KEY=VALUE`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PluginKeyValue {
     plugin: String,
@@ -83,16 +83,16 @@ impl fmt::Display for PluginKeyValue {
 }
 
 impl PluginKeyValue {
-    /// Plugin, key and value, as written.
+    /// Returns plugin, key and value, as written.
     pub(super) fn into_parts(self) -> (String, String, String) {
         (self.plugin, self.setting.key, self.setting.value)
     }
 
-    /// Adds the setting to what it names in a scene: a device, a model (on all its devices, or as `MODEL@DEVICE` on
-    /// one), a plugin's id; `device` is every device. Not real-time.
+    /// Adds the setting to its target in a scene: a device, a model (on all its devices, or as `MODEL@DEVICE` on one), a plugin's
+    /// id; `device` is every device. Not real-time.
     ///
     /// # Errors
-    /// In words: no such plugin in the scene, with the nearest name there is.
+    /// Error text if the scene has no such plugin, with the closest name.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), String> {
         let Scene { devices, models, .. } = scene;
         let of_name = |device: &DeviceUse| device.name == self.plugin || self.plugin == "device";
@@ -113,10 +113,10 @@ impl PluginKeyValue {
         self.apply_among(models, &names)
     }
 
-    /// Adds the setting to the model it names: by its name in the scene, or by its plugin's id.
+    /// Adds the setting to the models of this name in the scene, or of this plugin id.
     ///
     /// # Errors
-    /// No model, or more than one, has that name.
+    /// If no model has that name.
     pub fn apply_to_models(&self, models: &mut [ModelUse]) -> Result<(), String> {
         self.apply_among(models, &[])
     }

@@ -1,23 +1,23 @@
-//! The host's ceiling: the most it sends to a device that does not declare itself simulated, unless a person allows more.
+//! Ceiling of the host: the largest force for a device that does not declare itself simulated, unless the user allows more.
 
 use flotor_core::limits::{Bound, CEILING, Ceiling, Limits};
 use flotor_hal::{Capabilities, Embodiment};
 
-/// How strong the devices of a session may be.
+/// Permitted strength of the devices of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Strength {
-    /// At most the host's [ceiling](CEILING), but for simulated devices.
+    /// At most the host's [ceiling](CEILING), except for simulated devices.
     #[default]
     UnderCeiling,
-    /// As strong as scene and device allow: somebody has said so, and not in the scene.
+    /// As strong as scene and device allow: permitted by the user, and not in the scene.
     Strong,
 }
 
-/// Variable that allows strong devices if it is 1.
+/// Environment variable that allows strong devices if 1.
 const VARIABLE: &str = "FLOTOR_ALLOW_STRONG";
 
 impl Strength {
-    /// What the environment says: `FLOTOR_ALLOW_STRONG=1` allows strong devices. Not real-time.
+    /// Reads the permission from the environment: `FLOTOR_ALLOW_STRONG=1` allows strong devices. Not real-time.
     #[must_use]
     pub fn of_the_environment() -> Self {
         match std::env::var(VARIABLE).as_deref() {
@@ -27,21 +27,21 @@ impl Strength {
     }
 }
 
-/// A device that could get more than the ceiling: scene and device allow it.
+/// Device for which scene and device allow more than the ceiling.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StrongDevice {
     /// Name in the scene.
     pub name: String,
-    /// Id of its plugin.
+    /// Id of the plugin.
     pub plugin: String,
-    /// The most that scene and device allow, N.
+    /// Largest force that scene and device allow, N.
     pub force_n: f64,
-    /// The most that scene and device allow, N·m.
+    /// Largest torque that scene and device allow, N·m.
     pub torque_nm: f64,
 }
 
 impl StrongDevice {
-    /// If a device is one. Not real-time.
+    /// Returns a device that could exceed the ceiling; `None` for any other. Not real-time.
     pub(super) fn of(
         [name, plugin]: [&str; 2],
         embodiment: Embodiment,
@@ -58,7 +58,7 @@ impl StrongDevice {
         })
     }
 
-    /// What is reported of it at the start. Not real-time.
+    /// Returns the notice at the start of a run. Not real-time.
     pub(super) fn notice(&self, strength: Strength) -> String {
         let Ceiling { force_n, torque_nm } = CEILING;
         match strength {
@@ -79,13 +79,13 @@ impl std::fmt::Display for StrongDevice {
     }
 }
 
-/// The longest force (N) and torque (N·m) that scene and device allow.
+/// Returns the largest force (N) and torque (N·m) that scene and device allow.
 fn longest(limits: &Limits, device: &Capabilities) -> [f64; 2] {
     let boxes = [device.max_force_n, device.max_torque_nm].map(Bound::box_of);
     [limits.force_n.and(boxes[0]).longest(), limits.torque_nm.and(boxes[1]).longest()]
 }
 
-/// The limits of a device under the ceiling. Not real-time.
+/// Returns the limits of a device under the ceiling. Not real-time.
 pub(super) fn under_ceiling(limits: &Limits, embodiment: Embodiment) -> Limits {
     match embodiment {
         Embodiment::Physical => limits.under(CEILING),
@@ -93,12 +93,12 @@ pub(super) fn under_ceiling(limits: &Limits, embodiment: Embodiment) -> Limits {
     }
 }
 
-/// What one number as a limit means now and did not mean when it held along each axis, where a device makes it differ. Not
+/// Returns a notice if one number as a limit, which held along each axis in earlier versions, limits a device more as a norm. Not
 /// real-time.
 pub(super) fn norm_notice(limits: &Limits, devices: &[Capabilities]) -> Option<String> {
     let forces = devices.iter().map(|device| device.max_force_n);
     let torques = devices.iter().map(|device| device.max_torque_nm);
-    // Nobody declares how fast a handle can be.
+    // No device declares a largest speed of its handle.
     let speeds = || devices.iter().map(|_| [f64::INFINITY; 3]);
     let parts = [
         changed("force_n", limits.force_n, forces, "N"),
@@ -110,7 +110,7 @@ pub(super) fn norm_notice(limits: &Limits, devices: &[Capabilities]) -> Option<S
     (!parts.is_empty()).then(|| format!("one number limits the norm, not each axis: {}", parts.join("; ")))
 }
 
-/// The same of one limit.
+/// Returns the notice about one limit.
 fn changed(key: &str, bound: Bound, devices: impl Iterator<Item = [f64; 3]>, unit: &str) -> Option<String> {
     let most = bound.norm();
     if bound != Bound::ball(most) || most.is_infinite() {
@@ -118,7 +118,7 @@ fn changed(key: &str, bound: Bound, devices: impl Iterator<Item = [f64; 3]>, uni
     }
     let along_each_axis = |device| Bound::box_of([most; 3]).and(Bound::box_of(device)).longest();
     let before = devices.map(along_each_axis).fold(0.0, f64::max);
-    // A rounding of the corner is no change.
+    // Rounding at the corner is no change.
     (before > most * (1.0 + 1.0e-12)).then(|| {
         format!(
             "in earlier versions `limits.{key} = {most}` allowed up to {before:.2} {unit}, now {most} {unit}; \

@@ -1,19 +1,19 @@
-//! Which of several alternatives a run gets: decided by its seed, and by nothing else.
+//! Choice between alternatives of a run, decided by its seed alone.
 //!
-//! Permuted blocks, as trials are randomised: of `n` alternatives, any `n` seeds from a multiple of `n` on get each
-//! exactly once, in an order that looks random. So sixteen subjects with the seeds 0 to 15 are eight and eight, and
-//! nobody can tell from his seed what he felt. Source: M. Zelen, "The randomization and stratification of patients to
-//! clinical trials", J. Chronic Diseases 27, 1974, section 4 (blocks).
+//! Permuted blocks, as trials are randomised: of `n` alternatives, any `n` seeds from a multiple of `n` on get each exactly once,
+//! in an order that looks random. So sixteen subjects with the seeds 0 to 15 are eight and eight, and the seed does not reveal the
+//! alternative to a subject. Source: M. Zelen, "The randomization and stratification of patients to clinical trials", J. Chronic
+//! Diseases 27, 1974, section 4 (blocks).
 
 use flotor_core::Random;
 
-/// Which of so many alternatives a seed gets; `draw` distinguishes several choices of one run. Not real-time.
+/// Returns the alternative of a seed; `draw` distinguishes several choices of one run. Not real-time.
 pub(super) fn chosen(seed: u64, draw: u64, alternatives: usize) -> usize {
     let count = alternatives.max(1) as u64;
     let (block, place) = (seed / count, seed % count);
     let mut order: Vec<usize> = (0..alternatives.max(1)).collect();
     let mut random = Random::new(block, draw);
-    // Fisher and Yates: every order is as likely as any other.
+    // Fisher and Yates: all orders are equally likely.
     for last in (1..order.len()).rev() {
         #[allow(clippy::cast_possible_truncation)] // below the number of alternatives
         let other = (random.bits() % (last as u64 + 1)) as usize;

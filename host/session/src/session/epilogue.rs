@@ -1,4 +1,4 @@
-//! The end of a run: its devices de-energised, its models asked for their last words, and what is known put together.
+//! End of a run: de-energises the devices, queries the last messages of the models, and creates the outcome.
 
 use super::controls::Settled;
 use super::{Controls, DeviceOutcome, Finished, Outcome, Remains};
@@ -7,7 +7,7 @@ use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
 use flotor_servo::{Dismantled, Forces, Heartbeat, Layer, LayerReport, Reported};
 use std::time::Instant;
 
-/// What a run knows at its beginning and tells at its end.
+/// Data from the beginning of a run that its end needs.
 pub(super) struct Epilogue {
     pub(super) started: Instant,
     pub(super) warnings: Vec<String>,
@@ -18,7 +18,7 @@ pub(super) struct Epilogue {
 }
 
 impl Epilogue {
-    /// De-energises the devices and puts together what is known of the run.
+    /// De-energises the devices and returns the outcome of the run.
     pub(super) fn conclude(self, finished: Finished) -> Outcome {
         let Self { started, mut warnings, heart, names, controls, reserve } = self;
         let mut calls = reserve.begin();
@@ -35,7 +35,7 @@ impl Epilogue {
             closing.extend(opened.map(|opened| (name.clone(), opened)));
         }
         let couplings = forces.coupling_outcomes();
-        // No tick will take them any more.
+        // Replacements that no tick will apply any more.
         let waiting = swaps.into_layers().into_iter();
         let (layers, reports) =
             last_words(&mut calls, model_names, (forces, controls.take_retired()), &mut unresponsive);
@@ -76,7 +76,7 @@ impl Epilogue {
     }
 }
 
-/// De-energises a device that was told to stop: what it says of the run, and the device unless its plugin broke or hangs.
+/// De-energises a stopped device; returns its outcome, and the device unless its plugin failed or hangs.
 fn deactivate(
     calls: &mut EndCalls,
     name: &str,
@@ -101,11 +101,11 @@ fn deactivate(
     (DeviceOutcome { fault, implausible, effects, problem, ledger, words, float_changes }, opened)
 }
 
-/// Layers, each with the number of its model.
+/// Layers, each with its model number.
 type Layers = Vec<(usize, Box<Layer>)>;
 
-/// What became of each layer in the loop and of those it handed back, with the last words of those that did not behave; and
-/// the layers, unless one of those hangs.
+/// Returns reports on the layers in the loop and on those that it returned, with the last messages of unhealthy ones; and the
+/// layers, unless a call hangs.
 fn last_words(
     calls: &mut EndCalls,
     names: &[String],
@@ -127,7 +127,7 @@ fn last_words(
     })
 }
 
-/// Keeps the first plugin that did not return.
+/// Records the first plugin that did not return.
 fn note(error: CallError, unresponsive: &mut Option<Unresponsive>) {
     if let CallError::Unresponsive(hung) = error {
         unresponsive.get_or_insert(hung);

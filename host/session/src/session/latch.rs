@@ -1,5 +1,5 @@
-//! A run and the latch of its machine: nothing is energised while it is pressed, a press ends the run, and an emergency stop of the
-//! run presses it.
+//! Latch of the machine during a run: nothing is energised while the latch is pressed, a press ends the run, and an emergency stop
+//! of the run presses the latch.
 
 use super::RunError;
 use flotor_live::{Directory, Latch, LatchState, Pressed, process_number};
@@ -15,31 +15,31 @@ use std::time::{Duration, Instant, SystemTime};
 pub(super) const WATCH: &str = "the emergency stop of the machine";
 /// Poll interval of the latch file, for the stops of other runs. The emergency stop of this run wakes the thread at once.
 const POLL: Duration = Duration::from_millis(5);
-/// Time in which the other runs confirm an emergency stop.
+/// Timeout for the other runs to confirm an emergency stop.
 const CONFIRM_WAIT: Duration = Duration::from_secs(2);
 
-/// The latch as it was when a run began to load.
+/// Latch of the machine, with its state when a run began to load.
 #[derive(Clone, Debug)]
 pub struct LatchGuard {
     latch: Latch,
-    /// A second press changes nothing while the first is not released: who pressed while the run began would not be seen behind a
-    /// release.
+    /// State at the start. Pressing a pressed latch leaves no trace after a release, so a latch that was pressed at the start
+    /// counts as pressed.
     at_start: LatchState,
-    /// What the emergency stop of this run has reached, once it was pressed.
+    /// Reach of the emergency stop of this run; `None` before the stop.
     reach: Arc<Mutex<Option<StopReach>>>,
 }
 
-/// What an emergency stop of this run has reached beyond it.
+/// Reach of an emergency stop beyond its own run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StopReach {
-    /// Why a later run may start, if so.
+    /// Reason why a later run may start, if the latch could not be pressed.
     unkept: Option<String>,
-    /// The processes of the runs that have not confirmed it, or why the runs are not known.
+    /// Processes whose runs have not confirmed the stop, or the reason why the runs are unknown.
     unconfirmed: Result<Vec<u32>, String>,
 }
 
 impl LatchGuard {
-    /// From now on every press counts, also one that is released before anybody looks. Not real-time.
+    /// Creates a guard for which every press counts from now on, even one that is released before the next check. Not real-time.
     #[must_use]
     pub fn of(directory: &Directory) -> Self {
         let latch = directory.latch();
@@ -47,20 +47,20 @@ impl LatchGuard {
         Self { latch, at_start, reach: Arc::default() }
     }
 
-    /// Of the folder in which runs of this user are found. Not real-time.
+    /// Creates a guard for the folder with the runs of this user. Not real-time.
     #[must_use]
     pub fn of_this_user() -> Self {
         Self::of(&Directory::of_this_user())
     }
 
-    /// What an emergency stop of this run will not reach, if so: for people, before anything is energised.
+    /// Returns a warning, before anything is energised, if an emergency stop of this run will not reach other runs.
     #[must_use]
     pub fn warning(&self) -> Option<String> {
         let problem = self.latch.problem()?;
         Some(format!("an emergency stop does not outlast this run and may reach no other run: {problem}"))
     }
 
-    /// To be called right before a device is energised, after [`LatchGuard::watch`]. Not real-time.
+    /// Checks the latch right before a device is energised, after [`LatchGuard::watch`]. Not real-time.
     ///
     /// # Errors
     /// [`RunError::Latched`].
@@ -74,11 +74,11 @@ impl LatchGuard {
         }
     }
 
-    /// Watches on a thread of its own until the watch is dropped: a press closes the switch, and the switch's own emergency stop
-    /// presses. Not real-time.
+    /// Watches the latch on a thread of its own until the watch is dropped: a press closes the switch, and an emergency stop of the
+    /// switch presses the latch. Not real-time.
     ///
     /// # Errors
-    /// No thread.
+    /// If the system cannot start a thread.
     pub fn watch(&self, stop: &StopSwitch) -> io::Result<LatchWatch> {
         self.watch_with(POLL, stop)
     }
@@ -91,8 +91,8 @@ impl LatchGuard {
         Ok(LatchWatch { is_over, thread: Some(thread) })
     }
 
-    /// Presses for an emergency stop of this process, and asks the other runs to stop. Once only: whoever calls again gets what
-    /// the first call has reached. Not real-time: waits for the other runs, 2 s at most.
+    /// Presses the latch for an emergency stop of this process, and requests all other runs to stop. Only the first call does so;
+    /// later calls return the same reach. Not real-time: waits for the other runs, 2 s at most.
     pub fn press(&self, source: EmergencySource) -> StopReach {
         let mut reach = self.reach.lock().unwrap_or_else(PoisonError::into_inner);
         let reach = reach.get_or_insert_with(|| {
@@ -107,19 +107,19 @@ impl LatchGuard {
         reach.clone()
     }
 
-    /// What the emergency stop of this run has reached; nothing before, and if it came from another run. Not real-time.
+    /// Returns the reach of this run's emergency stop; `None` before, and for a stop by another run. Not real-time.
     #[must_use]
     pub fn reach(&self) -> Option<StopReach> {
         self.reach.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Returns the time of the press that is not released. Not real-time.
+    /// Returns the time of a press that is not released. Not real-time.
     pub(super) fn pressed_at(&self) -> Option<SystemTime> {
         self.latch.state().pressed.map(|pressed| pressed.at)
     }
 
-    /// Checks once, and watches until the watch is dropped: for what moves a device without [`Session::run`](super::Session::run).
-    /// Not real-time.
+    /// Checks the latch, and watches it until the watch is dropped: for devices that move without
+    /// [`Session::run`](super::Session::run). Not real-time.
     ///
     /// # Errors
     /// [`RunError::Latched`], or no thread.
@@ -151,7 +151,7 @@ impl LatchGuard {
 }
 
 impl StopReach {
-    /// Why the stop has not reached every run, now and later; nothing if it has.
+    /// Returns the reasons why the stop has not reached every run, now and later; `None` if it has.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         let unconfirmed = match &self.unconfirmed {
@@ -196,7 +196,7 @@ impl Drop for LatchWatch {
     }
 }
 
-/// Why nothing may be energised, in words.
+/// Returns the reason why nothing may be energised, as text.
 pub(super) fn latched_words(pressed: Option<&Pressed>) -> String {
     match pressed {
         Some(pressed) => format!(

@@ -1,4 +1,4 @@
-//! A run on the virtual clock that somebody else advances, tick by tick, and that ends with a report like any other.
+//! Run on the virtual clock that the caller advances, tick by tick, and that ends with the usual outcome.
 
 use super::prepare::activate;
 use super::{
@@ -11,7 +11,7 @@ use flotor_hal::Demand;
 use flotor_hal::abi::loader::Stopper;
 use flotor_servo::{Loop, RunEnd, Schedule, StopSwitch};
 
-/// A run that goes on when it is told to. If it is dropped before its end, the devices are stopped.
+/// Run that the caller advances. If it is dropped before its end, the devices are stopped.
 pub struct Lockstep {
     runner: Loop,
     controls: Controls,
@@ -22,7 +22,7 @@ pub struct Lockstep {
     epilogue: Epilogue,
 }
 
-/// Stops what is left when it goes.
+/// Stoppers that stop their devices when dropped.
 struct Stoppers(Vec<Stopper>);
 
 impl Drop for Stoppers {
@@ -32,8 +32,8 @@ impl Drop for Stoppers {
 }
 
 impl Session {
-    /// The same run, one tick for each call of [`Lockstep::advance`], whatever the clock of the session: without waiting, and
-    /// repeatable. Not real-time.
+    /// Converts the session to a run with one tick for each call of [`Lockstep::advance`], on the virtual clock whatever the
+    /// session's clock: without waiting, and repeatable. Not real-time.
     ///
     /// # Errors
     /// [`RunError`] if a device refuses to be energised; then none is.
@@ -48,8 +48,8 @@ impl Session {
 }
 
 impl Lockstep {
-    /// One tick; the observer is told of it and of what changed before it. How the run ended, if it has: then there was no
-    /// tick. Not real-time: the observer is not.
+    /// Runs one tick; passes the changes before the tick, and the tick's records, to the observer. Returns the end of the run once
+    /// it has ended. Not real-time: the observer is not.
     pub fn advance(&mut self, observer: &mut dyn Observer, stop: &StopSwitch) -> Option<RunEnd> {
         let Self { runner, controls, changes, taps, asked, .. } = self;
         if runner.end().is_some() {
@@ -65,7 +65,7 @@ impl Lockstep {
         runner.end()
     }
 
-    /// Stops the devices: what is known of the run. Not real-time.
+    /// Stops the devices and returns the outcome of the run. Not real-time.
     #[must_use]
     pub fn finish(self) -> Outcome {
         let Self { mut runner, stoppers, epilogue, .. } = self;

@@ -1,4 +1,4 @@
-//! From a scene to a run: loads what the scene names, pairs it, runs the loop, lets others watch and change it.
+//! Session: loads the plugins of a scene, pairs them, runs the loop, and gives observers and controls access.
 
 mod ceiling;
 mod choice;
@@ -61,26 +61,26 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use stop_time::StopTimer;
 
-/// How a scene is to be run.
+/// Options of a run.
 #[derive(Clone, Debug)]
 pub struct RunOptions {
-    /// Real or virtual time.
+    /// Real or virtual clock.
     pub clock: Clock,
     /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// Why a run did not start or did not end well.
+/// Reason why a run did not start, or failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {
-    /// The scene says something that cannot be.
+    /// The scene is not valid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A plugin is unknown or was refused.
+    /// A plugin is unknown or was rejected.
     #[error(transparent)]
     Lookup(#[from] LookupError),
-    /// A plugin said no.
+    /// A plugin refused its settings or a call.
     #[error(transparent)]
     Plugin(#[from] LoadError),
     /// Device and scene do not fit; all mismatches at once.
@@ -88,16 +88,16 @@ pub enum RunError {
     Mismatch {
         /// Id of the device.
         device: String,
-        /// What does not fit, each with a remedy.
+        /// Mismatches, each with a remedy.
         mismatches: Vec<String>,
     },
     /// A plugin did not return from a call before the run.
     #[error(transparent)]
     Calls(#[from] CallError),
-    /// The servo thread died.
+    /// The servo thread failed.
     #[error("the servo thread {0}; no device was moved")]
     Thread(&'static str),
-    /// The system has no thread for a part of the run, which is named.
+    /// The system has no thread for this part of the run.
     #[error("cannot start the thread for {0}, so no device was moved; {THREAD_ADVICE}")]
     NoThread(&'static str),
     /// The scene requires a stop that does not depend on this process, and there is none.
@@ -114,7 +114,7 @@ pub enum RunError {
     SharedControlGroup {
         /// Name of the device in the scene.
         device: String,
-        /// The group of both processes.
+        /// Control group of both processes.
         group: String,
     },
     /// The emergency stop of the machine is pressed, or was while the run started; nothing was energised.
@@ -125,7 +125,7 @@ pub enum RunError {
     Hung {
         /// Name in the scene, or "device" or "host".
         who: String,
-        /// Where it is.
+        /// Tick and place of the call.
         stuck: Stuck,
         /// The limit that the call has exceeded.
         limit: Exceeded,
@@ -133,13 +133,13 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// True if a request to stop came before the run.
+    /// Returns true if a stop was requested before the run.
     #[must_use]
     pub const fn is_stopped(&self) -> bool {
         matches!(self, Self::Calls(CallError::Stopped) | Self::Lookup(LookupError::Calls(CallError::Stopped)))
     }
 
-    /// True if the scene or the command line is wrong, not a plugin.
+    /// Returns true if the scene or the command line is wrong, not a plugin.
     #[must_use]
     pub fn is_configuration(&self) -> bool {
         match self {
@@ -164,32 +164,32 @@ impl RunError {
 pub struct PluginReport {
     /// Name in the scene, of device or model.
     pub name: String,
-    /// What the plugin says about itself.
+    /// Metadata of the plugin.
     pub metadata: Metadata,
-    /// What it can be told.
+    /// Parameters of the plugin.
     pub schema: &'static [Parameter],
-    /// What scene and command line set, as written, in order.
+    /// Settings of scene and command line, as written, in order.
     pub settings: Vec<(String, String)>,
-    /// Every parameter with the value in force before the run, as text.
+    /// Every parameter with its value before the run, as text.
     pub parameters: Vec<(String, String)>,
-    /// Where each parameter is usefully moved by hand; none for what is no number.
+    /// Range of each parameter for changes by hand; `None` for a parameter that is no number.
     pub soft_ranges: Vec<Option<SoftRange>>,
-    /// Of a device: what it moves.
+    /// Embodiment of a device; `None` for a model.
     pub embodiment: Option<Embodiment>,
-    /// Latency that a device declares, s; 0 of a model.
+    /// Latency that a device declares, s; 0 for a model.
     pub latency_s: f64,
-    /// Of a device: the outputs of models that reach the hand there.
+    /// Model outputs that reach the hand at a device.
     pub felt: Demand,
-    /// Of a model: where it runs, its origin looked at.
+    /// Isolation of a model, resolved by its origin; `None` for a device.
     pub isolation: Option<Isolation>,
-    /// Signals of the host that it took away while it was made, and that were taken back.
+    /// Signals of the host that the plugin took during its creation, restored since.
     pub signals_taken: TakenSignals,
-    /// What a model says of its own error when it is ready ([`crate::estimates`]), by name.
+    /// Error estimates of a model ([`crate::estimates`]), by name.
     pub estimates: Vec<(String, f64)>,
 }
 
 impl PluginReport {
-    /// That it took signals of the host away, if it did.
+    /// Returns a warning if the plugin took signals of the host.
     pub(crate) fn warning(&self) -> Option<String> {
         let Self { name, signals_taken, .. } = self;
         (!signals_taken.is_none()).then(|| {
@@ -198,16 +198,16 @@ impl PluginReport {
     }
 }
 
-/// Looks at every tick, off the loop.
+/// Observer of every tick, off the loop.
 pub trait Observer {
-    /// What a tick has left behind at one device: tick after tick, and within a tick device after device. Not real-time.
+    /// Receives the record of a tick at one device: tick after tick, and within a tick device after device. Not real-time.
     fn observe(&mut self, record: &TickRecord);
 
-    /// A parameter that changed, before the tick that saw it first. Not real-time.
+    /// Receives a change of a parameter, before the first tick with the new value. Not real-time.
     fn change(&mut self, _change: &Change) {}
 
-    /// Returns the outputs of models that the observer reads; the loop computes the others only where the hand feels them.
-    /// Called before the run and now and then during it. Not real-time.
+    /// Returns the model outputs that the observer reads; the loop computes the others only where the hand feels them. Called
+    /// before the run and repeatedly during the run. Not real-time.
     fn demand(&self) -> Demand {
         Demand::FORCE
     }
@@ -216,16 +216,16 @@ pub trait Observer {
 /// The newest record of a device, for another thread: version 0 is a device at home before the first tick. Read without waiting.
 pub type Tap = flotor_sync::Observer<TickRecord, RECORD_WORDS>;
 
-/// The loop's ends of the taps, each with the number of its device.
+/// Loop sides of the taps, each with its device number.
 type TapEnds = Vec<(u16, flotor_sync::Publisher<TickRecord, RECORD_WORDS>)>;
 
-/// Makes a record the newest of its device. Real-time: bounded, no allocation.
+/// Publishes a record as the newest of its device. Real-time: bounded, no allocation.
 #[inline]
 fn publish_to(taps: &mut TapEnds, record: &TickRecord) {
     taps.iter_mut().filter(|(device, _)| *device == record.device).for_each(|(_, tap)| tap.publish(record));
 }
 
-/// A device before the first tick.
+/// Initial record: device at home.
 const AT_HOME: TickRecord = TickRecord {
     tick: 0,
     device: 0,
@@ -258,26 +258,26 @@ pub struct Session {
     lines: Vec<(String, Line)>,
     strength: Strength,
     strong_devices: Vec<StrongDevice>,
-    /// Of the devices, in order, as scene and device allow: without the host's ceiling.
+    /// Envelopes of the devices, in order, without the host's ceiling.
     strong_envelopes: Vec<Envelope>,
     norm_notice: Option<String>,
     boundary_notices: Vec<String>,
     warnings: Vec<String>,
-    /// Stops what has a means of its own to be stopped, if this process is gone (real clock only).
+    /// Process that stops the devices if this process ends (real clock only).
     watchdog_process: Option<WatchdogProcess>,
-    /// The run ends without that.
+    /// True if the run has to end without the watchdog process.
     requires_independent_stop: bool,
-    /// None on the virtual clock, where no hand is held.
+    /// `None` on the virtual clock, where no hand is held.
     latch: Option<LatchGuard>,
     taps: TapEnds,
     capabilities: Vec<Capabilities>,
 }
 
-/// What is known after a run.
+/// Outcome of a run.
 pub struct Outcome {
-    /// How it ended.
+    /// End of the run.
     pub end: RunEnd,
-    /// How time was kept.
+    /// Timing statistics of the loop.
     pub timing: Timing,
     /// Time from the first deadline to the end of the last period, ns (virtual clock: virtual time).
     pub elapsed_ns: u64,
@@ -285,37 +285,37 @@ pub struct Outcome {
     pub wall_s: f64,
     /// Ticks whose records were dropped because an observer was too slow (real clock only).
     pub dropped_records: u64,
-    /// What the system granted.
+    /// Privileges that the system granted.
     pub real_time: RealTimeReport,
-    /// Time of the emergency stop, if there was one (real clock only).
+    /// Duration of the emergency stop, if there was one (real clock only).
     pub stop_time: Option<StopTime>,
-    /// What the devices say at the end, in the scene's order.
+    /// Outcomes of the devices, in the scene's order.
     pub devices: Vec<DeviceOutcome>,
-    /// What has become of each coupling, in the scene's order.
+    /// Statistics of the couplings, in the scene's order.
     pub couplings: Vec<CouplingOutcome>,
-    /// Name, health and last words of each model the run began with.
+    /// Name, health and last message of each model that the run began with.
     pub models: Vec<(String, ModelHealth, String)>,
-    /// Of the plugins that took the place of a model later, those that did not behave.
+    /// Replacements with faults.
     pub misbehaved: Vec<Misbehaved>,
-    /// The plugins in place of models after a hot swap, at the end; not those that the seed chose among several.
+    /// Replacements in place at the end, after a hot swap; not those that the seed chose among several.
     pub replacements: Vec<PluginReport>,
-    /// What people should know, a sentence each: first what was known before the run.
+    /// Warnings for users, a sentence each: first those known before the run.
     pub warnings: Vec<String>,
-    /// How many of them were told then, or at once.
+    /// Number of warnings that were shown before the run or at once.
     known_before: usize,
     /// The first plugin that did not return from a call right after the run.
     pub unresponsive: Option<Unresponsive>,
-    /// The plugins themselves. To be freed or dropped after all that depends on no plugin: their code may hang.
+    /// Plugin instances left to free. Free or drop them last: plugin code may hang.
     pub remains: Remains,
 }
 
 impl Outcome {
-    /// The warnings that came up in the run.
+    /// Returns the warnings that came up in the run.
     #[must_use]
     pub fn later_warnings(&self) -> &[String] {
         self.warnings.get(self.known_before..).unwrap_or_default()
     }
-    /// What is known of a run whose loop did not come back: how it ended, and for how long it was observed.
+    /// Returns the outcome of a run whose loop did not return, from the stuck place and the time observed, ns.
     #[must_use]
     pub fn of_hung_loop(stuck: Stuck, elapsed_ns: u64) -> Self {
         Self {
@@ -338,7 +338,7 @@ impl Outcome {
         }
     }
 
-    /// Which device faulted, and its last words.
+    /// Returns the number of the faulted device and its last message.
     #[must_use]
     pub fn faulted(&self) -> Option<(usize, &str)> {
         let mut devices = self.devices.iter().enumerate();
@@ -347,37 +347,37 @@ impl Outcome {
     }
 }
 
-/// What is known of a device after a run.
+/// Outcome of a device after a run.
 #[derive(Clone, Debug)]
 pub struct DeviceOutcome {
-    /// The first fault, of the device itself or found by the host.
+    /// First fault, reported by the device or found by the host.
     pub fault: Option<Fault>,
-    /// Its samples that cannot be.
+    /// Implausible samples of the device.
     pub implausible: ImplausibleSamples,
     /// Effects of the envelope's passivity controller and slew limit.
     pub effects: EnvelopeEffects,
-    /// What the host has found of its samples, or of how it takes commands.
+    /// Problem with samples or commands of the device, found by the host.
     pub problem: Option<String>,
-    /// Its own energy balance, where it keeps one.
+    /// Energy balance of the device itself, if it keeps one.
     pub ledger: Option<EnergyLedger>,
-    /// Its last message, or what the host found wrong with it; empty if there is neither.
+    /// Last message of the device, or the problem that the host found; empty without either.
     pub words: String,
-    /// Calls that left the floating-point environment of the loop's thread changed; it was put back each time.
+    /// Calls that changed the floating-point environment of the loop's thread; the host restored it each time.
     pub float_changes: u64,
 }
 
-/// Records that fit between loop and observers: four seconds at 1 kHz.
+/// Capacity for records between loop and observers: four seconds at 1 kHz.
 const RING_RECORDS: usize = 4096;
-/// How long a watchdog that is not needed any more may take to end.
+/// Timeout for the end of a watchdog that is not needed any more.
 const WATCHDOG_END: Duration = Duration::from_millis(50);
-/// How often observers look at a loop in real time.
+/// Poll interval of the observers in real time.
 const OBSERVER_PERIOD: Duration = Duration::from_millis(5);
-/// How long a loop whose device the watchdog has stopped may take to come back before it is given up: a tick that
-/// was only late ends by itself and leaves its report.
+/// Grace period for a stuck loop after the watchdog has stopped its device: a tick that was only late ends by itself, and its
+/// report is complete.
 const COME_BACK: Duration = Duration::from_millis(500);
 
 impl Session {
-    /// Loads, checks and opens everything a scene names, and nothing else. Not real-time.
+    /// Loads, checks and opens the plugins of a scene, and energises none. Not real-time.
     ///
     /// # Errors
     /// [`RunError`].
@@ -472,7 +472,7 @@ impl Session {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
         let [ramp_ns, watchdog_ns] =
             [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| (seconds * 1.0e9).round() as u64);
-        // A partner on another host is watched like the loop itself.
+        // A partner on another host is monitored like the loop itself.
         let patience = Patience { silence_ns: watchdog_ns, fade_ns: ramp_ns };
         let mut lines = Vec::new();
         let couplings = scene.couplings.iter().map(|coupling| {
@@ -513,8 +513,8 @@ impl Session {
         .with_strength(Strength::of_the_environment()))
     }
 
-    /// The same without the host's ceiling: the devices are as strong as they and the scene allow. Only a person who knows
-    /// the device should say so; a scene cannot. Not real-time.
+    /// Lifts the host's ceiling: the devices are as strong as they and the scene allow. Only a user who knows the device should
+    /// decide so; a scene cannot. Not real-time.
     #[must_use]
     pub fn allow_strong(mut self) -> Self {
         self.standby.guard_with(std::mem::take(&mut self.strong_envelopes));
@@ -522,7 +522,7 @@ impl Session {
         self
     }
 
-    /// [`Session::allow_strong`], if this is strong; otherwise the same. Not real-time.
+    /// Applies [`Session::allow_strong`] if the strength is [`Strength::Strong`]. Not real-time.
     #[must_use]
     pub fn with_strength(self, strength: Strength) -> Self {
         match (strength, self.strength) {
@@ -531,7 +531,7 @@ impl Session {
         }
     }
 
-    /// The devices that would get more without the host's ceiling, in the scene's order; none once that is
+    /// Returns the devices that would get more without the host's ceiling, in the scene's order; none once the ceiling is
     /// [lifted](Self::allow_strong).
     #[must_use]
     pub fn held_back(&self) -> &[StrongDevice] {
@@ -541,65 +541,65 @@ impl Session {
         }
     }
 
-    /// What a person should know of the limits before the run, a line each. Not real-time.
+    /// Returns notices about the limits, to be shown before the run, a line each. Not real-time.
     #[must_use]
     pub fn notices(&self) -> Vec<String> {
         let strong = self.strong_devices.iter().map(|device| device.notice(self.strength));
         self.norm_notice.iter().chain(&self.boundary_notices).cloned().chain(strong).collect()
     }
 
-    /// What people should know before this runs, a sentence each.
+    /// Returns the warnings collected during preparation, a sentence each.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// The same with the loop on this core, on the real clock.
+    /// Pins the loop to this core, on the real clock.
     #[must_use]
     pub fn on_core(self, core: Option<Core>) -> Self {
         Self { core, ..self }
     }
 
-    /// The same with the latch of another folder than that of this user's runs, from now on.
+    /// Uses the latch of another folder than that of this user's runs, from now on.
     #[must_use]
     pub fn latched_in(self, directory: &Directory) -> Self {
         Self { latch: self.latch.as_ref().map(|_| LatchGuard::of(directory)), ..self }
     }
 
-    /// The latch that stops this run and that it presses; none on the virtual clock, where no hand is held.
+    /// Returns the latch that stops this run and that its emergency stop presses; `None` on the virtual clock, where no hand is held.
     #[must_use]
     pub fn latch(&self) -> Option<&LatchGuard> {
         self.latch.as_ref()
     }
 
-    /// The loop itself, its devices energised, for whoever paces it differently; the stoppers must be used before it is
-    /// dropped. Not real-time.
+    /// Returns the servo with its devices energised, for a caller that paces the loop differently; the stoppers must be used before
+    /// the servo is dropped. Not real-time.
     ///
     /// # Errors
-    /// [`RunError::Plugin`] if a device says no, [`RunError::Latched`]; then none is energised.
+    /// [`RunError::Plugin`] if a device refuses, [`RunError::Latched`]; then none is energised.
     pub fn into_loop(self) -> Result<(Servo, Vec<Stopper>), RunError> {
         self.latch().map_or(Ok(()), LatchGuard::check)?;
         let stoppers = self.standby.stoppers();
         Ok((activate(self.standby, &self.plugins)?, stoppers))
     }
 
-    /// The core the loop is to run on, if one is named.
+    /// Returns the core for the loop, if one is named.
     pub fn core(&self) -> Option<Core> {
         self.core
     }
 
-    /// Nominal time between ticks, ns.
+    /// Returns the nominal time between ticks, ns.
     pub fn period_ns(&self) -> u64 {
         self.period_ns
     }
 
-    /// The plugins of this run with every parameter in force.
+    /// Returns the plugins of this run with the values of all parameters.
     #[must_use]
     pub fn plugins(&self) -> &[PluginReport] {
         &self.plugins
     }
 
-    /// The most that may reach a hand at any device: the tighter of what scene and device allow.
+    /// Returns the largest wrench that may reach a hand at any device: the tighter limit of scene and device.
     #[must_use]
     pub fn limits(&self) -> WrenchLimits {
         let finite = |limit: f64| limit.is_finite().then_some(limit);
@@ -609,14 +609,14 @@ impl Session {
         WrenchLimits { force_n, torque_nm, force_norm_n, torque_norm_nm }
     }
 
-    /// The couplings whose other end is on another host, by name, each with the line for its peer state.
-    /// Given once; an end whose line nobody takes is never heard of, and asks for nothing.
+    /// Returns the couplings with a remote end, by name, each with the line for its peer state. Returned once; an end without a
+    /// connected line gets no peer state and requests no force.
     #[must_use]
     pub fn take_lines(&mut self) -> Vec<(String, Line)> {
         std::mem::take(&mut self.lines)
     }
 
-    /// The newest record of a device, as soon as its tick is over: for a program that runs along with the loop. Not real-time.
+    /// Creates a tap for the newest record of a device, as soon as its tick is over: for a program that runs along. Not real-time.
     #[must_use]
     pub fn tap(&mut self, device: u16) -> Tap {
         let (end, tap) = flotor_sync::latest(TickRecord { device, ..AT_HOME });
@@ -624,30 +624,29 @@ impl Session {
         tap
     }
 
-    /// Returns the place where observers ask for outputs of the models, beside the one that the run is given.
+    /// Returns the demand of further observers for model outputs, beside the observer of the run.
     #[must_use]
     pub fn observers(&self) -> ObserverDemand {
         self.standby.observers()
     }
 
-    /// What the devices can do, in the scene's order.
+    /// Returns the capabilities of the devices, in the scene's order.
     #[must_use]
     pub fn capabilities(&self) -> &[Capabilities] {
         &self.capabilities
     }
 
-    /// The handle by which other threads change parameters of the run.
+    /// Returns the handle with which other threads change the run.
     #[must_use]
     pub fn controls(&self) -> Controls {
         self.controls.clone()
     }
 
-    /// Runs until the duration is over, somebody uses `stop`, or the device faults.
+    /// Runs until the duration is over, `stop` is used, or the device faults.
     ///
     /// # Errors
-    /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::NoThread`] if the system has no thread for a part of the run,
-    /// [`RunError::Hung`] if it does not come back: it is left behind then, and the process should end soon;
-    /// [`RunError::Latched`] if the emergency stop of the machine is pressed, on the real clock.
+    /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::NoThread`] if the system has no thread for a part of
+    /// the run, [`RunError::Hung`] if the loop does not return: its thread is abandoned then, and the process should end soon;
     pub fn run(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
         let reserve = EndReserve::take().map_err(|_| RunError::NoThread("the end of the run"))?;
         let epilogue = self.epilogue(reserve);
@@ -658,7 +657,7 @@ impl Session {
         Ok(epilogue.conclude(finished))
     }
 
-    /// What the end of this run needs to know of its beginning.
+    /// Collects the data from the beginning of this run that its end needs.
     fn epilogue(&self, reserve: EndReserve) -> Epilogue {
         Epilogue {
             reserve,
@@ -670,7 +669,7 @@ impl Session {
         }
     }
 
-    /// The loop on a thread of its own; this one lets the observers look.
+    /// Runs the loop on a thread of its own; this thread serves the observers.
     fn run_real(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Finished, RunError> {
         let (mut sender, mut receiver) = queue(RING_RECORDS);
         let Session {
@@ -691,7 +690,7 @@ impl Session {
         } = self;
         let watchdog_process = watchdog_process.map(Arc::new);
         let mut guardian = Guardian::of(watchdog_process.as_ref(), requires_independent_stop);
-        // Before the look at the latch that counts: a press after that is seen here.
+        // Watch before the final check of the latch, so that no press is missed.
         let watch = latch.as_ref().map(|latch| latch.watch(stop)).transpose();
         let _watch = watch.map_err(|_| RunError::NoThread(latch::WATCH))?;
         let mut asked = standby.observers().request(observer.demand());
@@ -701,17 +700,17 @@ impl Session {
         };
         let heart = standby.heart();
         let loop_stop = stop.clone();
-        // Not scoped: a thread that is stuck in a plugin has to be left behind.
+        // Not scoped: a thread that is stuck in a plugin has to be abandoned.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
         let (loop_heart, loop_plugins, loop_latch) = (heart.clone(), plugins.clone(), latch.clone());
         let (progress, all_stoppers) = (Progress::default(), standby.stoppers());
         let loop_progress = progress.clone();
-        // Number of the device that is being stopped, from 1: looked at from here, as `safe_stop` may hang too.
+        // Number of the device that is being stopped, from 1: polled from this thread, as `safe_stop` may hang, too.
         let stopping = Arc::new(AtomicUsize::new(0));
         let loop_stopping = Arc::clone(&stopping);
         let servo_thread = thread.spawn(move || {
             let real_time = enter_real_time(core);
-            // That it is gone is noticed by who looks on.
+            // The polling thread notices the end of the process.
             let signs = watchdog_process.as_ref().and_then(|process| {
                 let _ = process.follow_this_thread();
                 process.sign_of_life().ok()
@@ -720,7 +719,7 @@ impl Session {
                 Pacing::Host => Some(SpinWindow::measure(period_ns)),
                 Pacing::Device => None,
             };
-            // Last of all that takes time.
+            // Last step that takes time.
             let stoppers = standby.stoppers();
             loop_latch.as_ref().map_or(Ok(()), LatchGuard::check)?;
             let servo = activate_here(standby, &loop_plugins, &loop_progress)?;
@@ -742,11 +741,11 @@ impl Session {
                 });
             }
             let mut timer = StopTimer::start(Duration::from_nanos(tick_ns));
-            // A button, or the device itself: for the latch, whatever becomes of `safe_stop`.
+            // A button or the device itself: press for the latch, even if `safe_stop` hangs.
             if let Some(RunEnd::EmergencyStop(source)) = runner.end() {
                 loop_stop.press(source);
             }
-            // Here, whatever the thread that looks on is at, and while the watchdog still watches.
+            // Stop here, on the loop's thread, while the watchdog is still running.
             for (number, stopper) in (1..).zip(&stoppers) {
                 loop_stopping.store(number, Ordering::Relaxed);
                 stopper.safe_stop();
@@ -774,7 +773,7 @@ impl Session {
             controls.sweep();
             guardian.look(stop);
             if let Err(hung) = progress.look(limit()) {
-                // Others may be energised by now.
+                // Other devices may be energised by now.
                 all_stoppers.iter().for_each(Stopper::safe_stop);
                 return Err(CallError::from(hung).into());
             }
@@ -805,8 +804,8 @@ impl Session {
     }
 }
 
-/// Waits until the watchdog, which looks every millisecond, no longer holds the devices: they are closed where a hang is named.
-/// Not for longer: it may be in a `safe_stop` that hangs.
+/// Waits until the watchdog, which polls every millisecond, has released the devices, so that they are closed where a hang is
+/// reported. Has a timeout: the watchdog may be in a `safe_stop` that hangs.
 fn wait_for_end_of(watchdog: &JoinHandle<()>) {
     let since = Instant::now();
     while !watchdog.is_finished() && since.elapsed() < WATCHDOG_END {
@@ -814,7 +813,7 @@ fn wait_for_end_of(watchdog: &JoinHandle<()>) {
     }
 }
 
-/// Whose fault a stuck loop is, by name.
+/// Builds `RunError::Hung`, naming the plugin that blocks the loop.
 fn hung(stuck: Stuck, plugins: &[PluginReport], limit: Exceeded) -> RunError {
     let name = |index: usize| plugins.get(index).map_or_else(String::new, |plugin| plugin.name.clone());
     let devices = plugins.iter().filter(|plugin| plugin.metadata.kind == PluginKind::Device).count();
@@ -834,9 +833,9 @@ struct Finished {
     elapsed_ns: u64,
     dropped_records: u64,
     real_time: RealTimeReport,
-    /// Of an emergency stop on the real clock.
+    /// `None` without an emergency stop on the real clock.
     stop_time: Option<StopTime>,
-    /// What people should know, and were told.
+    /// Warning for users, which was shown already.
     warning: Option<String>,
 }
 

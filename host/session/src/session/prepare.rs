@@ -1,4 +1,4 @@
-//! From a scene to what a loop is made of: plugins loaded, their settings checked, everything paired.
+//! Preparation of a scene: loads plugins, checks their settings, and pairs scene and devices.
 
 use super::choice::chosen;
 use super::controls::{ChosenBy, ControlError, NewValue, PluginTable, understands};
@@ -33,7 +33,7 @@ pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) ->
     registry.load(&plugin.plugin, kind).map_err(|error| not_found(plugin, error))
 }
 
-/// Checks that the plugins of a scene are there, and runs no code of them. Not real-time.
+/// Checks that the plugins of a scene exist, without running their code. Not real-time.
 ///
 /// # Errors
 /// [`RunError`], with the line of the scene.
@@ -52,7 +52,7 @@ fn not_found(plugin: &PluginUse, error: LookupError) -> RunError {
     }
 }
 
-/// A plugin that said no.
+/// Returns the error about a plugin that refused.
 pub(super) fn refused(metadata: &Metadata, refusal: Refusal) -> RunError {
     let Metadata { path, id, .. } = metadata.clone();
     RunError::Plugin(LoadError::Refused { path, id, refusal })
@@ -67,7 +67,7 @@ pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Ser
     activated.inspect(Servo::follow_here)
 }
 
-/// The same on this thread; somebody else looks at the progress. Not real-time.
+/// Energises the devices on this thread, while another thread polls the progress. Not real-time.
 pub(super) fn activate_here(
     standby: Standby,
     plugins: &[PluginReport],
@@ -85,7 +85,7 @@ pub(super) fn activate_here(
     })
 }
 
-/// Hands the numbers of a scene's calibration file to the device they were measured on. Not real-time.
+/// Passes the scene's calibration to the device that it was measured on. Not real-time.
 fn calibrate(
     plugin: &Plugin,
     device: &mut OpenedDevice,
@@ -99,7 +99,7 @@ fn calibrate(
     device.calibrate_vertical(&curve).map_err(|refusal| refused(plugin.metadata(), refusal))
 }
 
-/// A device that is opened, not energised.
+/// Opened device, not energised.
 pub(super) struct Opened {
     pub(super) device: OpenedDevice,
     pub(super) capabilities: Capabilities,
@@ -108,8 +108,8 @@ pub(super) struct Opened {
     pub(super) stop: StopWithoutHost,
 }
 
-/// That models may ask for torque and the device gives none, unless the scene says that none is wanted. A model says that it can
-/// give torque, not that it will: so this is no mismatch.
+/// Returns a warning if models may request torque that the device lacks, unless the scene wants none. No mismatch: a model declares
+/// that it can compute torque, not that it will.
 pub(super) fn without_torque(scene: &Scene, number: u16, device: &Capabilities) -> Option<String> {
     let is_driven = device.actuated != Axes::NONE && !device.actuated.contains(Axes::ROTATION);
     let is_felt = scene.models.iter().any(|model| model.device == number);
@@ -165,7 +165,7 @@ pub(super) fn open_device(
     Ok((Opened { device, capabilities, embodiment, stop }, report))
 }
 
-/// A number of a plugin's parameter; NaN if it has none.
+/// Returns the value of a parameter; NaN without one.
 fn value_at(values: &[f64], index: usize) -> f64 {
     values.get(index).copied().unwrap_or(f64::NAN)
 }
@@ -173,7 +173,7 @@ fn value_at(values: &[f64], index: usize) -> f64 {
 /// Loads one model of a scene and creates it in all its places. Not real-time.
 ///
 /// # Errors
-/// [`RunError`]: the plugin is unknown, was refused, said no, or does not return.
+/// [`RunError`]: the plugin is unknown, was rejected, refused, or does not return.
 pub fn prepare_model(
     registry: &Registry,
     model: &ModelUse,
@@ -183,7 +183,7 @@ pub fn prepare_model(
     prepare_model_while(registry, model, config, clock, is_to_begin)
 }
 
-/// The same only while it is wanted.
+/// Prepares a model like [`prepare_model`], but only while it is wanted.
 pub(super) fn prepare_model_while(
     registry: &Registry,
     model: &ModelUse,
@@ -204,7 +204,7 @@ pub(super) fn prepare_model_while(
     };
     let isolation = making.isolation;
     let most = match isolation {
-        // A worker that is not made in time has to be ended, not left behind.
+        // A worker that is not ready in time has to be ended, not abandoned.
         Isolation::Process => limit() + END_OF_A_WORKER,
         Isolation::ByOrigin | Isolation::None => limit(),
     };
@@ -217,7 +217,7 @@ pub(super) fn prepare_model_while(
     Ok((layer, report))
 }
 
-/// Where no hand is, the origin of a model does not matter.
+/// Turns off isolation by origin where no hand is: on the virtual clock and on simulated devices.
 pub(super) fn settle_isolation(model: &mut ModelUse, clock: Clock, simulated: &[bool]) {
     let is_felt = clock == Clock::Real && simulated.get(usize::from(model.device)) != Some(&true);
     if model.isolation == Isolation::ByOrigin && !is_felt {
@@ -225,13 +225,13 @@ pub(super) fn settle_isolation(model: &mut ModelUse, clock: Clock, simulated: &[
     }
 }
 
-/// How long it may take to end a worker whose model was not made in time.
+/// Time for ending a worker whose model was not created in time.
 const END_OF_A_WORKER: Duration = Duration::from_secs(10);
 
-/// Most objects of a model that get a process each without the scene saying so.
+/// Most instances of a model that get a process each without the scene's explicit request.
 const MOST_PROCESSES: usize = 64;
 
-/// What stands between a model and the host, its origin looked at.
+/// Resolves the isolation of a model by its origin.
 fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolation, SceneError> {
     let is_outside = clock == Clock::Real && !is_installed(&plugin.path);
     match model.isolation {
@@ -251,10 +251,10 @@ fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolat
     }
 }
 
-/// Estimates of a model's own error, by the names of its details.
+/// Error estimates of a model, by the names of its details.
 type Estimates = Vec<(String, f64)>;
 
-/// All it takes to create a model.
+/// Inputs for creating a model.
 struct Making {
     isolation: Isolation,
     plugin: Plugin,
@@ -265,8 +265,7 @@ struct Making {
 }
 
 impl Making {
-    /// The model in all its places, the values of its parameters in force, and its estimates of its own error. Runs the
-    /// plugin's code.
+    /// Creates the model in all its places; returns it with the values of its parameters and its error estimates. Runs the plugin's code.
     fn layer(&self, progress: &Progress) -> Result<(Layer, Vec<f64>, Estimates), RunError> {
         let Self { plugin, model, config, clock, .. } = self;
         let budget_ns = budget_ns(model, *clock, config.period_ns);
@@ -288,12 +287,12 @@ impl Making {
         let values = (0..plugin.parameters().len()).map(&mut value).collect();
         let estimates = match instances.first_mut() {
             Some((Engine::Here(model), _)) => estimates(model),
-            _ => Vec::new(), // the process of a model tells wrenches only
+            _ => Vec::new(), // a worker returns wrenches only
         };
         let estimates =
             estimates.into_iter().map(|(detail, value)| (detail.id().to_owned(), value)).collect();
         let budget = match (self.isolation, &model.field) {
-            // Nobody waits for it any longer than that: how often is the same rule.
+            // The loop waits no longer than the budget, and a late reply counts as an overrun.
             (Isolation::Process, None) => TimeBudget::new(Some(budget_ns.unwrap_or(PATIENCE_NS))),
             (_, None) => TimeBudget::new(budget_ns),
             (_, Some(_)) => TimeBudget::default(),
@@ -302,7 +301,7 @@ impl Making {
         Ok((Layer::new(instances, &model.blend, budget, &sampled), values, estimates))
     }
 
-    /// One instance, wherever it is to run.
+    /// Creates one instance: in the loop, in a worker, or asynchronous.
     fn engine(&self, budget_ns: Option<u64>, progress: &Progress) -> Result<Engine, RunError> {
         let Self { isolation, plugin, settings, model, config, clock } = self;
         let no = |refusal| refused(plugin.metadata(), refusal);
@@ -319,7 +318,7 @@ impl Making {
                         .field
                         .as_ref()
                         .map_or(*config, |field| AsynchronousModel::config(field, config)),
-                    // Nobody in the loop waits for a field.
+                    // The loop does not wait for a field.
                     patience_ns: in_the_loop.unwrap_or(PATIENCE_NS),
                     making: limit(),
                 };
@@ -343,16 +342,16 @@ impl Making {
     }
 }
 
-/// What a scene says of a model that cannot be.
+/// Builds a scene error located at the model.
 fn complain(model: &ModelUse, problem: &str) -> SceneError {
     model.plugin.location.problem(format!("[{}] {problem}", model.name))
 }
 
-/// How long a run on the virtual clock waits for a model in a process of its own before it counts as hung, ns.
+/// Timeout of a worker on the virtual clock, ns.
 const PATIENCE_NS: u64 = 2_000_000_000;
 
-/// Longest time a step of a model may take, ns. On the virtual clock only if the scene says so: the wall
-/// clock would make two runs differ.
+/// Returns the time limit of a step of a model, ns. On the virtual clock only if the scene sets one: the wall clock would make two
+/// runs differ.
 fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: at most a second
     let told_ns = model.budget_s.map(|seconds| (seconds * 1.0e9).round() as u64);
@@ -363,7 +362,7 @@ fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
     told_ns.or(usual_ns)
 }
 
-/// Checks what was written against what the plugin understands; complaints name file and line.
+/// Checks settings against the plugin's schema; errors name file and line.
 pub(super) fn settings(
     plugin: &Plugin,
     name: &str,
@@ -378,8 +377,7 @@ pub(super) fn settings(
     parameters.iter().map(check).collect()
 }
 
-/// The value as the plugin is to get it: files a scene names lie beside the scene, those of a command line where
-/// the command runs.
+/// Returns the value for the plugin: a file is relative to the scene that names it, or to the working folder on a command line.
 fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, str> {
     let ParameterText { key, value, location } = text;
     let parameter = schema.iter().find(|parameter| parameter.id() == key);
@@ -395,7 +393,7 @@ fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, 
     }
 }
 
-/// What a run knows of a plugin that was made with these settings; `value` reads a parameter of it.
+/// Creates a report on a plugin with these settings; `value` reads a parameter of the plugin.
 fn report(
     plugin: &Plugin,
     name: &str,
@@ -421,7 +419,7 @@ fn report(
     }
 }
 
-/// Of every parameter the range it is moved in by hand, by its value in force. No hand is on a simulated device: its numbers
+/// Returns the range of each parameter for changes by hand, at its present value. No hand is on a simulated device: its numbers
 /// change at once.
 fn soft_ranges(plugin: &Plugin, values: &[(String, String)]) -> Vec<Option<SoftRange>> {
     if plugin.device_info().is_some_and(|info| info.embodiment() == Embodiment::Simulated) {
@@ -431,7 +429,7 @@ fn soft_ranges(plugin: &Plugin, values: &[(String, String)]) -> Vec<Option<SoftR
     values.iter().map(number).enumerate().map(|(index, value)| plugin.soft_range(index, value)).collect()
 }
 
-/// Every parameter with its value in force, as text.
+/// Returns every parameter with its value, as text.
 pub(super) fn in_force(
     plugin: &Plugin,
     settings: &[Setting],
@@ -440,7 +438,7 @@ pub(super) fn in_force(
     let schema = plugin.parameters();
     let show = |(index, parameter): (usize, &Parameter)| {
         let text = match parameter.kind() {
-            // Plugins answer with numbers: a text is in force if it was set.
+            // Plugins return numbers only: a text has its value if it was set.
             ParameterKind::Text | ParameterKind::File => {
                 let set = settings.iter().rev().find(|setting| setting.index() == index);
                 set.map_or_else(String::new, |setting| setting.display())
@@ -455,7 +453,7 @@ pub(super) fn in_force(
     schema.iter().enumerate().map(show).collect()
 }
 
-/// What of a scene its device `number` cannot do; all at once, before anything is energised.
+/// Returns all mismatches of a scene with its device `number`, before anything is energised.
 pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: bool) -> Vec<String> {
     let mut mismatches = Vec::new();
     let [slowest, fastest] = device.rate_hz;
@@ -465,7 +463,7 @@ pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: 
             scene.rate_hz
         ));
     }
-    // The first device sets the pace, if one does.
+    // Only the first device can set the pace.
     if scene.pacing == Pacing::Device && number == 0 && !can_pace {
         mismatches.push(
             "it cannot set the pace of the loop; remove `pacing`, or say `pacing = \"host\"`".to_owned(),
@@ -480,7 +478,7 @@ pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: 
     mismatches
 }
 
-/// A boundary so far inside the device's range that nothing is left of it: a spring to the centre.
+/// Returns an error text if the boundary's margin leaves no free workspace, but only a spring to the centre.
 fn boundless(boundary: &Boundary, device: &Capabilities) -> Option<String> {
     let narrowest = |range: [f64; 3]| {
         let moving = range.into_iter().filter(|half_side| *half_side > 0.0);
@@ -499,7 +497,7 @@ fn boundless(boundary: &Boundary, device: &Capabilities) -> Option<String> {
     (margin_deg >= range_deg).then(|| says("margin_deg", margin_deg, range_deg, "degrees"))
 }
 
-/// Force that models would ask for and the device cannot give, unless the scene says that none is wanted there.
+/// Returns an error text if models may request a force that the device lacks, unless the scene wants none there.
 fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
     let axes = [(Axes::X, "x"), (Axes::Y, "y"), (Axes::Z, "z")];
     let is_driven = axes.map(|(axis, _)| device.actuated.contains(axis));
@@ -530,13 +528,13 @@ fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
     })
 }
 
-/// What a scene has scheduled, checked and made.
+/// Scheduled changes and replacements of a scene, checked and created.
 pub(super) struct Scheduled {
     pub(super) changes: Vec<ScheduledChange>,
     pub(super) replacements: Vec<(u64, Replacement)>,
 }
 
-/// The changes a scene has scheduled, checked, and the models they put in, created; complaints name file and line.
+/// Checks the scheduled changes of a scene and creates the models for replacements; errors name file and line.
 pub(super) fn schedule(
     scene: &Scene,
     plugins: &PluginTable,
@@ -545,9 +543,9 @@ pub(super) fn schedule(
     clock: Clock,
 ) -> Result<Scheduled, RunError> {
     let mut in_time: Vec<&ChangeUse> = scene.changes.iter().collect();
-    in_time.sort_by(|a, b| a.at_s.total_cmp(&b.at_s)); // stable: a change is checked against what is there then
+    in_time.sort_by(|a, b| a.at_s.total_cmp(&b.at_s)); // stable: a change is checked against the plugins of its time
     let mut scheduled = Scheduled { changes: Vec::new(), replacements: Vec::new() };
-    // Of each model, what this seed might have got in its place instead of what it did get.
+    // Alternatives not drawn by this seed, per model.
     let mut passed_over = vec![Vec::new(); scene.models.len()];
     for (draw, change) in (0..).zip(in_time) {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
@@ -558,7 +556,7 @@ pub(super) fn schedule(
                 let new = NewValue { plugin, parameter: key, value };
                 match plugins.check(&new) {
                     Ok(checked) => checked,
-                    // It is for another seed.
+                    // The change is for another seed.
                     Err(_) if passed_over.iter().flatten().any(|part| understands(part, &new)) => continue,
                     Err(error) => return Err(complain("change.set", error).into()),
                 }
@@ -576,7 +574,7 @@ pub(super) fn schedule(
                         other.plugin.parameters.extend(parameters.iter().cloned());
                         prepare_model(registry, &other, config, clock)
                     };
-                    // All of them: what is wrong with one is to be known whatever the seed.
+                    // All of them: an error in one is found with any seed.
                     let mut made = by.iter().map(make).collect::<Result<Vec<_>, _>>()?;
                     if choice >= made.len() {
                         continue;

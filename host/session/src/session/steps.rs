@@ -1,4 +1,4 @@
-//! A run on the virtual clock that somebody else advances: for experiments, which decide between ticks what comes next.
+//! Run on the virtual clock that the caller advances: for experiments, which decide between ticks how to continue.
 
 use super::virtual_loop::VirtualLoop;
 use super::{Controls, Observer, RunError, RunOptions, Session};
@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use flotor_coupling::Line;
 use flotor_servo::{Clock, CouplingOutcome, RunEnd, StopSwitch};
 
-/// A run that goes on when it is told to. When it is dropped the devices are stopped.
+/// Run that the caller advances. When it is dropped the devices are stopped.
 pub struct Steps {
     ticks: VirtualLoop,
     controls: Controls,
@@ -15,7 +15,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Loads, checks, opens and activates everything a scene names; `stop` ends the run. Not real-time.
+    /// Loads, checks, opens and activates the plugins of a scene; `stop` ends the run. Not real-time.
     ///
     /// # Errors
     /// [`RunError`]; nothing is energised before this has succeeded.
@@ -30,29 +30,29 @@ impl Steps {
         Ok(Self { ticks: VirtualLoop::start(session, stop)?, controls, lines })
     }
 
-    /// The handle by which parameters, weights and models of the run are changed.
+    /// Returns the handle to change parameters, weights and models of the run.
     #[must_use]
     pub fn controls(&self) -> &Controls {
         &self.controls
     }
 
-    /// As [`Session::take_lines`]: whoever advances two runs can be the way between them.
+    /// Returns the lines of couplings, as [`Session::take_lines`]: a caller that advances two runs can connect them.
     #[must_use]
     pub fn take_lines(&mut self) -> Vec<(String, Line)> {
         std::mem::take(&mut self.lines)
     }
 
-    /// What has become of each coupling so far, in the scene's order. Not real-time.
+    /// Returns the statistics of each coupling so far, in the scene's order. Not real-time.
     #[must_use]
     pub fn couplings(&mut self) -> Vec<CouplingOutcome> {
         self.ticks.couplings()
     }
 
-    /// Ticks `ticks` times, or until the run ends; returns how it ended, if it did. The observer is told of each tick and of what changed
-    /// before it. Not real-time: the observer is not.
+    /// Runs `ticks` ticks, or until the run ends; returns the end of the run once it has ended. Passes the changes before each tick
+    /// and the tick's records to the observer. Not real-time: the observer is not.
     ///
     /// # Errors
-    /// [`RunError::Hung`] if a call of a plugin does not return: there are no ticks any more.
+    /// [`RunError::Hung`] if a plugin call does not return: there are no ticks any more.
     pub fn advance(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<Option<RunEnd>, RunError> {
         self.ticks.advance(ticks, observer)?;
         Ok(self.ticks.end())

@@ -1,10 +1,10 @@
-//! The time that an emergency stop takes, from its request to each device without force.
+//! Duration of an emergency stop, from its request to each device without force.
 
 use super::LatchGuard;
 use flotor_servo::{EmergencySource, StopSwitch, monotonic_ns};
 use std::time::{Duration, SystemTime};
 
-/// Time in which every device is without force, or is named.
+/// Time within which each device is without force; a slower one is reported.
 const BOUND: Duration = Duration::from_millis(20);
 
 /// Times of the last tick and of the stops of the devices, taken on the thread of the loop.
@@ -15,12 +15,12 @@ pub(super) struct StopTimer {
 }
 
 impl StopTimer {
-    /// Starts right after the last tick, which took `tick`. Not real-time.
+    /// Starts the timer right after the last tick, which took `tick`. Not real-time.
     pub(super) fn start(tick: Duration) -> Self {
         Self { tick, sent_ns: monotonic_ns(), stopped_ns: Vec::new() }
     }
 
-    /// Takes the time of the next device, whose `safe_stop` has returned. Not real-time.
+    /// Records the time of the next device, whose `safe_stop` has returned. Not real-time.
     pub(super) fn stopped(&mut self) {
         self.stopped_ns.push(monotonic_ns());
     }
@@ -30,7 +30,7 @@ impl StopTimer {
         let Self { tick, sent_ns, stopped_ns } = self;
         let since = |start_ns: u64, end_ns: u64| Duration::from_nanos(end_ns.saturating_sub(start_ns));
         let seen = stop.pressed_ns().map_or(Duration::ZERO, |pressed_ns| since(pressed_ns, sent_ns));
-        // Another run has pressed the latch before this one saw it.
+        // Another run pressed the latch before this one noticed.
         let latch = latch.filter(|_| stop.emergency() == Some(EmergencySource::Latch));
         let pressed =
             latch.and_then(LatchGuard::pressed_at).and_then(|at| SystemTime::now().duration_since(at).ok());
@@ -42,14 +42,14 @@ impl StopTimer {
     }
 }
 
-/// Time of an emergency stop, in the parts in which it can be lost.
+/// Duration of an emergency stop, in parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StopTime {
     /// From the request to the start of the last tick, which sends no force.
     before_the_tick: Duration,
-    /// Of that tick, with the commands to all devices.
+    /// Duration of that tick, with the commands to all devices.
     tick: Duration,
-    /// From the end of the tick to the end of the `safe_stop` of each device, in the scene's order: after it the device has no force, also
+    /// From the end of the tick to the end of each device's `safe_stop`, in the scene's order: the device then has no force, even
     /// if it has not taken the command of the tick.
     stops: Vec<Duration>,
 }
@@ -61,8 +61,8 @@ impl StopTime {
         self.stops.get(number).map(|stop| self.before_the_tick + self.tick + *stop)
     }
 
-    /// Returns the devices that could have force for longer than the bound, and the parts of the time; none if no device could. `names` are
-    /// those of the devices.
+    /// Returns a warning about devices that could have force for longer than the bound, with the parts of the time; `None` if no
+    /// device could. `names` are those of the devices.
     pub(super) fn warning(&self, names: &[String]) -> Option<String> {
         let ms = |time: Duration| format!("{:.1} ms", time.as_secs_f64() * 1.0e3);
         let late = names.iter().zip(&self.stops).enumerate().filter_map(|(number, (name, stop))| {

@@ -1,4 +1,4 @@
-//! The stop of a device after the end of the host's process, and the watchdog process that sends it: one rule for runs and for
+//! Stop of a device after the end of the host's process, and the watchdog process that sends the stop: one rule for runs and for
 //! commands that drive a device without a scene.
 
 use super::RunError;
@@ -13,12 +13,12 @@ pub struct StopWithoutHost {
     device: String,
     embodiment: Embodiment,
     actuated: Axes,
-    /// Nothing of a device that nothing stops.
+    /// Means of the stop; `None` if nothing stops the device.
     means: Option<Independence>,
 }
 
 impl StopWithoutHost {
-    /// Reads the stop of a device, which messages call `name`. Not real-time.
+    /// Reads the stop of a device; `name` is the device's name in messages. Not real-time.
     ///
     /// # Errors
     /// A [`Refusal`] of a stop that cannot be used.
@@ -32,7 +32,7 @@ impl StopWithoutHost {
         Ok(Self { device: name.to_owned(), embodiment, actuated: capabilities.actuated, means })
     }
 
-    /// Returns why the device is refused where a stop is required; nothing of a device with a stop or without force.
+    /// Returns the reason to reject the device if a stop is required; `None` for a device with a stop or without force.
     pub(super) fn missing(&self) -> Option<String> {
         self.is_missing().then(|| {
             "nothing stops it if this program is killed: its plugin lacks the extension `flotor.independent-stop/1`; remove \
@@ -63,10 +63,10 @@ impl StopWithoutHost {
     }
 }
 
-/// Start of a watchdog process.
+/// Result of starting a watchdog process.
 #[derive(Default)]
 pub struct WatchdogStart {
-    /// The process; none where no device is stopped by a message, or where none can be started and none is required.
+    /// Process; `None` if no device is stopped by a message, or if it cannot be started and is not required.
     pub process: Option<WatchdogProcess>,
     /// Ways in which the devices stay unguarded, a sentence each.
     pub warnings: Vec<String>,
@@ -75,7 +75,7 @@ pub struct WatchdogStart {
 /// Starts the watchdog process of open devices, before the first of them is energised. Not real-time.
 ///
 /// # Errors
-/// [`RunError::WatchdogProcess`] where `limits` require one and there is none; [`RunError::SharedControlGroup`] where a kill of one
+/// [`RunError::WatchdogProcess`] if `limits` require one and there is none; [`RunError::SharedControlGroup`] if a kill of one
 /// control group leaves the force of a device on and `limits` do not accept that.
 pub fn start_watchdog_process(
     stops: &[&StopWithoutHost],

@@ -1,11 +1,11 @@
-//! The end of the watchdog process itself.
+//! Monitor for the end of the watchdog process itself.
 
 use crate::calls::{Notice, tell};
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{RunEnd, StopSwitch};
 use std::sync::{Arc, Weak};
 
-/// Watch over the watchdog process of a run.
+/// Monitor of the watchdog process of a run.
 pub struct Guardian {
     process: Weak<WatchdogProcess>,
     is_required: bool,
@@ -13,13 +13,13 @@ pub struct Guardian {
 }
 
 impl Guardian {
-    /// Watches over this process, if there is one; `is_required` ends a run that loses it.
+    /// Monitors this process, if there is one; with `is_required` its loss ends the run.
     #[must_use]
     pub fn of(process: Option<&Arc<WatchdogProcess>>, is_required: bool) -> Self {
         Self { process: process.map(Arc::downgrade).unwrap_or_default(), is_required, is_gone: false }
     }
 
-    /// Reports the end of the process once; a run that requires it ends in order then. Not real-time.
+    /// Reports the end of the process once; a run that requires the process ends in order then. Not real-time.
     pub fn look(&mut self, stop: &StopSwitch) {
         if self.is_gone || !self.process.upgrade().is_some_and(|process| process.is_gone()) {
             return;
@@ -32,7 +32,7 @@ impl Guardian {
         }
     }
 
-    /// What this means for the end of a run.
+    /// Returns the end of the run, `Unguarded` if it was stopped for the loss of a required process.
     pub(super) fn end(&self, end: RunEnd) -> RunEnd {
         match end {
             RunEnd::Stopped if self.is_required && self.is_gone => RunEnd::Unguarded,
@@ -40,7 +40,7 @@ impl Guardian {
         }
     }
 
-    /// What people should know, and were told.
+    /// Returns the warning for users, which was shown already.
     pub(super) fn warning(&self) -> Option<String> {
         (self.is_gone && !self.is_required).then(|| Notice::Unguarded.to_string())
     }

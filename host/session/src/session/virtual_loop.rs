@@ -1,4 +1,4 @@
-//! The loop on the virtual clock, on a thread of its own: a call of a plugin that does not return is named, and left behind.
+//! Loop on the virtual clock, on a thread of its own: a plugin call that does not return is reported, and the thread abandoned.
 
 use super::prepare::activate;
 use super::{ChangeLog, Finished, Observer, PluginReport, RunError, Session, TapEnds, hung, publish_to};
@@ -17,21 +17,21 @@ use flotor_servo::{
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
-/// Records of one batch: observers see them between two batches, so that a slow observer slows the run and loses nothing.
+/// Records of one batch: observers run between two batches, so that a slow observer slows the run and loses nothing.
 const BATCH: usize = 1024;
-/// Interval between two looks at a batch that takes long.
+/// Poll interval for a batch that takes long.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// The loop and its publishers, which go to its thread for a batch and come back.
+/// Loop with its publishers, passed to the loop's thread for a batch and returned afterwards.
 struct Batch {
     runner: Loop,
     taps: TapEnds,
-    /// Ticks until the batch ends, if it is not full before.
+    /// Remaining ticks of the batch, if it is not full before.
     ticks: u64,
 }
 
 impl Session {
-    /// Ticks without waiting.
+    /// Runs the loop without waiting.
     pub(super) fn run_virtual(
         self,
         observer: &mut dyn Observer,
@@ -50,7 +50,7 @@ impl Session {
 /// The loop of a run whose devices are energised.
 pub(super) struct VirtualLoop {
     thread: LoopThread,
-    /// None once a call has not returned.
+    /// `None` once a call has not returned.
     batch: Option<Batch>,
     records: Consumer<TickRecord>,
     changes: ChangeLog,
@@ -70,7 +70,7 @@ impl VirtualLoop {
         let Session { standby, changes, taps, period_ns, duration_ns, plugins, .. } = session;
         let (stoppers, heart) = (standby.stoppers(), standby.heart());
         let asked = standby.observers().request(Demand::FORCE);
-        // The last tick of a batch may leave a record for each device.
+        // The last tick of a batch may add a record for each device.
         let (mut sender, records) = queue(BATCH + usize::from(MOST_DEVICES));
         let loop_stop = stop.clone();
         let thread = LoopThread::start(move |Batch { runner, taps, ticks }| {
@@ -89,12 +89,12 @@ impl VirtualLoop {
         Ok(Self { thread, batch, records, changes, asked, stop: stop.clone(), stoppers, heart, plugins })
     }
 
-    /// How the run ended, once it has.
+    /// Returns the end of the run; `None` while the run continues.
     pub(super) fn end(&self) -> Option<RunEnd> {
         self.batch.as_ref().and_then(|batch| batch.runner.end())
     }
 
-    /// Ticks `ticks` times, or until the run ends; the observer is told of each and of what changed before it. Not real-time.
+    /// Runs `ticks` ticks, or until the run ends; passes the changes before each and its records to the observer. Not real-time.
     ///
     /// # Errors
     /// [`RunError::Hung`] if a call does not return; then there are no ticks any more.
@@ -106,7 +106,7 @@ impl VirtualLoop {
         Ok(())
     }
 
-    /// Ticks `ticks` times, or until the batch is full or the run ends; returns the ticks that are left.
+    /// Runs `ticks` ticks, or until the batch is full or the run ends; returns the remaining ticks.
     fn batch(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<u64, RunError> {
         let batch = self.batch.take().ok_or(RunError::Thread("did not come back"))?;
         self.asked.change_to(observer.demand());
@@ -127,7 +127,7 @@ impl VirtualLoop {
         Ok(self.batch.insert(batch).ticks)
     }
 
-    /// Returns what has become of each coupling so far, in the scene's order. Not real-time.
+    /// Returns the statistics of each coupling so far, in the scene's order. Not real-time.
     pub(super) fn couplings(&mut self) -> Vec<CouplingOutcome> {
         self.batch.as_mut().map_or_else(Vec::new, |batch| batch.runner.servo().forces().coupling_outcomes())
     }
@@ -144,13 +144,13 @@ impl VirtualLoop {
     }
 }
 
-/// Why a batch does not come back.
+/// Reason why a batch does not return.
 enum Lost {
     Stuck(Stuck, Exceeded),
     Thread,
 }
 
-/// The thread of the loop, which ends when this is dropped.
+/// Thread of the loop; it ends when this handle is dropped.
 struct LoopThread {
     batches: SyncSender<Batch>,
     done: Receiver<Batch>,

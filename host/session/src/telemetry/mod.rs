@@ -1,15 +1,14 @@
-//! The running host, for other programs on this machine to watch and change: viewer, bridges, scripts.
+//! Telemetry of the running host, by which other programs on this machine observe and change a run: viewer, bridges, scripts.
 //!
 //! ```text
 //!  servo -> ring -> observers -> flotor_live::Publication -> socket -> watchers
 //!  servo <- Controls, StopSwitch, at a tick boundary <- Host <- socket <- watchers
 //! ```
 //!
-//! What is said over the socket, and both its ends, are the crate `flotor_live`; here is what this host says of itself, and how it
-//! does what it is asked for. Nothing of it runs on the servo's thread. Not real-time.
+//! The protocol of the socket, and both its ends, are the crate `flotor_live`; this module has the host's own messages and handles
+//! its requests. Nothing of it runs on the servo's thread. Not real-time.
 //!
-//! A model that somebody wants in place of another is loaded and made here, on a thread of its own, and goes to the loop when
-//! it is ready.
+//! A replacement for a model is loaded and created here, on a thread of its own, and sent to the loop when it is ready.
 
 mod pairing;
 mod peer_link;
@@ -32,10 +31,10 @@ use flotor_servo::{EmergencySource, StopSwitch};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Lets a prepared run be found, watched and changed.
+/// Publishes a prepared run, to be found, observed and changed.
 ///
 /// # Errors
-/// [`PublishError`]; the run goes on without.
+/// [`PublishError`]; the run continues without clients.
 pub fn publish(
     directory: &Directory,
     scene: &Scene,
@@ -49,10 +48,10 @@ pub fn publish(
     announce(directory, scene, run, session, Arc::new(host))
 }
 
-/// Lets a prepared run be found and watched; what else may be asked of it is up to `host`.
+/// Publishes a prepared run, to be found and observed; `host` handles all other requests.
 ///
 /// # Errors
-/// [`PublishError`]; the run goes on without.
+/// [`PublishError`]; the run continues without clients.
 pub fn announce(
     directory: &Directory,
     scene: &Scene,
@@ -77,11 +76,11 @@ fn panel(report: &PluginReport) -> PanelPlugin {
     PanelPlugin { is_simulated: *embodiment == Some(Embodiment::Simulated), ..panel }
 }
 
-/// An observer, and the clients of the telemetry server.
+/// Observer of a run, with the clients of the telemetry server.
 pub struct Watched<O> {
-    /// The one that is always there.
+    /// Observer of the run itself.
     pub observer: O,
-    /// The others, if the telemetry server has started.
+    /// Clients, if the telemetry server has started.
     pub publication: Option<Publication>,
 }
 
@@ -102,7 +101,7 @@ impl<O: Observer> Observer for Watched<O> {
         }
     }
 
-    /// That of the observer: each client asks for itself.
+    /// Returns the demand of the observer: each client requests its own.
     fn demand(&self) -> Demand {
         self.observer.demand()
     }
@@ -115,20 +114,20 @@ impl<O: Observer> Observer for Watched<O> {
     }
 }
 
-/// What does as a watcher asks.
+/// Handler of the requests of clients.
 struct Host {
     controls: Controls,
     stop: StopSwitch,
-    /// Pressed by an emergency stop before that is answered.
+    /// Pressed by an emergency stop before the reply.
     latch: Option<LatchGuard>,
-    /// Where the scene has plugins looked for.
+    /// Plugin folders of the scene.
     folders: Vec<PathBuf>,
-    /// Searched when the first model is replaced; kept, so that a file that has not changed is not mapped once more.
+    /// Searched at the first replacement of a model and reused, so that an unchanged file is not mapped again.
     registry: Mutex<Option<Registry>>,
 }
 
 impl Host {
-    /// On a thread of its own: the one that serves a watcher has too small a stack for plugins.
+    /// Replaces a model on a thread of its own: the thread that serves a client has too small a stack for plugins.
     fn swap(
         &self,
         model: &str,
@@ -153,7 +152,7 @@ impl Host {
     }
 }
 
-/// Why it was not done, for whoever asked.
+/// Converts an error to the reply for the client.
 fn refused(error: &ControlError) -> (RefusalCause, String) {
     let cause = match error {
         ControlError::Refused { cause, .. } => *cause,
@@ -163,17 +162,17 @@ fn refused(error: &ControlError) -> (RefusalCause, String) {
     (cause, error.to_string())
 }
 
-/// The emergency stop of a client: of this run, and of the machine before the client is answered.
+/// Performs a client's emergency stop: of this run, and of the machine before the reply.
 ///
 /// # Errors
-/// Only this run stops.
+/// If only this run stops.
 pub fn emergency_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) -> Result<(), (RefusalCause, String)> {
     stop.press(EmergencySource::Watcher);
     let problem = latch.and_then(|latch| latch.press(EmergencySource::Watcher).problem());
     problem.map_or(Ok(()), |problem| Err((RefusalCause::Other, format!("this run stops; {problem}"))))
 }
 
-/// The emergency stop of another run of the machine, for a run that has its latch.
+/// Performs the emergency stop of another run, if this run has the machine's latch.
 pub fn machine_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) {
     if latch.is_some() {
         stop.press(EmergencySource::Latch);
@@ -184,7 +183,7 @@ impl Serve for Host {
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         let Self { controls, stop, latch, .. } = self;
         match ask {
-            Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
+            Ask::Watch { .. } | Ask::LookAway => {} // handled by the publication
             Ask::Set { values } => {
                 let values: Vec<NewValue<'_>> = values
                     .iter()

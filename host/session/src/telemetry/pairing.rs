@@ -1,29 +1,29 @@
-//! Which run is the partner of a coupling: one, which answers this run, until it has been silent.
+//! Pairing of the two ends of a coupling: the partner is one run, which answers this run, until it has been silent.
 //!
-//! Each message names the run it comes from and the run it answers. An end takes the first that answers it or nobody, names it, and
-//! hears it from the message on that names this run; all others are told by that name that they are not meant. So a third is let in
-//! by nobody, and energy is counted by no more than one. A bridge is a star: who serves a coupling hears all that come to it, and they
-//! hear nobody else. (Were all to hear all, three that start at once could take turns; energy would still be counted once.)
+//! Each message names the run that it comes from and the run that it answers. An end takes the first run that answers this end or none,
+//! names that run, and uses its messages from the first that names this run; the name informs all other runs of their rejection. So a
+//! third run is never accepted, and energy is counted by one at most. A bridge is a star: the server of a coupling gets all messages to
+//! it, and their senders get no others. (If all got all, three that start at once could take turns; energy would still be counted once.)
 
 use flotor_core::peer::Dispatch;
 use serde::Serialize;
 
-/// Messages on their way to a loop.
+/// Counts of messages to a loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LinkCounts {
-    /// Messages of the partner that arrived, and were newer than the last.
+    /// Messages of the partner that arrived and were newer than the last.
     pub arrived: u64,
-    /// Ticks of the partner that were passed over: their messages were lost, or came after newer ones.
+    /// Skipped ticks of the partner: their messages were lost, or came after newer ones.
     pub lost: u64,
     /// Messages that came after newer ones, or twice.
     pub overtaken: u64,
-    /// Malformed messages, and our own.
+    /// Malformed messages, and those of this run itself.
     pub refused: u64,
     /// Messages of runs that are not the partner, or that answer another run.
     pub others: u64,
 }
 
-/// Finds the partner, and lets its newer messages through.
+/// Filter that finds the partner and passes its newer messages.
 #[derive(Debug)]
 pub struct Pairing {
     run: u64,
@@ -37,22 +37,22 @@ struct Partner {
     run: u64,
     tick: u64,
     heard_ns: u64,
-    /// When it named this run last; before, when it was taken.
+    /// Time when the partner last named this run, or was accepted, ns.
     named_ns: u64,
-    /// Whether it ever did: one that names nobody for a moment is not given up for another.
+    /// True once the partner has named this run: then it is not replaced if it names none for a moment.
     has_named_us: bool,
-    /// Our tick from which on we name it.
+    /// First tick of this run that names the partner.
     since: Option<u64>,
 }
 
 impl Pairing {
-    /// Of the run that began at this time, ns since 1970; who is silent for `silence_ns` is a partner no longer.
+    /// Creates the pairing of the run that began at this time, ns since 1970; a partner silent for `silence_ns` is dropped.
     #[must_use]
     pub fn new(run: u64, silence_ns: u64) -> Self {
         Self { run, silence_ns, partner: None, counts: LinkCounts::default() }
     }
 
-    /// A message of this end as it leaves: it names whom it answers.
+    /// Addresses a message of this end to the run that it answers.
     #[must_use]
     pub fn address(&mut self, dispatch: &Dispatch) -> Dispatch {
         let of_partner = |held: &mut Partner| (held.run, *held.since.get_or_insert(dispatch.tick));
@@ -60,7 +60,7 @@ impl Pairing {
         Dispatch { run: self.run, partner, since, ..*dispatch }
     }
 
-    /// The message if it is for the loop.
+    /// Returns the message if it is for the loop.
     pub fn take(&mut self, dispatch: Dispatch, now_ns: u64) -> Option<Dispatch> {
         let Self { run: us, silence_ns, partner, counts } = self;
         let Dispatch { run, partner: named, tick, .. } = dispatch;
@@ -78,7 +78,7 @@ impl Pairing {
                     return None;
                 }
                 if !names_us && named != 0 {
-                    // It has gone to another.
+                    // The partner has gone to another run.
                     *partner = None;
                     counts.others += 1;
                     return None;
@@ -105,12 +105,12 @@ impl Pairing {
         names_us.then_some(dispatch)
     }
 
-    /// A message that was none.
+    /// Counts a malformed message.
     pub fn refuse(&mut self) {
         self.counts.refused += 1;
     }
 
-    /// What came.
+    /// Returns the counts so far.
     #[must_use]
     pub fn counts(&self) -> LinkCounts {
         self.counts

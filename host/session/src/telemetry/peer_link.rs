@@ -1,10 +1,10 @@
-//! Transports the peer state of a coupling between the loop and the bridge to the other host.
+//! Peer link: transports the peer state of a coupling between the loop and the bridge to the other host.
 //!
 //! ```text
 //!  servo <-> latest-value cells (coupling::Line) <-> this thread <-> flotor_live::PeerSocket <-> bridge <-> network
 //! ```
 //!
-//! A thread for each coupling; the loop never waits for it. Not real-time.
+//! One thread for each coupling; the loop never waits for it. Not real-time.
 
 use super::pairing::{LinkCounts, Pairing};
 use flotor_coupling::Line;
@@ -14,10 +14,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Pause between two looks at both sides: half a period at 1 kHz.
+/// Poll interval of both sides: half a period at 1 kHz.
 const LOOK_PERIOD: Duration = Duration::from_micros(500);
 
-/// Datagrams taken in at a look.
+/// Most datagrams read per poll.
 const MOST_AT_ONCE: usize = 256;
 
 /// The thread of a peer link; it ends when dropped.
@@ -29,7 +29,7 @@ pub struct PeerLink {
 /// Starts the peer link of a coupling.
 ///
 /// # Errors
-/// [`PublishError`]; the run goes on, and its end of the coupling asks for nothing.
+/// [`PublishError`]; the run continues, and its end of the coupling requests no force.
 pub fn start_peer_link(directory: &Directory, coupling: &str, line: Line) -> Result<PeerLink, PublishError> {
     let socket = PeerSocket::listen(directory, coupling)?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -40,7 +40,7 @@ pub fn start_peer_link(directory: &Directory, coupling: &str, line: Line) -> Res
 }
 
 impl PeerLink {
-    /// Ends it; what it has counted.
+    /// Ends the thread and returns its counts.
     #[must_use]
     pub fn finish(mut self) -> LinkCounts {
         self.join()
@@ -73,7 +73,7 @@ fn run(mut socket: PeerSocket, line: Line, stop: &AtomicBool) -> LinkCounts {
             sent = version;
             socket.tell(&pairing.address(&dispatch));
         }
-        // Of what comes together only the last counts; a flood ends here, and goes on after the next look.
+        // Of several messages only the last counts; a flood is cut off here, and read further at the next poll.
         #[allow(clippy::cast_possible_truncation)] // in five hundred years
         let now_ns = since.elapsed().as_nanos() as u64;
         let mut newest = None;

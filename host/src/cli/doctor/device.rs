@@ -1,4 +1,4 @@
-//! `flotor doctor --device ID`: what the plugin says when it is opened, and what the machine says of its connection.
+//! `flotor doctor --device ID`: diagnosis of a device by its plugin and by the connection to the machine.
 
 use super::Diagnosis;
 use crate::platform::usb::{Machine, connection};
@@ -13,10 +13,10 @@ use flotor_servo::watchdog_process;
 use flotor_session::registry::Registry;
 use std::io;
 
-/// What a diagnosis of its stop is about.
+/// Topic of the findings on the stop of a device without its host.
 const WITHOUT_ITS_HOST: &str = "without its host";
 
-/// What is to be known of a device before it runs. Opens it, without force.
+/// Diagnoses a device before its first run. Opens the device, without force.
 pub(super) fn diagnose(
     registry: &Registry,
     id: &str,
@@ -35,14 +35,14 @@ pub(super) fn diagnose(
     let mut diagnoses = connection(machine, plugin.usb_kinds(), opened.is_ok());
     match opened {
         Ok(mut device) => diagnoses.extend(abilities(&plugin, &mut device)),
-        // One sentence for people: what, where, what to do.
+        // The reason is one sentence for people: problem, place, remedy.
         Err(LoadError::Refused { refusal, .. }) => diagnoses.push(Diagnosis::told("opening", refusal.reason)),
         Err(error) => diagnoses.push(Diagnosis::told("opening", error.to_string())),
     }
     Ok(diagnoses)
 }
 
-/// What an open device says of itself.
+/// Returns the findings on the capabilities of an open device.
 fn abilities(plugin: &Plugin, device: &mut OpenedDevice) -> Vec<Diagnosis> {
     let mut diagnoses =
         vec![Diagnosis::good("opening", format!("{} is open, without force", plugin.metadata().name))];
@@ -57,7 +57,7 @@ fn abilities(plugin: &Plugin, device: &mut OpenedDevice) -> Vec<Diagnosis> {
     diagnoses
 }
 
-/// What stops it when the host is gone.
+/// Returns the finding on the stop of the device without its host.
 fn without_its_host(told: Result<Option<Independence>, Refusal>) -> Diagnosis {
     match told {
         Ok(Some(Independence::Itself { .. })) => Diagnosis::good(WITHOUT_ITS_HOST, "stops by itself"),
@@ -67,7 +67,7 @@ fn without_its_host(told: Result<Option<Independence>, Refusal>) -> Diagnosis {
     }
 }
 
-/// A device that is stopped by a message: somebody has to send it.
+/// Returns the finding on a device that is stopped by a message, which the watchdog process has to send.
 fn by_message(watchdog_process: io::Result<()>) -> Diagnosis {
     match watchdog_process {
         Ok(()) => Diagnosis::good(WITHOUT_ITS_HOST, "the watchdog process stops it, by a message"),

@@ -1,4 +1,4 @@
-//! What `flotor doctor` finds in the files of the kernel.
+//! Findings of `flotor doctor` from files of the kernel.
 
 use crate::cli::doctor::Diagnosis;
 use flotor_servo::platform::{GroupLimit, LimitValue, Use, group_limits, real_time_budget_advice};
@@ -6,36 +6,36 @@ use flotor_servo::watchdog_process::probe_shared_group;
 use std::fs::read_to_string;
 use std::path::Path;
 
-/// How a user gets real-time priority where no control group refuses it.
+/// Remedy for missing real-time priority, if no control group refuses it.
 const PRIORITY_REMEDY: &str = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - rtprio 99` in \
                 /etc/security/limits.conf; then log in again";
-/// How a user gets locked memory.
+/// Remedy for missing locked memory.
 pub(crate) const MEMORY_REMEDY: &str = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - memlock unlimited` \
                 in /etc/security/limits.conf; then log in again";
 
-/// How a user keeps the watchdog process alive when the run is killed with its group.
+/// Remedy for a watchdog process that is killed with the group of the run.
 const SHARED_GROUP_REMEDY: &str = "start the run where systemd's user or system manager can be reached (`busctl --user status`), or in a \
                                    group with a writable outer group. In a service: `KillMode=mixed`, `OOMPolicy=continue`, \
                                    `ManagedOOMPreference=avoid`. In a container: end the run with a signal before the container";
 
-/// Share of a core that a loop with real-time priority may need: that of the whole machine by default.
+/// Least share of a core for a loop with real-time priority: slightly below the kernel's default for the whole machine.
 const SOUND_SHARE: f64 = 0.9;
 /// Threads and processes that a run starts, with a margin.
 const NEEDED_THREADS: u64 = 32;
 
-/// Returns the findings beside cores and privileges; those of control groups from the files below `root`.
+/// Returns the findings other than cores and privileges; those of control groups from the files below `root`.
 pub(crate) fn of_the_system(root: &Path) -> Vec<Diagnosis> {
     let own = [isolated_cores(), kernel(), throttling(), governor(), killed_together(), supervision()];
     own.into_iter().chain(group_limits(root).iter().filter_map(of_limit)).collect()
 }
 
-/// Returns how a user gets real-time priority.
+/// Returns the remedy for missing real-time priority.
 pub(crate) fn priority_remedy(root: &Path) -> String {
     let without = group_limits(root).into_iter().find(|limit| limit.value == LimitValue::RealTimeShare(0.0));
     without.map_or_else(|| PRIORITY_REMEDY.to_owned(), |limit| real_time_budget_advice(&limit.file))
 }
 
-/// Returns how a user gets a second core, where the loop shares its core with all other programs.
+/// Returns the remedy for a machine with one core, where the loop shares its core with all other programs.
 pub(crate) fn core_remedy(root: &Path) -> String {
     let limits = group_limits(root);
     let is_one = |limit: &&GroupLimit| match limit.value {
@@ -55,7 +55,7 @@ pub(crate) fn core_remedy(root: &Path) -> String {
     }
 }
 
-/// Whether this machine has one core.
+/// Returns true if this machine has one core.
 fn has_one_core() -> bool {
     read_to_string("/sys/devices/system/cpu/online").is_ok_and(|list| list.trim() == "0")
 }
@@ -112,7 +112,7 @@ fn of_limit(limit: &GroupLimit) -> Option<Diagnosis> {
     })
 }
 
-/// Returns the finding on a limit of memory: bad where a tenth of it is left.
+/// Returns the finding on a limit of memory: bad if less than a tenth is left.
 fn of_memory(what: &'static str, Use { most, now }: Use, file: &Path, remedy: &str) -> Diagnosis {
     let mib = |bytes: u64| bytes >> 20;
     let found =
@@ -124,7 +124,7 @@ fn of_memory(what: &'static str, Use { most, now }: Use, file: &Path, remedy: &s
     }
 }
 
-/// Whether a kill of all processes of a control group ends the watchdog process with the host.
+/// Checks whether a kill of all processes of a control group ends the watchdog process with the host.
 fn killed_together() -> Diagnosis {
     match probe_shared_group() {
         Ok(None) => Diagnosis::good("watchdog process", "in a control group of its own"),
@@ -137,7 +137,7 @@ fn killed_together() -> Diagnosis {
     }
 }
 
-/// Whether a supervisor waits for the process that runs plugins.
+/// Returns the finding on a supervisor of the process that runs plugins.
 fn supervision() -> Diagnosis {
     if std::process::id() != 1 {
         return Diagnosis::good("supervisor", "an end without a report fails");
@@ -163,7 +163,7 @@ fn isolated_cores() -> Diagnosis {
     }
 }
 
-/// Share of a core that real-time threads may take together.
+/// Returns the finding on the share of a core that all real-time threads may use together.
 fn throttling() -> Diagnosis {
     let number = |file: &str| read_to_string(file).ok()?.trim().parse::<f64>().ok();
     let [runtime, period] =

@@ -1,5 +1,5 @@
-//! `flotor lend`: somebody's program on a Flotor device, without a changed line: a drop-in library answers where the program
-//! calls its maker's.
+//! `flotor lend`: runs an unmodified program on a Flotor device: a drop-in library replaces that of the maker of the program's
+//! device.
 
 pub(crate) mod guard;
 mod outcome;
@@ -76,7 +76,7 @@ enum PaceOption {
     Lockstep,
 }
 
-/// An interface of another maker.
+/// Library interface of another maker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Api {
     /// Force Dimension's DHD and DRD
@@ -87,19 +87,19 @@ pub(crate) enum Api {
     Chai3d,
 }
 
-/// How a program reaches a device.
+/// Interface between a program and its device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Interface {
-    /// It loads a library.
+    /// Library that the program loads.
     Library(Api),
-    /// It connects to a service.
+    /// Service that the program connects to.
     Service(Service),
 }
 
 impl Api {
     const ALL: [Self; 3] = [Self::Dhd, Self::Openhaptics, Self::Chai3d];
 
-    /// The interface of this name.
+    /// Parses the name of an interface.
     fn of_word(word: &str) -> Result<Interface, CommandError> {
         let library = Self::ALL.into_iter().find(|api| api.word() == word).map(Interface::Library);
         let service = || Service::ALL.into_iter().find(|api| api.word() == word).map(Interface::Service);
@@ -113,7 +113,7 @@ impl Api {
         })
     }
 
-    /// What `--api` says.
+    /// Returns the name for `--api`.
     fn word(self) -> &'static str {
         match self {
             Self::Dhd => "dhd",
@@ -122,7 +122,7 @@ impl Api {
         }
     }
 
-    /// The library that cargo builds, and the crate.
+    /// Returns the library that cargo builds, and its crate.
     fn built(self) -> (&'static str, &'static str) {
         match self {
             Self::Dhd => ("libdrd.so", "flotor-dhd"),
@@ -131,7 +131,7 @@ impl Api {
         }
     }
 
-    /// The names by which programs look for it; the last one is that of an installation.
+    /// Returns the file names by which programs load the library; the last one is used by an installation.
     fn names(self) -> &'static [&'static str] {
         match self {
             Self::Dhd => &[
@@ -142,7 +142,7 @@ impl Api {
                 "libdrd.so.3",
                 "libdrd.so.3.17.6",
             ],
-            // Programs that are linked with the layer above load it, and call nothing of it.
+            // Programs that are linked with the higher layer load it, and call none of its functions.
             Self::Openhaptics => {
                 &["libHL.so", "libHL.so.3.4", "libHD.so.3.0", "libHD.so.3.4", "libHD.so.3.4.0", "libHD.so"]
             }
@@ -150,7 +150,7 @@ impl Api {
         }
     }
 
-    /// Names in a program that is linked with it, or looks for it.
+    /// Returns strings in a program that is linked with the library, or loads it.
     fn marks(self) -> &'static [&'static str] {
         match self {
             Self::Dhd => &["libdhd.so", "libdrd.so"],
@@ -159,7 +159,7 @@ impl Api {
         }
     }
 
-    /// The library, in the installation or the build folder that a program lies in.
+    /// Finds the library, in the installation or the build folder of this program.
     fn library(self, own: &Path) -> Result<PathBuf, CommandError> {
         let folder = own.parent().unwrap_or(Path::new("."));
         let (built, package) = self.built();
@@ -179,24 +179,24 @@ impl Api {
     }
 }
 
-/// A folder of our own with links to the libraries, gone when dropped.
+/// Private folder with links to the libraries, removed when dropped.
 struct Folder(PathBuf);
 
 impl Folder {
     fn new() -> Result<Self, CommandError> {
         let path = std::env::temp_dir().join(format!("flotor-lend-{}", std::process::id()));
-        // Left behind by a process of this number that was killed.
+        // From a killed process with the same id.
         let _ = std::fs::remove_dir_all(&path);
         let made = std::fs::DirBuilder::new().mode(0o700).create(&path);
         made.map_err(|cause| CommandError::file(&path, "cannot make a folder for the libraries", cause))?;
         Ok(Self(path))
     }
 
-    /// Puts a library there under the names of its interface, where loader and SDK variables look.
+    /// Links a library under the names of its interface, in the folders that loader and SDK variables search.
     fn put(&self, api: Api, library: &Path) -> Result<(), CommandError> {
         let library = library.canonicalize().unwrap_or_else(|_| library.to_path_buf());
         let sdk = self.0.join(format!("lib/release/lin-{}-gcc", std::env::consts::ARCH));
-        // One old client looks for a folder `lib` in the folder of the libraries.
+        // One old client searches a folder `lib` in the folder of the libraries.
         let folders = match api {
             Api::Dhd => vec![self.0.clone(), sdk.clone(), sdk.join("lib")],
             Api::Openhaptics | Api::Chai3d => vec![self.0.clone()],
@@ -211,7 +211,7 @@ impl Folder {
 }
 
 impl Folder {
-    /// File for the end of the program.
+    /// Returns the file for the end of the program.
     fn program_end(&self) -> PathBuf {
         self.0.join("program-end.json")
     }
@@ -223,7 +223,7 @@ impl Drop for Folder {
     }
 }
 
-/// Why `flotor lend` ends without an end of its program.
+/// Reason why `flotor lend` ends without an end of its program.
 enum Early {
     Failed(CommandError),
     /// The exit code, after a request to stop or an error that another process has printed.
@@ -239,7 +239,7 @@ impl From<CommandError> for Early {
 pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
     match lend(&arguments) {
         Ok(0) => Ok(()),
-        // Here the service has ended and the folder is gone, which `exit` would leave.
+        // The service has ended and the folder is removed: `exit` would skip that.
         Ok(code) | Err(Early::Exit(code)) => std::process::exit(code),
         Err(Early::Failed(error)) => Err(error),
     }
@@ -286,18 +286,18 @@ fn lend(arguments: &LendArguments) -> Result<i32, Early> {
     Ok(runs.exit_code())
 }
 
-/// Makes the folder with the libraries of an interface, or of all.
+/// Creates the folder with the libraries of one interface, or of all.
 fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Result<Folder, CommandError> {
     let folder = Folder::new()?;
     for wanted in api.map_or(Api::ALL.to_vec(), |api| vec![api]) {
         match wanted.library(own) {
             Ok(library) => folder.put(wanted, &library)?,
-            // Of those that nobody named, the ones that the program does not call may be missing.
+            // Without `--api`, the libraries that the program does not call may be missing.
             Err(missing) if api.is_some() || program.calls(wanted) => return Err(missing),
             Err(_) => {}
         }
     }
-    // CHAI3D looks at this one first, and calls nothing of it.
+    // CHAI3D searches for this file first, and calls none of its functions.
     let (beside, phantom) = (folder.0.join("libHD.so"), folder.0.join("libhdPhantom.so"));
     if !beside.exists() && phantom.exists() {
         let _ = symlink(&phantom, &beside);
@@ -339,8 +339,8 @@ fn carry_out(
     Ok(end)
 }
 
-/// Serves a program by the network; returns the exit code of the program and its runs, or where that is 0, of the service, whose run may
-/// have been refused.
+/// Serves a program over the network; returns the exit code of the program and its runs, or if that is 0, of the service, whose run
+/// may have been rejected.
 fn serve(
     arguments: &LendArguments,
     service: Service,
@@ -359,7 +359,7 @@ fn serve(
         match served {
             _ if service.leaves_its_summary_here() => runs.write(json)?,
             ServiceEnd::Killed => write_json(json, &json!({ "end": ServiceEnd::KILLED }))?,
-            // The service has written it.
+            // The service has written the file.
             ServiceEnd::Exited(_) => {}
         }
     }
@@ -369,7 +369,7 @@ fn serve(
     })
 }
 
-/// Reads the scene and looks for its plugins before the program starts: a program would see a device that is not there.
+/// Checks the scene and its plugins before the program starts, which would otherwise see a missing device.
 fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
     let Some(file) = &arguments.scene else { return Ok(()) };
     if file.is_dir() || !file.exists() {
@@ -390,7 +390,7 @@ fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// All a drop-in is told.
+/// Sets the environment variables of a drop-in library.
 fn environment(
     command: &mut Command,
     arguments: &LendArguments,
@@ -410,7 +410,7 @@ fn environment(
     told(command, arguments, folder, own)
 }
 
-/// What a run behind a program is told, whether that is a library or a service.
+/// Sets the environment variables of a run behind a program, in a library or a service.
 fn told(
     command: &mut Command,
     arguments: &LendArguments,

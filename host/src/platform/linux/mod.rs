@@ -1,4 +1,4 @@
-//! Linux: files of the kernel, programs that are lent a device, limits of the process.
+//! Linux: files of the kernel, programs of other makers, limits of the process.
 
 pub(crate) mod doctor;
 pub(crate) mod lend;
@@ -8,23 +8,23 @@ use rustix::process::{Resource, Signal, getrlimit, set_parent_process_death_sign
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What builds a plugin in C: `cc`.
+/// Command that builds a plugin in C, if other than `cc`.
 pub(crate) const C_COMPILER: Option<&str> = None;
 
-/// A path from the root, without links. Not real-time.
+/// Returns an absolute path without links. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the system.
 pub(crate) fn canonical(path: &Path) -> io::Result<PathBuf> {
     path.canonicalize()
 }
 
-/// How many files this process may have open; `None`: as many as it likes.
+/// Returns the largest number of open files of this process; `None` if it is unlimited.
 pub(crate) fn most_open_files() -> Option<u64> {
     getrlimit(Resource::Nofile).current
 }
 
-/// From now on this process is asked to end when the one that started it ends.
+/// Requests that the system ends this process, by SIGTERM, when its parent ends.
 pub(crate) fn end_with_parent() {
     let _ = set_parent_process_death_signal(Some(Signal::TERM));
 }

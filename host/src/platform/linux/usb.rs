@@ -1,4 +1,4 @@
-//! The connection of a device on USB, as the machine's files tell it: is it there, behind what, who has it, who may use it.
+//! Diagnosis of a device's USB connection from sysfs: presence, hub, driver, permission.
 
 use crate::cli::doctor::Diagnosis;
 use flotor_hal::{UsbAccess, UsbKind};
@@ -6,39 +6,39 @@ use rustix::fs::{Access, access};
 use std::fs::{read_dir, read_link, read_to_string};
 use std::path::{Path, PathBuf};
 
-/// Folders of rules for udev.
+/// Folders with rules of udev.
 const RULES: [&str; 4] = ["etc/udev/rules.d", "run/udev/rules.d", "usr/lib/udev/rules.d", "lib/udev/rules.d"];
-/// A rule that tells ModemManager to leave a port alone.
+/// Property by which a rule of udev excludes a port from ModemManager.
 const IGNORED: &str = "ID_MM_DEVICE_IGNORE";
 
-/// The files of a machine.
+/// Files of a machine.
 pub(crate) struct Machine {
     root: PathBuf,
-    /// Whether this user may read and write a file.
+    /// Returns true if this user may read and write a file.
     may_use: fn(&Path) -> bool,
 }
 
-/// A device that the system sees.
+/// USB device that the system reports.
 struct Seen {
     /// Its folder below `sys/bus/usb/devices`.
     folder: PathBuf,
-    /// Its place on the bus: `1-4.2` is the second port of a hub at the fourth of the first bus.
+    /// Position on the bus: `1-4.2` is the second port of a hub at the fourth of the first bus.
     place: String,
     vendor: u16,
     product: u16,
-    /// The kind that it is one of.
+    /// Matching kind.
     kind: UsbKind,
     access: UsbAccess,
 }
 
 impl Machine {
-    /// Whose files are below a folder: `/`, but for tests.
+    /// Uses the files below a folder: `/`, except in tests.
     pub(crate) fn at(root: &Path) -> Self {
         let may_use = |path: &Path| access(path, Access::READ_OK | Access::WRITE_OK).is_ok();
         Self { root: root.to_path_buf(), may_use }
     }
 
-    /// The devices of these kinds.
+    /// Returns the devices of these kinds.
     fn seen(&self, kinds: &[UsbKind]) -> Vec<Seen> {
         let entries = read_dir(self.root.join("sys/bus/usb/devices")).into_iter().flatten().flatten();
         let mut seen: Vec<Seen> = entries.filter_map(|entry| Seen::of(&entry.path(), kinds)).collect();
@@ -46,13 +46,13 @@ impl Machine {
         seen
     }
 
-    /// Whether a program of this name runs.
+    /// Returns true if a program of this name runs.
     fn runs(&self, program: &str) -> bool {
         let processes = read_dir(self.root.join("proc")).into_iter().flatten().flatten();
         processes.filter_map(|process| text_of(&process.path(), "comm")).any(|name| name == program)
     }
 
-    /// Whether a rule of udev keeps ModemManager away from a vendor's ports.
+    /// Returns true if a rule of udev excludes a vendor's ports from ModemManager.
     fn keeps_modem_manager_away(&self, vendor: u16) -> bool {
         let vendor = format!("{vendor:04x}");
         let files =
@@ -80,7 +80,7 @@ impl Seen {
         Some(Self { folder: folder.to_path_buf(), place, vendor, product, kind, access })
     }
 
-    /// Its interfaces: `1-4.2:1.0`, in order.
+    /// Returns the folders of its interfaces, such as `1-4.2:1.0`, in order.
     fn interfaces(&self) -> Vec<PathBuf> {
         let begins = format!("{}:", self.place);
         let siblings =
@@ -93,7 +93,7 @@ impl Seen {
         own
     }
 
-    /// The node through which a program uses it, below the root.
+    /// Returns the path of the node through which a program uses the device, below the root.
     fn node(&self, machine: &Machine) -> Option<PathBuf> {
         if self.access == UsbAccess::Raw {
             let number = |file| text_of(&self.folder, file)?.parse::<u16>().ok();
@@ -115,7 +115,7 @@ impl Seen {
         Some(machine.root.join("dev").join(name))
     }
 
-    /// The line for udev that lets the person at the machine use it, and no other product of a vendor who has many.
+    /// Returns the rule of udev that permits access for the user at the machine, limited to the product if the vendor has several.
     fn rule(&self) -> String {
         let (begins, attribute, then) = match self.access {
             UsbAccess::Raw => ("SUBSYSTEM==\"usb\"", "ATTR", String::new()),
@@ -164,7 +164,7 @@ impl Seen {
         diagnoses
     }
 
-    /// Who has it: a driver of the kernel, or another program, which is this one while the device is open.
+    /// Returns the finding on the user of a raw device: a driver of the kernel, or another program if the device is not open here.
     fn driver(&self, is_open: bool) -> Option<Diagnosis> {
         if self.access != UsbAccess::Raw {
             return None;
@@ -216,7 +216,7 @@ impl Seen {
     }
 }
 
-/// What keeps a program from a device; a note if it is open all the same, through a service or on another way.
+/// Creates a finding on an obstacle; a note if the device is open in spite of it, through a service or another connection.
 fn hindrance(is_open: bool, what: &'static str, found: String, remedy: String) -> Diagnosis {
     match is_open {
         true => Diagnosis::note(what, found, remedy),
@@ -224,10 +224,10 @@ fn hindrance(is_open: bool, what: &'static str, found: String, remedy: String) -
     }
 }
 
-/// What the machine says of a device of these kinds; whether it could be opened says how bad it is if none is there.
+/// Diagnoses the connection of a device of these kinds; a missing device is a note if the plugin opened one, and bad otherwise.
 pub(crate) fn connection(machine: &Machine, kinds: &[UsbKind], is_open: bool) -> Vec<Diagnosis> {
     if kinds.is_empty() {
-        return Vec::new(); // a simulated one, or behind something else
+        return Vec::new(); // a simulated device, or one behind a service
     }
     let seen = machine.seen(kinds);
     if seen.is_empty() {
@@ -252,7 +252,7 @@ fn wanted(kind: &UsbKind) -> String {
     format!("{:04x}:{product}", kind.vendor())
 }
 
-/// The text of a small file.
+/// Reads the trimmed text of a small file.
 fn text_of(folder: &Path, file: &str) -> Option<String> {
     Some(read_to_string(folder.join(file)).ok()?.trim().to_owned())
 }

@@ -1,4 +1,4 @@
-//! A process divided in two: the child carries out the command, the parent supervises it.
+//! Division of a process: the child carries out the command, the parent supervises it.
 #![allow(unsafe_code)] // `fork`, the word that both share, and the sender of a signal; tests/tests/system/architecture.rs lists it
 
 use crate::supervision::{End, Side};
@@ -20,17 +20,17 @@ const POLL: libc::timespec = libc::timespec { tv_sec: 1, tv_nsec: 0 };
 const AT_ONCE: libc::timespec = libc::timespec { tv_sec: 0, tv_nsec: 0 };
 /// Time that the child may take from its report to its end: functions that plugins have registered with `atexit` run meanwhile.
 const END_PATIENCE: Duration = Duration::from_secs(5);
-/// Signals of the terminal that suspend a process in the background.
+/// Signals with which a terminal suspends a process.
 const SUSPENDING: [c_int; 3] = [libc::SIGTSTP, libc::SIGTTIN, libc::SIGTTOU];
 
 /// Signals by which a person or a process manager ends a process, and which a shell ignores for its commands in the background.
 const INTERRUPTS: [c_int; 3] = [libc::SIGINT, libc::SIGQUIT, libc::SIGTERM];
 
-/// Number of the supervisor in its child; 0 in a process without one.
+/// Process id of the supervisor in its child; 0 in a process without one.
 static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
 
-/// Restores the default action of the signals that end a process, where this process has inherited that they are ignored. A hangup stays
-/// ignored: `nohup` is for that. Not real-time.
+/// Restores the default action of the signals that end a process, if this process was started with them ignored. A hangup stays
+/// ignored, for `nohup`. Not real-time.
 pub(crate) fn accept_interrupts() {
     for signal in INTERRUPTS {
         // SAFETY: the default action.
@@ -38,19 +38,19 @@ pub(crate) fn accept_interrupts() {
     }
 }
 
-/// Divides this process, which has one thread. The parent returns once the child has ended. Process 1 stays whole: in a container
-/// its end kills all processes at once, the watchdog process too, and only the descriptors of process 1 are closed before. As process
-/// 1 the host is seen to end by the watchdog process, as its child it would be killed together with it. `flotor doctor` says so.
+/// Forks this process, which has one thread. The parent returns once the child has ended. Process 1 is not divided: in a container
+/// its end kills all processes at once, the watchdog process too, and only the descriptors of process 1 are closed before. So the
+/// watchdog process sees the end of a host that is process 1; a child of process 1 is killed with it. `flotor doctor` reports this.
 ///
 /// # Errors
-/// No room for a process, or what the system says.
+/// If the system refuses a process or a mapping.
 pub(crate) fn divide() -> io::Result<Side> {
     if getpid() == Pid::INIT {
         return Ok(Side::Undivided);
     }
     let report = shared_word()?;
     let parent = getpid();
-    // What a parent that ignores the end of its children has passed on: nobody would learn of it.
+    // Inherited from a parent that ignores the end of its children: the end of the child would not be reported.
     // SAFETY: the default action.
     unsafe { libc::signal(libc::SIGCHLD, libc::SIG_DFL) };
     // Signals wait until there is a child to forward them to.
@@ -76,7 +76,7 @@ pub(crate) fn divide() -> io::Result<Side> {
     }
 }
 
-/// Whether this process had a supervisor, which is gone.
+/// Returns true if the supervisor of this process has ended.
 pub(crate) fn is_orphaned() -> bool {
     match SUPERVISOR.load(Ordering::Relaxed) {
         0 => false,
@@ -84,7 +84,7 @@ pub(crate) fn is_orphaned() -> bool {
     }
 }
 
-/// Ends this process by a signal, as its child has ended.
+/// Ends this process by the signal that ended its child.
 pub(crate) fn die_by(signal: c_int) -> ! {
     // SAFETY: the default action, then an initialised set, then no arguments.
     unsafe {
@@ -95,7 +95,7 @@ pub(crate) fn die_by(signal: c_int) -> ! {
     std::process::exit(128 + signal)
 }
 
-/// Forwards signals to the child and waits for its end.
+/// Forwards signals to the child, waits for its end and returns it.
 fn supervise(child: Pid, report: &AtomicU32) -> End {
     enter_guard_priority();
     // A signal of the terminal that arrived before the fork has not reached the child.
@@ -143,13 +143,13 @@ fn end_of(status: WaitStatus, report: Option<ReportedEnd>) -> End {
     }
 }
 
-/// Whether this signal asks a process to end, so that whoever sends it expects no message.
+/// Returns true for a signal that requests an end, whose sender expects no message.
 fn is_request(signal: c_int) -> bool {
     [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT, libc::SIGPIPE].contains(&signal)
 }
 
-/// Forwards a signal that the child has not received itself. A terminal signals the whole process group, except that its end
-/// reaches the leader of the session alone.
+/// Forwards a signal that the child has not received itself. A terminal signals the whole process group, but its closing
+/// reaches only the leader of the session.
 fn forward(child: Pid, info: &siginfo_t) {
     let is_of_a_process = info.si_code <= 0;
     match info.si_signo {
@@ -160,7 +160,7 @@ fn forward(child: Pid, info: &siginfo_t) {
     }
 }
 
-/// Sends a signal to the child in the name of its sender, which messages of the child name.
+/// Sends a signal to the child with the process id of its original sender, for the child's messages.
 fn send(child: Pid, info: &siginfo_t) {
     let mut queued = *info;
     queued.si_code = libc::SI_QUEUE;
@@ -175,8 +175,8 @@ fn send(child: Pid, info: &siginfo_t) {
     }
 }
 
-/// Suspends this process with a child that the terminal has suspended, as the shell expects, and continues both. A child that
-/// somebody else has stopped is continued by whoever did.
+/// Suspends this process with a child that the terminal has suspended, as the shell expects, and continues both. Whoever else
+/// has stopped the child continues it.
 fn suspend_with(child: Pid, signal: c_int) {
     if SUSPENDING.contains(&signal) {
         let _ = kill_process(getpid(), Signal::STOP);
@@ -184,7 +184,7 @@ fn suspend_with(child: Pid, signal: c_int) {
     }
 }
 
-/// Returns a word that this process shares with its children.
+/// Maps a zeroed word that this process shares with its children.
 fn shared_word() -> io::Result<&'static AtomicU32> {
     let protection = ProtFlags::READ | ProtFlags::WRITE;
     // SAFETY: a new mapping at an address of the system's choice aliases nothing.
@@ -195,7 +195,7 @@ fn shared_word() -> io::Result<&'static AtomicU32> {
     Ok(unsafe { &*address.cast::<AtomicU32>() })
 }
 
-/// Waits for a signal, until the timeout.
+/// Waits for a signal; `None` after the timeout.
 fn next_signal(timeout: libc::timespec) -> Option<siginfo_t> {
     let every = every_signal();
     let mut info = MaybeUninit::<siginfo_t>::zeroed();
@@ -221,7 +221,7 @@ fn no_signal() -> sigset_t {
     }
 }
 
-/// Blocks these signals alone; returns those that were blocked before.
+/// Replaces the set of blocked signals; returns the one before.
 fn set_blocked(set: &sigset_t) -> sigset_t {
     let mut before = no_signal();
     // SAFETY: initialised sets that are there for the call.

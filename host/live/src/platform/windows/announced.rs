@@ -1,4 +1,4 @@
-//! The file that names a port of this machine and a secret.
+//! File with a port of this machine and a secret.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
@@ -6,18 +6,18 @@ use std::os::windows::fs::OpenOptionsExt;
 use std::path::Path;
 use std::time::Duration;
 
-/// Others may read the file, and neither write nor remove it (`FILE_SHARE_READ`).
+/// Share mode in which others may read the file, and neither write nor remove it (`FILE_SHARE_READ`).
 const SHARE_READ: u32 = 1;
-/// `FILE_FLAG_DELETE_ON_CLOSE`: the file goes with the process, however that ends.
+/// `FILE_FLAG_DELETE_ON_CLOSE`: the system removes the file with the process, however that ends.
 const REMOVE_AT_END: u32 = 0x0400_0000;
-/// Bytes of a secret, which is written in digits.
+/// Bytes of a secret in hexadecimal digits.
 pub(super) const SECRET_BYTES: usize = 32;
-/// Looks at a file that is not written yet: its writer makes it and fills it in two calls.
+/// Attempts to read a file that is not written yet: its writer creates and fills it in two calls.
 const LOOKS: u32 = 5;
-/// Pause between two of them.
+/// Pause between two attempts.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// What a file says.
+/// Content of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Announced {
     pub(super) port: u16,
@@ -25,24 +25,24 @@ pub(super) struct Announced {
 }
 
 impl Announced {
-    /// A port, with a new secret: 128 random bits of the system.
+    /// Combines a port with a new secret: 128 random bits of the system.
     ///
     /// # Errors
-    /// The system has none.
+    /// If the system returns no random bits.
     pub(super) fn new(port: u16) -> io::Result<Self> {
         let mut bits = [0; SECRET_BYTES / 2];
         getrandom::fill(&mut bits).map_err(io::Error::other)?;
         Ok(Self { port, secret: format!("{:032x}", u128::from_le_bytes(bits)) })
     }
 
-    /// Writes it into a new file that stays until what is returned is closed.
+    /// Writes a new file, which is removed when the returned handle is closed.
     pub(super) fn write(&self, path: &Path) -> io::Result<File> {
         let mut file = create(path)?;
         file.write_all(format!("{} {}\n", self.port, self.secret).as_bytes())?;
         Ok(file)
     }
 
-    /// Reads a file. Waits a little for one that is not written to its end.
+    /// Reads a file. Waits a little for one that is incomplete.
     pub(super) fn read(path: &Path) -> io::Result<Self> {
         for _ in 0..LOOKS {
             let text = std::fs::read_to_string(path)?;

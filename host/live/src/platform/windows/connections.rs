@@ -1,7 +1,7 @@
-//! Connections: each client sends the secret first, within a time limit; the host waits for all of them at once.
+//! Connections: each client sends the secret first, within a time limit; the host waits for all of them concurrently.
 //!
-//! One thread reads from all of them and blocks on none: a client that sends nothing, or a byte now and then, is rejected when
-//! its time is over, and the end of a run waits for no client.
+//! One thread reads from all clients and blocks on none: a client that sends nothing, or a byte now and then, is rejected after
+//! the time limit, and the end of a run waits for no client.
 
 use super::announced::{Announced, SECRET_BYTES};
 use std::fs::File;
@@ -12,29 +12,29 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A connection.
+/// Connection between client and host.
 pub(crate) use std::net::TcpStream as Stream;
 
-/// How long a client may take to send the whole secret.
+/// Timeout for sending the whole secret.
 const SECRET_WAIT: Duration = Duration::from_secs(1);
-/// Most clients without the secret at a time; for one more, the oldest is rejected.
+/// Largest number of clients without the secret; for one more, the oldest is rejected.
 const MOST_PENDING: usize = 16;
-/// Pause between two reads from the clients without the secret.
+/// Poll interval of the clients without the secret.
 const POLL_PERIOD: Duration = Duration::from_millis(2);
 
-/// Accepts the connections of clients until it is closed.
+/// Listening socket that accepts connections of clients until it is closed.
 #[derive(Debug)]
 pub(crate) struct Listening {
     socket: TcpListener,
     secret: String,
     is_closed: AtomicBool,
-    /// Locked by the thread that accepts: one at a time.
+    /// Clients without the secret; locked by the thread that accepts, one at a time.
     pending: Mutex<Vec<Pending>>,
-    /// Keeps the file from being removed while the run lives.
+    /// Open file, which others cannot remove while the run lives.
     _file: File,
 }
 
-/// A client that has not sent the whole secret yet.
+/// Client that has not sent the whole secret yet.
 #[derive(Debug)]
 struct Pending {
     stream: Stream,
@@ -43,16 +43,16 @@ struct Pending {
     since: Instant,
 }
 
-/// What a client has sent so far.
+/// Result of checking the bytes received from a client.
 enum Check {
     Incomplete,
     Passed,
-    /// Not the secret, or not in time.
+    /// Wrong secret, or a timeout.
     Failed,
 }
 
 impl Listening {
-    /// Takes a port, and writes it with a new secret into a file.
+    /// Binds a port, and writes it with a new secret into a file.
     pub(crate) fn bind(path: &Path) -> io::Result<Self> {
         let socket = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
         let announced = Announced::new(socket.local_addr()?.port())?;
@@ -64,7 +64,7 @@ impl Listening {
     /// Ends every [`accept`](Self::accept), now and later.
     pub(crate) fn close(&self) {
         self.is_closed.store(true, Ordering::Relaxed);
-        // Wakes the thread that waits; the port is this socket's own for as long as it is open.
+        // Wakes the thread that waits; the port belongs to this socket as long as it is open.
         let _ = self.socket.local_addr().and_then(Stream::connect);
     }
 
@@ -72,7 +72,7 @@ impl Listening {
     pub(crate) fn accept(&self) -> io::Result<Option<Stream>> {
         let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
-            // Without a pending client there is nothing to do but to wait for one.
+            // Without a pending client, wait for one.
             self.socket.set_nonblocking(!pending.is_empty())?;
             let accepted = self.socket.accept();
             if self.is_closed.load(Ordering::Relaxed) {
@@ -109,7 +109,7 @@ impl Listening {
     }
 }
 
-/// Connects to the run behind a file.
+/// Connects to the run of a socket file.
 pub(crate) fn connect(path: &Path) -> io::Result<Stream> {
     let Announced { port, secret } = Announced::read(path)?;
     let mut stream = Stream::connect((Ipv4Addr::LOCALHOST, port))?;
@@ -118,13 +118,13 @@ pub(crate) fn connect(path: &Path) -> io::Result<Stream> {
     Ok(stream)
 }
 
-/// The same; the connection waits for nothing afterwards.
+/// Connects, and makes the connection non-blocking.
 pub(crate) fn connect_now(path: &Path) -> io::Result<Stream> {
     let stream = connect(path)?;
     stream.set_nonblocking(true).map(|()| stream)
 }
 
-/// Whether the client has closed its end without a request.
+/// Returns true if the client has closed its end without a request.
 pub(crate) fn has_left(stream: &Stream) -> bool {
     let peeked = stream.set_nonblocking(true).and_then(|()| stream.peek(&mut [0; 1]));
     stream.set_nonblocking(false).is_err() || peeked.is_ok_and(|available| available == 0)
@@ -140,7 +140,7 @@ impl Pending {
         Some(Self { stream, received: [0; SECRET_BYTES], length: 0, since: Instant::now() })
     }
 
-    /// Reads what has arrived, and no byte beyond the secret.
+    /// Reads received bytes, none beyond the secret, and checks them.
     fn read_secret(&mut self, secret: &str) -> Check {
         let rest = self.received.get_mut(self.length..).unwrap_or_default();
         match self.stream.read(rest) {

@@ -8,32 +8,32 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Where a datagram comes from.
+/// Sender of a datagram.
 #[derive(Debug)]
 pub(crate) struct Address(PathBuf);
 
 impl Address {
-    /// Its file, as that socket says.
+    /// Returns the file of the sender, as given in the datagram.
     #[allow(clippy::unnecessary_wraps)] // elsewhere a socket may have none
     pub(crate) fn as_pathname(&self) -> Option<&Path> {
         Some(&self.0)
     }
 }
 
-/// A socket for datagrams, whose file names its port and its secret. A datagram is the receiver's secret, the length of the
-/// name of the sender's file (2 bytes), that name, and what is sent.
+/// Datagram socket, whose file contains its port and its secret. A datagram consists of the receiver's secret, the length of the
+/// name of the sender's file (2 bytes), that name, and the payload.
 #[derive(Debug)]
 pub(crate) struct Datagrams {
     socket: UdpSocket,
     secret: String,
     path: String,
-    /// Others, by their files.
+    /// Contents of the files of other sockets.
     known: Mutex<Vec<Known>>,
-    /// Keeps the file from being removed while the socket is there.
+    /// Open file, which others cannot remove while the socket is open.
     _file: File,
 }
 
-/// What the file of another says.
+/// Cached content of the file of another socket.
 #[derive(Debug)]
 struct Known {
     path: PathBuf,
@@ -41,17 +41,17 @@ struct Known {
     seen: Instant,
 }
 
-/// How long what a file says is believed: whoever makes a socket anew under the same path misses what is sent in that time.
+/// Lifetime of a cached content: a socket recreated under the same path misses datagrams sent in this time.
 const LOOK_PERIOD: Duration = Duration::from_millis(10);
-/// Longest datagram, bytes: what is longer is discarded.
+/// Longest datagram, bytes: longer ones are discarded.
 const LONGEST: usize = 8 * 1024;
-/// What the system says of a datagram that is longer (`WSAEMSGSIZE`); its rest is gone.
+/// Error code of a datagram that is too long (`WSAEMSGSIZE`); its rest is lost.
 const TOO_LONG: i32 = 10040;
-/// Datagrams that are discarded in one look: who floods the port delays nobody for longer.
+/// Largest number of datagrams discarded in one call, which limits the delay by a flood.
 const MOST_DISCARDED: usize = 64;
 
 impl Datagrams {
-    /// Makes it. It waits for nothing, both ways.
+    /// Creates a non-blocking socket.
     pub(crate) fn bind(path: &Path) -> io::Result<Self> {
         let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
         socket.set_nonblocking(true)?;
@@ -61,11 +61,11 @@ impl Datagrams {
         Ok(Self { socket, secret: announced.secret, path, known: Mutex::default(), _file })
     }
 
-    /// Sends to the socket of another name.
+    /// Sends a datagram to the socket with this path.
     pub(crate) fn send_to(&self, bytes: &[u8], path: &Path) -> io::Result<usize> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let place = known.iter().position(|known| known.path == path);
-        // A call asks whether the other is there; states are sent often, and a look at a file takes its time.
+        // A call checks that the other socket exists; states are sent often, and reading a file takes time.
         let is_trusted = |known: &Known| !bytes.is_empty() && known.seen.elapsed() < LOOK_PERIOD;
         let place = match place.filter(|place| known.get(*place).is_some_and(is_trusted)) {
             Some(place) => place,
@@ -84,21 +84,21 @@ impl Datagrams {
         self.socket.send_to(&datagram, (Ipv4Addr::LOCALHOST, *port))
     }
 
-    /// The next datagram: its length, and where it comes from. `WouldBlock` when all has been read, or much was discarded.
+    /// Receives the next datagram; returns its length and sender. `WouldBlock` when all have been read, or many were discarded.
     pub(crate) fn recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, Address)> {
         let mut datagram = [0; LONGEST];
         for _ in 0..MOST_DISCARDED {
             let length = match self.socket.recv_from(&mut datagram) {
                 Ok((length, _)) => length,
                 Err(error) if error.raw_os_error() == Some(TOO_LONG) => continue,
-                // One that was sent before found nobody: its socket is gone, or made anew.
+                // An earlier datagram did not arrive: its socket is closed, or was recreated.
                 Err(error) if error.kind() == ErrorKind::ConnectionReset => {
                     self.known.lock().unwrap_or_else(PoisonError::into_inner).clear();
                     continue;
                 }
                 Err(error) => return Err(error),
             };
-            // Who does not know the secret says nothing.
+            // Datagrams without the secret are ignored.
             let Some((path, sent)) = datagram.get(..length).and_then(|said| self.read(said)) else {
                 continue;
             };

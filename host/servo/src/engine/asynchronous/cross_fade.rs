@@ -1,29 +1,29 @@
-//! Fields that come one after the other, made one force without a step.
+//! Cross-fade between successive fields: a force without steps.
 
 use flotor_hal::{LinearField, Pose, Wrench};
 
-/// The newest field and the one it takes over from.
+/// Newest field and the one that it replaces.
 pub(super) struct CrossFade {
     old: LinearField,
     new: LinearField,
-    /// When the new one came, ns.
+    /// Arrival of the new field, ns.
     since_ns: u64,
     fade_ns: u64,
 }
 
 impl CrossFade {
-    /// No force; each field will come in over `fade_ns`.
+    /// Creates a cross-fade without force; each field fades in over `fade_ns`.
     pub(super) fn new(fade_ns: u64) -> Self {
         Self { old: LinearField::NONE, new: LinearField::NONE, since_ns: 0, fade_ns }
     }
 
-    /// Back to no force. Real-time: bounded, no allocation.
+    /// Resets to no force. Real-time: bounded, no allocation.
     pub(super) fn clear(&mut self) {
         *self = Self::new(self.fade_ns);
     }
 
-    /// A field takes over from what is felt at a pose now, which goes on as a field of its own: nothing jumps, also if
-    /// the one before has not come in wholly. Real-time: bounded, no allocation.
+    /// Fades a new field in. The old field becomes the present wrench at this pose, so that the force does not jump even if the
+    /// last fade is not over. Real-time: bounded, no allocation.
     pub(super) fn take(&mut self, field: LinearField, pose: &Pose, now_ns: u64) {
         let share = self.share(now_ns);
         let (wrench, _) = self.at(pose, now_ns);
@@ -33,7 +33,7 @@ impl CrossFade {
                 *old += share * (new - *old);
             }
         }
-        // The one before counts until the new one has come in wholly, and no longer.
+        // The old field counts until the new one has faded in.
         let before = if share < 1.0 { &self.old } else { &self.new };
         self.old = LinearField {
             anchor: *pose,
@@ -46,7 +46,7 @@ impl CrossFade {
         (self.new, self.since_ns) = (field, now_ns);
     }
 
-    /// The wrench at a pose now, and whether both fields may be believed there. Real-time: bounded, no allocation.
+    /// Returns the wrench at a pose, and true if the fields in use are valid there. Real-time: bounded, no allocation.
     pub(super) fn at(&self, pose: &Pose, now_ns: u64) -> (Wrench, bool) {
         let share = self.share(now_ns);
         let (new, is_new_valid) = self.new.at(pose);
@@ -57,7 +57,7 @@ impl CrossFade {
         (old * (1.0 - share) + new * share, is_old_valid && is_new_valid)
     }
 
-    /// How far the new field has come in, 0 to 1.
+    /// Returns the weight of the new field, 0 to 1.
     fn share(&self, now_ns: u64) -> f64 {
         let passed_ns = now_ns.saturating_sub(self.since_ns);
         if passed_ns >= self.fade_ns { 1.0 } else { passed_ns as f64 / self.fade_ns as f64 }

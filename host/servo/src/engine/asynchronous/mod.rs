@@ -6,9 +6,9 @@
 //!             newest value     own rate          newest value   W0 - K d, faded in over a period
 //! ```
 //!
-//! On a real clock the model has a thread of its own, and neither side waits: a loop that finds no new field goes on with
-//! the old one, as long as it is not too old. On the virtual clock it is computed in the tick that looks, at multiples
-//! of its period, and its field is held back for the latency the scene declares: the same run, bit for bit, each time.
+//! On a real clock the model has a thread of its own, and neither side waits: without a new field the loop continues with the old
+//! one, up to a limit of age. On the virtual clock the model is computed in the loop's tick, at multiples of its period, and its
+//! field is delayed by the latency in the scene: every run is the same, bit for bit.
 
 mod cross_fade;
 mod thread;
@@ -20,45 +20,44 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, StepStatus};
 use thread::ModelThread;
 
-/// Periods without a new field after which the last one says nothing any more: what is older is about a handle that
-/// was elsewhere.
+/// Age in periods at which the last field is discarded: the handle has moved meanwhile.
 const OLDEST_PERIODS: u64 = 10;
 
 /// A model that is computed asynchronously.
 pub struct AsynchronousModel {
     computing: Computing,
     fields: CrossFade,
-    /// Time of the look the newest field answers, ns; `None` before the first.
+    /// Sample time of the newest field, ns; `None` before the first field.
     newest_ns: Option<u64>,
-    /// When the loop began to ask, ns.
+    /// Time of the first step since the last reset, ns.
     since_ns: Option<u64>,
     oldest_ns: u64,
     serves: Demand,
     memory: Memory,
-    /// Value in force of each parameter before the loop.
+    /// Value of each parameter before the loop.
     parameters: Vec<f64>,
 }
 
 enum Computing {
-    /// In the tick that looks, on the virtual clock.
+    /// In the loop's tick, on the virtual clock.
     Inline(Box<Inline>),
     /// On a thread of its own.
     Thread(ModelThread),
 }
 
-/// What came of looking for a new field.
+/// Result of a query for a new field.
 #[allow(clippy::large_enum_variant)] // read where it is returned; a box would allocate in the loop
 pub enum Arrival {
     /// A new field.
     Field(LinearField),
-    /// None yet.
+    /// No new field yet.
     Nothing,
-    /// The model broke: it panicked, or answered outside the contract.
+    /// The model panicked or violated the contract.
     Broken,
 }
 
 impl AsynchronousModel {
-    /// The loop a model with this timing is prepared for: a field cannot come more often than the loop looks.
+    /// Returns the loop settings to prepare the model for: its period is at least the loop's.
     #[must_use]
     pub fn config(timing: &FieldTiming, config: &LoopConfig) -> LoopConfig {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: 0.1 ms to 1 s
@@ -66,10 +65,10 @@ impl AsynchronousModel {
         LoopConfig { period_ns: period_ns.max(config.period_ns), ..*config }
     }
 
-    /// Prepares the model for its own rate ([`Self::config`]) and starts it, wherever it runs. Not real-time.
+    /// Prepares the model for its own rate ([`Self::config`]) and starts it, inline or on a thread. Not real-time.
     ///
     /// # Errors
-    /// The model's [`Refusal`], or why there is no thread.
+    /// The model's [`Refusal`], or the error of starting a thread.
     pub fn start(
         mut model: Engine,
         parameters: usize,
@@ -100,8 +99,8 @@ impl AsynchronousModel {
         })
     }
 
-    /// The wrench of the newest fields at the handle; `output` is only meaningful for [`Stepped::Answered`]. Real-time on a
-    /// real clock: bounded, no allocation.
+    /// Evaluates the newest fields at the handle; `output` is only valid for [`Stepped::Answered`]. Real-time on a real clock:
+    /// bounded, no allocation.
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let arrival = match &mut self.computing {
             Computing::Inline(inline) => inline.look(input),
@@ -112,7 +111,7 @@ impl AsynchronousModel {
                 self.fields.take(field, &input.pose, input.time_ns);
                 self.newest_ns = Some(field.time_ns);
             }
-            // As any answer that cannot be used.
+            // Passed on, to be rejected as a non-finite answer.
             Arrival::Field(field) => {
                 *output = field.wrench.into();
                 return Stepped::Answered;
@@ -138,22 +137,22 @@ impl AsynchronousModel {
         }
     }
 
-    /// The value in force of a parameter before the loop.
+    /// Returns the value of a parameter before the loop.
     pub fn parameter(&self, index: usize) -> f64 {
         self.parameters.get(index).copied().unwrap_or(f64::NAN)
     }
 
-    /// Force and torque, as far as the model serves them: a field has no energy.
+    /// Returns force and torque as far as the model can compute them: a field has no energy.
     pub fn serves(&self) -> Demand {
         self.serves.limited_to(Demand::WRENCH)
     }
 
-    /// Whether the answer depends on the path.
+    /// Returns the model's dependence on the path of the handle.
     pub fn memory(&self) -> Memory {
         self.memory
     }
 
-    /// Forgets history and fields. Real-time: bounded, no allocation.
+    /// Clears history and fields. Real-time: bounded, no allocation.
     pub fn reset(&mut self) -> CallStatus {
         self.fields.clear();
         (self.newest_ns, self.since_ns) = (None, None);
@@ -163,7 +162,7 @@ impl AsynchronousModel {
         }
     }
 
-    /// What the model said last. Not real-time.
+    /// Returns the last message of the model. Not real-time.
     pub fn last_message(&mut self) -> String {
         match &mut self.computing {
             Computing::Inline(inline) => inline.model.last_message(),
@@ -172,15 +171,15 @@ impl AsynchronousModel {
     }
 }
 
-/// A model computed in the loop at multiples of its period; its fields are held back.
+/// Model computed in the loop at multiples of its period, with delayed fields.
 struct Inline {
     model: Engine,
     period_ns: u64,
     latency_ns: u64,
-    /// When it looks next, ns.
+    /// Time of the next computation, ns.
     next_ns: u64,
     looked_ns: Option<u64>,
-    /// A field and when it is to be had, ns. A latency is no longer than a period: there is at most one.
+    /// Computed field with its release time, ns. A latency is at most a period, so there is at most one field.
     held_back: Option<(u64, LinearField)>,
 }
 
@@ -202,7 +201,7 @@ impl Inline {
                     field.time_ns = input.time_ns;
                     self.held_back = Some((input.time_ns + self.latency_ns, field));
                 }
-                // Its field may come the next time.
+                // The field may come the next time.
                 Stepped::Late | Stepped::Silent => {}
                 Stepped::Broken | Stepped::Gone => return Arrival::Broken,
             }

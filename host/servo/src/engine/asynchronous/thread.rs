@@ -1,6 +1,6 @@
-//! A model on a thread of its own, at a rate of its own.
+//! Model on a thread of its own, at its own rate.
 //!
-//! Loop and thread share two latest-value cells, a queue of orders and two flags; neither waits for the other.
+//! Loop and thread share two latest-value cells, a queue of commands and two flags; neither waits for the other.
 
 use super::Arrival;
 use crate::{Engine, Stepped, THREAD_ADVICE, enter_worker_priority};
@@ -12,10 +12,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// Orders that fit between two fields.
+/// Capacity of the command queue between two fields.
 const ORDERS: usize = 64;
 
-/// What the loop knows of the handle at a tick.
+/// Handle sample sent to the model thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Look {
     pose: Pose,
@@ -53,7 +53,7 @@ impl Words<LOOK_WORDS> for Look {
     }
 }
 
-/// A field on its way to the loop.
+/// Field sent to the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Sent(LinearField);
 
@@ -87,14 +87,14 @@ impl Words<FIELD_WORDS> for Sent {
     }
 }
 
-/// What the model is to do before its next field.
+/// Command that the model executes before its next field.
 #[derive(Clone, Copy, Debug)]
 enum Order {
     Set { index: usize, value: f64 },
     Reset,
 }
 
-/// What both sides may look at.
+/// State shared by loop and model thread.
 #[derive(Default)]
 struct Flags {
     is_over: AtomicBool,
@@ -102,7 +102,7 @@ struct Flags {
     last_words: OnceLock<String>,
 }
 
-/// The loop's end.
+/// Loop side of the model thread.
 pub(super) struct ModelThread {
     looks: Publisher<Look, LOOK_WORDS>,
     fields: Observer<Sent, FIELD_WORDS>,
@@ -110,16 +110,16 @@ pub(super) struct ModelThread {
     flags: Arc<Flags>,
     /// Version of the newest field taken.
     taken: u64,
-    /// A field from before this time belongs to a past that was forgotten, ns.
+    /// Time of the last reset, ns; fields of older samples are dropped.
     forgotten_ns: u64,
     now_ns: u64,
 }
 
 impl ModelThread {
-    /// Starts a thread that computes a field each period while the loop looks. Not real-time.
+    /// Starts a thread that computes a field each period while samples arrive. Not real-time.
     ///
     /// # Errors
-    /// The system has no thread to give.
+    /// If the system cannot start a thread.
     pub(super) fn start(model: Engine, period_ns: u64) -> Result<Self, Refusal> {
         let at_home = Look { pose: Pose::HOME, twist: Twist::ZERO, time_ns: 0, tick: 0, buttons: 0 };
         let (looks, seen) = latest(at_home);
@@ -146,7 +146,7 @@ impl ModelThread {
         Ok(Self { looks, fields, orders, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
     }
 
-    /// Says where the handle is and takes a new field, if there is one. Real-time: bounded, no allocation.
+    /// Publishes the handle sample and takes a new field, if there is one. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn look(&mut self, input: &Input) -> Arrival {
         let Input { pose, twist, time_ns, tick, buttons, .. } = *input;
@@ -164,12 +164,12 @@ impl ModelThread {
         }
     }
 
-    /// Real-time: bounded, no allocation.
+    /// Queues a change of a live parameter. Real-time: bounded, no allocation.
     pub(super) fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         self.order(Order::Set { index, value })
     }
 
-    /// Real-time: bounded, no allocation.
+    /// Queues a reset and drops fields of older samples. Real-time: bounded, no allocation.
     pub(super) fn reset(&mut self) -> CallStatus {
         self.forgotten_ns = self.now_ns.saturating_add(1);
         self.order(Order::Reset)
@@ -182,7 +182,7 @@ impl ModelThread {
         }
     }
 
-    /// What the model said when it broke. Not real-time.
+    /// Returns the last message of a failed model. Not real-time.
     pub(super) fn last_message(&self) -> String {
         self.flags.last_words.get().cloned().unwrap_or_default()
     }
@@ -194,7 +194,7 @@ impl Drop for ModelThread {
     }
 }
 
-/// The thread's end.
+/// Thread side, which computes the fields.
 struct Computer {
     model: Engine,
     demand: Demand,
@@ -223,7 +223,7 @@ impl Computer {
                 self.flags.is_broken.store(true, Ordering::Release);
                 return;
             }
-            // A period that is over is left out, not caught up.
+            // A missed period is skipped, not caught up.
             let now = Instant::now();
             deadline = (deadline + period).max(now);
             std::thread::sleep(deadline - now);
@@ -259,7 +259,7 @@ impl Computer {
                 self.fields.publish(&Sent(field));
                 CallStatus::Ok
             }
-            // Its field may come the next time.
+            // The field may come the next time.
             Stepped::Late | Stepped::Silent => CallStatus::Ok,
             Stepped::Broken | Stepped::Gone => CallStatus::Panicked,
         }

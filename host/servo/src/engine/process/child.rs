@@ -1,4 +1,4 @@
-//! The worker's side: the process that holds the model.
+//! Worker side: the process that runs the model.
 
 use super::Greeting;
 use super::memory::{MESSAGE_BYTES, SharedMemory};
@@ -13,14 +13,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-/// How often a worker nobody asks anything looks whether its host is still there, ns.
+/// Poll interval for host liveness while idle, ns.
 const HOST_CHECK_NS: u64 = 500_000_000;
 
-/// What a worker is started with, beside its host's number. Standard input is the shared memory, which takes the greeting, too:
-/// standard output belongs to the plugin.
+/// Start-up arguments of a worker. Standard input is the shared memory, which also takes the greeting: standard output belongs to
+/// the plugin.
 #[derive(Clone, Debug)]
 pub struct WorkerArguments {
-    /// Number of the host's process.
+    /// Process id of the host.
     pub host: i32,
     /// The plugin's shared library.
     pub plugin: PathBuf,
@@ -32,16 +32,16 @@ pub struct WorkerArguments {
     pub sets: Vec<String>,
 }
 
-/// How a plugin's file is loaded: by the caller that guarantees it.
+/// Loader of a plugin's file; the caller guarantees that the file is trusted.
 pub type LoadFile = fn(&Path) -> Result<Plugin, LoadError>;
 
-/// Loads the model, says so, and steps it as long as the host asks. Ends with the host.
+/// Loads the model, sends the greeting and serves the requests of the host. Ends with the host.
 ///
 /// # Errors
-/// Standard input is not the memory: nobody started this as a worker.
+/// Standard input is not the shared memory: the process was not started as a worker.
 pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
-    // Before anything of the plugin runs: whatever that does, it ends with its host, and by a signal that it sends to itself. The
-    // host may have gone before.
+    // Before any plugin code runs: whatever the plugin does, the worker ends with its host, and by a signal that it sends to
+    // itself. The host may have ended before.
     ignore_no_signal();
     let host = HostProcess::end_with(arguments.host)?;
     let has_gone = || host.has_gone();
@@ -106,7 +106,7 @@ fn obey(model: &mut Model, memory: &SharedMemory) -> CallStatus {
     }
 }
 
-/// Where the model can act and where it ends, with the parameters now in force.
+/// Publishes active region and workspace bounds for the current parameters.
 fn put_extent(model: &mut Model, memory: &SharedMemory) {
     memory.put_region(&model.active_region());
     memory.put_bounds(&model.workspace_bounds());
@@ -136,9 +136,8 @@ fn prepare(arguments: &WorkerArguments, load: LoadFile) -> Result<Prepared, Refu
     Ok((model, parameters))
 }
 
-/// Says something to the host before it asks for anything, in pieces that fit into the message. Each has a
-/// number, and the next one is said once the host has asked under that number: the last of them, which
-/// requests are counted on from. `None` if the host has gone.
+/// Sends the greeting to the host in pieces that fit into a message. Each piece has a number; the next one is sent once the host
+/// has made a request under that number. Returns the last number, from which requests are counted; `None` if the host has ended.
 fn greet(memory: &SharedMemory, text: &str, has_gone: impl Fn() -> bool) -> Option<u32> {
     let (mut left, mut number) = (text, 0_u32);
     loop {
@@ -150,7 +149,7 @@ fn greet(memory: &SharedMemory, text: &str, has_gone: impl Fn() -> bool) -> Opti
         memory.answer(number, if left.is_empty() { WHOLE } else { MORE_TO_COME });
         loop {
             let asked = memory.request.load(Ordering::Acquire);
-            // A host that has heard the last piece may be at its first request by now.
+            // A host that has received the last piece may already have sent its first request.
             if asked.wrapping_sub(number) <= 1 {
                 break;
             }
@@ -160,13 +159,13 @@ fn greet(memory: &SharedMemory, text: &str, has_gone: impl Fn() -> bool) -> Opti
             }
         }
         if left.is_empty() {
-            memory.put_message(""); // from now on: a model's last words
+            memory.put_message(""); // from now on: the model's last message
             return Some(number);
         }
     }
 }
 
-/// What stands beside the last piece of a greeting, and beside the others.
+/// Status of the last piece of a greeting, and of the others.
 pub(super) const WHOLE: CallStatus = CallStatus::Ok;
 const MORE_TO_COME: CallStatus = CallStatus::WrongPhase;
 

@@ -1,36 +1,35 @@
-//! What two processes see of each other: one page of memory, mapped by both.
+//! Shared-memory page between host and worker.
 //!
-//! Everything in it is an atomic, so that neither side can bring the other to read what it must not: whatever the
-//! other process writes, every bit pattern is a value.
+//! All fields are atomics, and every bit pattern is a valid value: neither process can make the other read invalid data.
 
 pub(super) use crate::platform::shared_memory::{SharedMemory, create_file};
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64};
 
-/// Words of a step's input: 7 of the pose, 6 of the twist, time, period, tick, buttons and demand in one.
+/// Words of a step's input: pose (7), twist (6), time, period, tick, and one for buttons and demand.
 pub(super) const INPUT_WORDS: usize = 17;
-/// Words of a step's answer: six of the wrench, the energy, the status.
+/// Words of a step's reply: wrench (6), energy, status.
 pub(super) const OUTPUT_WORDS: usize = 8;
-/// Words of where a model can act: shape, centre, half the sides.
+/// Words of an active region: shape, centre, half sides.
 pub(super) const REGION_WORDS: usize = 7;
-/// Words of where it ends: lower and upper.
+/// Words of workspace bounds: lower and upper corner.
 pub(super) const BOUNDS_WORDS: usize = 6;
 /// Words of a linear field: pose, wrench, stiffness, validity, time.
 pub(super) const FIELD_WORDS: usize = 7 + 6 + 36 + 3;
-/// Bytes of a model's last words.
+/// Capacity of a message, bytes.
 pub(super) const MESSAGE_BYTES: usize = 508;
 
-/// One request and one answer at a time.
+/// Page with one request and one reply at a time.
 #[repr(C)]
 pub(crate) struct SharedPage {
     /// Number of the newest request; the worker sleeps on it.
     pub(crate) request: AtomicU32,
     /// Number of the newest request that is answered; the host sleeps on it.
     pub(super) reply: AtomicU32,
-    /// What is asked for.
+    /// Code of the requested operation.
     pub(super) order: AtomicU32,
-    /// How it went.
+    /// Status of the reply.
     pub(super) status: AtomicU32,
-    /// Parameter to be changed, and its new value's bits.
+    /// Index of the parameter to change, and bits of its new value.
     pub(super) parameter: AtomicU64,
     pub(super) value: AtomicU64,
     pub(super) input: [AtomicU64; INPUT_WORDS],

@@ -1,12 +1,11 @@
-//! A force model in a process of its own: when it hangs or crashes, the loop goes on without it.
+//! Force model in a worker process: the loop continues without the model when it hangs or crashes.
 //!
-//! The host starts its own program once more, as `flotor worker`, which loads the plugin and makes the model. The
-//! two share one page of memory. A step is a request there; the worker sleeps until one comes, the loop sleeps until
-//! it is answered, but no longer than the model's time. A late answer costs one tick with the last force and none
-//! after that, until the worker has caught up; a worker that is late in five ticks more than in time is disabled, as a
-//! model in the loop would be, and one that has ended too.
+//! The host starts its own program once more, as `flotor worker`, which loads the plugin and creates the model. Both processes
+//! share one page of memory. A step is a request there; the worker sleeps until a request comes, the loop until the reply, but no
+//! longer than the model's timeout. In the first tick without a reply the last force is applied, then none until the worker has
+//! caught up. A worker that is late in five ticks more than in time is disabled, like a model in the loop, and so is an ended one.
 //!
-//! The library is loaded into the host as well, for its schema, but no model of it is made there.
+//! The host loads the library as well, for its schema, but creates no model.
 
 mod child;
 mod memory;
@@ -19,36 +18,36 @@ pub use parent::{Worker, WorkerOrder};
 
 use serde::{Deserialize, Serialize};
 
-/// What a worker says in the memory both share, once, in one line of JSON.
+/// First message of a worker: one line of JSON in the shared memory.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Greeting {
-    /// The model is made.
+    /// The model is created and prepared.
     Ready {
-        /// Value in force of each parameter, in the order of the schema; `None` for one that has none.
+        /// Initial value of each parameter, in the order of the schema; `None` for a parameter without one.
         parameters: Vec<Option<f64>>,
-        /// Whether it serves force, torque and energy.
+        /// Outputs that the model can compute: force, torque, energy.
         serves: [bool; 3],
-        /// Whether its answer depends on the path.
+        /// True if the answer depends on the path.
         remembers: bool,
-        /// Whether it has a linear field.
+        /// True if the model has a linear field.
         has_field: bool,
     },
-    /// The plugin was refused, or said no.
+    /// The plugin could not be loaded, or refused to create the model.
     Refused {
         /// Code of the [`flotor_hal::RefusalKind`].
         kind: u32,
-        /// Why.
+        /// Reason for the user.
         reason: String,
     },
 }
 
-/// What came of asking a worker.
+/// Result of a request to a worker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reply<T> {
-    /// It answered in time.
+    /// Reply in time.
     Answered(T),
-    /// It has not answered yet.
+    /// No reply yet.
     Late,
-    /// Its process has ended.
+    /// The worker process has ended.
     Gone,
 }

@@ -1,4 +1,4 @@
-//! The host's side: a model that lives in another process.
+//! Host side: a model in a worker process.
 
 use super::child::WHOLE;
 use super::memory::{SharedMemory, create_file};
@@ -20,27 +20,27 @@ use std::sync::mpsc::{Sender, channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// What a worker is to be.
+/// Start-up settings of a worker.
 pub struct WorkerOrder<'a> {
-    /// The plugin's file.
+    /// Path of the plugin's shared library.
     pub plugin: &'a Path,
-    /// Parameters, as text.
+    /// Parameters of the model, key and value as text.
     pub sets: Vec<(String, String)>,
-    /// What the loop promises.
+    /// Period and seed of the loop.
     pub config: LoopConfig,
-    /// How long the loop waits for an answer, ns.
+    /// Timeout of a reply, ns.
     pub patience_ns: u64,
-    /// How long making the model may take.
+    /// Timeout of `create` and `prepare`.
     pub making: Duration,
 }
 
-/// A model in a process of its own.
+/// Model in a worker process.
 pub struct Worker {
     child: Child,
     memory: SharedMemory,
     /// Number of the newest request.
     number: u32,
-    /// That request is not answered yet.
+    /// True after a timeout, until the newest request is answered.
     is_behind: bool,
     is_gone: bool,
     patience_ns: u64,
@@ -51,10 +51,10 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts a worker and waits until its model is made. Not real-time.
+    /// Starts a worker and waits until its model is ready. Not real-time.
     ///
     /// # Errors
-    /// The plugin's [`Refusal`], or why there is no worker.
+    /// The plugin's [`Refusal`], or the reason why no worker could start.
     pub fn start(order: &WorkerOrder<'_>) -> Result<Self, Refusal> {
         let no_worker = |error: io::Error| Refusal::resource(format!("no worker process: {error}"));
         let file = create_file().map_err(no_worker)?;
@@ -65,9 +65,9 @@ impl Worker {
         command.args(["--period-ns", &order.config.period_ns.to_string()]);
         command.args(["--seed", &order.config.seed.to_string()]);
         command.args(order.sets.iter().map(|(key, value)| format!("--set={key}={value}")));
-        // What a model prints goes where it does no harm, as long as it lives: to the host's errors.
+        // Output of the model goes to the host's standard error, where it does no harm.
         command.stdin(file).stdout(io::stderr());
-        // What a terminal sends is the host's affair: it still needs the model while the force fades out.
+        // Signals of the terminal go to the host alone, which needs the model while the force fades out.
         processes::keep_from_terminal(&mut command);
         let child = spawn(command).map_err(|error| no_worker(with_advice(error)))?;
         let mut worker = Self {
@@ -97,7 +97,7 @@ impl Worker {
                 Err(Refusal { kind: RefusalKind::from_code(kind), reason })
             }
             Err(_) => {
-                // It may be there all the same, saying nothing that makes sense: nobody waits for that.
+                // The worker may still be running without a valid greeting: do not wait for it.
                 let is_late = greeting.is_empty() && worker.child.try_wait().is_ok_and(|end| end.is_none());
                 let _ = worker.child.kill();
                 let end = worker.child.wait().map_err(no_worker)?;
@@ -112,7 +112,7 @@ impl Worker {
         }
     }
 
-    /// What the worker says first, once its model is made; nothing if its process ended before, or takes longer than it may.
+    /// Waits for the greeting of the worker, sent once its model is ready. Empty if the process ends before or the timeout expires.
     /// Not real-time.
     fn greeting(&mut self, making: Duration) -> String {
         let (child, started) = (&mut self.child, Instant::now());
@@ -122,17 +122,17 @@ impl Worker {
         text
     }
 
-    /// The value in force of a parameter when the model was made; NaN if it has none.
+    /// Returns the value of a parameter when the model was created; NaN for a parameter without one.
     pub fn parameter(&self, index: usize) -> f64 {
         self.parameters.get(index).copied().flatten().unwrap_or(f64::NAN)
     }
 
-    /// Which demands the model can serve.
+    /// Returns the outputs that the model can compute.
     pub fn serves(&self) -> Demand {
         self.serves
     }
 
-    /// One step. Real-time: waits as long as it may, no allocation.
+    /// Steps the model. Real-time: bounded by the reply timeout, no allocation.
     #[inline]
     pub fn step(&mut self, input: &Input) -> Reply<(CallStatus, Output)> {
         let patience_ns = self.patience_ns;
@@ -144,12 +144,12 @@ impl Worker {
         )
     }
 
-    /// Whether it has a linear field.
+    /// Returns true if the model has a linear field.
     pub fn has_linear_field(&self) -> bool {
         self.has_field
     }
 
-    /// The field at an input. Not real-time: waits as long as it may.
+    /// Computes the linear field at an input. Not real-time: bounded by the reply timeout.
     pub fn linear_field(&mut self, input: &Input) -> Reply<(CallStatus, LinearField)> {
         let patience_ns = self.patience_ns;
         self.request(
@@ -160,17 +160,17 @@ impl Worker {
         )
     }
 
-    /// Where the model can act; everywhere while it is at a request whose answer may change that. Real-time: bounded, no allocation.
+    /// Returns the active region of the model; everywhere while a pending request may change it. Real-time: bounded, no allocation.
     pub fn active_region(&self) -> ActiveRegion {
         if self.is_behind { ActiveRegion::EVERYWHERE } else { self.memory.region() }
     }
 
-    /// Where the model ends. Real-time: bounded, no allocation.
+    /// Returns the workspace bounds of the model. Real-time: bounded, no allocation.
     pub fn workspace_bounds(&self) -> WorkspaceBounds {
         self.memory.bounds()
     }
 
-    /// Changes a live parameter at a tick boundary. Real-time: waits as long as it may, no allocation.
+    /// Changes a live parameter at a tick boundary. Real-time: bounded by the reply timeout, no allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> Reply<CallStatus> {
         let put = |memory: &SharedMemory| {
             memory.parameter.store(index as u64, Ordering::Relaxed);
@@ -180,13 +180,13 @@ impl Worker {
         self.request(Order::SetParameter, patience_ns, put, |memory| memory.status())
     }
 
-    /// Forgets history. Real-time: waits as long as it may, no allocation.
+    /// Clears the history of the model. Real-time: bounded by the reply timeout, no allocation.
     pub fn reset(&mut self) -> Reply<CallStatus> {
         let patience_ns = self.patience_ns;
         self.request(Order::Reset, patience_ns, |_| (), |memory| memory.status())
     }
 
-    /// Whether the answer depends on the path.
+    /// Returns the model's dependence on the path of the handle.
     pub fn memory(&self) -> Memory {
         self.remembers
     }
@@ -201,7 +201,7 @@ impl Worker {
         if self.is_gone {
             return Reply::Gone;
         }
-        // One that has not answered the last request gets no new one: its memory still belongs to the old.
+        // No new request while the last one is pending: its data in the memory is still in use.
         if self.is_behind && !self.memory.is_answered(self.number) {
             return self.late();
         }
@@ -221,13 +221,13 @@ impl Worker {
         Reply::Answered(take(&self.memory))
     }
 
-    /// Late, or never again? One system call, only when something is wrong already.
+    /// Distinguishes a late worker from an ended one, with one system call.
     fn late<T>(&mut self) -> Reply<T> {
         self.is_gone = self.child.try_wait().is_ok_and(|end| end.is_some());
         if self.is_gone { Reply::Gone } else { Reply::Late }
     }
 
-    /// What the model said last, or how its process ended. Not real-time.
+    /// Returns the last message of the model, or the exit status of its process. Not real-time.
     pub fn last_message(&mut self) -> String {
         match self.child.try_wait() {
             Ok(Some(end)) => match processes::ending_signal(end) {
@@ -241,21 +241,21 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // It may hang: it is not asked to end. Nothing is lost with it.
+        // The worker may hang: kill it without a request to end. No data is lost.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// How often a worker that says nothing is looked at, ns.
+/// Poll interval while waiting for the greeting, ns.
 const LOOK_NS: u64 = 20_000_000;
 
-/// Hears what a worker says before it is asked for anything, piece by piece, and takes each by asking under
-/// its number. The last number, and the whole; `None` if the worker ended before.
+/// Receives the greeting of a worker piece by piece, and confirms each piece with a request under its number. Returns the last
+/// number and the whole text; `None` if the worker ended before.
 pub(super) fn heard(memory: &SharedMemory, mut has_ended: impl FnMut() -> bool) -> Option<(u32, String)> {
     let (mut number, mut text) = (0_u32, String::new());
     loop {
-        // Looked at first: what was said before the end was said.
+        // Checked first: a piece may have been sent before the end.
         let is_over = has_ended();
         if !memory.is_answered(number.wrapping_add(1)) {
             if is_over {
@@ -267,7 +267,7 @@ pub(super) fn heard(memory: &SharedMemory, mut has_ended: impl FnMut() -> bool) 
         number = number.wrapping_add(1);
         text.push_str(&memory.message());
         let is_whole = memory.status() == WHOLE;
-        // The order is not looked at yet.
+        // The worker does not read the operation yet.
         memory.ask(number, Order::Reset);
         if is_whole {
             return Some((number, text));
@@ -275,11 +275,11 @@ pub(super) fn heard(memory: &SharedMemory, mut has_ended: impl FnMut() -> bool) 
     }
 }
 
-/// A process to be started, and where it goes.
+/// Process to start, with the channel for its handle.
 type Start = (Command, Sender<io::Result<Child>>);
 
-/// Starts a process from a thread that stays as long as this process: a worker ends with the *thread* that started it, and
-/// one that exchanges a model may be gone before the run is.
+/// Starts a process from a thread that lives as long as this process: a worker ends with the *thread* that started it, and a thread
+/// that replaces a model may end before the run.
 fn spawn(command: Command) -> io::Result<Child> {
     static STARTER: Mutex<Option<Sender<Start>>> = Mutex::new(None);
     let (reply, child) = channel();
@@ -294,7 +294,7 @@ fn spawn(command: Command) -> io::Result<Child> {
     child.recv().map_err(|_| io::Error::other("the thread that starts processes is gone"))?
 }
 
-/// Starts the thread that starts processes.
+/// Starts the thread that starts worker processes.
 fn start_starter() -> io::Result<Sender<Start>> {
     let (starter, orders) = channel::<Start>();
     let thread = std::thread::Builder::new().name("flotor-starter".to_owned());
@@ -315,7 +315,7 @@ fn with_advice(error: io::Error) -> io::Error {
     }
 }
 
-/// The program that can be a worker: this one, or, for a program that only uses the library, `flotor` beside it or in the folder above.
+/// Returns the program to run as a worker: this one, or, if an application uses the library, `flotor` in its folder or the one above.
 pub(crate) fn program() -> io::Result<PathBuf> {
     if let Some(program) = crate::guest::program() {
         return Ok(program.clone());

@@ -1,4 +1,4 @@
-//! What host and worker say to each other, as words in shared memory.
+//! Encoding of requests and replies in shared memory.
 
 use super::memory::{BOUNDS_WORDS, FIELD_WORDS, INPUT_WORDS, OUTPUT_WORDS, REGION_WORDS, SharedPage};
 pub(super) use crate::platform::shared_memory::wait_for_change;
@@ -10,7 +10,7 @@ use flotor_hal::{
 };
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What a worker is asked for.
+/// Operation that the host requests of a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
     Step,
@@ -41,25 +41,25 @@ impl Order {
 }
 
 impl SharedPage {
-    /// The host's side: asks for something under a new number. Real-time: one system call.
+    /// Host side: sends a request under a new number. Real-time: one system call.
     pub(super) fn ask(&self, number: u32, order: Order) {
         self.order.store(order.code(), Ordering::Relaxed);
-        // Release: who sees the number sees the request.
+        // Release: a worker that reads the number also reads the request.
         self.request.store(number, Ordering::Release);
         wake(&self.request);
     }
 
-    /// The host's side: whether a request is answered.
+    /// Host side: returns true if the request is answered.
     pub(super) fn is_answered(&self, number: u32) -> bool {
         self.reply.load(Ordering::Acquire) == number
     }
 
-    /// The worker's side: what is asked for now.
+    /// Worker side: returns the requested operation; `None` for an unknown code.
     pub(super) fn order(&self) -> Option<Order> {
         Order::from_code(self.order.load(Ordering::Relaxed))
     }
 
-    /// The worker's side: a request is answered.
+    /// Worker side: sends the reply to a request.
     pub(super) fn answer(&self, number: u32, status: CallStatus) {
         self.status.store(status as u32, Ordering::Relaxed);
         self.reply.store(number, Ordering::Release);
@@ -123,7 +123,7 @@ impl SharedPage {
     }
 
     pub(super) fn put_output(&self, output: &Output) {
-        // An answer with a status outside the contract crosses as one that is not finite: neither can be used.
+        // A status outside the contract is encoded as a non-finite wrench: neither is usable.
         let (wrench, status) = match output.status() {
             Some(status) => (output.wrench, status),
             None => (NOT_USABLE, StepStatus::Ok),
@@ -148,7 +148,7 @@ impl SharedPage {
         let [shape, cx, cy, cz, hx, hy, hz] = words;
         let [center_m, half_sides_m] = [[cx, cy, cz], [hx, hy, hz]].map(|three| three.map(f64::from_bits));
         let [radius_m, ..] = half_sides_m;
-        // Numbers that make no sense are everywhere, too.
+        // Invalid numbers mean everywhere, too.
         match shape {
             1 => ActiveRegion::sphere(center_m, radius_m),
             2 => ActiveRegion::cuboid(center_m, half_sides_m),
@@ -207,10 +207,10 @@ const NOT_USABLE: Wrench = Wrench { force_n: [f64::NAN; 3], torque_nm: [f64::NAN
 
 pub(super) const NO_DEMAND: Demand = Demand::FORCE.limited_to(Demand::TORQUE);
 
-/// In the order of their bits here.
+/// Demands in the order of their bits in the shared memory.
 pub(super) const DEMANDS: [Demand; 3] = [Demand::FORCE, Demand::TORQUE, Demand::ENERGY];
 
-/// A field as words.
+/// Encodes a field as words.
 fn field_words(field: &LinearField) -> impl Iterator<Item = u64> {
     let LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns } = *field;
     let numbers = anchor.position_m.into_iter().chain(anchor.orientation_xyzw);

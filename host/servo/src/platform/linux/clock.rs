@@ -5,7 +5,7 @@ use rustix::time::{Timespec, clock_gettime};
 use std::sync::atomic::AtomicU32;
 use std::time::Duration;
 
-/// Nanoseconds of the monotonic clock. Real-time: bounded, no allocation (a vDSO call).
+/// Returns the time of the monotonic clock, ns. Real-time: bounded, no allocation (a vDSO call).
 #[inline]
 #[must_use]
 #[allow(clippy::cast_sign_loss)] // the monotonic clock starts at boot
@@ -21,7 +21,7 @@ pub fn sleep_until(deadline_ns: u64) {
         tv_sec: (deadline_ns / 1_000_000_000) as i64,
         tv_nsec: (deadline_ns % 1_000_000_000) as i64,
     };
-    // An interrupted sleep is as good as a short one: the spin afterwards looks at the clock.
+    // An interrupted sleep is harmless: the spin afterwards reads the clock.
     let _ = clock_nanosleep_absolute(ClockId::Monotonic, &request);
 }
 

@@ -1,10 +1,10 @@
-//! The control groups of a process, and where their files are.
+//! Control groups of a process, and the folders of their files.
 
 use std::path::{Path, PathBuf};
 
 /// A control group of a process.
 pub(super) struct Group {
-    /// The controllers, or the name of the hierarchy; empty for version 2.
+    /// Controllers, or name of the hierarchy; empty for version 2.
     hierarchy: String,
     /// Path of the group in its hierarchy.
     pub(super) path: String,
@@ -23,12 +23,12 @@ pub(super) fn groups(file: &str, mounts: &[Mount]) -> Vec<Group> {
 }
 
 impl Group {
-    /// Whether the group is one of this controller of version 1.
+    /// Returns true if the group belongs to this controller of version 1.
     pub(super) fn is_of(&self, controller: &str) -> bool {
         self.hierarchy.split(',').any(|own| own == controller)
     }
 
-    /// Whether nothing is outside of it: nobody kills the root of a hierarchy. The root of a container's own view is none.
+    /// Returns true for the root of a hierarchy, which is never killed as a group. The root of a container's own view does not count.
     pub(super) fn is_root(&self) -> bool {
         self.path == "/" && self.mount.as_ref().is_none_or(Mount::is_whole)
     }
@@ -37,7 +37,7 @@ impl Group {
         self.hierarchy == outer.hierarchy && Path::new(&self.path).starts_with(&outer.path)
     }
 
-    /// Returns the folders of the group and of all outer groups that are mounted, innermost first; none where the group is not.
+    /// Returns the mounted folders of the group and of all outer groups, innermost first; none if the group is not mounted.
     pub(super) fn folders(&self) -> Vec<PathBuf> {
         let Some(mount) = &self.mount else { return Vec::new() };
         let Ok(inner) = Path::new(&self.path).strip_prefix(&mount.root) else { return Vec::new() };
@@ -45,19 +45,19 @@ impl Group {
     }
 }
 
-/// Where a hierarchy of control groups is mounted.
+/// Mount point of a hierarchy of control groups.
 #[derive(Clone)]
 pub(super) struct Mount {
-    /// The group at the folder, as this process sees it.
+    /// Group at the folder, as visible to this process.
     root: String,
     folder: PathBuf,
-    /// As in [`Group::hierarchy`]: several, of which one is the hierarchy's.
+    /// Options of the mount, which include the controllers of version 1, as in [`Group::hierarchy`].
     options: Vec<String>,
     is_second_version: bool,
 }
 
 impl Mount {
-    /// A line of `/proc/self/mountinfo`.
+    /// Parses a line of `/proc/self/mountinfo`; `None` for other file systems.
     pub(super) fn parse(line: &str) -> Option<Self> {
         let (mount, system) = line.split_once(" - ")?;
         let mut mount = mount.split(' ').skip(3);
@@ -83,8 +83,8 @@ impl Mount {
         }
     }
 
-    /// Whether the folder is the root of the whole hierarchy, which has no events of its own in version 2 and the only agent in
-    /// version 1.
+    /// Returns true if the folder is the root of the whole hierarchy, which has no events of its own in version 2 and the only
+    /// agent in version 1.
     fn is_whole(&self) -> bool {
         match self.is_second_version {
             true => !self.folder.join("cgroup.events").exists(),

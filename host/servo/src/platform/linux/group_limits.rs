@@ -1,4 +1,4 @@
-//! Limits that the control groups of this process set, each as its tightest group has it.
+//! Limits of the control groups of this process, each from its tightest group.
 
 use super::control_group::{Group, Mount, groups};
 use std::fs::read_to_string;
@@ -7,42 +7,42 @@ use std::path::{Path, PathBuf};
 /// A limit of a control group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroupLimit {
-    /// File of the group that sets it.
+    /// File of the group that sets the limit.
     pub file: PathBuf,
-    /// The limit.
+    /// Kind and value of the limit.
     pub value: LimitValue,
 }
 
-/// What a control group limits.
+/// Kind and value of a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LimitValue {
-    /// Share of a core that real-time threads of the group may take, where none means that the system refuses real-time priority.
+    /// Part of a core for real-time threads of the group; at zero the system refuses real-time priority.
     RealTimeShare(f64),
     /// Processor time of the group, cores.
     Cores(f64),
-    /// Cores that the group may use.
+    /// Number of cores that the group may use.
     CoreCount(usize),
     /// Memory at which the system ends processes of the group, and memory in use, bytes.
     Memory(Use),
     /// Memory from which the system delays the group, and memory in use, bytes.
     DelayingMemory(Use),
-    /// Threads that the group may have, and has.
+    /// Number of threads of the group, and threads in use.
     Threads(Use),
 }
 
-/// A limit and how much of it is in use.
+/// Limit with its current use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Use {
-    /// The limit.
+    /// Largest use allowed.
     pub most: u64,
-    /// Part of it in use.
+    /// Current use.
     pub now: u64,
 }
 
-/// Bytes from which version 1 means no limit, for pages of any size.
+/// Bytes from which a limit of version 1 means none, for any page size.
 const NO_MEMORY_LIMIT: u64 = 1 << 62;
 
-/// Returns the limits of the control groups of this process that bind it, in the files below `root`. Not real-time.
+/// Returns the limits that bind this process through its control groups, from the files below `root`. Not real-time.
 #[must_use]
 pub fn group_limits(root: &Path) -> Vec<GroupLimit> {
     let file = |name: &str| read_to_string(root.join("proc/self").join(name)).unwrap_or_default();
@@ -54,17 +54,17 @@ pub fn group_limits(root: &Path) -> Vec<GroupLimit> {
     readers.into_iter().filter_map(|read| tightest(&folders, read)).collect()
 }
 
-/// Returns the file in which a control group of this process gives real-time threads no budget, so that the system refuses real-time
+/// Returns the file of a control group that gives real-time threads of this process no budget, so that the system refuses real-time
 /// priority. Not real-time.
 pub(crate) fn file_without_real_time() -> Option<PathBuf> {
     let is_none = |limit: &GroupLimit| limit.value == LimitValue::RealTimeShare(0.0);
     group_limits(Path::new("/")).into_iter().find(is_none).map(|limit| limit.file)
 }
 
-/// Reads a limit of one group: the file that sets it, and its value.
+/// Reader of a limit of one group: returns the file that sets the limit, and the value.
 type Reader = fn(&Path) -> Option<(&'static str, LimitValue)>;
 
-/// Returns the limit that leaves least; of equal ones the outermost, without which the inner ones change nothing.
+/// Returns the limit with the least room; of equal ones the outermost, without which the inner ones change nothing.
 fn tightest(folders: &[PathBuf], read: Reader) -> Option<GroupLimit> {
     let limits = folders.iter().rev().filter_map(|folder| {
         let (file, value) = read(folder)?;
@@ -74,7 +74,7 @@ fn tightest(folders: &[PathBuf], read: Reader) -> Option<GroupLimit> {
 }
 
 impl LimitValue {
-    /// Returns what is left of the limit.
+    /// Returns the unused part of the limit.
     #[allow(clippy::cast_precision_loss)] // only compared
     fn room(&self) -> f64 {
         match *self {

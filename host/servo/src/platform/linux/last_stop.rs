@@ -1,4 +1,4 @@
-//! What the system does with a process that dies: signals, the stack they are taken on, `exit`.
+//! End of a process on Linux: signals, the alternate stack of their handlers, `exit`.
 //!
 //! Nothing that runs in a handler allocates, locks or formats into memory of its own.
 #![allow(unsafe_code)] // handlers of deadly signals and of `exit` cannot be made without; tests/tests/system/architecture.rs
@@ -13,12 +13,12 @@ use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Mutex, Once, OnceLock, PoisonError};
 use std::time::Duration;
 
-/// What an instruction that cannot be carried out raises, and `abort`: nobody but the process itself means them.
+/// Signals of failed instructions and of `abort`, raised by the process itself.
 const RAISED: [c_int; 7] =
     [libc::SIGSEGV, libc::SIGBUS, libc::SIGFPE, libc::SIGILL, libc::SIGABRT, libc::SIGSYS, libc::SIGTRAP];
-/// What asks a process to end: one without handlers of its own ends by them, as whoever sends them expects.
+/// Signals that request the end of a process; a process without handlers ends by them, as the sender expects.
 const ASKING: [c_int; 5] = [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT, libc::SIGPIPE];
-/// What ends no process by itself, or cannot be caught.
+/// Signals that end no process by themselves, or cannot be caught.
 const HARMLESS: [c_int; 9] = [
     libc::SIGKILL,
     libc::SIGSTOP,
@@ -30,10 +30,10 @@ const HARMLESS: [c_int; 9] = [
     libc::SIGURG,
     libc::SIGWINCH,
 ];
-/// What a timer, a limit or another program sends to the process as a whole.
+/// Signals that a timer, a limit or another program sends to the process as a whole.
 const SENT: [c_int; 7] =
     [libc::SIGUSR2, libc::SIGALRM, libc::SIGVTALRM, libc::SIGPROF, libc::SIGXCPU, libc::SIGIO, libc::SIGPWR];
-/// Signals that stay the host's, whatever a plugin does: what is raised, what asks a run to end or suspends it, the emergency stop.
+/// Signals reserved for the host: those of crashes, requests to end or suspend a run, the emergency stop.
 const KEPT: [c_int; 15] = [
     libc::SIGSEGV,
     libc::SIGBUS,
@@ -51,32 +51,32 @@ const KEPT: [c_int; 15] = [
     libc::SIGTTOU,
     libc::SIGUSR1,
 ];
-/// Numbers of signals, 1 to 64; two of them belong to the C library, which says so.
+/// Numbers of signals, 1 to 64; two of them are reserved by the C library.
 const SIGNALS: usize = 65;
-/// Bytes of the alternate stack: frames of a handler with the widest registers take some 12 KiB, a device's stop little.
+/// Size of the alternate stack, bytes: frames of a handler with the widest registers take some 12 KiB, a device's stop little.
 const STACK_BYTES: usize = 128 * 1024;
-/// Bytes of a thread's name with its end.
+/// Capacity of a thread's name with its terminator, bytes.
 pub(crate) const NAME_BYTES: usize = 16;
 
-/// The process that has armed a run: a copy of it, made by `fork`, has the same devices, but they are not its own.
+/// Process that armed a run: a copy made by `fork` does not own the devices.
 static OWN_PROCESS: AtomicI32 = AtomicI32::new(0);
 
 fn is_own_process() -> bool {
     OWN_PROCESS.load(Ordering::Acquire) == process_number()
 }
 
-/// What stood there before a handler of ours.
+/// Actions of the signals before our handler.
 static BEFORE: [OnceLock<sigaction>; SIGNALS] = [const { OnceLock::new() }; SIGNALS];
 
-/// Takes every signal that would end the process, in this thread on a stack of its own, and `exit`. Again for each run: a
-/// plugin may have put something else there. Not real-time.
+/// Installs handlers for every fatal signal, on this thread's alternate stack, and for `exit`. Repeated for each run, as a plugin
+/// may have installed others. Not real-time.
 pub(crate) fn install() {
     install_for(|signal| !HARMLESS.contains(&signal));
     take_sent();
 }
 
-/// Takes the signals that this thread itself raises when it crashes, and `exit`. What asks the process to end is left as it is:
-/// the host has not said yet who is to hear of it. Not real-time.
+/// Installs handlers for the signals that this thread raises when it crashes, and for `exit`. Requests to end the process are left
+/// alone: the host has not yet chosen their receiver. Not real-time.
 pub(crate) fn install_for_crashes() {
     install_for(|signal| RAISED.contains(&signal));
 }
@@ -106,22 +106,22 @@ fn install_for(is_wanted: impl Fn(c_int) -> bool) {
         let mut ours = found;
         ours.sa_sigaction = handler();
         ours.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK | libc::SA_NODEFER | libc::SA_RESTART;
-        // A stop that dies itself is taken; a timer that runs out in the middle of one waits.
+        // A stop that crashes is caught; a timer that expires during a stop waits.
         ours.sa_mask = all_but(&RAISED);
         set_action(signal, &ours);
     }
 }
 
-/// Keeps deadly signals that are sent to the whole process from this thread and all that it starts from now on: threads of a
-/// run that wait for no processor take them, its loop and its watchdog. Not real-time.
+/// Blocks fatal signals sent to the whole process in this thread and all that it starts from now on: the loop and the watchdog take
+/// them, which wait for no processor. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// If the system call fails.
 pub fn leave_sent_signals_to_the_loop() -> io::Result<()> {
     block_signals(&SENT)
 }
 
-/// From now on this thread takes them, unless they are another program's. Not real-time.
+/// Unblocks the sent signals in this thread, unless they belong to another program. Not real-time.
 pub(crate) fn take_sent() {
     if leaves_signals() {
         return;
@@ -147,12 +147,12 @@ extern "C" fn on_signal(signal: c_int, info: *mut siginfo_t, _: *mut c_void) {
             end_if_in_call(death);
         }
     }
-    // No run: as if we had never been here.
+    // No run: restore the action before our handler.
     let before = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)?.get());
     if let Some(before) = before {
         set_action(signal, before);
     }
-    // An instruction that failed fails once more where it stands.
+    // A failed instruction fails once more where it stands.
     if code <= 0 || !RAISED.contains(&signal) {
         raise(signal);
     }
@@ -160,7 +160,7 @@ extern "C" fn on_signal(signal: c_int, info: *mut siginfo_t, _: *mut c_void) {
 
 extern "C" fn at_exit() {
     if is_own_process() && (is_armed() || is_in_call()) {
-        // A stop that calls `exit` itself comes here once more.
+        // A stop that calls `exit` itself is caught once more.
         // SAFETY: as where it was registered first.
         let _ = unsafe { libc::atexit(at_exit) };
         end_if_armed(Death::Exit);
@@ -168,13 +168,13 @@ extern "C" fn at_exit() {
     }
 }
 
-/// Ends the process: by the signal that asked it to, if that is what one is for; else with a code.
+/// Ends the process: by the signal that requested the end, if one did; otherwise with a code.
 pub(crate) fn end_by(death: Death, code: i32) -> ! {
     if let Death::Signal { signal, .. } = death
         && is_guest()
         && let Some(before) = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)?.get())
     {
-        // The program's own way to die, be it a handler or the default.
+        // The program's own end, be it a handler or the default.
         set_action(signal, before);
         raise(signal);
     }
@@ -189,13 +189,13 @@ pub(crate) fn end_by(death: Death, code: i32) -> ! {
     leave_process(code)
 }
 
-/// Ends the process at once: nothing of what a process does at its end is done. Real-time: never returns.
+/// Ends the process at once, without exit handlers. Real-time: never returns.
 pub(crate) fn leave_process(code: i32) -> ! {
     // SAFETY: takes nothing and never returns.
     unsafe { libc::_exit(code) }
 }
 
-/// Sends a signal to the calling thread, which takes it before this returns.
+/// Sends a signal to the calling thread, which handles it before this function returns.
 fn raise(signal: c_int) {
     let set = set_of(&[signal]);
     // SAFETY: an initialised set, and a null pointer where nothing is to be written.
@@ -205,13 +205,13 @@ fn raise(signal: c_int) {
     }
 }
 
-/// Writes to standard error, once: a reader that is gone is no reason to stay.
+/// Writes to standard error, once and without error handling: the reader may be closed.
 pub(crate) fn say(bytes: &[u8]) {
     // SAFETY: the bytes are there for the call, and as many as said.
     let _ = unsafe { libc::write(libc::STDERR_FILENO, bytes.as_ptr().cast(), bytes.len()) };
 }
 
-/// The number of the calling thread.
+/// Returns the id of the calling thread.
 pub(crate) fn thread_number() -> i32 {
     // SAFETY: takes nothing, and cannot fail.
     unsafe { libc::gettid() }
@@ -222,7 +222,7 @@ fn process_number() -> i32 {
     unsafe { libc::getpid() }
 }
 
-/// The name of the calling thread.
+/// Returns the name of the calling thread.
 pub(crate) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
     // SAFETY: the system writes 16 bytes at most, which are there for the call.
     unsafe { libc::prctl(libc::PR_GET_NAME, name.as_mut_ptr()) };
@@ -234,7 +234,7 @@ pub(crate) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
 pub struct SignalName(pub i32);
 
 impl SignalName {
-    /// Whether the process itself raises this signal, as an invalid memory access or `abort` does.
+    /// Returns true if the process itself raises this signal, as an invalid memory access or `abort` does.
     #[must_use]
     pub fn is_a_crash(&self) -> bool {
         RAISED.contains(&self.0)
@@ -293,11 +293,11 @@ fn name_of(signal: c_int) -> Option<&'static str> {
 // ---------------------------------------------------------------- the stack
 
 thread_local! {
-    /// Where the handlers of this thread run.
+    /// Stack for the handlers of this thread.
     static STACK: AlternateStack = AlternateStack::of_this_thread();
 }
 
-/// Memory in which a handler runs where the thread's own stack is full.
+/// Memory of an alternate stack, on which a handler runs when the thread's own stack is full.
 struct AlternateStack {
     memory: *mut [u8],
 }
@@ -329,7 +329,7 @@ impl Drop for AlternateStack {
 /// Blocks signals in the calling thread and in all that it starts from now on; [`wait_for_signal`] takes them. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// If the system call fails.
 pub fn block_signals(signals: &[i32]) -> io::Result<()> {
     let set = set_of(signals);
     // SAFETY: an initialised set, and a null pointer where nothing is to be written.
@@ -339,7 +339,7 @@ pub fn block_signals(signals: &[i32]) -> io::Result<()> {
     }
 }
 
-/// Waits for one of these signals, which are blocked in every thread; `None` after `patience`. Not real-time.
+/// Waits for one of these signals, which are blocked in every thread; `None` after the timeout. Not real-time.
 #[must_use]
 pub fn wait_for_signal(signals: &[i32], patience: Duration) -> Option<i32> {
     let set = set_of(signals);
@@ -363,10 +363,10 @@ pub fn ignore_no_signal() {
     }
 }
 
-/// Starts a process that blocks no signal, whatever the calling thread does: it would else inherit that. Not real-time.
+/// Starts a process with no signal blocked; it would otherwise inherit the blocked signals of the calling thread. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// If the system cannot start the process.
 pub fn spawn_unblocked(command: &mut Command) -> io::Result<Child> {
     let before = blocked();
     set_blocked(&set_of(&[]));
@@ -375,34 +375,34 @@ pub fn spawn_unblocked(command: &mut Command) -> io::Result<Child> {
     child
 }
 
-/// How the host's signals are taken, and which the calling thread blocks: to be put back after a plugin was called.
+/// Snapshot of the host's signal actions and of the calling thread's blocked signals, to be restored after a plugin call.
 pub struct SignalGuard {
     actions: [Option<sigaction>; KEPT.len()],
     blocked: sigset_t,
 }
 
-/// Signals of the host that somebody took away.
+/// Signals of the host that a plugin took away.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TakenSignals {
     bits: u64,
 }
 
 impl SignalGuard {
-    /// How they are taken now. Not real-time.
+    /// Takes a snapshot of the current actions. Not real-time.
     #[must_use]
     pub fn take() -> Self {
         Self { actions: KEPT.map(action), blocked: blocked() }
     }
 
-    /// Puts back what has changed since, and says what that was. Not real-time.
+    /// Restores the actions that have changed since, and returns their signals. Not real-time.
     pub fn put_back(&self) -> TakenSignals {
         let mut taken = TakenSignals::default();
         if is_guest() {
-            return taken; // who changed them may be the program itself
+            return taken; // the program itself may have changed them
         }
         let blocked = blocked();
         for (signal, before) in KEPT.into_iter().zip(&self.actions) {
-            // Ours, if another run of this process has begun meanwhile.
+            // The handler is ours if another run of this process has begun meanwhile.
             if let (Some(now), Some(before)) = (action(signal), before)
                 && now.sa_sigaction != handler()
                 && (now.sa_sigaction, now.sa_flags) != (before.sa_sigaction, before.sa_flags)
@@ -420,19 +420,19 @@ impl SignalGuard {
 }
 
 impl TakenSignals {
-    /// None.
+    /// Returns true if no signal was taken.
     #[must_use]
     pub const fn is_none(self) -> bool {
         self.bits == 0
     }
 
-    /// One bit a signal, for a word that threads share.
+    /// Encodes the signals, one bit each, for an atomic word.
     #[must_use]
     pub(crate) const fn bits(self) -> u64 {
         self.bits
     }
 
-    /// The set of such a word.
+    /// Decodes the word of [`Self::bits`].
     pub(crate) const fn from_bits(bits: u64) -> Self {
         Self { bits }
     }
@@ -442,7 +442,7 @@ impl TakenSignals {
     }
 }
 
-/// Their names, with commas.
+/// Writes the names of the signals, with commas.
 impl std::fmt::Display for TakenSignals {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let taken = KEPT.into_iter().filter(|signal| self.bits >> (signal - 1) & 1 == 1);
@@ -453,7 +453,7 @@ impl std::fmt::Display for TakenSignals {
 
 // ---------------------------------------------------------------- calls of the system
 
-/// How a signal is taken; `None` for one that is not ours to ask about.
+/// Returns the action of a signal; `None` for a signal of the C library.
 fn action(signal: c_int) -> Option<sigaction> {
     let mut found = MaybeUninit::<sigaction>::zeroed();
     // SAFETY: nothing is changed, and the system writes to memory that is there for the call.
@@ -462,7 +462,7 @@ fn action(signal: c_int) -> Option<sigaction> {
     (code == 0).then(|| unsafe { found.assume_init() })
 }
 
-/// Takes a signal like that: as the system said it was taken, or by the handler of this module.
+/// Sets the action of a signal: one that the system returned, or the handler of this module.
 fn set_action(signal: c_int, action: &sigaction) {
     // SAFETY: an initialised action whose handler, if any, was there before, is `on_signal`, which may run at any time, or is the
     // system's default.

@@ -1,4 +1,4 @@
-//! Linux: absolute sleeps, SCHED_FIFO, handlers of signals, anonymous files, handles that go from process to process.
+//! Linux: absolute sleeps, SCHED_FIFO, signal handlers, anonymous files, handles passed between processes.
 
 pub(crate) mod clock;
 mod control_group;

@@ -1,37 +1,37 @@
-//! Processes beside the host's.
+//! Processes beside the host's own.
 
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 use std::io;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Command, ExitStatus};
 
-/// The process that started this one, with which this one ends.
+/// Host process, with which this process ends.
 pub(crate) struct HostProcess {
     number: Option<Pid>,
 }
 
 impl HostProcess {
-    /// From now on this process ends with the host of this number, which may have gone before. Not real-time.
+    /// Binds the end of this process to that of its host, which may have ended before. Not real-time.
     ///
     /// # Errors
-    /// What the system says.
+    /// If the system call fails.
     pub(crate) fn end_with(number: i32) -> io::Result<Self> {
         set_parent_process_death_signal(Some(Signal::KILL))?;
         Ok(Self { number: Pid::from_raw(number) })
     }
 
-    /// Whether it has gone.
+    /// Returns true if the host has ended.
     pub(crate) fn has_gone(&self) -> bool {
         getppid() != self.number
     }
 }
 
-/// What a terminal sends does not reach the process that is started so.
+/// Shields the process to be started from signals of the terminal.
 pub(crate) fn keep_from_terminal(command: &mut Command) {
     command.process_group(0);
 }
 
-/// The signal that ended a process, if one did.
+/// Returns the signal that ended a process, if one did.
 pub(crate) fn ending_signal(status: ExitStatus) -> Option<i32> {
     status.signal()
 }

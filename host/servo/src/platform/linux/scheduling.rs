@@ -11,16 +11,16 @@ use thread_priority::unix::{
 };
 use thread_priority::{Error, ThreadPriority, ThreadPriorityValue};
 
-/// How a user gets room for a thread or a process that the system has refused.
+/// Advice for users if the system refuses a thread or a process.
 pub const THREAD_ADVICE: &str =
     "end other programs of this user, or raise its limit (`ulimit -u`, or `pids.max` of its control group)";
 
-/// Returns how a user allows the priority of a loop. Not real-time.
+/// Returns advice for users to allow the priority of a loop. Not real-time.
 pub(crate) fn priority_advice() -> String {
     file_without_real_time().map_or_else(|| PRIORITY_ADVICE.to_owned(), |file| real_time_budget_advice(&file))
 }
 
-/// Returns how a user gets real-time priority where this file of a control group gives it no budget.
+/// Returns advice for users to get real-time priority if this file of a control group gives it no budget.
 #[must_use]
 pub fn real_time_budget_advice(file: &Path) -> String {
     let file = file.display();
@@ -30,48 +30,48 @@ pub fn real_time_budget_advice(file: &Path) -> String {
     )
 }
 
-/// Cores that the system can name.
+/// Number of cores that the system can address.
 pub(crate) const MOST_CORES: usize = CpuSet::MAX_CPU;
 
-/// How this system calls the priority that a loop asks for.
+/// System's name for the priority of a loop.
 pub const PRIORITY_NAME: &str = "SCHED_FIFO";
-/// How a user allows it where no control group refuses it.
+/// Advice for users to allow the priority if no control group refuses it.
 const PRIORITY_ADVICE: &str = "allow it with `@realtime - rtprio 99` in /etc/security/limits.conf, or `setcap \
                                    cap_sys_nice+ep` on the executable";
-/// How a user allows locked memory.
+/// Advice for users to allow locked memory.
 pub(crate) const MEMORY_ADVICE: &str =
     "allow it with `@realtime - memlock unlimited` in /etc/security/limits.conf";
-/// How a user finds the cores that a process may use.
+/// Advice for users to find the cores that a process may use.
 pub(crate) const CORE_ADVICE: &str = "`grep Cpus_allowed_list /proc/self/status` lists them";
 
 /// Priority of the loop: below the kernel's own threads (99), above everything ordinary.
 const LOOP_PRIORITY: u8 = 80;
 
-/// Name of the user namespace that a kernel starts with, a constant of its interface.
+/// Name of the initial user namespace, a constant of the kernel's interface.
 const FIRST_USER_NAMESPACE: &[u8] = b"user:[4026531837]";
 
-/// What a thread of the host is for, which its priority follows from.
+/// Role of a thread, which determines its priority.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Duty {
-    /// Runs the loop.
+    /// Thread of the loop.
     Loop,
-    /// Runs a model in a process of its own: below the loop, which waits for it but not for ever.
+    /// Model in a worker process: below the loop, which waits for the model with a timeout.
     Worker,
-    /// Interrupts the loop: above it.
+    /// Watchdog: above the loop, to interrupt it.
     Watchdog,
 }
 
-/// Locks the memory that the process has; also what it will have, unless a limit would then refuse memory to the process. `None`
-/// where the system locks no process. Not real-time.
+/// Locks the memory of the process; future memory as well, unless a limit would then refuse memory to the process. `None` if the
+/// system locks no process. Not real-time.
 ///
 /// # Errors
-/// The system's.
+/// If the system call fails.
 pub(crate) fn lock_memory() -> Option<Result<(), String>> {
     let future = if may_lock_any_memory() { MlockAllFlags::FUTURE } else { MlockAllFlags::empty() };
     Some(mlockall(MlockAllFlags::CURRENT | future).map_err(|error| error.to_string()))
 }
 
-/// Whether no limit on locked memory holds for this process. A capability lifts it in the first user namespace only.
+/// Returns true if no limit on locked memory binds this process. A capability lifts the limit in the first user namespace only.
 fn may_lock_any_memory() -> bool {
     let is_first = || {
         readlink("/proc/self/ns/user", Vec::new()).is_ok_and(|name| name.as_bytes() == FIRST_USER_NAMESPACE)
@@ -80,15 +80,15 @@ fn may_lock_any_memory() -> bool {
     getrlimit(Resource::Memlock).current.is_none() || is_capable() && is_first()
 }
 
-/// Takes it back. Not real-time.
+/// Unlocks the memory of the process. Not real-time.
 pub(crate) fn unlock_memory() {
     let _ = rustix::mm::munlockall();
 }
 
-/// Keeps the calling thread on the core of this number; the process's other threads go where they did. Not real-time.
+/// Pins the calling thread to the core of this number; other threads of the process are not affected. Not real-time.
 ///
 /// # Errors
-/// There is no such core, or it is not this process's: the system refuses nothing else.
+/// If there is no such core, or the process may not use it: the system has no other error.
 pub(crate) fn pin(core: usize) -> Result<(), NoSuchCore> {
     let mut set = CpuSet::new();
     set.set(core);
@@ -99,10 +99,10 @@ pub(crate) fn pin(core: usize) -> Result<(), NoSuchCore> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NoSuchCore;
 
-/// Asks for the priority of a duty for the calling thread. Not real-time.
+/// Requests the priority of a role for the calling thread. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// If the system refuses, with its reason.
 pub(crate) fn enter_priority(duty: Duty) -> Result<(), String> {
     let priority = match duty {
         Duty::Worker => LOOP_PRIORITY - 1,

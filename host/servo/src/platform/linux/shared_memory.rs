@@ -1,5 +1,5 @@
-//! Memory that two processes see: an anonymous file, mapped by both. Its length is sealed: a worker holds the file as its
-//! standard input, and what it could cut off would be a bus error in the host.
+//! Shared memory of two processes: an anonymous file, mapped by both. Its length is sealed: a worker has the file as its standard
+//! input, and truncating it would cause a bus error in the host.
 #![allow(unsafe_code)] // a mapping cannot be made without; tests/tests/system/architecture.rs lists it
 
 use crate::engine::process::SharedPage;
@@ -22,10 +22,10 @@ unsafe impl Send for SharedMemory {}
 // SAFETY: as above.
 unsafe impl Sync for SharedMemory {}
 
-/// Makes the anonymous file, of a length that is for ever. Not real-time.
+/// Creates the anonymous file, with a sealed length. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// If a system call fails.
 pub(crate) fn create_file() -> io::Result<OwnedFd> {
     let file = memfd_create("flotor-worker", MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)?;
     ftruncate(&file, size_of::<SharedPage>() as u64)?;
@@ -34,7 +34,7 @@ pub(crate) fn create_file() -> io::Result<OwnedFd> {
 }
 
 impl SharedMemory {
-    /// The memory that this process was given as its standard input. Not real-time.
+    /// Maps the memory passed to this process as standard input. Not real-time.
     ///
     /// # Errors
     /// As for [`SharedMemory::map`].
@@ -42,13 +42,12 @@ impl SharedMemory {
         Self::map(io::stdin())
     }
 
-    /// Maps a file made by [`create_file`]. Not real-time.
+    /// Maps a file of [`create_file`]. Not real-time.
     ///
     /// # Errors
-    /// The file is no such file, or what the system says.
+    /// If the file is not one of [`create_file`], or a system call fails.
     pub(crate) fn map(file: impl AsFd) -> io::Result<Self> {
-        // The seal before the length: a length that was read first might be cut before the seal is there.
-        // What is no anonymous file has no seals to ask for.
+        // The seal before the length: a length that was read first might be cut before the seal is there. Other files have no seals.
         let is_sealed = fcntl_get_seals(&file).is_ok_and(|seals| seals.contains(SealFlags::SHRINK));
         let held = rustix::fs::fstat(&file)?.st_size;
         if !is_sealed || usize::try_from(held).unwrap_or(0) < size_of::<SharedPage>() {
@@ -88,7 +87,7 @@ pub(crate) fn wait_for_change(word: &AtomicU32, value: u32, timeout_ns: u64) {
         tv_sec: (timeout_ns / 1_000_000_000) as i64,
         tv_nsec: (timeout_ns % 1_000_000_000) as i64,
     };
-    // Whatever ends the sleep, the caller looks at the word again.
+    // The caller reads the word again after any wake-up.
     let _ = futex::wait(word, futex::Flags::empty(), value, Some(&timeout));
 }
 

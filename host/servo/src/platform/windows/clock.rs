@@ -4,10 +4,10 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicU32;
 use std::time::{Duration, Instant};
 
-/// Time before the first look at the clock, ns: so long ago is no time before the clock.
+/// Time of the clock at its first reading, ns: no past time is before zero.
 const BEFORE_NS: u64 = 3_600_000_000_000;
 
-/// Nanoseconds of the monotonic clock, an hour at the first look. Real-time: bounded, no allocation (the performance counter).
+/// Returns the time of the monotonic clock, ns, an hour at the first reading. Real-time: bounded, no allocation (the performance counter).
 #[inline]
 #[must_use]
 pub fn monotonic_ns() -> u64 {
@@ -32,5 +32,5 @@ pub(crate) fn sleep_while_zero(_: &AtomicU32, timeout: Duration) {
     std::thread::sleep(timeout.min(Duration::from_millis(5)));
 }
 
-/// Wakes nothing: [`sleep_while_zero`] polls.
+/// Does nothing: [`sleep_while_zero`] polls.
 pub(crate) fn wake_all(_: &AtomicU32) {}

@@ -1,11 +1,11 @@
-//! What the system does with a process that dies: exceptions that nobody handles, and the end of the process.
+//! End of a process on Windows: unhandled exceptions, and the end by `exit`.
 //!
-//! Nothing that runs there allocates, locks or formats into memory of its own. There are no signals: what a console sends is
-//! heard where the command line is, and no plugin can take it away.
+//! Nothing that runs there allocates, locks or formats into memory of its own. There are no signals: the command line handles
+//! console events, which no plugin can take away.
 //!
-//! Not caught: `abort` and other immediate terminations (`__fastfail`), heap corruption that the system finds, which end the process
-//! without asking any filter; and `TerminateProcess`, which asks nobody. Nothing stops a device then but the device. The end of the
-//! process by `exit` is told by a callback of the loader, which Wine 8 does not call for a program: it is not tested.
+//! Not caught: `abort` and other immediate terminations (`__fastfail`), heap corruption that the system finds, which bypass all
+//! filters; and `TerminateProcess`. Only the device itself can stop then. The end of the process by `exit` is reported by a
+//! callback of the loader, which Wine 8 does not call for a program: it is not tested.
 #![allow(unsafe_code)] // neither filter nor callback can be made without; tests/tests/system/architecture.rs lists it
 
 use crate::guest::leaves_signals;
@@ -26,15 +26,15 @@ use windows_sys::Win32::System::Threading::{
     GetCurrentProcess, GetCurrentThreadId, SetThreadStackGuarantee, TerminateProcess,
 };
 
-/// Bytes of a thread's name with its end.
+/// Capacity of a thread's name with its terminator, bytes.
 pub(crate) const NAME_BYTES: usize = 16;
-/// Bytes of a stack that has overflowed which are left for the filter: a device's stop takes little.
+/// Part of an overflowed stack reserved for the filter, bytes: a device's stop takes little.
 const STACK_BYTES: u32 = 64 * 1024;
-/// What a filter answers: the next one is asked, which ends the process.
+/// Result of a filter: the next one is called, which ends the process.
 const CONTINUE_SEARCH: i32 = 0;
 
-/// Takes the exceptions that nobody handles, and the end of the process by `exit`; not what the head of this module lists. Again
-/// for each run: a plugin may have put something else there. Not real-time.
+/// Installs handlers for unhandled exceptions and for `exit`, not for the ends listed in the head of this module. Repeated for each
+/// run, as a plugin may have installed others. Not real-time.
 pub(crate) fn install() {
     let mut bytes = STACK_BYTES;
     // SAFETY: a number that is there for the call.
@@ -43,17 +43,17 @@ pub(crate) fn install() {
         // SAFETY: a function that may be called in any thread at any time.
         let _ = unsafe { SetUnhandledExceptionFilter(Some(on_exception)) };
     }
-    // A look that cannot be left out keeps the callback in the program.
+    // A volatile read keeps the callback in the program.
     // SAFETY: a static of this module.
     let _ = unsafe { std::ptr::read_volatile(&raw const AT_END) };
 }
 
-/// The same: an exception is the thread's that raises it.
+/// Installs the handlers of [`install`]: an exception belongs to the thread that raises it.
 pub(crate) fn install_for_crashes() {
     install();
 }
 
-/// From now on this thread takes what is sent to the process: nothing is.
+/// Does nothing: no signals are sent to the process.
 pub(crate) fn take_sent() {}
 
 unsafe extern "system" fn on_exception(exception: *const EXCEPTION_POINTERS) -> i32 {
@@ -65,7 +65,7 @@ unsafe extern "system" fn on_exception(exception: *const EXCEPTION_POINTERS) -> 
     CONTINUE_SEARCH
 }
 
-/// Called by the loader at the end of the process, whoever asked for it, when this is the only thread left.
+/// Callback of the loader at the end of the process, when this is the only thread left.
 #[used]
 #[unsafe(link_section = ".CRT$XLD")]
 static AT_END: unsafe extern "system" fn(*mut c_void, u32, *mut c_void) = at_end;
@@ -82,15 +82,15 @@ pub(crate) fn end_by(_: Death, code: i32) -> ! {
     leave_process(code)
 }
 
-/// Ends the process at once: nothing of what a process does at its end is done. Real-time: never returns.
+/// Ends the process at once, without exit handlers. Real-time: never returns.
 pub(crate) fn leave_process(code: i32) -> ! {
     // SAFETY: the handle that means this process is always there.
     let _ = unsafe { TerminateProcess(GetCurrentProcess(), code.cast_unsigned()) };
-    // It has ended, if the system lets a process end itself at all.
+    // Not reached, if the system lets a process end itself.
     std::process::abort()
 }
 
-/// Writes to standard error, once: a reader that is gone is no reason to stay.
+/// Writes to standard error, once and without error handling: the reader may be closed.
 pub(crate) fn say(bytes: &[u8]) {
     let (mut written, length) = (0, u32::try_from(bytes.len()).unwrap_or(0));
     // SAFETY: the bytes are there for the call, and as many as said; a null pointer where no waiting is described.
@@ -105,13 +105,13 @@ pub(crate) fn say(bytes: &[u8]) {
     };
 }
 
-/// The number of the calling thread.
+/// Returns the id of the calling thread.
 pub(crate) fn thread_number() -> i32 {
     // SAFETY: takes nothing, and cannot fail.
     unsafe { GetCurrentThreadId() }.cast_signed()
 }
 
-/// The name of the calling thread, which is its number: the system gives a name only into memory that it allocates.
+/// Returns the id of the calling thread as its name: the system returns names only in memory that it allocates.
 pub(crate) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
     let mut rest = &mut name[..];
     let _ = io::Write::write_fmt(&mut rest, format_args!("{}", thread_number().cast_unsigned()));
@@ -123,7 +123,7 @@ pub(crate) fn thread_name(name: &mut [u8; NAME_BYTES]) -> &str {
 pub struct SignalName(pub i32);
 
 impl SignalName {
-    /// Whether the process itself raises this exception: each is.
+    /// Returns true: the process itself raises each exception.
     #[must_use]
     pub fn is_a_crash(&self) -> bool {
         true
@@ -149,57 +149,57 @@ impl std::fmt::Display for SignalName {
 
 // ---------------------------------------------------------------- signals, of which there are none
 
-/// Lets every signal that this process ignores end it again: there is none.
+/// Does nothing: the process ignores no signals.
 pub fn ignore_no_signal() {}
 
 /// Starts a process. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// If the system cannot start the process.
 pub fn spawn_unblocked(command: &mut Command) -> io::Result<Child> {
     command.spawn()
 }
 
-/// How the host's signals are taken: there are none.
+/// Snapshot of the host's signal actions: empty on this system.
 pub struct SignalGuard;
 
-/// Signals of the host that somebody took away: there are none.
+/// Signals of the host that a plugin took away: none on this system.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TakenSignals(());
 
 impl SignalGuard {
-    /// How they are taken now.
+    /// Returns the empty snapshot.
     #[must_use]
     pub fn take() -> Self {
         Self
     }
 
-    /// Puts back what has changed since: nothing can.
+    /// Restores nothing, and returns the empty set.
     pub fn put_back(&self) -> TakenSignals {
         TakenSignals(())
     }
 }
 
 impl TakenSignals {
-    /// None.
+    /// Returns true: no signal was taken.
     #[must_use]
     pub const fn is_none(self) -> bool {
         true
     }
 
-    /// One bit a signal, for a word that threads share.
+    /// Encodes the signals for an atomic word.
     #[must_use]
     pub(crate) const fn bits(self) -> u64 {
         0
     }
 
-    /// The set of such a word.
+    /// Decodes the word of [`Self::bits`].
     pub(crate) const fn from_bits(_: u64) -> Self {
         Self(())
     }
 }
 
-/// Their names: none.
+/// Writes no names.
 impl std::fmt::Display for TakenSignals {
     fn fmt(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         Ok(())

@@ -1,18 +1,18 @@
-//! Processes beside the host's.
+//! Processes beside the host's own.
 
 use super::not_yet;
 use std::io;
 use std::os::windows::process::CommandExt;
 use std::process::{Command, ExitStatus};
 
-/// `CREATE_NEW_PROCESS_GROUP`: what a console sends goes to its own group.
+/// `CREATE_NEW_PROCESS_GROUP`: console events reach their own group only.
 const NEW_PROCESS_GROUP: u32 = 0x200;
 
-/// The process that started this one, with which this one ends. There is none yet.
+/// Host process, with which this process ends: not available yet.
 pub(crate) enum HostProcess {}
 
 impl HostProcess {
-    /// From now on this process ends with the host of this number.
+    /// Binds the end of this process to that of its host: not available yet.
     ///
     /// # Errors
     /// Always.
@@ -20,18 +20,18 @@ impl HostProcess {
         Err(not_yet("a model in a process of its own"))
     }
 
-    /// Whether it has gone.
+    /// Returns true if the host has ended.
     pub(crate) fn has_gone(&self) -> bool {
         match *self {}
     }
 }
 
-/// What a console sends does not reach the process that is started so.
+/// Shields the process to be started from console events.
 pub(crate) fn keep_from_terminal(command: &mut Command) {
     command.creation_flags(NEW_PROCESS_GROUP);
 }
 
-/// The signal that ended a process: none ever does.
+/// Returns `None`: no signal ends a process.
 pub(crate) fn ending_signal(_: ExitStatus) -> Option<i32> {
     None
 }

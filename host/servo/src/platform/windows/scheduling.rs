@@ -7,47 +7,47 @@ use windows_sys::Win32::System::Threading::{
     THREAD_PRIORITY_TIME_CRITICAL,
 };
 
-/// How a user gets room for a thread or a process that the system has refused.
+/// Advice for users if the system refuses a thread or a process.
 pub const THREAD_ADVICE: &str = "end other programs";
 
-/// Cores that the system can name in one group of processors.
+/// Number of cores that the system can address in one group of processors.
 pub(crate) const MOST_CORES: usize = usize::BITS as usize;
 
-/// How this system calls the priority that a loop asks for.
+/// System's name for the priority of a loop.
 pub const PRIORITY_NAME: &str = "time-critical priority";
-/// Returns how a user allows it.
+/// Returns advice for users to allow the priority of a loop.
 pub(crate) fn priority_advice() -> String {
     "Windows refuses it to programs in the background mode of their priority only".to_owned()
 }
 
-/// How a user allows locked memory.
+/// Advice for users to allow locked memory.
 pub(crate) const MEMORY_ADVICE: &str = "Windows locks the memory of no whole program";
-/// How a user finds the cores that a process may use.
+/// Advice for users to find the cores that a process may use.
 pub(crate) const CORE_ADVICE: &str = "the Task Manager lists them under \"Set affinity\"";
 
-/// What a thread of the host is for, which its priority follows from.
+/// Role of a thread, which determines its priority.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Duty {
-    /// Runs the loop.
+    /// Thread of the loop.
     Loop,
-    /// Runs a model in a process of its own: below the loop, which waits for it but not for ever.
+    /// Model in a worker process: below the loop, which waits for the model with a timeout.
     Worker,
-    /// Interrupts the loop. The system has nothing above it: beside it.
+    /// Watchdog, which interrupts the loop, at the loop's priority: the system has none above.
     Watchdog,
 }
 
-/// Locks the memory of the process: this system does not.
+/// Returns `None`: this system locks no whole process.
 pub(crate) fn lock_memory() -> Option<Result<(), String>> {
     None
 }
 
-/// Takes it back.
+/// Does nothing: no memory is locked.
 pub(crate) fn unlock_memory() {}
 
-/// Keeps the calling thread on the core of this number; the process's other threads go where they did. Not real-time.
+/// Pins the calling thread to the core of this number; other threads of the process are not affected. Not real-time.
 ///
 /// # Errors
-/// There is no such core, or it is not this process's.
+/// If there is no such core, or the process may not use it.
 pub(crate) fn pin(core: usize) -> Result<(), NoSuchCore> {
     let mask = u32::try_from(core).ok().and_then(|core| 1_usize.checked_shl(core)).ok_or(NoSuchCore)?;
     // SAFETY: the handle that means the calling thread is always there.
@@ -61,10 +61,10 @@ pub(crate) fn pin(core: usize) -> Result<(), NoSuchCore> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NoSuchCore;
 
-/// Asks for the priority of a duty for the calling thread. Not real-time.
+/// Requests the priority of a role for the calling thread. Not real-time.
 ///
 /// # Errors
-/// What the system says.
+/// If the system refuses, with its reason.
 pub(crate) fn enter_priority(duty: Duty) -> Result<(), String> {
     let priority = match duty {
         Duty::Worker => THREAD_PRIORITY_HIGHEST,

@@ -1,4 +1,4 @@
-//! Memory that two processes see. There is none yet.
+//! Shared memory of two processes: not available on this system yet.
 
 use super::not_yet;
 use crate::engine::process::SharedPage;
@@ -6,10 +6,10 @@ use std::io;
 use std::os::windows::io::OwnedHandle;
 use std::sync::atomic::AtomicU32;
 
-/// A page that another process may have mapped too. There is none yet.
+/// Page that another process may have mapped too: not available yet.
 pub(crate) enum SharedMemory {}
 
-/// Makes what is mapped. Not real-time.
+/// Creates the shared file. Not real-time.
 ///
 /// # Errors
 /// Always.
@@ -18,7 +18,7 @@ pub(crate) fn create_file() -> io::Result<OwnedHandle> {
 }
 
 impl SharedMemory {
-    /// The memory that this process was given as its standard input. Not real-time.
+    /// Maps the memory passed to this process as standard input. Not real-time.
     ///
     /// # Errors
     /// Always.
@@ -26,7 +26,7 @@ impl SharedMemory {
         Err(not_yet("a model in a process of its own"))
     }
 
-    /// Maps what [`create_file`] made. Not real-time.
+    /// Maps a file of [`create_file`]. Not real-time.
     ///
     /// # Errors
     /// Always.
@@ -43,8 +43,8 @@ impl std::ops::Deref for SharedMemory {
     }
 }
 
-/// Sleeps until `word` is no longer `value`: there is no such word.
+/// Returns at once: no word is shared.
 pub(crate) fn wait_for_change(_: &AtomicU32, _: u32, _: u64) {}
 
-/// Wakes the other process: there is none.
+/// Does nothing: there is no other process.
 pub(crate) fn wake(_: &AtomicU32) {}

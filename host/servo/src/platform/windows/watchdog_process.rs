@@ -1,35 +1,35 @@
-//! The watchdog process. There is none yet: of a device that is stopped by a message the run says so.
+//! Watchdog process: not available yet; a run with a device that is stopped by a message reports so.
 
 use super::not_yet;
 use flotor_hal::Independence;
 use std::io;
 
-/// Whether this system has one. Not real-time.
+/// Returns an error: this system has no watchdog process yet. Not real-time.
 ///
 /// # Errors
-/// That it has none.
+/// Always.
 pub fn is_offered() -> io::Result<()> {
     Err(not_yet("the watchdog process"))
 }
 
-/// The watchdog process of this host. There is none yet.
+/// Watchdog process of this host: not available yet.
 pub enum WatchdogProcess {}
 
-/// Tells the watchdog process that this process runs. There is none yet.
+/// Sender of heartbeats to the watchdog process: not available yet.
 pub enum SignOfLife {}
 
 impl SignOfLife {
-    /// Announces the next call within this time.
+    /// Sends a heartbeat and announces the next one within this time, ns.
     pub(crate) fn give(&self, _: u64) {
         match *self {}
     }
 }
 
 impl WatchdogProcess {
-    /// Starts it for the devices that are stopped by a message; `None` if there are none. Not real-time.
+    /// Starts the process for the devices that are stopped by a message; `None` without such devices. Not real-time.
     ///
     /// # Errors
-    /// There is one.
+    /// If there is such a device.
     pub fn start<'a>(
         devices: impl IntoIterator<Item = (&'a str, &'a Independence)>,
     ) -> io::Result<Option<Self>> {
@@ -40,7 +40,7 @@ impl WatchdogProcess {
         }
     }
 
-    /// Returns what tells the process that this one runs.
+    /// Returns a sender of heartbeats to the process.
     ///
     /// # Errors
     /// None.
@@ -48,7 +48,7 @@ impl WatchdogProcess {
         match *self {}
     }
 
-    /// The calling thread runs the loop.
+    /// Registers the calling thread as the loop's.
     ///
     /// # Errors
     /// None.
@@ -56,7 +56,7 @@ impl WatchdogProcess {
         match *self {}
     }
 
-    /// Follows the process alone from now on.
+    /// Watches the host's process alone from now on.
     ///
     /// # Errors
     /// None.
@@ -64,13 +64,13 @@ impl WatchdogProcess {
         match *self {}
     }
 
-    /// Returns the control group that the process shares with the host: this system has none.
+    /// Returns the control group that the process shares with the host: none on this system.
     #[must_use]
     pub fn shared_group(&self) -> Option<&str> {
         match *self {}
     }
 
-    /// Whether it has ended before it was told to.
+    /// Returns true if the process has ended early.
     #[must_use]
     pub fn is_gone(&self) -> bool {
         match *self {}

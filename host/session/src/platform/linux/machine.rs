@@ -1,7 +1,7 @@
-//! What belongs to the whole process and any plugin can change: looked at before and after its code has run, and put back.
+//! State of the process that any plugin can change: recorded before plugin code runs, and restored afterwards.
 //!
-//! What belongs to a thread (priority, cores, floating-point environment) needs no such look: the code of a plugin runs in a
-//! thread that ends with it. The main thread is the one that others can change by the number of the process.
+//! The state of a thread (priority, cores, floating-point environment) needs no restoring: plugin code runs in a thread that ends
+//! with it. Only the main thread can be changed by others, through the process id.
 
 use super::locale;
 use rustix::fs::Mode;
@@ -31,7 +31,7 @@ pub(crate) struct MachineState {
 }
 
 impl MachineState {
-    /// As it is. Not real-time.
+    /// Records the present state. Not real-time.
     pub(crate) fn now() -> Self {
         Self {
             folder: getcwd(Vec::new()).ok(),
@@ -43,8 +43,7 @@ impl MachineState {
         }
     }
 
-    /// Puts back what is different now: its names. What the system refuses to put back is named all the same. Not
-    /// real-time.
+    /// Restores the changed parts and returns their names, also of parts that the system refuses to restore. Not real-time.
     pub(crate) fn restore(&self) -> Vec<&'static str> {
         let Self { folder, limits, cores, nice, mask, locale } = self;
         let now = Self::now();
@@ -89,7 +88,7 @@ impl MachineState {
     }
 }
 
-/// Returns the mode mask of new files, from a file of the kernel: to read it with `umask` is to change it.
+/// Returns the mode mask of new files, from a file of the kernel: reading it with `umask` would change it.
 fn file_mask() -> Option<Mode> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let mask = status.lines().find_map(|line| line.strip_prefix("Umask:"))?;

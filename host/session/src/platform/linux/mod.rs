@@ -1,4 +1,4 @@
-//! Linux: owners and permissions of folders, numbers of files, limits of the process.
+//! Linux: owners and permissions of folders, identity of files, state of the process.
 
 mod locale;
 mod machine;
@@ -14,31 +14,31 @@ use std::fs::Metadata;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
-/// What ends this process without a stop of the devices, though another system catches it: nothing.
+/// Warning about ends of this process that stop no device, on this system only: none.
 pub(crate) const NOT_CAUGHT: Option<&str> = None;
 
-/// What tells a file from all others that exist.
+/// Returns device and inode, which identify a file among all that exist.
 pub(crate) fn identity(file: &Metadata) -> [u64; 2] {
     [file.dev(), file.ino()]
 }
 
-/// When contents or attributes changed last, s and ns since 1970: no program can set it back.
+/// Returns the time of the last change of contents or attributes, s and ns since 1970: no program can set it back.
 pub(crate) fn changed(file: &Metadata) -> (i64, i64) {
     (file.ctime(), file.ctime_nsec())
 }
 
-/// Whether two paths lead to one file that exists. Not real-time.
+/// Returns true if two paths lead to one file that exists. Not real-time.
 #[must_use]
 pub fn is_same_file(one: &Path, other: &Path) -> bool {
     let of = |path: &Path| std::fs::metadata(path).map(|file| identity(&file));
     matches!((of(one), of(other)), (Ok(one), Ok(other)) if one == other)
 }
 
-/// Cause of a program whose place the system does not tell.
+/// Error text if the system does not report the path of this program.
 pub(crate) const UNKNOWN_PROGRAM: &str = "the folder of this program is unknown, because /proc is not mounted: mount it, or name folders of plugins";
 
-/// Where a user keeps plugins for all installations, by the XDG base directory specification. Root has none: a file of a home
-/// folder is no reason to run code with all rights.
+/// Returns the folder of a user's plugins for all installations, by the XDG base directory specification. None for root: a file in
+/// a home folder must not run with all rights.
 pub(crate) fn user_folder() -> Option<PathBuf> {
     if geteuid().is_root() {
         return None;
@@ -48,8 +48,8 @@ pub(crate) fn user_folder() -> Option<PathBuf> {
     Some(data?.join("flotor/plugins"))
 }
 
-/// Why a folder is not searched: somebody could put a plugin there whom the user has not trusted yet. Trusted are root, the user,
-/// and the owner of this program.
+/// Returns the reason not to search a folder: another user could put a plugin there. Trusted are root, the user, and the owner of
+/// this program.
 pub(crate) fn distrust(folder: &Path, attributes: &Metadata) -> Option<String> {
     let folder = folder.display();
     if attributes.permissions().mode() & 0o002 != 0 {

@@ -10,26 +10,26 @@ use std::mem::MaybeUninit;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command};
 
-/// Makes a command the leader of a process group. The system kills it when the thread that starts it ends.
+/// Makes a command the leader of a process group. The system kills the leader when the thread that starts it ends.
 pub(crate) fn lead_until_parent_ends(command: &mut Command) {
     end_with_this_thread(command.process_group(0));
 }
 
-/// Lets the system kill the process of a command when the thread that starts it ends, however that ends. The process blocks no signal;
-/// the thread may block them all meanwhile, so that none ends it while it starts the process. Not real-time.
+/// Makes the system kill the process of a command when the thread that starts it ends, for any reason. The process blocks no
+/// signal, even if the thread blocks them all, so that none ends the thread while it starts the process. Not real-time.
 pub fn end_with_this_thread(command: &mut Command) {
     let parent = getpid();
     let end_with_parent = move || {
         set_parent_process_death_signal(Some(Signal::KILL))?;
         block_no_signal();
-        // A parent that ended before sends no signal any more.
+        // A parent that ended before sends no signal.
         if getppid() == Some(parent) { Ok(()) } else { Err(io::ErrorKind::NotFound.into()) }
     };
     // SAFETY: system calls alone, without a lock or an allocation.
     unsafe { command.pre_exec(end_with_parent) };
 }
 
-/// Lets this thread take every signal.
+/// Unblocks every signal in this thread.
 fn block_no_signal() {
     let mut none = MaybeUninit::<libc::sigset_t>::zeroed();
     // SAFETY: a set on this stack that the first call initialises, and a null pointer where nothing is to be written.
@@ -45,7 +45,7 @@ pub(crate) fn has_ended(child: &mut Child) -> io::Result<bool> {
     Ok(waitid(WaitId::Pid(Pid::from_child(child)), options)?.is_some())
 }
 
-/// Kills the process group that a child leads, which was not waited for.
+/// Kills the process group of a child that has not been waited for.
 pub(crate) fn kill(child: &mut Child) {
     let _ = kill_process_group(Pid::from_child(child), Signal::KILL);
 }

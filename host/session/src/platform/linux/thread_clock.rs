@@ -6,28 +6,28 @@ use std::time::Duration;
 /// Unit of processor times under /proc: `USER_HZ` is 100 on every Linux.
 const CLOCK_TICK: Duration = Duration::from_millis(10);
 
-/// Use of the processors by a thread.
+/// Processor use of a thread.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Used {
     /// Processor time since the start of the thread.
     pub(crate) ran: Duration,
-    /// Whether it runs, would run on a free processor, or waits for a disk.
+    /// True if the thread runs, would run on a free processor, or waits for a disk.
     pub(crate) wants: bool,
 }
 
-/// Reads the use of the processors by one thread.
+/// Reader of the processor use of one thread.
 pub struct ThreadClock {
     path: String,
 }
 
 impl ThreadClock {
-    /// That of the calling thread.
+    /// Creates a reader for the calling thread.
     #[must_use]
     pub fn of_this_thread() -> Self {
         Self { path: format!("/proc/self/task/{}/stat", gettid().as_raw_nonzero()) }
     }
 
-    /// Reads it; `None` if the system does not tell. Not real-time.
+    /// Returns the processor use; `None` if the system does not report it. Not real-time.
     pub(crate) fn used(&self) -> Option<Used> {
         let text = std::fs::read_to_string(&self.path).ok()?;
         // Field 3 of proc(5), the state, comes first after the name; fields 14 and 15 are the times.

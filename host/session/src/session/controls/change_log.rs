@@ -1,4 +1,4 @@
-//! Reports of the loop about changes, for the observer of a run.
+//! Log of changes that the loop reports, for the observer of a run.
 
 use super::plugin_table::PluginTable;
 use flotor_core::Change;
@@ -17,7 +17,7 @@ impl ChangeLog {
         Self { plugins, reports, pending: None }
     }
 
-    /// Passes all changes up to a tick on. Not real-time.
+    /// Passes all changes up to a tick to `observe`. Not real-time.
     pub(in super::super) fn up_to(&mut self, tick: u64, mut observe: impl FnMut(&Change)) {
         while let Some(report) = self.pending.take().or_else(|| self.reports.pop().ok()) {
             if report.tick > tick {

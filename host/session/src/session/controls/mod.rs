@@ -35,46 +35,46 @@ pub enum ControlError {
         names.join(", ")
     )]
     UnknownPlugin {
-        /// The name in the request.
+        /// Requested name.
         name: String,
-        /// The most similar name there is.
+        /// Most similar name of a plugin.
         nearest: Option<String>,
-        /// All names.
+        /// Names of all plugins.
         names: Vec<String>,
     },
     /// The plugin has no such parameter, or the value is not legal for it.
     #[error("[{plugin}] {error}")]
     Setting {
-        /// The plugin.
+        /// Name of the plugin.
         plugin: String,
-        /// What is wrong.
+        /// Error of the setting.
         #[source]
         error: SettingError,
     },
     /// The parameter is only read when the plugin is created.
     #[error("[{plugin}] `{id}` cannot change while the loop runs; {}", live_words(live))]
     Fixed {
-        /// The plugin.
+        /// Name of the plugin.
         plugin: String,
-        /// The parameter.
+        /// Id of the parameter.
         id: String,
-        /// Parameters that can.
+        /// Ids of the parameters that can change.
         live: Vec<String>,
     },
-    /// Only models are mixed and replaced.
+    /// A device has no weight and cannot be replaced.
     #[error("only models have a weight and can be swapped; this is a device")]
     NoWeight,
     /// A model cannot be replaced.
     #[error("[{model}] model unchanged: {problem}")]
     Refused {
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// Why.
+        /// Problem as text.
         problem: String,
-        /// What is wrong.
+        /// Cause of the refusal.
         cause: RefusalCause,
     },
-    /// More changes wait than the loop takes in, or the model replaced last is still fading.
+    /// Too many changes are pending, or the last replacement of the model is still fading.
     #[error("previous changes are pending, or a swap is still fading in; try again in a moment")]
     Busy,
     /// The loop has ended.
@@ -90,19 +90,19 @@ fn live_words(live: &[String]) -> String {
     }
 }
 
-/// A new value for a parameter of a plugin of the run, in words.
+/// New value for a parameter of a plugin of the run, as text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NewValue<'a> {
-    /// The name of a device or model in the scene (a model on several devices: `NAME@DEVICE` is the one on that
-    /// device, `NAME` all), or a plugin's id.
+    /// Name of a device or model in the scene (a model on several devices: `NAME@DEVICE` for one of them, `NAME` for all), or id of
+    /// a plugin.
     pub plugin: &'a str,
     /// Id of the parameter.
     pub parameter: &'a str,
-    /// Its value, as a person would type it.
+    /// Value in the notation of users.
     pub value: &'a str,
 }
 
-/// A handle to a running loop, for any thread; clone it freely. Nothing here makes the loop wait.
+/// Handle to a running loop, for any thread, with cheap clones. No method makes the loop wait.
 #[derive(Clone)]
 pub struct Controls {
     shared: Arc<Shared>,
@@ -112,7 +112,7 @@ struct Shared {
     plugins: PluginTable,
     /// Locked by panels and scripts, never by the loop.
     changes: Mutex<ChangeSender>,
-    /// The models of the scene: place and mixing of a replacement.
+    /// Models of the scene, for place and mixing of a replacement.
     models: Vec<ModelUse>,
     config: LoopConfig,
     clock: Clock,
@@ -137,18 +137,17 @@ impl Controls {
         Self { shared: Arc::new(Shared { plugins, changes, models: models.to_vec(), config, clock, swaps }) }
     }
 
-    /// Every plugin of the run with its schema: the device, then the models in the scene's order.
+    /// Returns every plugin of the run with its schema: the devices, then the models in the scene's order.
     #[must_use]
     pub fn plugins(&self) -> Vec<(String, &'static [Parameter])> {
         let plugins = self.shared.plugins.lock();
         plugins.iter().map(|plugin| (plugin.now().name.clone(), plugin.now().schema)).collect()
     }
 
-    /// Moves a live parameter to a new value, a tenth of its [soft range](flotor_hal::SoftRange) in 50 ms; what is no number
-    /// changes before the next tick. Not real-time.
+    /// Moves a live parameter to a new value, by a tenth of its [soft range](flotor_hal::SoftRange) in 50 ms; a value that is no
+    /// number changes before the next tick. Not real-time.
     ///
-    /// The plugin may still refuse it, if it does not fit its other values: observers are told what became of it
-    /// ([`super::Observer::change`]).
+    /// The plugin may still refuse a value that does not fit its other values: observers get the outcome ([`super::Observer::change`]).
     ///
     /// # Errors
     /// [`ControlError`]: no such plugin, parameter or value; not a live one; the loop is busy or over.
@@ -169,8 +168,8 @@ impl Controls {
         self.send(&checked.iter().map(slowed).collect::<Vec<_>>())
     }
 
-    /// Gives several live parameters new values, all before the same tick: for what no hand feels while it changes, such as the
-    /// next stimulus of an experiment. Not real-time.
+    /// Sets several live parameters, all before the same tick: for changes that no hand feels, such as the next stimulus of an
+    /// experiment. Not real-time.
     ///
     /// # Errors
     /// [`ControlError`]; then none of them changes.
@@ -179,8 +178,8 @@ impl Controls {
         self.send(&checked.collect::<Result<Vec<_>, _>>()?.concat())
     }
 
-    /// Lets a model be felt more or less: its weight moves there at the rate of its fade, from the next tick on. A
-    /// weight of 0 silences it, and it is not asked any more. Not real-time.
+    /// Sets the weight of a model, approached at the rate of its fade from the next tick on. A model with a weight of 0 is not
+    /// stepped any more. Not real-time.
     ///
     /// # Errors
     /// [`ControlError`]: no such model; the loop is busy or over.
@@ -193,15 +192,15 @@ impl Controls {
         if changes.is_abandoned() {
             return Err(ControlError::Ended);
         }
-        // All or none, and the loop sees them at once.
+        // All or none, and the loop applies them together.
         changes.push_entire_slice(checked).map_err(|_| ControlError::Busy)
     }
 
-    /// Hot swap of a model by another plugin, or by the same one rebuilt: the new one is loaded and created here, and fades
+    /// Replaces a model by another plugin, or by the same one rebuilt (hot swap): the new one is loaded and created here, and fades
     /// in from the next tick on while the old one fades out. Not real-time: takes as long as creating the model.
     ///
-    /// Without `plugin` it is the one the scene names, with the scene's settings; another one starts from its own
-    /// defaults. `settings` come on top. Places, mapping and weight stay.
+    /// Without `plugin`, plugin and settings are those of the scene; another plugin starts from its own defaults. `settings` are
+    /// added. Places, mapping and weight stay.
     ///
     /// # Errors
     /// [`ControlError`]: no such model; the plugin is refused; the model replaced last is still fading; the loop is over.
@@ -228,7 +227,7 @@ impl Controls {
             if plugin.is_some() {
                 other.plugin.location = Location { file: "--plugin".into(), line: 0 };
             }
-            // After the end of a run, or a request for it, nothing waits for the code of a plugin.
+            // After the end of a run, or a request for it, no thread waits for plugin code.
             let is_wanted = || !self.shared.changes().is_abandoned() && is_to_begin();
             prepare_model_while(registry, &other, config, *clock, is_wanted).map_err(refused)
         };

@@ -1,4 +1,4 @@
-//! The plugins of a run with their replacements: checks of new values before they enter the loop, and descriptions of its reports.
+//! Table of the plugins of a run with their replacements: checks new values before they enter the loop, and describes its reports.
 
 use super::super::PluginReport;
 use super::versions::{ChosenBy, Versions};
@@ -30,7 +30,7 @@ fn live_setting(part: &PluginReport, new: &NewValue<'_>) -> Result<Setting, Cont
     })
 }
 
-/// True if a new value names a plugin and is legal for it. Not real-time.
+/// Returns true if a new value names a plugin and is legal for it. Not real-time.
 pub(in super::super) fn understands(part: &PluginReport, new: &NewValue<'_>) -> bool {
     let is_named = is_named(&part.name, new.plugin) || part.metadata.id == new.plugin;
     is_named && live_setting(part, new).is_ok()
@@ -43,7 +43,7 @@ pub(in super::super) struct PluginTable {
 }
 
 impl PluginTable {
-    /// The plugins that a run begins with.
+    /// Creates the table of the plugins that a run begins with.
     pub(in super::super) fn new(plugins: &[PluginReport]) -> Self {
         Self { places: Arc::new(Mutex::new(plugins.iter().map(Versions::new).collect())) }
     }
@@ -83,7 +83,7 @@ impl PluginTable {
         self.lock().iter().filter_map(in_place).collect()
     }
 
-    /// Records that the loop has returned a generation of a model, which may be forgotten.
+    /// Records that the loop has returned a generation of a model, which may be dropped.
     pub(super) fn retire(&self, model: usize, generation: u16) {
         let mut places = self.lock();
         let devices = devices(&places);
@@ -100,8 +100,7 @@ impl PluginTable {
         self.lock().iter_mut().for_each(|versions| versions.current = 0);
     }
 
-    /// Returns the numbers of the plugins with a name (a model has one on each of its devices), else that of the first plugin with
-    /// this id.
+    /// Returns the numbers of the plugins with a name (a model has one on each of its devices), or of the first plugin with this id.
     fn numbers(&self, name: &str) -> Result<Vec<u16>, ControlError> {
         let places = self.lock();
         let named = |versions: &Versions| is_named(&versions.now().name, name);
@@ -155,7 +154,7 @@ impl PluginTable {
         Ok(ParameterChange { plugin, generation, parameter, value: setting.value(), pace: Pace::AtOnce })
     }
 
-    /// Returns the rate at which a person's request moves a number: a tenth of its soft range in 50 ms.
+    /// Returns the rate at which a user's request moves a number: a tenth of its soft range in 50 ms.
     pub(super) fn pace(&self, change: &ParameterChange) -> Pace {
         let places = self.lock();
         let part = places.get(usize::from(change.plugin)).map(|versions| versions.get(change.generation));

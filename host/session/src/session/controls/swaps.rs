@@ -1,4 +1,4 @@
-//! Hot swaps of models: replacements on their way into the loop, and plugins that the loop has returned.
+//! Hot swaps of models: pending replacements, and plugins that the loop has returned.
 
 use super::super::PluginReport;
 use super::ControlError;
@@ -7,14 +7,14 @@ use crate::calls::{Attended, Call, Unresponsive, end_limit};
 use flotor_servo::{HostSwaps, Layer, LayerReport, ModelHealth, Replacement};
 use std::time::Duration;
 
-/// A plugin of a run, the first of a model or its replacement, that broke a rule.
+/// Plugin of a run with faults: the first one of a model, or a replacement.
 #[derive(Clone, Debug)]
 pub struct Misbehaved {
-    /// The plugin; its name is that of the model.
+    /// Plugin, under the name of the model.
     pub plugin: PluginReport,
-    /// Its faults.
+    /// Health counters with the faults.
     pub health: ModelHealth,
-    /// Its last message; may be empty.
+    /// Last message; may be empty.
     pub words: String,
 }
 
@@ -22,21 +22,21 @@ pub struct Misbehaved {
 pub(super) struct Swaps {
     queues: HostSwaps,
     busy: Vec<bool>,
-    /// With the number of the model and the generation: the first of each file, which bounds the list.
+    /// Plugins with faults, each with model number and generation: the first of each file, which bounds the list.
     misbehaved: Vec<(usize, u16, Misbehaved)>,
     /// Warnings about replacements, a sentence each.
     warnings: Vec<String>,
-    /// Plugins being freed on threads of their own: `sweep` does not wait for the code of a plugin.
+    /// Plugins being freed on helper threads: `sweep` does not wait for plugin code.
     freeing: Vec<Attended<LayerReport>>,
     /// The first plugin that was not freed in time.
     hung: Option<Unresponsive>,
 }
 
-/// Models of a run that is over.
+/// Models of a finished run.
 pub(in super::super) struct Settled {
     /// Health and last message of the models of the scene, in its order.
     pub(in super::super) first: Vec<(ModelHealth, String)>,
-    /// Replacements that broke a rule.
+    /// Replacements with faults.
     pub(in super::super) misbehaved: Vec<Misbehaved>,
     /// Replacements in place at the end.
     pub(in super::super) replacements: Vec<PluginReport>,
@@ -56,7 +56,7 @@ impl Swaps {
         }
     }
 
-    /// Starts to free plugins that the loop has returned, and notes faults of the freed ones. Not real-time; does not wait.
+    /// Starts to free plugins that the loop has returned, and records faults of the freed ones. Not real-time; does not wait.
     pub(super) fn sweep(&mut self, plugins: &PluginTable) {
         while let Ok((model, mut layer)) = self.queues.retired.pop() {
             let number = model as usize;
@@ -99,7 +99,7 @@ impl Swaps {
         models.for_each(|(_, busy)| *busy = is_busy);
     }
 
-    /// Notes the faults of freed plugins, waiting for each up to a time.
+    /// Records the faults of freed plugins, waiting for each up to a time.
     pub(super) fn collect(&mut self, plugins: &PluginTable, time: Duration) {
         let mut at = 0;
         while let Some(calls) = self.freeing.get(at) {
@@ -121,7 +121,7 @@ impl Swaps {
         }
     }
 
-    /// Keeps the faults of a layer, if it has any.
+    /// Records the faults of a layer, if it has any.
     pub(super) fn note(&mut self, plugins: &PluginTable, report: LayerReport) {
         let LayerReport { model, generation, health, words } = report;
         if health.is_good() {
@@ -138,7 +138,7 @@ impl Swaps {
         }
     }
 
-    /// Sends a replacement to the loop. There is room: each model has at most one under way.
+    /// Sends a replacement to the loop. There is room: each model has at most one pending.
     ///
     /// # Errors
     /// [`ControlError::Busy`].

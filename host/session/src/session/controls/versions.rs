@@ -1,15 +1,15 @@
-//! The plugins of one place in a run: the first one and its replacements, by generation.
+//! Versions of a plugin in a run: the first one and its replacements, by generation.
 
 use super::super::PluginReport;
 use std::collections::VecDeque;
 
-/// Capacity that stays allocated: the version in place, the one before, one that fades in, one that fades out.
+/// Capacity that stays allocated: for the version in place, the one before, one that fades in, one that fades out.
 const USUAL_VERSIONS: usize = 4;
 
-/// The first plugin of a place in a run, and its replacements.
+/// First plugin of a place in a run, with its replacements.
 pub(super) struct Versions {
     pub(super) first: PluginReport,
-    /// Replacements that reports may still name, oldest first.
+    /// Replacements that reports may still refer to, oldest first.
     pub(super) later: VecDeque<Version>,
     /// The newest generation.
     newest: u16,
@@ -22,35 +22,35 @@ pub(super) struct Versions {
 /// The source of a replacement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in super::super) enum ChosenBy {
-    /// A name: in the scene, or of a person.
+    /// Name, in the scene or from a user.
     Name,
     /// The seed, among several; hidden from reports.
     Seed,
 }
 
-/// A replacement.
+/// Replacement of a plugin.
 pub(super) struct Version {
     pub(super) generation: u16,
     pub(super) report: PluginReport,
     pub(super) chosen_by: ChosenBy,
-    /// Whether the loop has returned it.
+    /// True once the loop has returned the replacement.
     pub(super) is_retired: bool,
 }
 
 impl Versions {
-    /// The place of a plugin without replacements.
+    /// Creates the versions of a plugin without replacements.
     pub(super) fn new(first: &PluginReport) -> Self {
         Self { first: first.clone(), later: VecDeque::new(), newest: 0, current: 0, in_place: 0 }
     }
 
-    /// Returns the plugin of a generation; the first plugin, if it is forgotten.
+    /// Returns the plugin of a generation, or the first plugin if that generation was dropped.
     pub(super) fn get(&self, generation: u16) -> &PluginReport {
         let version = self.later.iter().find(|version| version.generation == generation);
         version.map_or(&self.first, |version| &version.report)
     }
 
     /// Adds a replacement and returns its generation. Generation 0 is the plugin of the scene; after the last number, 1 follows,
-    /// whose replacement was forgotten long before.
+    /// whose replacement was dropped long before.
     pub(super) fn add(&mut self, report: PluginReport, chosen_by: ChosenBy) -> u16 {
         self.newest = self.newest.checked_add(1).unwrap_or(1);
         self.current = self.newest;
@@ -58,8 +58,8 @@ impl Versions {
         self.newest
     }
 
-    /// Forgets replacements that no report can name any more, so that a run may replace its models without end. A pending
-    /// change may name the version before the one in place; the loop may name an older one until it returns it.
+    /// Drops replacements that no report can refer to any more, so that memory stays bounded. A pending change may refer to the
+    /// version before the one in place, and the loop to an older one until its return.
     pub(super) fn forget(&mut self) {
         let in_place = self.later.iter().position(|version| version.generation == self.in_place);
         let mut old = in_place.unwrap_or(0).saturating_sub(1);
@@ -67,7 +67,7 @@ impl Versions {
             self.later.pop_front();
             old -= 1;
         }
-        // A slow thread may have kept more of them for a while.
+        // Gives back the capacity of an earlier burst.
         self.later.shrink_to(USUAL_VERSIONS);
     }
 

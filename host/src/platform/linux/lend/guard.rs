@@ -1,7 +1,7 @@
-//! The process between `flotor lend` and the program: starts the program, reports its end, and kills what remains of its process group
+//! Guard process between `flotor lend` and the program: starts the program, reports its end, and kills the rest of its process group
 //! when the program or `flotor lend` ends, however that happens.
 //!
-//! The system gives this process the children of every descendant that ends, so that none is lost. A descendant that has moved to a
+//! The guard is a subreaper: it becomes the parent of orphaned descendants, so that none is lost. A descendant that has moved to a
 //! process group of its own, as a daemon does, goes on and is reported.
 
 use clap::Args;
@@ -20,15 +20,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 use std::time::{Duration, Instant};
 
-/// Asks the guard to kill the process group; the system sends it when `flotor lend` ends.
+/// Signal to the guard to kill the process group; the system sends it when `flotor lend` ends.
 pub(super) const KILL_GROUP: Signal = Signal::USR1;
 /// Poll interval; signals and the end of a child wake the guard at once.
 const POLL: Duration = Duration::from_secs(1);
 /// Pause between two attempts to kill the group.
 const KILL_PAUSE: Duration = Duration::from_millis(2);
-/// Time after which a process that a signal does not kill is left to the system.
+/// Timeout for killing the group; processes that survive are left to the system.
 const KILL_PATIENCE: Duration = Duration::from_secs(5);
-/// Time in which processes outside the group may end by themselves, as those of a run do that the program has had.
+/// Grace period for processes outside the group to end by themselves, such as those of a run that has ended.
 const GRACE: Duration = Duration::from_millis(500);
 
 /// Arguments of the guard of a program, which `flotor lend` starts.
@@ -45,7 +45,7 @@ pub(crate) struct GuardArguments {
     program: Vec<OsString>,
 }
 
-/// The end of a program, as its guard reports it.
+/// End of a program, as its guard reports it.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct ProgramEnd {
     /// Wait status of the program.
@@ -55,12 +55,12 @@ pub(super) struct ProgramEnd {
 }
 
 impl ProgramEnd {
-    /// Reads the result of a guard that has ended; nothing if it was not written.
+    /// Reads the result of a guard that has ended; `None` if it was not written.
     pub(super) fn read(file: &Path) -> Option<Self> {
         serde_json::from_slice(&std::fs::read(file).ok()?).ok()
     }
 
-    /// Returns the end of a program whose guard was killed, and the program with it.
+    /// Creates the end of a program whose guard was killed, and the program with it.
     pub(super) fn of(status: ExitStatus) -> Self {
         Self { status: status.into_raw(), left_running: Vec::new() }
     }
@@ -78,7 +78,7 @@ impl ProgramEnd {
     }
 }
 
-/// A process that descends from the guard.
+/// Process that descends from the guard.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Descendant {
     process: i32,
@@ -110,7 +110,7 @@ pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
     }
     let mut command = Command::new(program);
     end_with_this_thread(command.args(rest));
-    // This process blocks its signals all the time: one that is pending here would end it.
+    // This process always blocks its signals: a pending one would end it.
     let child =
         command.spawn().map_err(|cause| CommandError::file(program.as_ref(), "cannot be started", cause))?;
     let program = Pid::from_child(&child);
@@ -118,7 +118,7 @@ pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
     while status.is_none() && !is_orphaned() {
         match wait_for_signal(&signals, POLL) {
             Some(signal) if signal == KILL_GROUP.as_raw() => break,
-            // The status of a program that has ended is collected here alone, so that its number is still its own.
+            // Only `collect` reaps the program, so its process id is still valid here.
             Some(signal) if signal == Signal::TERM.as_raw() => drop(kill_process(program, Signal::TERM)),
             _ => {}
         }
@@ -134,7 +134,7 @@ pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
         .map_err(|cause| CommandError::file(&arguments.end, "cannot be written", cause))
 }
 
-/// Collects the children that have ended; the wait status of the program, if it is one of them.
+/// Reaps the children that have ended; returns the wait status of the program, if it has.
 fn collect(program: Pid) -> Option<i32> {
     let ended = std::iter::from_fn(|| wait(WaitOptions::NOHANG).ok().flatten());
     ended.filter(|(child, _)| *child == program).map(|(_, status)| status.as_raw()).last()
@@ -174,7 +174,7 @@ fn descendants() -> Vec<Descendant> {
     found
 }
 
-/// Reads a line of `/proc/PID/stat`: the parent, and the process; nothing of a process that has ended.
+/// Parses a line of `/proc/PID/stat`: the parent, and the process; `None` for a process that has ended.
 fn parse(stat: &str) -> Option<(i32, Descendant)> {
     let (process, rest) = stat.split_once(" (")?;
     // The name may contain parentheses.

@@ -1,4 +1,4 @@
-//! Summaries of the runs behind a program in the folder of `flotor lend`: one of each process that opened a device.
+//! Summaries of the runs behind a program in the folder of `flotor lend`: one for each process that opened a device.
 
 use super::guard::ProgramEnd;
 use super::program::Program;
@@ -9,33 +9,33 @@ use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 
-/// Exit code of a run that a device, the watchdog or an oscillation has ended, as that of `flotor run`.
+/// Exit code of a run ended by a device, the watchdog or an oscillation, equal to that of `flotor run`.
 const RUN_FAILED: i32 = 4;
-/// End of the name of a file that a run has not completed.
+/// Extension of a file that a run has not completed.
 const SO_FAR: &str = "so-far";
 
-/// What one run has left.
+/// Result files of a run.
 #[derive(Default)]
 struct Run {
     text: Option<String>,
     summary: Option<Value>,
-    /// The run has ended before its process did.
+    /// True if the run has ended before its process did.
     is_whole: bool,
 }
 
-/// The runs behind a program, by what is in the names of their files.
+/// Runs behind a program, by the suffix in the names of their files.
 pub(super) struct Runs<'a> {
     runs: BTreeMap<String, Run>,
     program: &'a ProgramEnd,
 }
 
 impl<'a> Runs<'a> {
-    /// Names of the files that a run is told to write in this folder: its text and its summary.
+    /// Returns the names of the files that a run writes in this folder: its text and its summary.
     pub(super) fn files(folder: &Path) -> [PathBuf; 2] {
         ["report.txt", "report.json"].map(|name| folder.join(name))
     }
 
-    /// Reads what is there at the end of the program.
+    /// Reads the files that exist at the end of the program.
     pub(super) fn read(folder: &Path, program: &'a ProgramEnd) -> Self {
         let mut runs = BTreeMap::<String, Run>::new();
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -61,7 +61,7 @@ impl<'a> Runs<'a> {
         Self { runs, program }
     }
 
-    /// Prints what is known of each run; whether anything is.
+    /// Prints the text of each run; returns true if there is any.
     pub(super) fn tell(&self, program: &Program, record: Option<&Path>) -> bool {
         let name = program.path.display();
         for (suffix, run) in &self.runs {
@@ -81,7 +81,7 @@ impl<'a> Runs<'a> {
         self.runs.values().any(|run| run.text.is_some())
     }
 
-    /// How the program ended, for a run that did not end before.
+    /// Describes the end of the program, for a run that did not end before.
     fn end(&self) -> String {
         let status = self.program.status();
         match (status.signal(), status.code()) {
@@ -92,7 +92,7 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// Writes the summary of each run: of the first into `file`, of others beside it.
+    /// Writes the summary of each run: of the first into `file`, of others beside that file.
     pub(super) fn write(&self, file: &Path) -> Result<(), CommandError> {
         if self.runs.is_empty() {
             return write_json(
@@ -114,7 +114,7 @@ impl<'a> Runs<'a> {
         Ok(())
     }
 
-    /// Returns the exit code of the whole: that of the program, or of a run that ended before a program which did not mind.
+    /// Returns the exit code of the command: that of the program, or that of a failed run whose program ended with 0.
     pub(super) fn exit_code(&self) -> i32 {
         let ended_early = |run: &Run| {
             let end = run.summary.as_ref().and_then(|summary| summary.get("end")).and_then(Value::as_str);
@@ -129,7 +129,7 @@ impl<'a> Runs<'a> {
     }
 }
 
-/// The name of a file with what distinguishes a run.
+/// Inserts the suffix of a run into the name of a file.
 fn named(file: &Path, suffix: &str) -> PathBuf {
     let mut name = file.file_stem().unwrap_or_default().to_owned();
     name.push(suffix);

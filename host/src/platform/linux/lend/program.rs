@@ -1,4 +1,4 @@
-//! The program that is to be lent a device: where it is, and whether a library can be put in its way.
+//! Program of `flotor lend`: its path, and checks whether a drop-in library can replace its maker's.
 
 use super::Api;
 use flotor_command::CommandError;
@@ -6,22 +6,22 @@ use std::ffi::OsStr;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-/// Bytes of a program that are looked through for names of libraries.
+/// Largest size of a program that is searched for names of libraries, bytes.
 const MOST_BYTES: u64 = 512 << 20;
 
-/// A program.
+/// Program to be run on a device.
 pub(super) struct Program {
     pub(super) path: PathBuf,
-    /// Its file, if it is a native one.
+    /// Properties of its file, if it is a native program.
     native: Option<Native>,
 }
 
-/// What a native program's file says.
+/// Properties of a native program's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Native {
     bits: Bits,
     is_dynamic: bool,
-    /// Which interfaces its file names, in the order of [`Api::ALL`].
+    /// True for each interface that the file names, in the order of [`Api::ALL`].
     names: [bool; 3],
 }
 
@@ -33,7 +33,7 @@ enum Bits {
 }
 
 impl Program {
-    /// Finds it, as a shell would.
+    /// Finds the program, as a shell would.
     pub(super) fn find(name: &OsStr) -> Result<Self, CommandError> {
         let is_program = |path: &PathBuf| {
             std::fs::metadata(path).is_ok_and(|file| file.is_file() && file.permissions().mode() & 0o111 != 0)
@@ -58,12 +58,12 @@ impl Program {
         Ok(Self { path, native })
     }
 
-    /// Whether its file names an interface.
+    /// Returns true if the program's file names an interface.
     pub(super) fn calls(&self, api: Api) -> bool {
         self.native.is_some_and(|native| native.calls(api))
     }
 
-    /// Whether a library can be put in its way.
+    /// Checks that a drop-in library can replace the one of the program.
     pub(super) fn check(&self, api: Option<Api>) -> Result<(), CommandError> {
         let Some(native) = self.native else { return Ok(()) };
         let name = self.path.display();
@@ -80,7 +80,7 @@ impl Program {
             )));
         }
         let Some(api) = api.filter(|api| !native.calls(*api)) else { return Ok(()) };
-        // Programs of CHAI3D name the libraries of all its devices, and take one that libhdPhantom brings.
+        // Programs of CHAI3D name the libraries of all its devices, and use one that libhdPhantom replaces.
         let others = [Api::Chai3d].into_iter().chain(Api::ALL);
         match others.into_iter().find(|other| native.calls(*other)) {
             Some(other) => Err(CommandError::Usage(format!(
@@ -89,7 +89,7 @@ impl Program {
                 api.word(),
                 other.word()
             ))),
-            // It may find a library by a name that it puts together.
+            // The program may compose the name of a library at run time.
             None => Ok(()),
         }
     }
@@ -101,7 +101,7 @@ impl Native {
     }
 }
 
-/// What the file of a native program says; nothing of a script.
+/// Reads the properties of a native program's file; `None` for a script.
 fn read_native(path: &Path) -> Option<Native> {
     let length = std::fs::metadata(path).ok()?.len();
     if length > MOST_BYTES {
@@ -114,7 +114,7 @@ fn read_native(path: &Path) -> Option<Native> {
     Some(Native { bits, is_dynamic, names: Api::ALL.map(|api| api.marks().iter().any(holds)) })
 }
 
-/// Returns the size of the addresses of an ELF program; nothing of another file.
+/// Returns the size of the addresses of an ELF program; `None` for another file.
 fn bits(bytes: &[u8]) -> Option<Bits> {
     match bytes.get(..5)? {
         b"\x7fELF\x01" => Some(Bits::ThirtyTwo),
@@ -123,9 +123,9 @@ fn bits(bytes: &[u8]) -> Option<Bits> {
     }
 }
 
-/// Whether a 64-bit ELF program asks for a loader; nothing if it is none.
+/// Returns true if a 64-bit ELF program requires a loader; `None` for another file.
 fn has_interpreter(bytes: &[u8]) -> Option<bool> {
-    /// Segment that names the loader.
+    /// Type of the segment that names the loader.
     const INTERPRETER: u32 = 3;
     let number = |at: usize, length: usize| {
         let bytes = bytes.get(at..at.checked_add(length)?)?;

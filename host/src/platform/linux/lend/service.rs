@@ -1,4 +1,4 @@
-//! Interfaces that a program reaches by the network: the service is a process of its own beside the program.
+//! Interfaces that a program reaches over the network: the service is a separate process beside the program.
 
 use super::stop_request::{Stage, StopRequest};
 use super::{Early, Folder, LendArguments, PaceOption, has_ended, told};
@@ -13,12 +13,12 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-/// The simulated flotor that a program of the ML API finds without a scene.
+/// Scene with a simulated flotor, for a program of the ML API without a scene.
 const SCENE: &str = include_str!("ml-api.toml");
-/// Longest run: longer than anybody waits.
+/// Duration of the run, a year: longer than any program.
 const LONGEST: &str = "8760h";
 
-/// A service of another maker.
+/// Service of another maker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Service {
     /// Haply's Inverse Service.
@@ -30,7 +30,7 @@ pub(super) enum Service {
 impl Service {
     pub(super) const ALL: [Self; 2] = [Self::Haply, Self::MlApi];
 
-    /// What `--api` says.
+    /// Returns the name for `--api`.
     pub(super) fn word(self) -> &'static str {
         match self {
             Self::Haply => "haply",
@@ -38,12 +38,12 @@ impl Service {
         }
     }
 
-    /// Whether its summary appears in the folder of `flotor lend`; the other is a `flotor run` with a file of its own.
+    /// Returns true if the service writes its summary to the folder of `flotor lend`; the other is a `flotor run` with its own file.
     pub(super) fn leaves_its_summary_here(self) -> bool {
         self == Self::Haply
     }
 
-    /// Where it listens unless another place is wanted.
+    /// Returns the default address.
     fn usual(self) -> &'static str {
         match self {
             Self::Haply => "127.0.0.1:10001",
@@ -51,7 +51,7 @@ impl Service {
         }
     }
 
-    /// Starts it and waits until it listens.
+    /// Starts the service and waits until it listens.
     pub(super) fn start<'a>(
         self,
         arguments: &LendArguments,
@@ -76,7 +76,7 @@ impl Service {
             }
             Self::MlApi => self.run(arguments, folder, own)?,
         };
-        // Ctrl-C is for the program: the service ends after it.
+        // Ctrl-C is for the program: the service ends after the program.
         command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
         end_with_this_thread(&mut command);
         let file = command.get_program().to_owned();
@@ -85,7 +85,7 @@ impl Service {
         Served::wait(child, self, stop)
     }
 
-    /// `flotor run` with the controller as one more model of the scene.
+    /// Returns a `flotor run` command with the controller as one more model of the scene.
     fn run(self, arguments: &LendArguments, folder: &Folder, own: &Path) -> Result<Command, CommandError> {
         if arguments.pace == PaceOption::Lockstep {
             return Err(CommandError::Usage(
@@ -115,7 +115,7 @@ impl Service {
     }
 }
 
-/// The end of a service.
+/// End of a service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ServiceEnd {
     /// The service ended with this exit code; not 0 after a failed run.
@@ -129,7 +129,7 @@ impl ServiceEnd {
     pub(super) const KILLED: &str =
         "the service did not end in time after the request to stop, and was killed without a summary";
 
-    /// Returns the exit code that it gives to the command.
+    /// Returns the exit code of the command for this end.
     pub(super) fn exit_code(self) -> i32 {
         match self {
             Self::Exited(code) => code,
@@ -165,7 +165,7 @@ impl<'a> Served<'a> {
         })?;
         let address = stop.poll(|stage| match served.output.try_recv() {
             Ok(address) => Some(Ok(address)),
-            // It has printed why.
+            // The service has printed the cause.
             Err(TryRecvError::Disconnected) => Some(Err(None)),
             Err(TryRecvError::Empty) => (stage > Stage::Running).then_some(Err(Some(INTERRUPTED))),
         });
@@ -184,7 +184,7 @@ impl<'a> Served<'a> {
         }
     }
 
-    /// Ends it, prints its output on the run, and returns its end.
+    /// Ends the service, prints its output on the run, and returns its end.
     pub(super) fn finish(mut self) -> ServiceEnd {
         let end = self.end();
         if end == ServiceEnd::Killed {
@@ -201,8 +201,8 @@ impl<'a> Served<'a> {
         end
     }
 
-    /// Asks it to end, and waits. At the end of the schedule its process group is killed; its devices are stopped by the watchdog
-    /// process.
+    /// Requests the end of the service, and waits. At the end of the schedule its process group is killed; the watchdog process then
+    /// stops the devices.
     fn end(&mut self) -> ServiceEnd {
         let process = Pid::from_child(&self.child);
         if has_ended(&mut self.child).is_none() {
@@ -223,7 +223,7 @@ impl Drop for Served<'_> {
     }
 }
 
-/// Where a service says that it listens; nothing if it ends before.
+/// Returns the address at which a service listens; `None` if the service ends before.
 fn listening(output: &mut BufReader<ChildStdout>) -> Option<String> {
     loop {
         let mut line = String::new();

@@ -1,5 +1,5 @@
-//! The end of `flotor lend` after a request to stop: program and service share one schedule, which starts with the request, so that
-//! their grace periods do not add up.
+//! Schedule of the end of `flotor lend` after a request to stop: program and service share one schedule, which starts with the request,
+//! so that their grace periods do not add up.
 
 use flotor_command::CommandError;
 use flotor_command::stopping::stop_on_signals;
@@ -7,21 +7,21 @@ use flotor_servo::StopSwitch;
 use std::cell::OnceCell;
 use std::time::{Duration, Instant};
 
-/// Poll interval of the request and of what ends after it.
+/// Poll interval of the request and of the processes that end after it.
 const POLL: Duration = Duration::from_millis(10);
 
 /// Stage of the end, in the order of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
-    /// Nobody has requested a stop.
+    /// No stop was requested.
     Running,
     /// The program may end by the signal that a terminal has sent to it.
     Requested,
-    /// SIGTERM asks the program to end.
+    /// The program has received SIGTERM.
     ProgramAsked,
     /// The process group of the program is killed.
     ProgramKilled,
-    /// The service is killed, and nothing is waited for.
+    /// The service is killed, and all waiting ends.
     Over,
 }
 
@@ -41,7 +41,7 @@ impl Stage {
     }
 }
 
-/// The request to stop `flotor lend`, by a signal.
+/// Request to stop `flotor lend`, by a signal.
 pub(super) struct StopRequest {
     switch: StopSwitch,
     /// Time of the poll that found the request.
@@ -49,7 +49,7 @@ pub(super) struct StopRequest {
 }
 
 impl StopRequest {
-    /// Takes signals from now on. Called before there are other threads.
+    /// Starts taking signals. Called before there are other threads.
     pub(super) fn by_signals() -> Result<Self, CommandError> {
         Ok(Self { switch: stop_on_signals()?, found: OnceCell::new() })
     }
@@ -68,7 +68,7 @@ impl StopRequest {
         if is_emergency { stage.max(Stage::ProgramKilled) } else { stage }
     }
 
-    /// Polls until there is a value; nothing at [`Stage::Over`].
+    /// Polls until there is a value; returns `None` at [`Stage::Over`].
     pub(super) fn poll<T>(&self, mut poll: impl FnMut(Stage) -> Option<T>) -> Option<T> {
         loop {
             let stage = self.stage();

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Turns a second.
+/// Frequency of the motion, Hz.
 const FREQUENCY_HZ: f64 = 1.0;
 
 /// The device, open: known, not energised.
@@ -100,7 +100,7 @@ impl ActiveDevice for ActiveYourName {
     }
 }
 
-/// Takes the force away: from any thread, at any time, without the device's cooperation.
+/// Removes the force: from any thread, at any time, without the device's cooperation.
 struct Stop(Arc<AtomicBool>);
 
 impl SafeStop for Stop {

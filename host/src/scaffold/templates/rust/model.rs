@@ -6,9 +6,9 @@ mod shape;
 
 use flotor_hal::*;
 
-/// One instance of the model.
+/// Instance of the model.
 struct YourName {
-    /// Values of the parameters, in their order.
+    /// Values of the parameters, in the order of `PARAMETERS`.
     values: [f64; 3],
     shape: Shape,
 }

@@ -1,8 +1,8 @@
-//! The control groups of the watchdog process: an out-of-memory daemon, a container and a service manager kill all processes of a
-//! group together, so this process leaves the groups of its host.
+//! Control groups of the watchdog process. An out-of-memory daemon, a container and a service manager kill all processes of a group
+//! together, so this process leaves the groups of its host.
 //!
-//! Two ways lead out: systemd moves the process into a scope of its own, and the process writes its number into an outer group.
-//! Whether one did is read from the kernel afterwards.
+//! There are two ways out: systemd moves the process into a scope of its own, or the process writes its id into an outer group. The
+//! result is read from the kernel afterwards.
 
 use super::super::control_group::{Group, Mount, groups};
 use rustix::process::{geteuid, getpid};
@@ -12,14 +12,14 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// How long systemd may take to move a process.
+/// Timeout for systemd to move a process.
 const SCOPE_PATIENCE: Duration = Duration::from_secs(1);
-/// Poll interval while it does.
+/// Poll interval while systemd moves a process.
 const SCOPE_POLL: Duration = Duration::from_millis(2);
-/// Name of the group that is made inside an outer group whose own processes are not allowed.
+/// Name of the group created inside an outer group that may not hold processes itself.
 const OWN_GROUP: &str = "flotor-watchdog";
 
-/// Leaves the control groups of the host; returns one that both processes are still in. Not real-time.
+/// Leaves the control groups of the host; returns a group that both processes still share. Not real-time.
 pub(super) fn leave_those_of(host: i32) -> Option<String> {
     let processes = Processes::with(host);
     processes.shared_group()?;
@@ -31,7 +31,7 @@ pub(super) fn leave_those_of(host: i32) -> Option<String> {
     processes.shared_group().map(|group| group.path)
 }
 
-/// The host and this process.
+/// Host and watchdog process.
 struct Processes {
     host: i32,
     mounts: Vec<Mount>,
@@ -47,7 +47,7 @@ impl Processes {
         left_groups(&read_to_string("/proc/self/cgroup").unwrap_or_default(), &self.mounts)
     }
 
-    /// A group of the host that this process is in as well, itself or through a group inside.
+    /// Returns a group of the host that this process is in as well, directly or through an inner group.
     fn shared_group(&self) -> Option<Group> {
         let hosts = read_to_string(format!("/proc/{}/cgroup", self.host)).unwrap_or_default();
         let own = self.own();
@@ -56,13 +56,13 @@ impl Processes {
     }
 }
 
-/// Returns those that this process leaves. The memory controller of version 1 stays: its killer ends single processes, and the memory
-/// of this process counts where that of the host does.
+/// Returns the groups to leave. The memory controller of version 1 is not among them: its killer ends single processes, and the
+/// memory of this process counts where that of the host does.
 fn left_groups(file: &str, mounts: &[Mount]) -> Vec<Group> {
     groups(file, mounts).into_iter().filter(|group| !group.is_of("memory")).collect()
 }
 
-/// Moves this process to the outermost group around this one that takes it.
+/// Moves this process to the outermost enclosing group that accepts it.
 fn leave(group: &Group) -> Option<()> {
     group.folders().iter().skip(1).rev().find_map(|outer| enter(outer).or_else(|| enter_inside(outer)))
 }
@@ -81,7 +81,7 @@ fn enter_inside(group: &Path) -> Option<()> {
     }
 }
 
-/// Lets systemd move this process into a scope of its own; whether it is out of the host's groups then.
+/// Moves this process into a systemd scope of its own; returns true once it has left the host's groups.
 fn join_scope(processes: &Processes) -> bool {
     let managers = if geteuid().is_root() { ["--system", "--user"] } else { ["--user", "--system"] };
     managers.iter().any(|manager| {
@@ -99,7 +99,7 @@ fn join_scope(processes: &Processes) -> bool {
     })
 }
 
-/// Asks a manager of systemd over its bus; whether it has accepted in time.
+/// Requests a scope from a manager of systemd over its bus; returns true if accepted in time.
 fn ask_for_scope(manager: &str, started: Instant) -> bool {
     let process = getpid().as_raw_nonzero().to_string();
     let scope = format!("flotor-watchdog-{process}.scope");

@@ -1,4 +1,4 @@
-//! The process itself.
+//! Guard side: the watchdog process itself.
 
 use super::control_group::leave_those_of;
 use super::{PACKET_BYTES, Packet, bytes_of};
@@ -14,15 +14,15 @@ use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, OwnedFd};
 use std::time::Duration;
 
-/// How often a message is written: the first may fall into half a command of the host's, the second then finds the
-/// beginning of a message, the third is for luck.
+/// Number of times a message is written: the first may fall into half a command of the host's, the second then starts a new
+/// message, the third is a spare.
 const TIMES: u32 = 3;
-/// Time between two of them, longer than a device takes to look at one.
+/// Pause between two writes, longer than a device takes to process one.
 const PAUSE: Duration = Duration::from_millis(2);
-/// How long a handle that is full is waited for, each time.
+/// Timeout for a full handle, per write.
 const PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 5_000_000 };
 
-/// How long a host whose thread has ended has to say that this is in order.
+/// Grace period for a host whose thread has ended to report an orderly end.
 const LAST_WORD: Timespec = Timespec { tv_sec: 0, tv_nsec: 1_000_000 };
 
 /// A device on guard.
@@ -32,11 +32,11 @@ struct Guarded {
     message: Vec<u8>,
 }
 
-/// Guards the devices that the host, whose process has this number, passes on standard input; returns when the host has said that
-/// its devices are stopped, or after they were stopped from here.
+/// Guards the devices that the host with this process id passes on standard input. Returns when the host has reported its devices
+/// stopped, or after stopping them.
 ///
 /// # Errors
-/// Standard input is no such socket: nobody started this as a watchdog.
+/// Standard input is not such a socket: the process was not started as a watchdog.
 pub fn serve(host: i32) -> io::Result<()> {
     let link = io::stdin();
     let host_number = Pid::from_raw(host);
@@ -53,7 +53,7 @@ pub fn serve(host: i32) -> io::Result<()> {
                 }
             }
             (Some(Packet::Begin), _) => break,
-            // It has gone before anything was energised, or is no host.
+            // The host has ended before anything was energised, or is none.
             _ => return Err(io::Error::other("nobody passes any devices")),
         }
     }
@@ -61,9 +61,9 @@ pub fn serve(host: i32) -> io::Result<()> {
         return Err(io::Error::other("there is no process of the host's number"));
     };
     if getppid() != host_number {
-        return Ok(()); // gone, and another one has its number
+        return Ok(()); // ended, and its id is in use again
     }
-    // A kill of the host's session, process group or control group is the host's alone.
+    // A kill of the host's session, process group or control group must not reach this process.
     let _ = setsid();
     let shared_group = leave_those_of(host).unwrap_or_default();
     enter_guard_priority();
@@ -72,7 +72,7 @@ pub fn serve(host: i32) -> io::Result<()> {
     let mut watch = Watch { link, process, thread: None, patience: None };
     let event = loop {
         match watch.wait_for_event() {
-            // It may go on, and may be killed before: this process stays.
+            // The host may go on, or be killed later: this process stays.
             Event::HostSilent => {
                 stop(&devices);
                 report("the host does not run", &devices);
@@ -87,18 +87,18 @@ pub fn serve(host: i32) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes why which devices were stopped to standard error.
+/// Reports the reason and the stopped devices on standard error.
 fn report(why: &str, devices: &[Guarded]) {
     let names: Vec<String> =
         devices.iter().map(|device| format!("`{}`", device.name.escape_debug())).collect();
     let _ = writeln!(io::stderr(), "flotor watchdog: {why}; stopped {}", names.join(", "));
 }
 
-/// What happens to a host.
+/// Event of a host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Event {
     EndedInOrder,
-    /// It is there and has given no sign of life in time.
+    /// The host exists but has sent no heartbeat in time.
     HostSilent,
     HostGone,
 }
@@ -107,15 +107,15 @@ enum Event {
 struct Watch<L> {
     link: L,
     process: OwnedFd,
-    /// The thread of the loop.
+    /// Thread of the host's loop.
     thread: Option<OwnedFd>,
-    /// How long the host may be silent; for ever while it has promised nothing.
+    /// Timeout of the next heartbeat; `None` if none is announced.
     patience: Option<Timespec>,
 }
 
 impl<L: AsFd> Watch<L> {
-    /// Waits until the host says that it is over, closes the link, or ends, or the thread of its loop does, or until the host has
-    /// been silent for too long.
+    /// Waits until the host reports its end, closes the link or ends, until the thread of its loop ends, or until its heartbeat is
+    /// overdue.
     fn wait_for_event(&mut self) -> Event {
         loop {
             let Self { link, process, thread, patience } = self;
@@ -131,7 +131,7 @@ impl<L: AsFd> Watch<L> {
                 Err(_) => return Event::HostGone,
             }
             if all.first().is_none_or(|said| said.revents().is_empty()) {
-                // Nothing was said, so something has ended. What says that this is in order may be on its way from another thread.
+                // No packet, so something has ended. An end report may still come from another thread.
                 let mut link = [PollFd::new(&*link, PollFlags::IN)];
                 if !poll(&mut link, Some(&LAST_WORD)).is_ok_and(|seen| seen > 0) {
                     return Event::HostGone;
@@ -148,22 +148,22 @@ impl<L: AsFd> Watch<L> {
     }
 }
 
-/// The longest silence that a sign of life announces.
+/// Decodes the timeout that a heartbeat announces.
 fn patience_of(limit_ns: &[u8]) -> Option<Timespec> {
     Timespec::try_from(Duration::from_nanos(u64::from_le_bytes(limit_ns.try_into().ok()?))).ok()
 }
 
-/// A handle of the thread with this number; nothing before Linux 6.9, which knows processes only.
+/// Returns a handle of the thread with this id; `None` before Linux 6.9, which has handles of processes only.
 fn thread_of(number: &[u8]) -> Option<OwnedFd> {
     // PIDFD_THREAD, which rustix has no name for, is this flag.
     let of_thread = PidfdFlags::from_bits_retain(OFlags::EXCL.bits());
     pidfd_open(Pid::from_raw(i32::from_le_bytes(number.try_into().ok()?))?, of_thread).ok()
 }
 
-/// Writes each message, to all devices before it is written once more.
+/// Writes each message several times, each time to all devices.
 fn stop(devices: &[Guarded]) {
     for Guarded { handle, .. } in devices {
-        // The host, whose handle this is as well, is gone: nobody else minds.
+        // The host shares the handle with its flags, but does not run any more.
         if let Ok(mode) = fcntl_getfl(handle) {
             let _ = fcntl_setfl(handle, mode | OFlags::NONBLOCK);
         }
@@ -178,7 +178,7 @@ fn stop(devices: &[Guarded]) {
     }
 }
 
-/// Writes a message until it is taken, or nothing has been for a while.
+/// Writes a message until it is complete, or the handle stays full for the timeout.
 fn put(handle: &OwnedFd, message: &[u8]) {
     let mut left = message;
     while !left.is_empty() {
@@ -196,7 +196,7 @@ fn put(handle: &OwnedFd, message: &[u8]) {
     }
 }
 
-/// The next packet: what it says, the rest of it, and the handle beside it; nothing if the other end is closed.
+/// Receives the next packet: its kind, the rest, and the attached handle; no kind if the other end is closed.
 fn receive(link: impl AsFd) -> io::Result<(Option<Packet>, Vec<u8>, Option<OwnedFd>)> {
     let mut bytes = [0; PACKET_BYTES];
     let mut room = [MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(1))];

@@ -1,4 +1,4 @@
-//! The host's side: starts the process, and tells it when it is needed no more.
+//! Host side: starts the watchdog process, and ends it.
 
 use super::{PACKET_BYTES, Packet, bytes_of};
 use crate::engine::process::parent::program;
@@ -14,10 +14,10 @@ use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, OwnedFd};
 use std::process::{Child, Command, Stdio};
 
-/// How long the process may take to be on guard.
+/// Timeout for the watchdog process to be ready.
 const PATIENCE: Timespec = Timespec { tv_sec: 5, tv_nsec: 0 };
 
-/// The watchdog process of this host. Dropping it reports that the devices are stopped, and ends it.
+/// Watchdog process of this host. Dropping it reports that the devices are stopped, and ends the process.
 pub struct WatchdogProcess {
     child: Child,
     link: OwnedFd,
@@ -25,10 +25,10 @@ pub struct WatchdogProcess {
 }
 
 impl WatchdogProcess {
-    /// Starts it for the devices that are stopped by a message, each with its name; `None` if there are none. Not real-time.
+    /// Starts the process for the devices that are stopped by a message, each with its name; `None` without such devices. Not real-time.
     ///
     /// # Errors
-    /// What the system says, or that it does not answer.
+    /// If a system call fails, or the process does not answer.
     pub fn start<'a>(
         devices: impl IntoIterator<Item = (&'a str, &'a Independence)>,
     ) -> io::Result<Option<Self>> {
@@ -61,33 +61,32 @@ impl WatchdogProcess {
         Ok(process)
     }
 
-    /// Returns the control group that the process shares with the host, because no way led out of it: whoever kills the group
-    /// kills both.
+    /// Returns the control group that the process shares with the host, because it could not leave: killing the group ends both.
     #[must_use]
     pub fn shared_group(&self) -> Option<&str> {
         self.shared_group.as_deref()
     }
 
-    /// Returns what tells the process that this one runs. Not real-time.
+    /// Returns a sender of heartbeats to the process. Not real-time.
     ///
     /// # Errors
-    /// The system has no further descriptor.
+    /// If the system has no further descriptor.
     pub fn sign_of_life(&self) -> io::Result<SignOfLife> {
         Ok(SignOfLife { link: self.link.try_clone()? })
     }
 
-    /// The calling thread runs the loop: when it ends without an end in order, the host counts as gone. Not real-time.
+    /// Registers the calling thread as the loop's: its end without an orderly end counts as the host's. Not real-time.
     ///
     /// # Errors
-    /// The process is gone.
+    /// If the watchdog process has ended.
     pub fn follow_this_thread(&self) -> io::Result<()> {
         self.say(Packet::Thread, &gettid().as_raw_nonzero().get().to_le_bytes())
     }
 
-    /// Follows the process alone from now on: the thread that was followed may end. Not real-time.
+    /// Watches the host's process alone from now on: the registered thread may end. Not real-time.
     ///
     /// # Errors
-    /// The process is gone.
+    /// If the watchdog process has ended.
     pub fn follow_no_thread(&self) -> io::Result<()> {
         self.say(Packet::Thread, &[])
     }
@@ -107,15 +106,15 @@ impl WatchdogProcess {
         Ok(())
     }
 
-    /// Whether it has ended before it was told to, whatever ended it. Not real-time.
+    /// Returns true if the process has ended early, for any reason. Not real-time.
     #[must_use]
     pub fn is_gone(&self) -> bool {
-        // It says nothing more: whatever there is to see is the end of the link.
+        // The process sends nothing more: any event is the end of the link.
         let mut link = [PollFd::new(&self.link, PollFlags::IN)];
         poll(&mut link, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })).is_ok_and(|seen| seen > 0)
     }
 
-    /// Waits until the process is on guard; returns the control group that it could not leave.
+    /// Waits until the process is ready; returns the control group that it could not leave.
     fn wait_until_ready(&self) -> io::Result<Option<String>> {
         let mut answer = [0; PACKET_BYTES];
         let mut link = [PollFd::new(&self.link, PollFlags::IN)];
@@ -130,20 +129,19 @@ impl WatchdogProcess {
     }
 }
 
-/// Tells the watchdog process that this process runs: the devices are stopped when it does not, because somebody has stopped or
-/// traces it.
+/// Sender of heartbeats to the watchdog process, which stops the devices without them: this process may be stopped or traced.
 pub struct SignOfLife {
     link: OwnedFd,
 }
 
 impl SignOfLife {
-    /// Announces the next call within `limit_ns`. Bounded: waits for nobody.
+    /// Sends a heartbeat and announces the next one within `limit_ns`. Bounded: never waits.
     pub(crate) fn give(&self, limit_ns: u64) {
         self.send(&bytes_of(Packet::Alive, &limit_ns.to_le_bytes()));
     }
 
     fn send(&self, packet: &[u8]) {
-        // A process that reads nothing is stopped itself, or gone: the run finds that out where it looks at the process.
+        // A process that reads nothing is stopped itself, or has ended: the run finds out in its own check.
         let _ = send(&self.link, packet, SendFlags::NOSIGNAL | SendFlags::DONTWAIT);
     }
 }
@@ -154,11 +152,10 @@ impl Drop for SignOfLife {
     }
 }
 
-/// Starts a watchdog process without devices and ends it; returns the control group that it shares with this process. Not
-/// real-time.
+/// Starts a watchdog process without devices and ends it; returns the control group shared with this process. Not real-time.
 ///
 /// # Errors
-/// As [`WatchdogProcess::start`].
+/// As for [`WatchdogProcess::start`].
 pub fn probe_shared_group() -> io::Result<Option<String>> {
     WatchdogProcess::start_for(&[]).map(|process| process.shared_group.clone())
 }

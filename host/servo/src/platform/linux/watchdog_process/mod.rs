@@ -1,4 +1,4 @@
-//! Both ends of the link, and what is said over it.
+//! Watchdog process on Linux: both ends of the link, and its packets.
 
 mod control_group;
 mod guard;
@@ -7,7 +7,7 @@ mod host;
 pub use guard::serve;
 pub use host::{SignOfLife, WatchdogProcess, probe_shared_group};
 
-/// Whether this system has one: it has. Not real-time.
+/// Returns `Ok`: this system has a watchdog process. Not real-time.
 ///
 /// # Errors
 /// None.
@@ -16,29 +16,29 @@ pub fn is_offered() -> std::io::Result<()> {
     Ok(())
 }
 
-/// Bytes of the longest packet between the two: what it says, and a message or a name.
+/// Longest packet, bytes: its kind, and a message or a name.
 const PACKET_BYTES: usize = 128;
 
 /// First byte of a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 enum Packet {
-    /// To the process: a device's message, and its handle beside it.
+    /// To the process: message of a device, with its handle attached.
     Device = b'd',
-    /// To the process: the name of that device, for people.
+    /// To the process: name of the last device, for users.
     Name = b'n',
-    /// To the process: these were all.
+    /// To the process: the list of devices is complete.
     Begin = b'b',
-    /// To the process: the number of the thread that runs the loop, nothing where none does any more. A killed process ends with its last thread, which on a busy
-    /// machine may wait for its turn; this one has priority.
+    /// To the process: id of the thread that runs the loop, empty once none does. A killed process ends with its last thread, which
+    /// on a busy machine may wait for a processor; the loop's thread has priority.
     Thread = b't',
-    /// To the process: the host runs, and says so again within this many ns. A process that is stopped does not.
+    /// To the process: heartbeat of the host, with the time until the next one, ns. A stopped process sends none.
     Alive = b'a',
-    /// To the process: the host says no more that it runs.
+    /// To the process: no more heartbeats follow.
     Quiet = b'q',
-    /// From the process: it is on guard; the control group that it shares with the host, if it could not leave one.
+    /// From the process: ready; with the control group shared with the host, if it could not leave one.
     Ready = b'r',
-    /// To the process: the devices are stopped, nobody has to guard them any more.
+    /// To the process: the devices are stopped and need no guard any more.
     End = b'e',
 }
 
@@ -58,7 +58,7 @@ impl Packet {
     }
 }
 
-/// A packet, its end cut off if it is too long.
+/// Encodes a packet; the end of a long one is cut off.
 fn bytes_of(packet: Packet, rest: &[u8]) -> Vec<u8> {
     std::iter::once(packet as u8).chain(rest.iter().copied()).take(PACKET_BYTES).collect()
 }
