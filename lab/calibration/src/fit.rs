@@ -1,50 +1,50 @@
-//! From readings to a polynomial: least squares, degree by cross-validation, confidence.
+//! Polynomial fit of the readings: least squares, degree by cross-validation, confidence.
 //!
-//! With the commanded force `F`, the delivered share `s(z)` and the weight `W` of what moves, the sensor reads
+//! With the commanded force `F`, the delivered ratio `s(z)` and the weight `W` of the moving part, the sensor reads
 //!
 //! ```text
 //! R = F s(z) - W,      s(z) = a0 P0(u) + a1 P1(u) + ... + ad Pd(u),      u = z over the measured range, -1..1
 //! ```
 //!
-//! which is linear in all unknowns; two forces tell the share from the weight. The Legendre polynomials `Pk` keep
-//! the unknowns nearly independent; what is kept in the end are powers of the height.
+//! which is linear in all unknowns; two forces separate the ratio from the weight. The Legendre polynomials `Pk` make
+//! the unknowns nearly independent; the result is stored as powers of the height.
 //!
-//! **Degree.** Each height is left out once and predicted from all others (leaving out single readings would let
-//! those beside it answer). The smallest degree is taken whose error is within one standard error of the least
-//! (Breiman et al. 1984, the one-standard-error rule): more is fitting noise.
+//! **Degree.** Each height is left out once and predicted from all others (single readings would be predicted by their
+//! neighbours). The choice is the smallest degree whose error is within one standard error of the least (Breiman et al.
+//! 1984, the one-standard-error rule): a higher degree fits noise.
 
 use super::CalibrationError;
 use super::least_squares::{Solution, solve};
 use super::procedure::Reading;
 use flotor_hal::{CALIBRATION_COEFFICIENTS, VerticalCalibration, math};
 
-/// Highest degree that is tried. One less than there is room for: the cross-validated curve has to bend down again.
+/// Highest degree of a fit. One less than the format has room for: the cross-validated curve has to bend down again.
 pub const MAX_DEGREE: usize = CALIBRATION_COEFFICIENTS - 2;
 
 /// Quantile of the normal distribution for a two-sided interval of 95 %; there are hundreds of readings.
 const QUANTILE_95: f64 = 1.959_963_985;
 
-/// How well a degree predicts heights it has not seen.
+/// Prediction error of a degree on heights left out of the fit.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Candidate {
     /// Degree of the polynomial.
     pub degree: usize,
     /// Root mean square of the prediction error, N.
     pub error_n: f64,
-    /// Standard error of that, from height to height, N.
+    /// Standard error of `error_n` over the heights, N.
     pub standard_error_n: f64,
 }
 
-/// A fitted calibration, and how far it can be trusted.
+/// Fitted calibration with its confidence.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// The curve.
+    /// Fitted curve.
     pub calibration: VerticalCalibration,
-    /// Its degree.
+    /// Degree of the curve.
     pub degree: usize,
-    /// Every degree that was tried.
+    /// Candidates of every degree.
     pub candidates: Vec<Candidate>,
-    /// Weight of what moves, N, and its 95 % interval to either side.
+    /// Weight of the moving part, N, with the half width of its 95 % interval.
     pub weight_n: [f64; 2],
     /// Standard deviation of the residuals, N.
     pub residual_n: f64,
@@ -55,11 +55,11 @@ pub struct Fit {
     pub residuals_n: Vec<f64>,
 }
 
-/// Fits the readings.
+/// Fits a calibration to the readings.
 ///
 /// # Errors
 /// [`CalibrationError::TooFew`] unless there are two forces and more heights than coefficients;
-/// [`CalibrationError::Implausible`] if the curve is no calibration.
+/// [`CalibrationError::Implausible`] if the curve is not a valid calibration.
 pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
     let stops = distinct(readings.iter().map(|reading| u64::from(reading.stop)));
     let forces = distinct(readings.iter().map(|reading| reading.commanded_n.to_bits()));
@@ -128,10 +128,10 @@ impl Scale {
         (height_m - self.middle_m) / self.half_m
     }
 
-    /// Coefficients of powers of the height in m for those of Legendre polynomials of `u`.
+    /// Converts coefficients of Legendre polynomials of `u` to coefficients of powers of the height in m.
     fn powers_of_height(&self, shares: &[f64]) -> Vec<f64> {
         let mut powers = vec![0.0; shares.len()];
-        // Pk as polynomials in z, by the three-term recurrence (k+1) P(k+1) = (2k+1) u Pk - k P(k-1).
+        // Evaluate Pk as polynomials in z, by the three-term recurrence (k+1) P(k+1) = (2k+1) u Pk - k P(k-1).
         let [u0, u1] = [-self.middle_m / self.half_m, 1.0 / self.half_m];
         let (mut before, mut now): (Vec<f64>, Vec<f64>) = (Vec::new(), vec![1.0]);
         for (k, share) in (0_u32..).zip(shares) {
@@ -153,7 +153,7 @@ impl Scale {
     }
 }
 
-/// Legendre polynomials 0 to `degree` at `u`.
+/// Returns Legendre polynomials 0 to `degree` at `u`.
 fn legendre(u: f64, degree: usize) -> Vec<f64> {
     let mut values = vec![1.0, u];
     for k in 1..degree.max(1) {
@@ -184,7 +184,7 @@ fn predict(reading: &Reading, solution: &Solution, scale: &Scale, degree: usize)
     row(reading, scale, degree).iter().zip(&solution.x).map(|(a, b)| a * b).sum()
 }
 
-/// Predicts each height from all others.
+/// Predicts each height from all others; `None` if the others do not determine the curve.
 fn cross_validate(readings: &[Reading], stops: &[u64], scale: &Scale, degree: usize) -> Option<Candidate> {
     let mut squares = Vec::new();
     for stop in stops {
@@ -199,21 +199,21 @@ fn cross_validate(readings: &[Reading], stops: &[u64], scale: &Scale, degree: us
     let count = squares.len() as f64;
     let spread = (mean(squares.iter().map(|value| math::powi(value - square, 2))) / (count - 1.0)).sqrt();
     let error_n = square.sqrt();
-    // The error of a square root: that of what is under it, over twice the root.
+    // Standard error of a square root: that of the radicand, over twice the root.
     Some(Candidate { degree, error_n, standard_error_n: spread / (2.0 * error_n) })
 }
 
-/// The smallest degree within one standard error of the best.
+/// Returns the smallest degree within one standard error of the best.
 fn choose(candidates: &[Candidate]) -> usize {
     let best = candidates.iter().min_by(|a, b| a.error_n.total_cmp(&b.error_n));
     let bound_n = best.map_or(f64::INFINITY, |best| best.error_n + best.standard_error_n);
     candidates.iter().find(|candidate| candidate.error_n <= bound_n).map_or(0, |candidate| candidate.degree)
 }
 
-/// Largest standard deviation of `s(z) - mean of s` for residuals of unit variance. The mean of the share is less
-/// sure than its shape (it hangs on the difference of two forces) and is a scale, not an unevenness.
+/// Returns the largest standard deviation of `s(z) - mean of s` for residuals of unit variance. The mean is less
+/// certain than the shape, as it depends on the difference of two forces, and it is a scale, not an unevenness.
 fn shape_deviation(solution: &Solution, degree: usize) -> f64 {
-    /// Odd, so that the middle is looked at.
+    /// Number of points; odd, so that the middle is included.
     const POINTS: u32 = 101;
     let variance = |point: u32| {
         let u = 2.0 * f64::from(point) / f64::from(POINTS - 1) - 1.0;
@@ -233,7 +233,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
-/// The values that occur, each once, in the order of first occurrence.
+/// Returns the distinct values in the order of first occurrence.
 fn distinct(values: impl Iterator<Item = u64>) -> Vec<u64> {
     let mut found = Vec::new();
     for value in values {

@@ -1,27 +1,27 @@
 //! Least squares for a handful of unknowns, by Householder reflections (Golub and Van Loan, section 5.3).
 
-/// The most unknowns there are: eight coefficients and a weight.
+/// Maximum number of unknowns: eight coefficients and a weight.
 pub(super) const MAX_UNKNOWNS: usize = 9;
 
-/// Solution of `rows x = values` in the sense of least squares.
+/// Least-squares solution of `rows x = values`.
 #[derive(Clone, Debug)]
 pub(super) struct Solution {
     pub(super) x: Vec<f64>,
     /// Sum of the squared residuals.
     pub(super) residual_squares: f64,
-    /// The triangle `R` of `rows = Q R`, row by row: the covariance of `x` is `s² (RᵀR)⁻¹`.
+    /// Triangle `R` of `rows = Q R`, row by row: the covariance of `x` is `s² (RᵀR)⁻¹`.
     triangle: Vec<Vec<f64>>,
 }
 
-/// Solves; nothing if the rows do not determine every unknown.
+/// Solves the system; `None` if the rows do not determine every unknown.
 pub(super) fn solve(rows: &[Vec<f64>], values: &[f64]) -> Option<Solution> {
-    /// A diagonal this much smaller than the largest is lost in rounding.
+    /// Smallest diagonal entry relative to the largest, above rounding errors.
     const RANK_TOLERANCE: f64 = 1.0e-12;
     let unknowns = rows.first()?.len();
     if rows.len() < unknowns || unknowns > MAX_UNKNOWNS || rows.len() != values.len() {
         return None;
     }
-    // Each row carries its value as a last column, so that the reflections turn both at once.
+    // Append each value to its row as a last column, so that the reflections transform both.
     let mut table: Vec<Vec<f64>> =
         rows.iter().zip(values).map(|(row, value)| row.iter().copied().chain([*value]).collect()).collect();
     for column in 0..unknowns {
@@ -41,7 +41,7 @@ pub(super) fn solve(rows: &[Vec<f64>], values: &[f64]) -> Option<Solution> {
 }
 
 impl Solution {
-    /// Variance of `directionᵀ x` for residuals of unit variance: `|R⁻ᵀ direction|²`.
+    /// Returns the variance of `directionᵀ x` for residuals of unit variance: `|R⁻ᵀ direction|²`.
     pub(super) fn unit_variance(&self, direction: &[f64]) -> f64 {
         let mut y: Vec<f64> = Vec::with_capacity(direction.len());
         for (k, wanted) in direction.iter().enumerate() {
@@ -53,7 +53,7 @@ impl Solution {
     }
 }
 
-/// Makes everything below the diagonal of a column zero; nothing if the column is zero or not finite.
+/// Zeroes a column below the diagonal; `None` if the column is zero or not finite.
 fn reflect(table: &mut [Vec<f64>], column: usize) -> Option<()> {
     let at = |row: &Vec<f64>| row.get(column).copied().unwrap_or(0.0);
     let length = table.iter().skip(column).map(|row| at(row) * at(row)).sum::<f64>().sqrt();
@@ -61,7 +61,7 @@ fn reflect(table: &mut [Vec<f64>], column: usize) -> Option<()> {
     if !(length.is_finite() && length > 0.0) {
         return None;
     }
-    // Away from the first entry, so that nothing cancels.
+    // Reflect away from the first entry, so that nothing cancels.
     let target = if first > 0.0 { -length } else { length };
     let mut mirror: Vec<f64> = table.iter().skip(column).map(at).collect();
     *mirror.first_mut()? -= target;

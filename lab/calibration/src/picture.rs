@@ -1,4 +1,4 @@
-//! A calibration as a picture: readings and curves, residuals, and the error before and after.
+//! Picture of a calibration: readings and curves, residuals, and the error before and after.
 
 use super::fit::Fit;
 use super::procedure::Reading;
@@ -7,13 +7,13 @@ use flotor_hal::VerticalCalibration;
 use flotor_plot::{Axis, Figure, Panel, Quantity, Series};
 
 const MM_PER_M: f64 = 1.0e3;
-/// Readings of different forces at one height stand side by side, this far apart, mm.
+/// Horizontal distance of readings of different forces at one height, mm.
 const APART_MM: f64 = 0.16;
-/// Looks of the fit and of the thesis's polynomial, the same in every panel.
+/// Colour slots of the fit and of the thesis's polynomial, equal in every panel.
 const FIT: usize = 2;
 const REPORT: usize = 3;
 
-/// Draws what was measured, what was fitted, and what came of it. `curves` are the error curves by name.
+/// Draws readings, fit and errors as SVG. `curves`: error curves by name.
 #[must_use]
 pub fn to_svg(
     readings: &[Reading],
@@ -77,13 +77,13 @@ fn residuals(readings: &[Reading], fit: &Fit) -> Panel {
     panel
 }
 
-/// Each group with how far to the side it is drawn, mm, all of them about the height.
+/// Returns each group with its horizontal offset, mm, centred on the height.
 fn side_by_side<T>(groups: Vec<T>) -> impl Iterator<Item = (f64, T)> {
     let middle = 0.5 * groups.len().saturating_sub(1) as f64;
     groups.into_iter().enumerate().map(move |(index, group)| ((index as f64 - middle) * APART_MM, group))
 }
 
-/// Readings of each commanded force, in order of appearance, with their index.
+/// Groups readings by commanded force, in order of appearance, with their index.
 fn by_force(readings: &[Reading]) -> Vec<(f64, Vec<(usize, &Reading)>)> {
     let mut groups: Vec<(f64, Vec<(usize, &Reading)>)> = Vec::new();
     for (index, reading) in readings.iter().enumerate() {

@@ -1,18 +1,18 @@
-//! The procedure: which forces at which heights, how often, and what is written down.
+//! Measurement procedure: forces, heights, repetitions, readings.
 
 use super::CalibrationError;
 use super::rig::Rig;
 
-/// What is measured, in which order.
+/// Forces and heights of a procedure, in order of measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Commanded vertical forces, N; two or more, so that the weight can be told from the field.
+    /// Commanded vertical forces, N; two or more, so that the weight can be separated from the field.
     pub forces_n: Vec<f64>,
-    /// How often each force is measured over all heights.
+    /// Number of runs over all heights for each force.
     pub runs: u32,
     /// Highest height, m; the sensor is lowered from there.
     pub top_m: f64,
-    /// Distance of two heights, m.
+    /// Distance between two heights, m.
     pub step_m: f64,
     /// Number of steps down.
     pub steps: u32,
@@ -21,41 +21,41 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The thesis's procedure (Varadharajan 2007, section 3.4): 10 N and 12 N, two runs each, 14 steps of 1 mm;
+    /// Returns the thesis's procedure (Varadharajan 2007, section 3.4): 10 N and 12 N, two runs each, 14 steps of 1 mm;
     /// here with ten readings at each height, a second of a slow force sensor.
     #[must_use]
     pub fn thesis() -> Self {
         Self { forces_n: vec![10.0, 12.0], runs: 2, top_m: 7.0e-3, step_m: 1.0e-3, steps: 14, readings: 10 }
     }
 
-    /// Heights from the top down, m.
+    /// Returns the heights from the top down, m.
     pub fn heights_m(&self) -> impl Iterator<Item = f64> + '_ {
         (0..=self.steps).map(|step| self.top_m - f64::from(step) * self.step_m)
     }
 
-    /// Number of times the sensor stands still.
+    /// Returns the number of stops of the sensor.
     #[must_use]
     pub fn stops(&self) -> u64 {
         self.forces_n.len() as u64 * u64::from(self.runs) * (u64::from(self.steps) + 1)
     }
 }
 
-/// What the force sensor said while a constant force was commanded.
+/// Reading of the force sensor under a constant commanded force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// Commanded vertical force, N, gravity compensation included.
     pub commanded_n: f64,
-    /// Which run over all heights, from 0.
+    /// Index of the run over all heights, from 0.
     pub run: u32,
-    /// Which stop on the way down, from 0: readings of one stop are at the same height.
+    /// Index of the stop on the way down, from 0: readings of one stop are at the same height.
     pub stop: u32,
-    /// Height of the handle as the device measures it, m.
+    /// Height of the handle as measured by the device, m.
     pub height_m: f64,
-    /// Force of the handle on the sensor, N: what arrives, less the weight of what moves.
+    /// Force of the handle on the sensor, N: delivered force less the weight of the moving part.
     pub force_n: f64,
 }
 
-/// Measures everything of a plan; `stopped` is called after each stop.
+/// Measures all readings of a plan; `stopped` is called after each stop.
 ///
 /// # Errors
 /// [`CalibrationError`], from the rig.
@@ -78,7 +78,7 @@ pub fn measure(
                     if rig.still_rests(&rest)? {
                         break;
                     }
-                    // The sensor moved on in between: which height these readings are of is not known.
+                    // The sensor moved during these readings, so their height is unknown.
                     readings.truncate(before);
                 }
                 stopped();

@@ -1,19 +1,19 @@
-//! The force sensor of a calibration: a device plugin that measures, read for as long as a reading takes.
+//! Force sensor of a calibration: a device plugin that measures, read synchronously.
 
 use super::CalibrationError;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick};
 use std::time::{Duration, Instant};
 
-/// Plugin that reads a force sensor on a serial port.
+/// Default plugin of a force sensor on a serial port.
 pub const SERIAL_SENSOR: &str = "force-sensor";
 
-/// How often it is looked whether there is a reading.
+/// Poll interval for a reading.
 const LOOK_AGAIN: Duration = Duration::from_millis(1);
-/// Longer than a sensor may take before its plugin calls it silent.
+/// Timeout of a reading; longer than the sensor timeout of a plugin.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// An open force sensor.
+/// Open force sensor.
 pub struct ForceSensor {
     device: ActiveDevice,
     opened: Instant,
@@ -24,7 +24,7 @@ impl ForceSensor {
     /// Opens the sensor of a plugin at a port, with its other settings. Not real-time.
     ///
     /// # Errors
-    /// [`CalibrationError`] if there is no sensor, or its plugin has no `port`.
+    /// [`CalibrationError`] if there is no sensor, or the plugin has no parameter `port`.
     pub fn open(plugin: &Plugin, port: &str, mut settings: Vec<Setting>) -> Result<Self, CalibrationError> {
         let setting = Setting::parse(plugin.parameters(), "port", port);
         settings
@@ -36,12 +36,12 @@ impl ForceSensor {
         Ok(Self { device, opened: Instant::now(), tick: Tick::default() })
     }
 
-    /// A reading that began after this call, N. Not real-time.
+    /// Returns a reading that began after this call, N. Not real-time.
     ///
     /// # Errors
-    /// [`CalibrationError::Sensor`] if there is none.
+    /// [`CalibrationError::Sensor`] if no reading arrives.
     pub fn read_n(&mut self) -> Result<f64, CalibrationError> {
-        // The reading that is on its way began before.
+        // Discard the reading that began before.
         self.next_n()?;
         self.next_n()
     }

@@ -1,7 +1,7 @@
-//! The thesis's own correction, as a baseline (Varadharajan 2007, section 3.4 and appendix A).
+//! Correction of the thesis, as a baseline (Varadharajan 2007, section 3.4 and appendix A).
 //!
-//! It fits the excess of the sensor's reading over its mean by `p(z)` in N, z in mm, and multiplies the force of
-//! the spring by `F / (F + p(z))`, where `F` is the feed-forward. Written as a share, `s(z) = 1 + p(z) / F`.
+//! The thesis fits the excess of the sensor's reading over its mean by `p(z)` in N, z in mm, and multiplies the spring
+//! force by `F / (F + p(z))`, where `F` is the feed-forward. As a ratio, `s(z) = 1 + p(z) / F`.
 
 use flotor_hal::{InvalidCalibration, VerticalCalibration};
 
@@ -11,13 +11,13 @@ pub const POLYNOMIAL_N_PER_MM: [f64; 3] = [0.191_57, -0.025_83, -0.004_51];
 /// Feed-forward of the thesis's program, N (section 3.2 and appendix A).
 pub const FEED_FORWARD_N: f64 = 7.7;
 
-/// Half the stretch the thesis measured, m.
+/// Half the height range of the thesis's measurement, m.
 pub const HALF_STRETCH_M: f64 = 7.0e-3;
 
-/// The thesis's polynomial as a calibration of the total command at a feed-forward of `feed_forward_n`.
+/// Returns the thesis's polynomial as a calibration of the total command at a feed-forward of `feed_forward_n`.
 ///
 /// # Errors
-/// [`InvalidCalibration`] if the feed-forward is so small that the curve is none.
+/// [`InvalidCalibration`] if the feed-forward is too small for a valid curve.
 pub fn calibration(feed_forward_n: f64) -> Result<VerticalCalibration, InvalidCalibration> {
     let [constant, linear, square] = POLYNOMIAL_N_PER_MM.map(|coefficient| coefficient / feed_forward_n);
     VerticalCalibration::new(
@@ -26,7 +26,7 @@ pub fn calibration(feed_forward_n: f64) -> Result<VerticalCalibration, InvalidCa
     )
 }
 
-/// The command of the thesis's program, N: feed-forward as it is, spring corrected.
+/// Returns the command of the thesis's program, N: uncorrected feed-forward, corrected spring force.
 #[must_use]
 pub fn command_n(total_n: f64, height_m: f64) -> f64 {
     let z_mm = height_m * 1.0e3;

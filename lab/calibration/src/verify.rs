@@ -1,24 +1,24 @@
-//! How uneven the vertical force is: delivered over commanded, over the height; as the simulated device says it, over
-//! z = -7 mm to 7 mm, or as a force sensor read it.
+//! Unevenness of the vertical force: ratio of delivered to commanded force over the height; as reported by the
+//! simulated device, over z = -7 mm to 7 mm, or as read by a force sensor.
 
 use super::CalibrationError;
 use super::procedure::Reading;
 use super::rig::Rig;
 
-/// Half the stretch the error is measured over, m.
+/// Half the measured height range, m.
 const HALF_STRETCH_M: f64 = 7.0e-3;
-/// Distance of two heights, m; between them a polynomial of the sizes met here bends by less than 1e-4 of itself.
+/// Distance between two heights, m; within it a typical calibration polynomial bends by less than 1e-4 of its value.
 const STEP_M: f64 = 0.25e-3;
 /// Number of steps to either side of the middle.
 const STEPS: u32 = 28;
 
-/// Total vertical force that is asked for, N: between the two a calibration measures.
+/// Commanded total vertical force, N: between the two forces of a calibration.
 pub const PROBE_N: f64 = 11.0;
 
-/// Delivered over commanded force at heights from bottom to top.
+/// Ratio of delivered to commanded force at heights from bottom to top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorCurve {
-    /// Height in m, and the ratio there.
+    /// Height, m, and ratio.
     pub ratios: Vec<(f64, f64)>,
 }
 
@@ -26,7 +26,7 @@ impl ErrorCurve {
     /// Number of heights.
     pub const HEIGHTS: u64 = 2 * STEPS as u64 + 1;
 
-    /// Measures it with what the rig's device was calibrated with; `command_n` says what is commanded, N, for a
+    /// Measures the curve with the present calibration of the rig's device; `command_n` returns the command, N, for a
     /// height in m (usually [`PROBE_N`]). `stopped` is called after each height.
     ///
     /// # Errors
@@ -45,7 +45,7 @@ impl ErrorCurve {
         Ok(Self { ratios })
     }
 
-    /// What a force sensor read at each height, in the mean over forces, runs and readings; what moves weighs `weight_n`.
+    /// Averages a force sensor's readings at each height over forces, runs and repetitions; `weight_n`: weight of the moving part.
     #[must_use]
     pub fn of_readings(readings: &[Reading], weight_n: f64) -> Self {
         let mut stops: Vec<u32> = readings.iter().map(|reading| reading.stop).collect();
@@ -58,11 +58,11 @@ impl ErrorCurve {
             let ratio = |reading: &Reading| (reading.force_n + weight_n) / reading.commanded_n;
             (height_m, at_stop().map(ratio).sum::<f64>() / count)
         };
-        // From the bottom to the top: the sensor was lowered.
+        // From bottom to top, reversed: the sensor was lowered.
         Self { ratios: stops.iter().rev().map(mean).collect() }
     }
 
-    /// Difference of the largest and the smallest ratio, percent.
+    /// Returns the difference between the largest and the smallest ratio, percent.
     #[must_use]
     pub fn error_percent(&self) -> f64 {
         let ratios = || self.ratios.iter().map(|(_, ratio)| *ratio);
@@ -72,5 +72,5 @@ impl ErrorCurve {
     }
 }
 
-/// The stretch is what the steps cover.
+/// The steps cover the height range exactly.
 const _: () = assert!(STEPS as f64 * STEP_M == HALF_STRETCH_M);

@@ -1,13 +1,13 @@
-//! An allocator for the process in which `flotor validate` looks for calls that leave their memory.
+//! Guarding allocator for the process in which `flotor validate` detects accesses outside a block.
 //!
 //! ```text
 //!  a page boundary                                        a page boundary
-//!  |      head | block of `size` bytes | edge (0 to 15 bytes) |  guard, which nobody may touch |
+//!  |      head | block of `size` bytes | edge (0 to 15 bytes) |  guard page without any access |
 //! ```
 //!
-//! Every block ends at a guard, so that a read or write past its end ends the process there. Head and edge hold known
-//! bytes, which are looked at when the block is freed; freed memory becomes a guard itself and is never given again. The
-//! library takes the place of the C library's functions by `LD_PRELOAD`. It keeps no list and takes no lock.
+//! Every block ends at a guard, so that a read or write past its end ends the process there. Head and edge contain
+//! known bytes, which are checked when the block is freed; freed memory becomes a guard itself and is never reused. The
+//! library replaces the C library's functions through `LD_PRELOAD`. It has no lists and no locks.
 #![allow(unsafe_code)]
 
 use rustix::mm::{MapFlags, ProtFlags, mmap_anonymous};
@@ -15,19 +15,19 @@ use std::ffi::{c_int, c_void};
 use std::ptr::null_mut;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Size of a guard, and what lengths are rounded to: a multiple of every page size.
+/// Size of a guard, and rounding unit of lengths: a multiple of every page size.
 const PAGE: usize = 64 * 1024;
-/// Alignment of a block that asks for none.
+/// Default alignment of a block.
 const ALIGNMENT: usize = 16;
-/// The edge behind a block.
+/// Fill byte of the edge behind a block.
 const EDGE: u8 = 0xa5;
 const MAGIC: usize = 0x464c_4f54_4755_4152;
-/// Blocks with a guard at a time: each is two mappings, of which Linux allows a process 65530. What is beyond has none.
+/// Maximum number of guarded blocks at a time: each is two mappings, and Linux allows a process 65530. Further blocks have no guard.
 const MOST_GUARDED: usize = 20_000;
 
 static GUARDED: AtomicUsize = AtomicUsize::new(0);
 
-/// What stands before a block.
+/// Header before a block.
 #[repr(C)]
 struct Head {
     start: usize,
@@ -38,10 +38,10 @@ struct Head {
 
 const HEAD: usize = size_of::<Head>();
 
-/// Memory of the system, zeroed, at `place` or anywhere; null if there is none.
+/// Maps zeroed memory of the system, at `place` or anywhere; null on failure.
 ///
 /// # Safety
-/// `place` is 0, or what lies there for `length` bytes belongs to the caller and is used by nobody.
+/// `place` is 0, or the `length` bytes there belong to the caller and are in use nowhere.
 unsafe fn map(place: usize, length: usize, access: ProtFlags) -> *mut u8 {
     let place_flag = if place == 0 { MapFlags::empty() } else { MapFlags::FIXED };
     let flags = MapFlags::PRIVATE | MapFlags::NORESERVE | place_flag;
@@ -50,7 +50,7 @@ unsafe fn map(place: usize, length: usize, access: ProtFlags) -> *mut u8 {
     mapped.map_or(null_mut(), <*mut c_void>::cast)
 }
 
-/// A block of zeroes; null if there is none or no such block can be.
+/// Allocates a zeroed block; null on failure or for an impossible size.
 fn allocate(size: usize, alignment: usize) -> *mut c_void {
     let needed = size.checked_add(HEAD + alignment).and_then(|bytes| bytes.checked_next_multiple_of(PAGE));
     let Some((length, whole)) = needed.and_then(|bytes| Some((bytes, bytes.checked_add(PAGE)?))) else {
@@ -77,10 +77,10 @@ fn allocate(size: usize, alignment: usize) -> *mut c_void {
     block as *mut c_void
 }
 
-/// The head of a block, if nobody has written over it or the edge; ends the process otherwise.
+/// Returns the head of a block; ends the process if head or edge are damaged.
 ///
 /// # Safety
-/// `block` was given by [`allocate`] and is not freed, else this may end the process by a signal: that is what it is for.
+/// `block` came from [`allocate`] and is not freed; otherwise this may end the process by a signal, which is the purpose.
 unsafe fn head_of(block: *mut c_void) -> Head {
     let place = block as usize;
     // SAFETY: every block has its head before it.
@@ -97,19 +97,19 @@ unsafe fn head_of(block: *mut c_void) -> Head {
     head
 }
 
-/// The C library's `malloc`.
+/// Replaces the C library's `malloc`.
 #[unsafe(no_mangle)]
 pub extern "C" fn malloc(size: usize) -> *mut c_void {
     allocate(size, ALIGNMENT)
 }
 
-/// The C library's `calloc`.
+/// Replaces the C library's `calloc`.
 #[unsafe(no_mangle)]
 pub extern "C" fn calloc(count: usize, size: usize) -> *mut c_void {
     count.checked_mul(size).map_or(null_mut(), |bytes| allocate(bytes, ALIGNMENT))
 }
 
-/// The C library's `free`.
+/// Replaces the C library's `free`.
 ///
 /// # Safety
 /// As in C: null, or a block that is not freed.
@@ -125,7 +125,7 @@ pub unsafe extern "C" fn free(block: *mut c_void) {
     let _ = unsafe { map(head.start, head.length, ProtFlags::empty()) };
 }
 
-/// The C library's `realloc`.
+/// Replaces the C library's `realloc`.
 ///
 /// # Safety
 /// As in C: null, or a block that is not freed.
@@ -144,19 +144,19 @@ pub unsafe extern "C" fn realloc(block: *mut c_void, size: usize) -> *mut c_void
     moved
 }
 
-/// The C library's `aligned_alloc`.
+/// Replaces the C library's `aligned_alloc`.
 #[unsafe(no_mangle)]
 pub extern "C" fn aligned_alloc(alignment: usize, size: usize) -> *mut c_void {
     if alignment.is_power_of_two() { allocate(size, alignment.max(ALIGNMENT)) } else { null_mut() }
 }
 
-/// The C library's `memalign`.
+/// Replaces the C library's `memalign`.
 #[unsafe(no_mangle)]
 pub extern "C" fn memalign(alignment: usize, size: usize) -> *mut c_void {
     aligned_alloc(alignment, size)
 }
 
-/// The C library's `posix_memalign`.
+/// Replaces the C library's `posix_memalign`.
 ///
 /// # Safety
 /// As in C: `out` has room for a pointer.
@@ -172,7 +172,7 @@ pub unsafe extern "C" fn posix_memalign(out: *mut *mut c_void, alignment: usize,
     0
 }
 
-/// The C library's `malloc_usable_size`.
+/// Replaces the C library's `malloc_usable_size`.
 ///
 /// # Safety
 /// As in C: null, or a block that is not freed.

@@ -1,21 +1,21 @@
-//! Times of single calls.
+//! Timing of single calls.
 
 use std::time::Instant;
 
-/// Time since a moment less what the clock costs, ns.
+/// Returns the time since a moment less the overhead of the clock, ns.
 #[must_use]
 pub fn net_ns(overhead_ns: f64, begin: Instant) -> f64 {
     (begin.elapsed().as_nanos() as f64 - overhead_ns).max(0.0)
 }
 
-/// What reading the clock twice costs: the median of many.
+/// Measures the overhead of reading the clock twice, ns: the median of many.
 #[must_use]
 pub fn overhead_ns() -> f64 {
     let mut samples: Vec<f64> = (0..1001).map(|_| net_ns(0.0, Instant::now())).collect();
     quantile(&mut samples, 0.5)
 }
 
-/// The value a part of the samples lies below; NaN of nothing.
+/// Returns the quantile of the samples at a fraction, 0 to 1; NaN without samples.
 pub fn quantile(samples: &mut [f64], part: f64) -> f64 {
     samples.sort_by(f64::total_cmp);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

@@ -1,10 +1,10 @@
-//! The judges of models and devices, and what they ask with.
+//! Checks and stress tests of models and devices.
 //!
 //! - [`stress`]: numerical stability of a force model.
-//! - [`mod@validate`]: a plugin against the rules of the contract.
-//! - [`subject`]: the model under test; [`watch`]: finds the call that does not return.
-//! - [`sampling`]: points that cover a space evenly; [`trajectory`]: smooth motions.
-//! - [`plant`]: the plainest device; [`call_timer`]: times of single calls.
+//! - [`mod@validate`]: check of a plugin against the rules of the contract.
+//! - [`subject`]: model under test; [`watch`]: detector of calls that do not return.
+//! - [`sampling`]: low-discrepancy points; [`trajectory`]: smooth motions.
+//! - [`plant`]: simplest device; [`call_timer`]: timing of single calls.
 //!
 //! Not real-time throughout.
 
@@ -23,10 +23,10 @@ mod wording;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-/// Time between ticks unless said otherwise, ns.
+/// Default time between ticks, ns.
 pub const PERIOD_NS: u64 = 1_000_000;
 
-/// How much is measured.
+/// Extent of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Size {
@@ -37,7 +37,7 @@ pub enum Size {
 }
 
 impl Size {
-    /// Its name.
+    /// Returns the name of the size.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -49,9 +49,9 @@ impl Size {
 
 /// Receives the progress of a measurement, from any thread. `()` ignores it.
 pub trait Progress: Sync {
-    /// So many steps of something begin.
+    /// Begins a measurement of `steps` steps.
     fn begin(&self, name: &str, steps: u64);
-    /// So many more steps are done.
+    /// Reports the completion of further steps.
     fn advance(&self, steps: u64);
 }
 

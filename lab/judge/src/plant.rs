@@ -1,12 +1,12 @@
-//! The plainest device there is: a mass on a damper along each axis, an inertia on a damper about each,
-//! solved exactly while a wrench is held.
+//! Simplest device: a mass with a damper along each axis, an inertia with a damper about each, integrated exactly under
+//! a constant wrench.
 
 use flotor_hal::{DVec3, Pose, Twist, Wrench, orientation_from_rotation_vector};
 
-/// A mass on a damper and perhaps a spring: one axis of the device with the hand that holds it.
+/// Mass with a damper and an optional spring: one axis of the device with the hand on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plant {
-    /// Mass of all that moves, kg.
+    /// Moving mass, kg.
     pub mass_kg: f64,
     /// Damping of the device and the hand, N s/m.
     pub damping_ns_per_m: f64,
@@ -15,10 +15,10 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Position and velocity after a period under a held force: what each has of position, velocity and force before.
+    /// Returns position and velocity after a period of constant force, as coefficients of the initial position, velocity and force.
     ///
-    /// Exact: the state `(x, x', u)` obeys a linear equation with constant coefficients, whose exponential over a period
-    /// holds both the free motion and the answer to the force.
+    /// Exact: the state `(x, x', u)` obeys a linear equation with constant coefficients, whose exponential over a
+    /// period contains both the free motion and the response to the force.
     #[must_use]
     pub fn held(&self, period_s: f64) -> [[f64; 3]; 2] {
         let [position, velocity, _] = exponential([
@@ -36,9 +36,9 @@ impl Plant {
 
 type Matrix = [[f64; 3]; 3];
 
-/// Exponential of a small matrix by scaling, Taylor series and squaring (Moler and Van Loan 2003, method 3).
+/// Returns the exponential of a small matrix by scaling, Taylor series and squaring (Moler and Van Loan 2003, method 3).
 fn exponential(matrix: Matrix) -> Matrix {
-    /// Halved until no entry exceeds 2^-4, where 14 terms leave less than 1e-16.
+    /// Limit of the scaled entries, 2^-4, at which 14 terms leave an error below 1e-16.
     const LARGEST_ENTRY: f64 = 0.0625;
     const TERMS: u32 = 14;
     let largest = matrix.iter().flatten().fold(0.0_f64, |largest, entry| largest.max(entry.abs()));
@@ -74,12 +74,12 @@ fn product(left: &Matrix, right: &Matrix) -> Matrix {
     })
 }
 
-/// The thesis's flotor, kg (Varadharajan 2007, section 3.2).
+/// Mass of the thesis's flotor, kg (Varadharajan 2007, section 3.2).
 const MASS_KG: f64 = 0.58;
-/// Its moments of inertia as the simulated flotor has them (never published), kg m².
+/// Moments of inertia of the simulated flotor (the real ones were never published), kg m².
 const INERTIA_KG_M2: [f64; 3] = [3.35e-3, 3.35e-3, 3.65e-3];
 
-/// The flotor in the model frame, without gravity, on light drag: what is left is the loop alone.
+/// Flotor in the model frame, without gravity and with light drag, to isolate the effect of the loop.
 pub struct Flotor {
     position_m: DVec3,
     velocity_m_per_s: DVec3,
@@ -89,17 +89,17 @@ pub struct Flotor {
     angular: [Hold; 3],
 }
 
-/// One degree of freedom over one period of constant force.
+/// Coefficients of one degree of freedom over one period of constant force.
 #[derive(Clone, Copy)]
 struct Hold([[f64; 3]; 2]);
 
 impl Hold {
-    /// Of `m v' + b v = F`.
+    /// Integrates `m v' + b v = F` over a period.
     fn new(mass_kg: f64, damping_ns_per_m: f64, period_s: f64) -> Self {
         Self(Plant { mass_kg, damping_ns_per_m, stiffness_n_per_m: 0.0 }.held(period_s))
     }
 
-    /// Velocity at the end, and the way.
+    /// Returns the final velocity and the displacement.
     fn advance(self, velocity: f64, force: f64) -> (f64, f64) {
         let [[_, coast_s, compliance], [_, decay, mobility]] = self.0;
         (velocity * decay + force * mobility, velocity * coast_s + force * compliance)
@@ -107,7 +107,7 @@ impl Hold {
 }
 
 impl Flotor {
-    /// At rest at a pose. Drag on rotation is the drag on translation at a lever arm.
+    /// Creates a flotor at rest at a pose. The rotational drag is the translational drag at a lever arm.
     #[must_use]
     pub fn at_rest(pose: Pose, damping_ns_per_m: f64, lever_m: f64, period_s: f64) -> Self {
         let angular_damping = damping_ns_per_m * lever_m * lever_m;
@@ -121,7 +121,7 @@ impl Flotor {
         }
     }
 
-    /// One period under a held wrench.
+    /// Advances one period under a constant wrench.
     pub fn advance(&mut self, wrench: &Wrench) {
         let mut shift_m = [0.0; 3];
         let mut turn_rad = [0.0; 3];
@@ -139,19 +139,19 @@ impl Flotor {
         self.pose = Pose::new(self.position_m, (turn * self.pose.orientation()).normalize());
     }
 
-    /// Where it is.
+    /// Returns the pose.
     #[must_use]
     pub fn pose(&self) -> Pose {
         self.pose
     }
 
-    /// How it moves.
+    /// Returns the twist.
     #[must_use]
     pub fn twist(&self) -> Twist {
         Twist::new(self.velocity_m_per_s, self.angular_rad_per_s)
     }
 
-    /// Energy of motion, J.
+    /// Returns the kinetic energy, J.
     #[must_use]
     pub fn kinetic_j(&self) -> f64 {
         let spin = self.angular_rad_per_s * self.angular_rad_per_s;

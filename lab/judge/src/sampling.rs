@@ -1,17 +1,16 @@
-//! Points that cover a space evenly: the same for the same seed, in any order of work.
+//! Low-discrepancy points that cover a space evenly, reproducible by seed and in any order of work.
 //!
-//! Even coverage is Sobol's sequence (I. M. Sobol, USSR Comput. Math. 7(4), 1967) with the direction numbers
-//! of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30, 2008), its points shifted by the seed: any first part of it
-//! covers the space evenly.
+//! The sequence is Sobol's (I. M. Sobol, USSR Comput. Math. 7(4), 1967) with the direction numbers of S. Joe and F. Y.
+//! Kuo (SIAM J. Sci. Comput. 30, 2008), its points shifted by the seed: any first part of it covers the space evenly.
 
 pub use flotor_core::Random; // the same for the same seed
 
 /// Dimensions of the sequence: one per degree of freedom.
 pub const DIMENSIONS: usize = 6;
-/// Binary digits of a coordinate; the sequence has as many points as fit.
+/// Binary digits of a coordinate; the sequence has 2 to this power points.
 const DIGITS: usize = 32;
-/// Degree and inner coefficients of a primitive polynomial, and the first direction numbers, for dimensions 2
-/// to 6 (Joe and Kuo, file new-joe-kuo-6.21201).
+/// Degree and inner coefficients of a primitive polynomial, and the first direction numbers, for dimensions 2 to 6 (Joe
+/// and Kuo, file new-joe-kuo-6.21201).
 const POLYNOMIALS: [(usize, u32, [u32; 4]); DIMENSIONS - 1] = [
     (1, 0, [1, 0, 0, 0]),
     (2, 1, [1, 3, 0, 0]),
@@ -28,7 +27,7 @@ pub struct Sobol {
 }
 
 impl Sobol {
-    /// The sequence of a seed.
+    /// Builds the sequence of a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut directions = [[0; DIGITS]; DIMENSIONS];
@@ -50,7 +49,7 @@ impl Sobol {
         Self { directions, shift }
     }
 
-    /// Point number `index`, strictly inside the unit cube. Any order, no state.
+    /// Returns point `index`, strictly inside the unit cube. Stateless: any order.
     #[must_use]
     pub fn point(&self, index: u64) -> [f64; DIMENSIONS] {
         std::array::from_fn(|dimension| {

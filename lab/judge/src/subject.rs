@@ -1,7 +1,7 @@
-//! The model under test: one instance that is asked for wrenches, and replaced when it breaks.
+//! Model under test: one instance that is stepped, and replaced after a panic.
 //!
-//! A model without history is asked directly. One with history is walked to each pose in small steps, the way
-//! a hand would take it there, and held until it has converged.
+//! A stateless model is stepped directly. A model with memory is walked to each pose in small steps, as a hand would
+//! take it there, and held until it has converged.
 
 use crate::PERIOD_NS;
 use crate::watch::calling;
@@ -12,19 +12,19 @@ use flotor_hal::{
     orientation_from_rotation_vector, rotation_vector,
 };
 
-/// Largest step of a walk, m.
+/// Largest translation in a step of a walk, m.
 const STEP_M: f64 = 0.05e-3;
-/// Largest turn of a walk, rad.
+/// Largest rotation in a step of a walk, rad.
 const STEP_RAD: f64 = 0.002;
-/// Longest way that is walked in such steps; a pose farther away is approached in as many, larger ones.
+/// Maximum number of steps of a walk; a pose farther away is approached in larger steps.
 const MOST_STEPS: f64 = 4000.0;
-/// Ticks a handle is held for the model to converge.
+/// Maximum number of ticks for which a handle is held for the model to converge.
 const MOST_HOLDS: usize = 2000;
 
-/// An instance for a loop of 1 kHz.
+/// Creates and prepares an instance for a loop of 1 kHz.
 ///
 /// # Errors
-/// [`LoadError`] if the plugin is no model, or it refuses the settings or the loop.
+/// [`LoadError`] if the plugin is no model, or rejects the settings or the loop.
 pub fn prepared(plugin: &Plugin, settings: &[Setting], seed: u64) -> Result<Model, LoadError> {
     let mut model = plugin.create_model(settings)?;
     model.prepare(&LoopConfig { period_ns: PERIOD_NS, seed }).map_err(|refusal| {
@@ -34,16 +34,16 @@ pub fn prepared(plugin: &Plugin, settings: &[Setting], seed: u64) -> Result<Mode
     Ok(model)
 }
 
-/// The input of a tick of a 1 kHz loop whose handle is at rest.
+/// Returns the input of a tick of a 1 kHz loop with the handle at rest.
 #[must_use]
 pub fn input_of(tick: u64, pose: Pose) -> Input {
     Input { tick, time_ns: tick * PERIOD_NS, dt_ns: PERIOD_NS, ..Input::at_rest(pose) }
 }
 
-/// One call, watched.
+/// Makes one call under the watch of [`crate::watch`].
 ///
 /// # Errors
-/// What the model returned in the place of an answer.
+/// The call status of the model, if not `Ok`.
 pub fn call(model: &mut Model, input: &Input) -> Result<Output, CallStatus> {
     let mut output = Output::default();
     let _call = calling(std::slice::from_ref(input));
@@ -53,16 +53,16 @@ pub fn call(model: &mut Model, input: &Input) -> Result<Output, CallStatus> {
     }
 }
 
-/// Steps of a way, of at most 0.05 mm and 2 mrad.
+/// Returns the number of steps for a path, each of at most 0.05 mm and 2 mrad.
 #[must_use]
 pub fn steps(way_m: DVec3, way_rad: DVec3) -> f64 {
     (way_m.length() / STEP_M).max(way_rad.length() / STEP_RAD).ceil()
 }
 
-/// Calls `step` along a way, whose parameter goes from 0 to 1, and at its end until the model has converged.
+/// Calls `step` along a path, whose parameter grows from 0 to 1, and at its end until the model has converged.
 ///
 /// # Errors
-/// The first of `step`.
+/// The first error of `step`.
 pub fn walk<E>(
     steps: f64,
     between: impl Fn(f64) -> Pose,
@@ -84,31 +84,31 @@ pub fn walk<E>(
     Ok(output)
 }
 
-/// How a model failed to answer, and where.
+/// Failure of a model to answer, with the pose.
 #[derive(Clone, Debug)]
 pub struct Trouble {
-    /// What went wrong.
+    /// Kind of the failure.
     pub kind: TroubleKind,
-    /// Where.
+    /// Pose of the failure.
     pub pose: Pose,
 }
 
-/// The ways not to answer.
+/// Kinds of failures.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TroubleKind {
-    /// It panicked, with this message.
+    /// The model panicked, with this message.
     Panicked(String),
-    /// NaN or infinity came back.
+    /// The answer contains NaN or infinity.
     NotFinite,
-    /// The status is none the contract knows.
+    /// The status is not one of the contract.
     UnknownStatus,
-    /// The call was refused.
+    /// The call returned this error status.
     Refused(CallStatus),
-    /// It calls an input sound that is not finite.
+    /// The status for a non-finite input is `Ok`.
     CallsNonsenseSound,
 }
 
-/// One instance of the model under test.
+/// Instance of the model under test.
 pub struct Subject<'a> {
     plugin: &'a Plugin,
     settings: &'a [Setting],
@@ -121,17 +121,17 @@ pub struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// A new instance, at home.
+    /// Creates an instance at home.
     ///
     /// # Errors
-    /// [`LoadError`] as of [`prepared`].
+    /// [`LoadError`] from [`prepared`].
     pub fn new(plugin: &'a Plugin, settings: &'a [Setting], seed: u64) -> Result<Self, LoadError> {
         let model = prepared(plugin, settings, seed)?;
         let demand = Demand::ALL.limited_to(model.serves());
         Ok(Self { plugin, settings, seed, model, demand, at: Pose::HOME, tick: 0, time_ns: 0 })
     }
 
-    /// Back to home, history forgotten; a new instance if the old one is broken.
+    /// Resets the model to home; replaces it by a new instance after a panic.
     pub fn restart(&mut self) {
         match self.model.reset() {
             CallStatus::Panicked => self.replace(),
@@ -145,10 +145,10 @@ impl<'a> Subject<'a> {
         self.time_ns = 0;
     }
 
-    /// The wrench at a pose, reached the way the model's memory asks for.
+    /// Returns the answer at a pose, after a walk there if the model has memory.
     ///
     /// # Errors
-    /// How it failed to answer.
+    /// The failure to answer.
     pub fn ask(&mut self, pose: Pose) -> Result<Output, Trouble> {
         match self.memory() {
             Memory::Stateless => self.step(&self.at_rest(pose)),
@@ -156,16 +156,16 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Walks to a pose, and says so after every step.
+    /// Walks to a pose; calls `on_the_way` after every step.
     ///
     /// # Errors
-    /// How it failed to answer.
+    /// The failure to answer.
     pub fn walk(&mut self, end: Pose, on_the_way: &mut dyn FnMut()) -> Result<Output, Trouble> {
         let from = self.at;
         let way_m = end.position() - from.position();
         let way_rad = rotation_vector(end.orientation() * from.orientation().conjugate());
         let steps = steps(way_m, way_rad);
-        // Nowhere to walk to where a number is missing: the model sees the pose once.
+        // A non-finite pose has no path: the model is stepped there once.
         let steps = if steps.is_finite() { steps.clamp(1.0, MOST_STEPS) } else { 1.0 };
         let between = |part: f64| {
             let turn = orientation_from_rotation_vector(way_rad * part);
@@ -174,10 +174,10 @@ impl<'a> Subject<'a> {
         walk(steps, between, end, |pose| self.advance(pose, Twist::ZERO, PERIOD_NS).inspect(|_| on_the_way()))
     }
 
-    /// One tick of a loop: the pose `dt_ns` after the one before.
+    /// Runs one tick of a loop: the pose `dt_ns` after the previous one.
     ///
     /// # Errors
-    /// How it failed to answer.
+    /// The failure to answer.
     pub fn advance(&mut self, pose: Pose, twist: Twist, dt_ns: u64) -> Result<Output, Trouble> {
         let input = self.input(pose, twist, dt_ns);
         if pose.is_finite() {
@@ -186,13 +186,13 @@ impl<'a> Subject<'a> {
         self.step(&input)
     }
 
-    /// The input of a pose without history.
+    /// Returns the input of a pose without history.
     #[must_use]
     pub fn at_rest(&self, pose: Pose) -> Input {
         Input { demand: self.demand, ..Input::at_rest(pose) }
     }
 
-    /// The input of the next tick.
+    /// Returns the input of the next tick.
     pub fn input(&mut self, pose: Pose, twist: Twist, dt_ns: u64) -> Input {
         let Self { time_ns, tick, demand, .. } = *self;
         let input = Input { twist, time_ns, dt_ns, tick, demand, ..Input::at_rest(pose) };
@@ -201,11 +201,11 @@ impl<'a> Subject<'a> {
         input
     }
 
-    /// One call, checked: an answer is finite and has a known status. A model that panicked is replaced by a new
+    /// Makes one call and checks the answer: finite, with a known status. Replaces a model that panicked by a new
     /// instance.
     ///
     /// # Errors
-    /// How it failed to answer.
+    /// The failure to answer.
     pub fn step(&mut self, input: &Input) -> Result<Output, Trouble> {
         let trouble = |kind| Err(Trouble { kind, pose: input.pose });
         let output = match call(&mut self.model, input) {
@@ -219,7 +219,7 @@ impl<'a> Subject<'a> {
         };
         match output.status() {
             None => trouble(TroubleKind::UnknownStatus),
-            // NaN is how a model says that it has no energy here.
+            // NaN as energy is valid: none available here.
             _ if !output.wrench.is_finite() || output.energy_j.is_infinite() => {
                 trouble(TroubleKind::NotFinite)
             }
@@ -228,19 +228,19 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// The instance itself, for measures that time it or compare bits.
+    /// Returns the instance, for measures that time it or compare bits.
     pub fn model(&mut self) -> &mut Model {
         &mut self.model
     }
 
-    /// Whether it remembers.
+    /// Returns the kind of the model's memory.
     #[must_use]
     pub fn memory(&self) -> Memory {
         self.model.memory()
     }
 
     fn replace(&mut self) {
-        // If no new instance can be had, the broken one stays and every call is one more trouble.
+        // If creation fails, the broken instance remains and every call fails.
         if let Ok(model) = prepared(self.plugin, self.settings, self.seed) {
             self.model = model;
         }

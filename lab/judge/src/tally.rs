@@ -1,44 +1,44 @@
-//! What the parts of a long measurement found, put together in the order of the parts: the same whoever did which.
+//! Results of the parts of a long measurement, merged in the order of the parts, independent of the schedule.
 
 use flotor_hal::{Pose, math};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
-/// Something that is found in parts. Putting together is associative; the default stands for nothing found.
+/// Result of a part. Merging is associative; the default is an empty result.
 pub(crate) trait Merge: Default {
-    /// Adds what the part after this one found.
+    /// Merges the result of the next part.
     fn merge(&mut self, later: Self);
 }
 
-/// Counts are added.
+/// Merges counts by addition.
 impl Merge for u64 {
     fn merge(&mut self, later: Self) {
         *self += later;
     }
 }
 
-/// Of positive numbers the largest counts.
+/// Merges positive numbers by their maximum.
 impl Merge for f64 {
     fn merge(&mut self, later: Self) {
         *self = self.max(later);
     }
 }
 
-/// Of what is wanted once the first counts.
+/// Merges options to the first value.
 impl<T> Merge for Option<T> {
     fn merge(&mut self, later: Self) {
         *self = self.take().or(later);
     }
 }
 
-/// All are kept.
+/// Merges lists by concatenation.
 impl<T> Merge for Vec<T> {
     fn merge(&mut self, mut later: Self) {
         self.append(&mut later);
     }
 }
 
-/// Each with its own.
+/// Merges arrays by element.
 impl<T: Merge, const N: usize> Merge for [T; N]
 where
     [T; N]: Default,
@@ -48,7 +48,7 @@ where
     }
 }
 
-/// A struct that is put together field by field.
+/// Defines a struct that merges field by field.
 macro_rules! tally {
     ($(#[$about:meta])* $seen:vis struct $name:ident { $($(#[$note:meta])* $shown:vis $field:ident: $type:ty,)* }) => {
         $(#[$about])*
@@ -64,7 +64,7 @@ macro_rules! tally {
 }
 pub(crate) use tally;
 
-/// The largest value so far, and the pose it was seen at. Of equals the first stays.
+/// Largest value so far, with its pose; the first of equal ones.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Worst {
     pub(crate) value: f64,
@@ -85,17 +85,17 @@ impl Merge for Worst {
     }
 }
 
-/// How often a positive quantity fell into each twentieth of a decade.
+/// Histogram of a positive quantity with twenty bins per decade.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Decades(BTreeMap<i32, u64>);
 
 /// Bins per decade.
 const BINS_PER_DECADE: f64 = 20.0;
-/// What is smaller counts as this: below rounding of anything that is measured here.
+/// Smallest counted value; smaller ones count as this, below rounding of any measured quantity.
 const SMALLEST: f64 = 1.0e-18;
 
 impl Decades {
-    /// Counts one value.
+    /// Counts one value; ignores NaN.
     pub(crate) fn count(&mut self, value: f64) {
         if value.is_nan() {
             return;
@@ -105,12 +105,12 @@ impl Decades {
         *self.0.entry(bin).or_default() += 1;
     }
 
-    /// Adds what others counted.
+    /// Adds the counts of another histogram.
     pub(crate) fn add(&mut self, later: Self) {
         self.merge(later);
     }
 
-    /// Lower edge, upper edge and count of every bin from the first to the last that counted something.
+    /// Returns lower edge, upper edge and count of every bin from the first to the last non-empty one.
     #[must_use]
     pub fn bins(&self) -> Vec<(f64, f64, u64)> {
         let (Some((first, _)), Some((last, _))) = (self.0.first_key_value(), self.0.last_key_value()) else {

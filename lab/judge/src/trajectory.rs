@@ -5,16 +5,16 @@ use flotor_hal::{DVec3, Pose, math, orientation_from_rotation_vector, rotation_v
 use std::array::from_fn;
 use std::f64::consts::{SQRT_2, TAU};
 
-/// Harmonics of a random motion: enough to turn in every plane of the six dimensions at once.
+/// Number of harmonics of a random motion: enough to turn in every plane of the six dimensions at once.
 const HARMONICS: usize = 3;
 
-/// The pose at a position and a rotation vector, m and rad.
+/// Returns the pose at a position, m, and a rotation vector, rad.
 #[must_use]
 pub fn at(position_m: DVec3, rotation_rad: DVec3) -> Pose {
     Pose::new(position_m, orientation_from_rotation_vector(rotation_rad))
 }
 
-/// What a sensor with these steps (m, rad) says of a pose; without steps it is ideal.
+/// Quantises a pose like a sensor with these steps (m, rad); zero steps leave it unchanged.
 #[must_use]
 pub fn sensed(pose: Pose, quantum_m: f64, quantum_rad: f64) -> Pose {
     let step = |vector: DVec3, quantum: f64| match quantum > 0.0 {
@@ -24,24 +24,24 @@ pub fn sensed(pose: Pose, quantum_m: f64, quantum_rad: f64) -> Pose {
     at(step(pose.position(), quantum_m), step(rotation_vector(pose.orientation()), quantum_rad))
 }
 
-/// A motion over a parameter: a time, or the part of a lap.
+/// Motion over a parameter: a time, or the fraction of a lap.
 pub struct Trajectory {
-    /// m.
+    /// Position, m.
     pub position: Series,
     /// Rotation vector, rad.
     pub rotation: Series,
 }
 
-/// Three coordinates, each a mean and sines about it.
+/// Mean and sines of three coordinates.
 pub struct Series {
-    /// What they swing about.
+    /// Mean of the coordinates.
     pub mean: DVec3,
     terms: Vec<Term>,
-    /// Angle of a rate of one over a unit of the parameter.
+    /// Angle of a rate of one per unit of the parameter, rad.
     scale: f64,
 }
 
-/// A sine and a cosine in each coordinate.
+/// Sine and cosine amplitudes of each coordinate.
 struct Term {
     rate: DVec3,
     sine: DVec3,
@@ -49,19 +49,19 @@ struct Term {
 }
 
 impl Series {
-    /// A sine in each coordinate, of these sizes and angular frequencies, about zero.
+    /// Creates a sine in each coordinate, of these amplitudes and angular frequencies, about zero.
     #[must_use]
     pub fn sines(sine: DVec3, rate: DVec3) -> Self {
         Self { mean: DVec3::ZERO, terms: vec![Term { rate, sine, cosine: DVec3::ZERO }], scale: 1.0 }
     }
 
-    /// An ellipse over 0 to 1, of a sine and a cosine of these sizes.
+    /// Creates an ellipse over 0 to 1, of a cosine and a sine of these amplitudes.
     #[must_use]
     pub fn ellipse(mean: DVec3, cosine: DVec3, sine: DVec3) -> Self {
         Self { mean, terms: vec![Term { rate: DVec3::ONE, sine, cosine }], scale: TAU }
     }
 
-    /// A closed motion that stays within `reach` along each axis: half of it for the mean, half for the swing.
+    /// Draws a closed motion within `reach` along each axis: half for the mean, half for the oscillation.
     fn random(random: &mut Random, reach: f64) -> Self {
         let swing = 0.5 * reach / (HARMONICS as f64 * SQRT_2);
         let mean = random.vector() * (0.5 * reach);
@@ -73,7 +73,7 @@ impl Series {
         Self { mean, terms: cosines.into_iter().enumerate().map(term).collect(), scale: TAU }
     }
 
-    /// The value, and its derivative by the parameter.
+    /// Returns the value, and its derivative by the parameter.
     fn at(&self, parameter: f64) -> (DVec3, DVec3) {
         let terms = self.terms.iter();
         terms.fold((self.mean, DVec3::ZERO), |(sum, slope), Term { rate, sine, cosine }| {
@@ -86,14 +86,14 @@ impl Series {
 }
 
 impl Trajectory {
-    /// A closed motion over 0 to 1, at most so far along each axis, m and rad.
+    /// Draws a closed motion over 0 to 1, within limits along each axis, m and rad.
     #[must_use]
     pub fn random(random: &mut Random, [position_m, rotation_rad]: [f64; 2]) -> Self {
         let position = Series::random(random, position_m);
         Self { position, rotation: Series::random(random, rotation_rad) }
     }
 
-    /// The same motion, moved so that it starts at home.
+    /// Shifts the motion so that it starts at home.
     #[must_use]
     pub fn starting_at_home(mut self) -> Self {
         for series in [&mut self.position, &mut self.rotation] {
@@ -103,14 +103,14 @@ impl Trajectory {
         self
     }
 
-    /// The pose.
+    /// Returns the pose at a parameter.
     #[must_use]
     pub fn pose(&self, parameter: f64) -> Pose {
         self.at(parameter).0
     }
 
-    /// The pose, and the derivatives by the parameter: of the position, m, and of the rotation as the turn it makes,
-    /// rad.
+    /// Returns the pose with derivatives by the parameter: of the position, m, and of the rotation as an angular
+    /// velocity, rad.
     #[must_use]
     pub fn at(&self, parameter: f64) -> (Pose, DVec3, DVec3) {
         let (position_m, shift_m) = self.position.at(parameter);
@@ -119,12 +119,12 @@ impl Trajectory {
     }
 }
 
-/// Angular velocity of an orientation given by a rotation vector `r` that changes by `r'`: the left Jacobian
-/// of the rotations, `r' + (1 - cos a)/a² r x r' + (a - sin a)/a³ r x (r x r')`.
+/// Returns the angular velocity of an orientation given by a rotation vector `r` that changes by `r'`: the left
+/// Jacobian of the rotations, `r' + (1 - cos a)/a² r x r' + (a - sin a)/a³ r x (r x r')`.
 fn turning(rotation_rad: DVec3, slope_rad: DVec3) -> DVec3 {
     let angle = rotation_rad.length();
     let square = angle * angle;
-    // Below 1e-2 the closed forms cancel; the next terms of the series are under one rounding there.
+    // Below 1e-2 the closed forms cancel; the omitted terms of the series are below rounding there.
     let (first, second) = if angle < 1.0e-2 {
         (0.5 - square / 24.0 * (1.0 - square / 30.0), 1.0 / 6.0 - square / 120.0 * (1.0 - square / 42.0))
     } else {

@@ -1,7 +1,7 @@
-//! Finds the step of a model that does not return: every call says where it is while it lasts, and one thread looks.
+//! Watchdog for steps that do not return: every call records its inputs while it lasts, and one thread polls.
 //!
-//! Nothing can end such a call but the end of its process. So the thread that finds one reports it, and whoever
-//! measures runs in a process of its own.
+//! Nothing can end such a call but the end of its process. So the watchdog thread reports it, and each measurement runs
+//! in its own process.
 
 use flotor_hal::{Input, Pose};
 use flotor_session::{Exceeded, LongCall, ThreadClock};
@@ -12,10 +12,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread;
 use std::time::Duration;
 
-/// Interval between two looks.
+/// Poll interval.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// A thread that makes calls, and the call that it is in.
+/// Thread that makes calls, with its present call.
 struct Caller {
     clock: ThreadClock,
     doing: Mutex<Doing>,
@@ -23,13 +23,13 @@ struct Caller {
 
 #[derive(Clone, Copy, Default)]
 struct Doing {
-    /// Calls that have begun.
+    /// Number of calls so far.
     calls: u64,
-    /// Steps of the one that lasts, and the tick and the pose of the first.
+    /// Present call: number of steps, and tick and pose of the first.
     at: Option<(u32, u64, Pose)>,
 }
 
-/// The threads that have made calls.
+/// Threads that have made calls.
 static CALLERS: Mutex<Vec<Weak<Caller>>> = Mutex::new(Vec::new());
 
 thread_local! {
@@ -40,12 +40,12 @@ thread_local! {
     };
 }
 
-/// What is locked here is whole after each statement.
+/// Locks a mutex; poisoning is ignored, because no invariant spans statements.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// While it lives, this thread is in a call.
+/// Guard: while it exists, this thread is in a call.
 pub struct Calling(());
 
 /// Marks this thread as being in `step` with these inputs, until the result is dropped. Takes some tens of nanoseconds.
@@ -66,14 +66,14 @@ impl Drop for Calling {
     }
 }
 
-/// A step that does not return.
+/// Step that does not return.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StuckStep {
-    /// Tick of its input.
+    /// Tick of the step's input.
     pub tick: u64,
-    /// Pose of its input.
+    /// Pose of the step's input.
     pub pose: Pose,
-    /// The limit that it has exceeded.
+    /// Limit that was exceeded.
     pub limit: Exceeded,
 }
 
@@ -83,11 +83,11 @@ impl fmt::Display for StuckStep {
     }
 }
 
-/// Watches all threads of this process, until one is in a step for longer than `limit` of processor time, or waits there ten
-/// times as long: then it reports the step, once, from a thread of its own.
+/// Watches all threads of this process until a step exceeds `limit` of processor time, or ten times that in waiting;
+/// then reports the step, once, from the watchdog's thread.
 ///
 /// # Errors
-/// The system's, if there can be no thread.
+/// If no thread can be started.
 pub fn start(limit: Duration, on_stuck: impl FnOnce(StuckStep) + Send + 'static) -> io::Result<()> {
     thread::Builder::new().spawn(move || {
         let mut seen = BTreeMap::new();
@@ -101,7 +101,7 @@ pub fn start(limit: Duration, on_stuck: impl FnOnce(StuckStep) + Send + 'static)
     Ok(())
 }
 
-/// Returns a step that has exceeded its limit. `seen`: the call of each thread.
+/// Returns a step that has exceeded its limit. `seen`: call of each thread.
 fn stuck(seen: &mut BTreeMap<usize, LongCall<u64>>, limit: Duration) -> Option<StuckStep> {
     let callers: Vec<Arc<Caller>> = {
         let mut all = locked(&CALLERS);

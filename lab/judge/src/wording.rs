@@ -1,10 +1,10 @@
-//! Answers of plugins in words and numbers with units, for findings.
+//! Text form of answers of plugins, with units, for findings.
 
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, DeviceState, LinearField, Output, Pose, Twist, Wrench, rotation_vector};
 use std::time::Duration;
 
-/// Returns the words for a call status.
+/// Returns the text of a call status.
 pub(crate) fn status(status: CallStatus) -> &'static str {
     match status {
         CallStatus::Ok => "ok",
@@ -21,7 +21,7 @@ pub(crate) fn vector(vector: DVec3) -> String {
     format!("[{x}, {y}, {z}]")
 }
 
-/// Returns a time in the unit that suits its length, with three digits.
+/// Formats a time in the unit that suits its length, with three digits.
 pub(crate) fn time(time: Duration) -> String {
     let (number, unit) = match time.as_nanos() {
         0..1_000 => (time.as_secs_f64() * 1.0e9, "ns"),
@@ -35,7 +35,7 @@ pub(crate) fn time(time: Duration) -> String {
     format!("{short} {unit}")
 }
 
-/// Returns position, m, and rotation vector, rad, of a pose.
+/// Formats position, m, and rotation vector, rad, of a pose.
 pub(crate) fn pose(pose: &Pose) -> String {
     let turned_rad = rotation_vector(pose.orientation());
     match turned_rad == DVec3::ZERO {
@@ -44,23 +44,23 @@ pub(crate) fn pose(pose: &Pose) -> String {
     }
 }
 
-/// Returns velocity, m/s, and angular velocity, rad/s, of a twist.
+/// Formats velocity, m/s, and angular velocity, rad/s, of a twist.
 pub(crate) fn twist(twist: &Twist) -> String {
     format!("{} m/s and {} rad/s", vector(twist.linear()), vector(twist.angular()))
 }
 
-/// Returns force, N, and torque, N·m, of a wrench.
+/// Formats force, N, and torque, N·m, of a wrench.
 pub(crate) fn wrench(wrench: &Wrench) -> String {
     format!("{} N and {} N·m", vector(wrench.force()), vector(wrench.torque()))
 }
 
-/// Returns wrench, energy and status of the answer to a step.
+/// Formats wrench, energy and status of the answer to a step.
 pub(crate) fn output(output: &Output) -> String {
     let status = if output.status().is_some() { "" } else { ", with a status unknown to the contract" };
     format!("{} and {} J{status}", wrench(&output.wrench), output.energy_j)
 }
 
-/// Returns wrench and range of a local linear model.
+/// Formats wrench and range of a local linear model.
 pub(crate) fn linear_field(field: &LinearField) -> String {
     let stiffness =
         if field.stiffness.iter().flatten().all(|rate| rate.is_finite()) { "finite" } else { "not finite" };
@@ -73,7 +73,7 @@ pub(crate) fn linear_field(field: &LinearField) -> String {
     )
 }
 
-/// Returns pose, twist and delivered wrench of a sample.
+/// Formats pose, twist and delivered wrench of a sample.
 pub(crate) fn sample(state: &DeviceState) -> String {
     let DVec3 { x, y, z } = state.pose.position();
     format!(

@@ -1,8 +1,8 @@
-//! A force model at given poses, without a loop or a device.
+//! Evaluation of a force model at given poses, without a loop or a device.
 //!
-//! A model without history is asked directly, in batches. One with history is taken to each pose the way a
-//! hand would: along a straight line in position and rotation vector, in small steps, then held until it has
-//! converged. Where every pose is reached from home the ways are independent, and all processors walk them.
+//! A stateless model is evaluated directly, in batches. A model with memory is moved to each pose as a hand would do:
+//! along a straight line in position and rotation vector, in small steps, then held until it has converged. If every
+//! pose is reached from home the paths are independent, and all processors share them.
 
 use super::PERIOD_NS;
 use flotor_hal::abi::CallStatus;
@@ -22,7 +22,7 @@ pub struct Handle {
 }
 
 impl Handle {
-    /// The home pose.
+    /// Home pose.
     pub const HOME: Handle = Handle { position_m: DVec3::ZERO, rotation_rad: DVec3::ZERO };
 
     fn pose(self) -> Pose {
@@ -41,69 +41,69 @@ pub struct Answer {
     pub wrench: Wrench,
     /// Stored energy, J, if the model has one.
     pub energy_j: Option<f64>,
-    /// What the model says about the answer.
+    /// Status of the answer.
     pub status: StepStatus,
-    /// Its details, in the order of its [`flotor_hal::Detail`]s; empty if not requested.
+    /// Details in the order of the model's [`flotor_hal::Detail`]s; empty if not requested.
     pub details: Vec<Option<f64>>,
 }
 
-/// Whether poses are independent or successive.
+/// Path to each pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Travel {
-    /// Each pose is reached from home.
+    /// From home.
     FromHome,
-    /// Each pose is reached from the one before.
+    /// From the previous pose.
     Successive,
-    /// Each pose is that of the next tick of a loop: one step, wherever it comes from.
+    /// In one step of a loop, one tick per pose.
     PerTick,
 }
 
-/// Whether a model also returns its details.
+/// Choice of the model's details in an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Details {
     /// Wrench, energy and status only.
     Omitted,
-    /// Its details as well.
+    /// Details as well.
     Asked,
 }
 
-/// Why there are no answers.
+/// Failure of an evaluation.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
     /// The model could not be created.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// It panicked and cannot be called any more.
+    /// The model panicked and cannot be called any more.
     #[error("the model failed: {words}")]
     Broke {
-        /// Its message.
+        /// Message of the model.
         words: String,
     },
 }
 
-/// Longest way that is walked in steps; a pose farther away is approached in as many, larger ones.
+/// Maximum number of steps of a walk; a pose farther away is approached in larger steps.
 const MOST_STEPS: f64 = 1.0e5;
-/// Poses evaluated per call of a model without history.
+/// Poses per batch call of a stateless model.
 const BATCH: usize = 1024;
 
-/// A model to be asked, and how.
+/// Settings of an evaluation.
 pub struct Evaluation<'a> {
-    /// The plugin.
+    /// Plugin of the model.
     pub plugin: &'a Plugin,
-    /// Its settings.
+    /// Settings of the model.
     pub settings: &'a [Setting],
-    /// Whether poses are independent or successive.
+    /// Path to each pose.
     pub travel: Travel,
-    /// Whether it is asked for more than the wrench.
+    /// Choice of the model's details.
     pub details: Details,
 }
 
 impl<'a> Evaluation<'a> {
-    /// Answers for all handles, in order, the same however many processors walk. `on_answer` is called once for each
-    /// answer, in no particular order and from any of them. Not real-time.
+    /// Evaluates the model for all handles, in order; the result does not depend on the number of processors.
+    /// `on_answer` is called once for each answer, in no particular order and from any thread. Not real-time.
     ///
     /// # Errors
-    /// [`EvaluateError`] if the model refuses its settings or panics.
+    /// [`EvaluateError`] if the model rejects its settings or panics.
     pub fn answers(
         &self,
         handles: &[Handle],
@@ -140,7 +140,7 @@ impl<'a> Evaluation<'a> {
     }
 }
 
-/// One handle, and the model that is asked where it is.
+/// Handle with the model under evaluation.
 struct Walker<'a> {
     subject: Subject<'a>,
     details: Details,
@@ -148,7 +148,7 @@ struct Walker<'a> {
 }
 
 impl Walker<'_> {
-    /// As if it had never moved.
+    /// Resets the model to home without history.
     fn go_home(&mut self) {
         self.subject.restart();
         self.at = Handle::HOME;
@@ -160,7 +160,7 @@ impl Walker<'_> {
         on_answer: &(dyn Fn() + Sync),
     ) -> Result<Vec<Answer>, EvaluateError> {
         if self.details == Details::Asked {
-            // They are about the last step: one pose at a time.
+            // Details refer to the last step: one pose at a time.
             let ask = |handle: &Handle| {
                 let output = self.step(handle.pose())?;
                 on_answer();
@@ -183,16 +183,16 @@ impl Walker<'_> {
         Ok(answers)
     }
 
-    /// One step at a pose.
+    /// Makes one step at a pose.
     fn tick_at(&mut self, handle: Handle) -> Result<Answer, EvaluateError> {
         let output = self.step(handle.pose())?;
         self.answer(handle, &output)
     }
 
-    /// Takes the handle from where it is to a pose and holds it there until the model has converged.
+    /// Moves the handle to a pose and holds it there until the model has converged.
     fn walk_to(&mut self, target: Handle) -> Result<Answer, EvaluateError> {
         if !target.is_finite() {
-            // Nowhere to walk to: the model gets to see the pose once and says what it thinks of it.
+            // A non-finite pose has no path: the model is stepped there once and returns its status.
             let output = self.step(target.pose())?;
             return self.answer(target, &output);
         }

@@ -1,8 +1,8 @@
-//! Timing of the servo on this machine, next to that of a bare loop.
+//! Timing of the servo on this machine, compared with that of a bare loop.
 //!
-//! Lateness on a shared machine is mostly the machine's. So the servo is compared with a loop that only sleeps
-//! and spins: same spin window, same priority, same core, in alternating slices of a second, so that both meet
-//! the same neighbours. What the servo adds is the difference.
+//! Lateness on a shared machine is mostly caused by the machine. So the servo is compared with a loop that only sleeps
+//! and spins: with equal spin window, priority and core, in alternating slices of a second, so that both have the same
+//! neighbours. The difference is caused by the servo.
 
 use flotor_hal::SampleWait;
 use flotor_hal::abi::loader::Stopper;
@@ -16,58 +16,58 @@ use serde::Serialize;
 /// Length of one slice, ns.
 const SLICE_NS: u64 = 1_000_000_000;
 
-/// How one of the two loops kept time.
+/// Timing of one of the two loops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LoopTiming {
-    /// Start of a tick after its deadline.
+    /// Delay of a tick's start after its deadline, ns.
     pub lateness_ns: Percentiles,
-    /// Ticks run.
+    /// Number of ticks run.
     pub ticks: u64,
-    /// Ticks that started later than a tenth of the period.
+    /// Number of ticks that started later than a tenth of the period.
     pub late_ticks: u64,
-    /// Ticks skipped because their whole period had passed.
+    /// Number of ticks skipped because their whole period had passed.
     pub missed_ticks: u64,
 }
 
-/// Servo and bare loop side by side.
+/// Timing of servo and bare loop.
 #[derive(Clone, Debug, Serialize)]
 pub struct JitterReport {
-    /// Rate of both, Hz.
+    /// Rate of both loops, Hz.
     pub rate_hz: f64,
-    /// The final stretch before a deadline that both spin, ns.
+    /// Time before a deadline that both loops spin, ns.
     pub spin_window_ns: u64,
-    /// Slices of each.
+    /// Number of slices of each loop.
     pub slices: u64,
-    /// The servo with its device, models and envelope.
+    /// Timing of the servo with its device, models and envelope.
     pub servo: LoopTiming,
-    /// Sleep, spin, look at the clock.
+    /// Timing of the bare loop: sleep, spin, read the clock.
     pub bare: LoopTiming,
-    /// How many ticks more the servo missed than the bare loop, and how far that is to be trusted.
+    /// Difference of the missed ticks, with its standard error.
     pub missed_more: MissedMore,
-    /// What the system granted to both.
+    /// Real-time configuration of both loops.
     #[serde(skip)]
     pub real_time: RealTimeReport,
-    /// Histograms of both, for a picture: lateness and how many ticks had it.
+    /// Histograms of both loops, for a picture: lateness, ns, and number of ticks.
     #[serde(skip)]
     pub bins: [Vec<(u64, u64)>; 2],
 }
 
-/// A difference of counts between servo and bare loop.
+/// Difference of the missed ticks between servo and bare loop.
 ///
-/// On a shared machine a second without disturbance is followed by one with twenty missed ticks, whichever loop has its turn.
-/// How much the pairs of slices differ says how much of the difference may be that.
+/// On a shared machine a second without disturbance is followed by one with twenty missed ticks, in either loop. The
+/// scatter of the pairs of slices estimates the part of the difference due to such disturbances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MissedMore {
-    /// Servo less bare loop, ticks.
+    /// Missed ticks of the servo less those of the bare loop.
     pub ticks: f64,
-    /// Standard error of that, ticks: it grows with the root of the time; none of a single pair.
+    /// Standard error of `ticks`; grows with the root of the time. `None` for a single pair.
     pub standard_error: Option<f64>,
 }
 
-/// Runs servo and bare loop in turns for `slices` seconds each. `progress` is called after each pair.
+/// Runs servo and bare loop alternately for `slices` seconds each. `progress` is called after each pair.
 ///
 /// # Errors
-/// [`RunError::NoThread`] if the system has no thread for the loop, [`RunError::Plugin`] if a device refuses to be energised.
+/// [`RunError::NoThread`] if the loop's thread cannot be started, [`RunError::Plugin`] if a device rejects activation.
 pub fn measure(
     session: Session,
     slices: u64,
@@ -99,7 +99,7 @@ pub fn measure(
                 done += 1;
                 progress(done);
             }
-            // A button, or the device itself.
+            // Stopped by a button, or by the device itself.
             if let RunState::EmergencyStopped(source) = servo.run() {
                 stop.press(source);
             }
@@ -121,7 +121,7 @@ pub fn measure(
     })
 }
 
-/// The bare loop, written separately: it shares only the system call with the servo's schedule.
+/// Runs the bare loop, written separately: it shares only the system call with the servo's schedule.
 fn bare_slice(timing: &mut Timing, period_ns: u64, window: SpinWindow) {
     let start_ns = monotonic_ns() + period_ns;
     let mut slot = 0;
@@ -141,7 +141,7 @@ fn bare_slice(timing: &mut Timing, period_ns: u64, window: SpinWindow) {
     }
 }
 
-/// What the slices of a pair differ by, over all pairs.
+/// Differences between the slices of a pair, over all pairs.
 #[derive(Default)]
 struct Pairs {
     count: f64,
@@ -157,7 +157,7 @@ impl Pairs {
         self.sum_of_squares += difference * difference;
     }
 
-    /// The pairs are taken as independent of each other: the standard error of a sum of `n` is that of one times the root of `n`.
+    /// Returns the sum; the pairs count as independent: the standard error of a sum of `n` is that of one times the root of `n`.
     fn missed_more(&self) -> MissedMore {
         let variance = (self.sum_of_squares - self.sum * self.sum / self.count) / (self.count - 1.0);
         let standard_error = (self.count > 1.0).then(|| (self.count * variance.max(0.0)).sqrt());

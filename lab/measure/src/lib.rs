@@ -1,14 +1,14 @@
 //! Measurements of plugins, loops and recordings.
 //!
-//! - [`evaluate`]: a force model at given [`poses`].
+//! - [`evaluate`]: evaluation of a force model at given [`poses`].
 //! - [`mod@bench`]: cost and error of an evaluation.
-//! - [`stability`]: the largest stable stiffness of the servo.
+//! - [`stability`]: largest stable stiffness of the servo.
 //! - [`jitter`]: timing of the servo.
-//! - [`replay`]: the models of a recording re-evaluated.
+//! - [`replay`]: re-evaluation of the models of a recording.
 //!
-//! The judges of models and devices, and what all of these ask a model with, are `flotor-judge`.
+//! The checks and stress tests of models and devices, and the shared means to call a model, are in `flotor-judge`.
 //!
-//! Nothing here runs a hand; not real-time throughout.
+//! Nothing here drives a device with a hand; not real-time throughout.
 
 pub mod bench;
 pub mod cli;

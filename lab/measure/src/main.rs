@@ -1,4 +1,4 @@
-//! The program `flotor-lab`; everything is in the library.
+//! Entry point of the program `flotor-lab`; the rest is in the library.
 
 fn main() -> std::process::ExitCode {
     flotor_lab::cli::main()

@@ -1,4 +1,4 @@
-//! A table of poses: `[id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad`, one row a pose.
+//! Table of poses: `[id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad`, one row per pose.
 
 use crate::evaluate::Handle;
 use flotor_hal::{DVec3, HashLines, Table, TextProblem, text_from_bytes};
@@ -8,28 +8,28 @@ use flotor_session::scene::did_you_mean;
 const POSE_COLUMNS: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
 /// Optional first column.
 const ID_COLUMN: &str = "id";
-/// Longest text of a table that a message repeats, characters.
+/// Maximum length of a quotation from the table in a message, characters.
 const LONGEST_QUOTE: usize = 40;
 
-/// The poses of a table and their names.
+/// Poses of a table with their names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Poses {
-    /// The column `id`, or the number of the row, from 0.
+    /// Values of the column `id`, or the numbers of the rows, from 0.
     pub ids: Vec<String>,
-    /// A pose a row; NaN and infinity are legal.
+    /// Pose of each row; NaN and infinity are valid.
     pub handles: Vec<Handle>,
 }
 
-/// Why a table is none, with file and line; an empty file has no line.
+/// Error in a table, with file and line; an empty file has no line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct PosesError(String);
 
 impl Poses {
-    /// Reads a table; `file` is its name in errors. Not real-time.
+    /// Parses a table; `file`: name for errors. Not real-time.
     ///
     /// # Errors
-    /// [`PosesError`]: the line, and what is wrong with it.
+    /// [`PosesError`] with the line and the problem.
     pub fn parse(file: &str, bytes: Vec<u8>) -> Result<Self, PosesError> {
         let wrong = |problem: &TextProblem| PosesError(problem.in_file(file));
         let text = text_from_bytes(bytes).map_err(|problem| wrong(&problem))?;
@@ -60,7 +60,7 @@ impl Poses {
     }
 }
 
-/// Where each pose column is; the error of a missing or unknown one names the right columns.
+/// Returns the position of each pose column; the error of a missing or unknown one names the right columns.
 fn columns(header: &[String]) -> Result<[usize; 6], String> {
     let known = || POSE_COLUMNS.iter().copied().chain([ID_COLUMN]);
     if let Some(unknown) = header.iter().find(|name| !known().any(|column| column == name.as_str())) {
@@ -75,12 +75,12 @@ fn columns(header: &[String]) -> Result<[usize; 6], String> {
     Ok(columns)
 }
 
-/// A text of the table in a message of one line: what stands in quotation marks may have several.
+/// Escapes a text of the table for a message of one line: quoted text may have several.
 fn plain(text: &str) -> String {
     text.chars().take(LONGEST_QUOTE).flat_map(char::escape_debug).collect()
 }
 
-/// The header as people write it.
+/// Returns the header as users write it.
 fn header_text() -> String {
     format!("[{ID_COLUMN},]{}", POSE_COLUMNS.join(","))
 }

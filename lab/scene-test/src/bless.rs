@@ -1,4 +1,4 @@
-//! `--bless`: expected numbers become those of the runs, in the file; each change is printed, and each failure that it cannot change.
+//! `--bless`: replaces expected numbers in test files by measured ones; prints each change, and each failure beyond its reach.
 
 use crate::bound::Bound;
 use crate::case::{Case, Check};
@@ -10,16 +10,16 @@ use serde_json::Value;
 use std::fmt::Write;
 use std::ops::Range;
 
-/// Which expectations of a file are changed.
+/// Kinds of expectations that are replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Blessed {
-    /// Those of the form `{ value, within }` that were missed.
+    /// Missed expectations of the form `{ value, within }`.
     Numbers,
-    /// Also the digests of all runs.
+    /// Missed numbers, and the digests of all runs.
     NumbersAndDigests,
 }
 
-/// Changes the files of these cases, and says what. An expectation that was changed is no failure any more.
+/// Updates the files of these cases and prints the changes. Removes the failures of changed expectations.
 pub(crate) fn bless(
     files: &[TestFile],
     cases: &[Case<'_>],
@@ -30,7 +30,7 @@ pub(crate) fn bless(
         let own: Vec<usize> =
             (0..cases.len()).filter(|index| std::ptr::eq(cases[*index].file, file)).collect();
         let mut text = file.text.clone();
-        // From the end on: a change leaves what stands before it where it was.
+        // From the end on: earlier positions stay valid after a change.
         let mut near: Vec<&Expectation> =
             file.expect.iter().filter(|expected| matches!(expected.bound, Bound::Near { .. })).collect();
         near.sort_by_key(|expected| std::cmp::Reverse(expected.at));
@@ -88,7 +88,7 @@ pub(crate) fn bless(
     Ok(())
 }
 
-/// Where the number after `value =` stands, on the line of the expectation.
+/// Returns the range of the number after `value =`, on the line of the expectation.
 fn number_of_value(text: &str, expected: &Expectation) -> Option<Range<usize>> {
     let line = text.get(expected.at..)?.lines().next()?;
     let last = expected.path.rsplit('.').next()?;
@@ -142,7 +142,7 @@ fn digests(
     Ok(())
 }
 
-/// The text with the table `[digests]` replaced, or at its end.
+/// Returns the text with the table `[digests]` replaced or appended.
 fn with_table(text: &str, table: &str) -> String {
     let mut kept = String::new();
     let mut inside = false;

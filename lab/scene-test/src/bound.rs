@@ -1,24 +1,24 @@
-//! What a number of a run is expected to be.
+//! Bounds of the numbers of a run.
 
 use serde_json::Value;
 
-/// What is expected of one value.
+/// Bound of one value.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Bound {
-    /// Not below, not above; at least one of the two.
+    /// Minimum and maximum; at least one of the two.
     Range { min: Option<f64>, max: Option<f64> },
-    /// No further away than this.
+    /// Value with a tolerance.
     Near { value: f64, within: f64 },
-    /// Exactly this number.
+    /// Exact number.
     Number(f64),
-    /// Exactly this word.
+    /// Exact text.
     Word(String),
-    /// Exactly this truth.
+    /// Exact truth value.
     Flag(bool),
 }
 
 impl Bound {
-    /// Reads a bound. A table that has other keys than those of a bound is a level of the path: `None`.
+    /// Parses a bound; `None` for a table without keys of a bound, which is a level of the path.
     pub(crate) fn read(value: &toml::Value) -> Result<Option<Self>, String> {
         const KEYS: [&str; 4] = ["min", "max", "value", "within"];
         let table = match value {
@@ -47,7 +47,7 @@ impl Bound {
         }
     }
 
-    /// Whether a value meets it. NaN and a missing value meet no bound.
+    /// Returns true if a value is within the bound. NaN and a missing value never are.
     pub(crate) fn is_met_by(&self, value: Option<&Value>) -> bool {
         let number = value.and_then(Value::as_f64).unwrap_or(f64::NAN);
         match self {
@@ -61,7 +61,7 @@ impl Bound {
         }
     }
 
-    /// The numbers at which it ends, from the least.
+    /// Returns the finite ends of the bound, in ascending order.
     pub(crate) fn ends(&self) -> Vec<f64> {
         match self {
             Self::Range { min, max } => [min, max].into_iter().filter_map(|end| *end).collect(),
@@ -71,7 +71,7 @@ impl Bound {
         }
     }
 
-    /// Whether a value of this kind could meet it.
+    /// Returns true if a value of this type could be within the bound.
     pub(crate) fn fits(&self, value: &Value) -> bool {
         match (self, value) {
             (_, Value::Null) => true,
@@ -81,7 +81,7 @@ impl Bound {
         }
     }
 
-    /// In words.
+    /// Describes the bound in words.
     pub(crate) fn text(&self) -> String {
         match self {
             Self::Range { min: Some(min), max: Some(max) } => format!("{min} to {max}"),
@@ -95,7 +95,7 @@ impl Bound {
     }
 }
 
-/// A finite number of a test file.
+/// Parses a finite number of a test file.
 pub(crate) fn number(value: &toml::Value) -> Result<f64, String> {
     let number = match value {
         toml::Value::Integer(number) => *number as f64,

@@ -1,12 +1,12 @@
-//! The cases of a file: every seed with every combination of settings, and every check of its plugins.
+//! Cases of a file: every seed with every combination of settings, and every check of its plugins.
 
 use crate::file::TestFile;
 
-/// One thing that passes or fails.
+/// Single test that passes or fails.
 #[derive(Debug)]
 pub(crate) struct Case<'f> {
     pub(crate) file: &'f TestFile,
-    /// What distinguishes it from the other cases of its file.
+    /// Distinguishing part of the name within the file.
     pub(crate) label: String,
     pub(crate) check: Check,
 }
@@ -21,7 +21,7 @@ pub(crate) enum Check {
 }
 
 impl<'f> Case<'f> {
-    /// The cases of a file, in an order of their own.
+    /// Returns the cases of a file, in a fixed order.
     pub(crate) fn of(file: &'f TestFile) -> Vec<Self> {
         let runs = !(file.expect.is_empty() && file.reference.is_none() && file.digests.is_empty());
         let mut cases = Vec::new();
@@ -49,7 +49,7 @@ impl<'f> Case<'f> {
     }
 }
 
-/// Every choice of one value for each key.
+/// Returns every choice of one value for each key.
 pub(crate) fn combinations(set: &[(String, Vec<String>)]) -> Vec<Vec<(String, String)>> {
     set.iter().fold(vec![Vec::new()], |chosen, (key, values)| {
         let with = |before: &Vec<(String, String)>, value: &String| {
@@ -59,7 +59,7 @@ pub(crate) fn combinations(set: &[(String, Vec<String>)]) -> Vec<Vec<(String, St
     })
 }
 
-/// A part of all cases: those whose names fall to it. The parts are disjoint, and together they are the whole.
+/// Part of all cases, selected by name. The parts are disjoint and complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Shard {
     number: u64,
@@ -80,7 +80,7 @@ impl std::str::FromStr for Shard {
 
 impl Shard {
     pub(crate) fn has(self, name: &str) -> bool {
-        // FNV-1a: the same on every machine and in every version.
+        // FNV-1a: equal on every machine and in every version.
         let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
         });

@@ -1,4 +1,4 @@
-//! Carrying out a case, and judging what comes of it.
+//! Execution and judgement of cases.
 
 use crate::bound::Bound;
 use crate::case::{Case, Check, combinations};
@@ -15,35 +15,35 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// What came of a case.
+/// Result of a case.
 #[derive(Debug, Serialize)]
 pub(crate) struct Outcome {
     pub(crate) case: String,
     pub(crate) scene: PathBuf,
     pub(crate) passed: bool,
     pub(crate) failures: Vec<Failure>,
-    /// The values that were judged, by path.
+    /// Judged values by path.
     pub(crate) values: BTreeMap<String, Value>,
-    /// The command that judges the case again.
+    /// Command that repeats the case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) repeat: Option<String>,
-    /// A command that shows what failed by itself: a pose, a rule, a measure, or a run as far as its fault.
+    /// Command that reproduces the failure alone: a pose, a rule, a measure, or a run up to its fault.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) detail: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) picture: Option<PathBuf>,
     #[serde(skip)]
     pub(crate) digest: Option<String>,
-    /// The test file.
+    /// Path of the test file.
     #[serde(skip)]
     pub(crate) file: PathBuf,
-    /// How long it took.
+    /// Duration of the case.
     #[serde(skip)]
     pub(crate) took: Duration,
 }
 
 impl Outcome {
-    /// Removes what is said of a failure where none remains.
+    /// Sets `passed`, and clears the commands of a failure if there is none.
     pub(crate) fn settle(&mut self) {
         self.passed = self.failures.is_empty();
         if self.passed {
@@ -51,13 +51,13 @@ impl Outcome {
         }
     }
 
-    /// The commands for a failure, the one that judges first.
+    /// Returns the commands for a failure, the one that repeats the case first.
     pub(crate) fn commands(&self) -> impl Iterator<Item = &String> {
         self.repeat.iter().chain(&self.detail)
     }
 }
 
-/// One expectation that was not met.
+/// Expectation that was not met.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Failure {
     pub(crate) what: String,
@@ -70,20 +70,20 @@ impl Failure {
         Self { what: what.into(), expected: expected.into(), got: got.into() }
     }
 
-    /// As one line, for people.
+    /// Formats the failure in one line.
     pub(crate) fn line(&self) -> String {
         format!("{}: expected {}, got {}", self.what, self.expected, self.got)
     }
 }
 
-/// A model of a scene.
+/// Model of a scene.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
     pub(crate) name: String,
     pub(crate) file: String,
 }
 
-/// The models that a run names.
+/// Returns the models named in the JSON of a run.
 pub(crate) fn models(json: &Value) -> Vec<Model> {
     let text = |plugin: &Value, key: &str| plugin.get(key).and_then(Value::as_str).map(str::to_owned);
     let plugins = json.get("plugins").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
@@ -93,7 +93,7 @@ pub(crate) fn models(json: &Value) -> Vec<Model> {
         .collect()
 }
 
-/// The arguments of a run.
+/// Returns the arguments of a run.
 pub(crate) fn run_arguments(
     file: &TestFile,
     seed: u64,
@@ -117,7 +117,7 @@ pub(crate) fn run_arguments(
     arguments
 }
 
-/// The bounds that a picture of the run shows: those of numbers that are largest at one instant.
+/// Returns the plot arguments for bounds of peak force and peak torque.
 fn drawn_bounds(file: &TestFile) -> impl Iterator<Item = String> {
     let drawn = file
         .expect
@@ -130,7 +130,7 @@ fn drawn_bounds(file: &TestFile) -> impl Iterator<Item = String> {
     drawn.flat_map(of).flatten()
 }
 
-/// Carries out a case. `models` are those of its scene, or why they are not known.
+/// Executes and judges a case. `models`: models of the scene, or the reason why they are unknown.
 pub(crate) fn check(
     flotor: &Flotor,
     case: &Case<'_>,
@@ -151,7 +151,7 @@ pub(crate) fn check(
         took: Duration::ZERO,
     };
     let begun = Instant::now();
-    // A check of a plugin has no picture of its own: the scene shows what the plugin does.
+    // A check of a plugin has no picture of its own: draw the scene with the plugin.
     let settings = combinations(&case.file.set).swap_remove(0);
     let scene = run_arguments(case.file, case.file.seeds[0], &settings, case.file.duration.as_deref());
     let mut plotted = Some(scene);
@@ -193,7 +193,7 @@ pub(crate) fn check(
     outcome
 }
 
-/// The command that judges a case again.
+/// Returns the command that repeats a case.
 fn judging_again(case: &Case<'_>) -> String {
     let file = case.file.path.display().to_string();
     let folders = case.file.plugin_path.arguments().map(|word| word.to_string_lossy().into_owned());
@@ -201,19 +201,19 @@ fn judging_again(case: &Case<'_>) -> String {
     command_line(words.into_iter().chain(folders))
 }
 
-/// The file of a case's picture.
+/// Returns the path of a case's picture.
 pub(crate) fn picture(folder: &Path, case: &Case<'_>) -> PathBuf {
     let plain = |c: char| if c.is_alphanumeric() || "-_.=".contains(c) { c } else { '-' };
     folder.join(case.name().chars().map(plain).collect::<String>() + ".svg")
 }
 
-/// A run, judged.
+/// Judged run.
 pub(crate) struct Judged {
     pub(crate) failures: Vec<Failure>,
     pub(crate) json: Option<Value>,
 }
 
-/// Carries out a run of a case, with its settings or fewer, and judges it.
+/// Executes and judges a run of a case, with its settings or fewer.
 pub(crate) fn run(
     flotor: &Flotor,
     case: &Case<'_>,
@@ -282,7 +282,7 @@ fn missed(what: &str, bound: &Bound, value: Option<&Value>) -> Option<Failure> {
     Some(Failure::new(what, bound.text(), got))
 }
 
-/// Compares a model with a curve; a failure is drawn as `picture`, if there is one.
+/// Compares a model with a curve; draws a failure to `picture`, if given.
 fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], picture: Option<&Path>, outcome: &mut Outcome) {
     let Some(curve) = &file.curve else { return };
     let named = |model: &&Model| curve.model.as_ref().is_none_or(|name| *name == model.name);
@@ -395,7 +395,7 @@ fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
     for model in models {
         let score = with_settings(&["stress", "--model", &model.file, "--size", &stress.size], &stress.set);
         let counted: Vec<&String> = stress.measures.iter().collect();
-        // What does not count is not computed.
+        // Compute only measures that count.
         let asked = [&score[..], &only(&counted), &["--json".to_owned(), "-".to_owned()]].concat();
         let answered = flotor.run(asked, "");
         let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
@@ -420,7 +420,7 @@ fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
     failing
 }
 
-/// Returns the failure of a measure of a stress test that has not the verdict demanded, or is not there.
+/// Returns the failure of a stress test's measure whose verdict does not meet the demand or is missing.
 fn measure(json: &Value, id: &str, demand: MeasureDemand) -> Option<Failure> {
     let measures = json.get("measures").and_then(Value::as_array);
     let has_id = |measure: &&Value| measure.get("id").and_then(Value::as_str) == Some(id);

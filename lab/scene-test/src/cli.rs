@@ -1,4 +1,4 @@
-//! `flotor test`: scenes with expectations. The program `flotor-test`, which `flotor` starts.
+//! `flotor test`: scenes with expectations. Command line of the program `flotor-test`, which `flotor` starts.
 
 use crate::bless::{Blessed, bless};
 use crate::case::{Case, Check, Shard, combinations};
@@ -79,7 +79,7 @@ struct TestArguments {
     digest: bool,
 }
 
-/// The command with its arguments. Not real-time.
+/// Returns the command with its arguments. Not real-time.
 #[must_use]
 pub fn command() -> clap::Command {
     Arguments::command()
@@ -140,11 +140,11 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     }
 }
 
-/// Cases chosen by name.
+/// Filter of cases by name.
 enum Filter<'t> {
-    /// The case of this name.
+    /// Exact name.
     Whole(&'t str),
-    /// Those with this in their name.
+    /// Part of a name.
     Part(&'t str),
 }
 
@@ -161,7 +161,7 @@ impl<'t> Filter<'t> {
     }
 }
 
-/// All results, or the first error after the others were printed.
+/// Returns all results, or the first error after printing the others.
 fn all_or_errors<T>(results: impl Iterator<Item = Result<T, CommandError>>) -> Result<Vec<T>, CommandError> {
     let (mut good, mut wrong) = (Vec::new(), None);
     for result in results {
@@ -174,7 +174,7 @@ fn all_or_errors<T>(results: impl Iterator<Item = Result<T, CommandError>>) -> R
     wrong.map_or(Ok(good), Err)
 }
 
-/// The files that the paths name, or that lie in them.
+/// Finds the test files named by the paths or inside them.
 fn found(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
     let here = [PathBuf::from(".")];
     let mut found = Vec::new();
@@ -214,13 +214,13 @@ fn search(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Models of a file's scene, or why they are not known.
+/// Models of a file's scene, or the reason why they are unknown.
 type Known<'f> = (&'f TestFile, Result<Vec<Model>, String>);
 
-/// How long a scene is tried.
+/// Duration of a trial run of a scene.
 const TRIAL: &str = "10ms";
 
-/// Tries the scenes of these cases with all their settings for a moment: what is wrong in a file is told before any case runs.
+/// Runs the scenes of these cases briefly with all their settings: errors in a file are reported before any case runs.
 fn probe<'f>(flotor: &Flotor, jobs: usize, cases: &[Case<'f>]) -> Result<Vec<Known<'f>>, CommandError> {
     let mut trials: Vec<(&'f TestFile, Vec<(String, String)>)> = Vec::new();
     for case in cases {
@@ -252,7 +252,7 @@ fn probe<'f>(flotor: &Flotor, jobs: usize, cases: &[Case<'f>]) -> Result<Vec<Kno
     Ok(known)
 }
 
-/// What a trial says: an error if the file is wrong, the reason if the plugin is.
+/// Evaluates a trial run: an error if the file is wrong, the reason if the plugin is.
 fn models_of(
     file: &TestFile,
     answer: Result<Ran, String>,
@@ -286,8 +286,8 @@ fn models_of(
     Ok(Ok(models(&json)))
 }
 
-/// Returns the result of `work` for each item, in their order, whatever the number of threads: where the system has too few, this
-/// one does the rest.
+/// Applies `work` to each item on `jobs` threads; returns the results in order. If threads cannot be started, this one
+/// does the rest.
 fn in_parallel<T: Sync, R: Send>(jobs: usize, items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::new());

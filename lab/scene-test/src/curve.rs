@@ -1,27 +1,27 @@
-//! A force-position curve: a CSV with poses and the wrench expected at each.
+//! Force-position curve: CSV with poses and the expected wrench at each.
 
 use flotor_hal::{HashLines, Table, TextProblem, read_text};
 use flotor_plot::{Axis, Figure, Panel, Quantity, Series};
 use std::path::Path;
 
-/// Columns of a pose, as `flotor eval` reads them.
+/// Columns of a pose, as in the input of `flotor eval`.
 pub(crate) const POSE: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
-/// Columns of a wrench, as `flotor eval` writes them: force N, then torque N·m.
+/// Columns of a wrench, as in the output of `flotor eval`: force N, then torque N·m.
 pub(crate) const WRENCH: [&str; 6] = ["fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm"];
 
 /// Poses and wrenches, in the model frame.
 #[derive(Debug)]
 pub(crate) struct Points {
-    /// Which of [`WRENCH`] the file has.
+    /// Indices of the columns of [`WRENCH`] in the file.
     pub(crate) compared: Vec<usize>,
     rows: Vec<([f64; 6], [f64; 6])>,
 }
 
 impl Points {
-    /// Reads a file. A column of the pose that it does not have is 0, one of the wrench that it does not have is not compared.
+    /// Reads a file. A missing column of the pose is 0, a missing column of the wrench is not compared.
     ///
     /// # Errors
-    /// In words, with the line.
+    /// A message with the line.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
         let read = read_text(path, "the curve").and_then(|text| Self::parse(&text));
         read.map_err(|wrong| wrong.in_file(path.display()))
@@ -61,17 +61,17 @@ impl Points {
         }
     }
 
-    /// The poses, as `flotor eval` reads them.
+    /// Formats the poses for `flotor eval`.
     pub(crate) fn poses(&self) -> String {
         let row = |(pose, _): &([f64; 6], [f64; 6])| pose.map(|number| format!("{number:e}")).join(",");
         let rows: Vec<String> = std::iter::once(POSE.join(",")).chain(self.rows.iter().map(row)).collect();
         rows.join("\n") + "\n"
     }
 
-    /// The wrench at each pose, of the columns that are compared, and its status. `answers` is what `flotor eval` wrote.
+    /// Parses the wrench at each pose, in the compared columns, and its status. `answers`: output of `flotor eval`.
     ///
     /// # Errors
-    /// In words: the answers are not those of these poses.
+    /// A message if the answers do not match these poses.
     fn answers(&self, answers: &str) -> Result<Vec<Answer>, String> {
         let mut lines = answers.lines();
         let head: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
@@ -85,11 +85,11 @@ impl Points {
         self.rows.iter().map(answer).collect()
     }
 
-    /// The worst point for which `error` over its tolerance is largest, if one is outside: the column, the pose, expected and
-    /// got. `answers` is what `flotor eval` wrote.
+    /// Returns the point with the largest error relative to its tolerance, if above one. `answers`: output of `flotor
+    /// eval`.
     ///
     /// # Errors
-    /// In words: the answers are not those of these poses.
+    /// A message if the answers do not match these poses.
     pub(crate) fn worst(
         &self,
         answers: &str,
@@ -117,7 +117,7 @@ impl Points {
     /// Draws each compared column with its bounds and the answers, over the coordinate of the pose that changes most.
     ///
     /// # Errors
-    /// In words: the answers are not those of these poses.
+    /// A message if the answers do not match these poses.
     pub(crate) fn picture(
         &self,
         title: &str,
@@ -151,7 +151,7 @@ impl Points {
         Ok(self.compared.iter().copied().fold(figure, panel).to_svg())
     }
 
-    /// Number of the coordinate with the widest range, in millimetres and degrees.
+    /// Returns the index of the coordinate with the widest range, in millimetres and degrees.
     fn coordinate_that_changes(&self) -> usize {
         let range = |index: usize| {
             let numbers = self.rows.iter().map(|(pose, _)| pose[index] * COORDINATES[index].1.unit().1);
@@ -163,7 +163,7 @@ impl Points {
     }
 }
 
-/// An answer of `flotor eval`.
+/// Answer of `flotor eval`.
 struct Answer {
     wrench: [f64; 6],
     status: String,
@@ -189,7 +189,7 @@ const COLUMNS: [(&str, Quantity); 6] = [
     ("Torque, z", Quantity::Torque),
 ];
 
-/// A point that is too far from the curve.
+/// Point that is outside the tolerance of the curve.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Worst {
     pub(crate) column: &'static str,

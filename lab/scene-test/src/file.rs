@@ -1,4 +1,4 @@
-//! `NAME.test.toml`: which scene, with what, and what is expected of it.
+//! Test file `NAME.test.toml`: scene, settings and expectations.
 
 use crate::bound::{Bound, number};
 use crate::curve::Points;
@@ -12,14 +12,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::{Spanned, Value};
 
-/// The end of the name of every such file.
+/// Suffix of the names of test files.
 pub(crate) const SUFFIX: &str = ".test.toml";
 
-/// A file with expectations, checked as far as is possible without running a plugin.
+/// Test file with expectations, checked as far as possible without running a plugin.
 #[derive(Debug)]
 pub(crate) struct TestFile {
     pub(crate) path: PathBuf,
-    /// Its path without the suffix: what its cases are called.
+    /// Path without the suffix, for the names of the cases.
     pub(crate) name: String,
     pub(crate) text: String,
     pub(crate) scene: PathBuf,
@@ -27,7 +27,7 @@ pub(crate) struct TestFile {
     pub(crate) plugin_path: PluginPathOption,
     pub(crate) seeds: Vec<u64>,
     pub(crate) duration: Option<String>,
-    /// `PLUGIN.PARAMETER` and the values it takes: the cases are their product.
+    /// Values by `PLUGIN.PARAMETER`: the cases are their product.
     pub(crate) set: Vec<(String, Vec<String>)>,
     pub(crate) expect: Vec<Expectation>,
     pub(crate) reference: Option<Reference>,
@@ -35,20 +35,20 @@ pub(crate) struct TestFile {
     pub(crate) golden: Option<Golden>,
     pub(crate) validate: Option<Validate>,
     pub(crate) stress: Option<Stress>,
-    /// Digests by the name of a case: only where somebody wrote them.
+    /// Digests by the name of a case; empty if the file has none.
     pub(crate) digests: BTreeMap<String, String>,
 }
 
-/// What is expected of one value of a run.
+/// Expectation of one value of a run.
 #[derive(Debug)]
 pub(crate) struct Expectation {
     pub(crate) path: String,
-    /// Where its key stands in the text, bytes.
+    /// Position of the key in the text, bytes.
     pub(crate) at: usize,
     pub(crate) bound: Bound,
 }
 
-/// Other settings with which the same numbers must come out.
+/// Other settings that must give equal numbers.
 #[derive(Debug)]
 pub(crate) struct Reference {
     pub(crate) set: Vec<(String, String)>,
@@ -56,7 +56,7 @@ pub(crate) struct Reference {
     pub(crate) within: Vec<(String, f64)>,
 }
 
-/// A force-position curve.
+/// Expected force-position curve.
 #[derive(Debug)]
 pub(crate) struct Curve {
     pub(crate) points: Points,
@@ -66,7 +66,7 @@ pub(crate) struct Curve {
     pub(crate) set: Vec<(String, String)>,
 }
 
-/// A recording that the models must reproduce.
+/// Recording that the models must reproduce.
 #[derive(Debug)]
 pub(crate) struct Golden {
     pub(crate) recording: PathBuf,
@@ -74,34 +74,34 @@ pub(crate) struct Golden {
     pub(crate) within_nm: f64,
 }
 
-/// Which plugins `flotor validate` checks.
+/// Plugins for `flotor validate`.
 #[derive(Debug)]
 pub(crate) enum Validate {
-    /// The models of the scene.
+    /// All models of the scene.
     Models,
     File(PathBuf),
 }
 
-/// The stress test of the models of the scene.
+/// Stress test of the models of the scene.
 #[derive(Debug)]
 pub(crate) struct Stress {
     pub(crate) size: String,
-    /// Measures that count.
+    /// Identifiers of the measures that count.
     pub(crate) measures: Vec<String>,
     pub(crate) demand: MeasureDemand,
     pub(crate) set: Vec<(String, String)>,
 }
 
-/// The verdict that a measure of a stress test needs.
+/// Required verdict of a measure of a stress test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MeasureDemand {
-    /// Any but a failure: the file names no measure, and not every one applies to every model.
+    /// Any verdict but a failure: for a file without named measures, because not every one applies to every model.
     NotFailed,
-    /// A pass or a note: the file names the measure.
+    /// Pass or note: for a measure named in the file.
     Judged,
 }
 
-/// The file as it is written.
+/// Unchecked contents of the file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -166,7 +166,7 @@ struct StressTable {
     set: BTreeMap<String, Value>,
 }
 
-/// The measures of a stress test that no load of the machine can change: all but the cost.
+/// Measures of a stress test that count by default: all that do not depend on the load of the machine, so not the cost.
 const MEASURES: [&str; 10] = ["M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9"];
 const COST: &str = "M7";
 
@@ -174,7 +174,7 @@ impl TestFile {
     /// Reads and checks a file.
     ///
     /// # Errors
-    /// `FILE:LINE: what is wrong`.
+    /// An error `FILE:LINE: PROBLEM`.
     pub(crate) fn read(path: &Path, plugin_path: &PluginPathOption) -> Result<Self, CommandError> {
         let text = read_text(path, "the test")
             .map_err(|wrong| CommandError::Usage(wrong.in_file(path.display())))?;
@@ -183,7 +183,7 @@ impl TestFile {
         Ok(Self { plugin_path: plugin_path.clone(), ..file })
     }
 
-    /// Outputs of the models that the numbers of the file need, each once.
+    /// Returns the model outputs that the numbers of the file need, each once.
     pub(crate) fn outputs(&self) -> BTreeSet<&'static str> {
         let compared = self.reference.iter().flat_map(|reference| &reference.within).map(|(path, _)| path);
         let paths = self.expect.iter().map(|expectation| &expectation.path).chain(compared);
@@ -286,13 +286,13 @@ impl TestFile {
         if nothing { Err((0, "nothing is expected; write at least [expect]".to_owned())) } else { Ok(self) }
     }
 
-    /// `FILE:LINE` of a place in its text.
+    /// Formats a position in the text as `FILE:LINE`.
     pub(crate) fn place(&self, at: usize) -> String {
         place(&self.path, &self.text, at)
     }
 }
 
-/// Where, bytes from the start, and what.
+/// Position of an error, bytes from the start, and its message.
 type Wrong = (usize, String);
 
 fn place(path: &Path, text: &str, at: usize) -> String {
@@ -300,7 +300,7 @@ fn place(path: &Path, text: &str, at: usize) -> String {
     format!("{}:{}", path.display(), before.matches('\n').count() + 1)
 }
 
-/// The parser's message about an unknown key, with the nearest one in place of the list.
+/// Replaces the list of known keys in the parser's message by the nearest one.
 fn with_nearest(message: &str) -> String {
     let mut words = message.split('`').skip(1).step_by(2);
     match (message.starts_with("unknown field"), words.next()) {
@@ -309,7 +309,7 @@ fn with_nearest(message: &str) -> String {
     }
 }
 
-/// Leaves of nested tables, with their dotted keys: `a.b = 1` and `"a.b" = 1` are the same.
+/// Visits the leaves of nested tables, with their dotted keys: `a.b = 1` and `"a.b" = 1` are equal.
 fn flatten<'v>(
     key: &str,
     value: &'v Value,

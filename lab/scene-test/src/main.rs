@@ -1,4 +1,4 @@
-//! The program `flotor-test`; everything is in the library.
+//! Entry point of the program `flotor-test`; the rest is in the library.
 
 fn main() -> std::process::ExitCode {
     flotor_test::cli::main()

@@ -1,16 +1,16 @@
-//! The shortest run that still fails in the same way.
+//! Search for the shortest run with the same failure.
 
 use crate::case::{Case, Check};
 use crate::check::{Failure, run, run_arguments};
 use crate::process::Flotor;
 use serde_json::Value;
 
-/// Longest run that is searched for the tick of a crash, ticks: it has no summary that says how long it was.
+/// Longest run in the search for a crash, ticks: a crashed run has no summary with its length.
 const LONGEST: u64 = 1 << 20;
 
-/// The arguments of the shortest run of a case, with its settings, that has the fault of this failure: the run did not end, ended
-/// early, or has a plugin in another health. `None` for a number, which belongs to the whole run, and for a run that did not end in
-/// time, which is not repeated.
+/// Returns the arguments of the shortest run of a case, with its settings, that has the same fault: the run did not
+/// end, ended early, or has a plugin in another health. `None` for a number, which depends on the whole run, and for a
+/// run that timed out, which is not repeated.
 pub(crate) fn shortest(
     flotor: &Flotor,
     case: &Case<'_>,
@@ -24,7 +24,7 @@ pub(crate) fn shortest(
     let fails = |duration: &str| {
         let judged = run(flotor, case, *seed, set, Some(duration));
         judged.failures.iter().any(|other| {
-            // A shorter run may not have come to its end.
+            // A shorter run may stop before its end.
             let is_same_word = other.what != "end" || other.got == failure.got;
             is_same_word && (&other.what, &other.expected) == (&failure.what, &failure.expected)
         })
@@ -37,14 +37,14 @@ pub(crate) fn shortest(
     Some(run_arguments(case.file, *seed, set, Some(&duration(ticks))))
 }
 
-/// Whether a failure has an instant from which on it is there, and is not a number of the whole run.
+/// Returns true if a failure appears at some instant, and is not a number of the whole run.
 fn is_fault(failure: &Failure) -> bool {
     let is_of_the_run = failure.what == "the run" && failure.expected != "an end";
     let ended_early = failure.what == "end" && failure.got != "finished";
     is_of_the_run || ended_early || failure.what.starts_with("plugins.") && failure.what.ends_with(".health")
 }
 
-/// The number of ticks from which on it fails.
+/// Returns the smallest number of ticks that fails.
 fn first_failing(whole: Option<u64>, mut fails: impl FnMut(u64) -> bool) -> Option<u64> {
     if fails(1) {
         return Some(1);

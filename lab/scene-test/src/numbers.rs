@@ -1,23 +1,23 @@
-//! Values of a run's JSON by their path: `peak_force_n`, `energy.port_lowest_j`, `events.boundary`, `plugins.spring.health`.
+//! Lookup of values in a run's JSON by path: `peak_force_n`, `energy.port_lowest_j`, `events.boundary`, `plugins.spring.health`.
 
 use flotor_core::trace::Events;
 use serde_json::Value;
 use std::sync::OnceLock;
 
-/// The value at a path. A list is entered by the name of an entry, or by its number from 0; an event that did not happen has the
-/// count 0.
+/// Returns the value at a path. List entries are addressed by name, or by index from 0; an event that did not happen
+/// has the count 0.
 pub(crate) fn at<'j>(json: &'j Value, path: &str) -> Option<&'j Value> {
     let found = path.split('.').try_fold(json, step);
     let is_event = || path.strip_prefix("events.").is_some_and(|event| Events::NAMES.contains(&event));
     found.or_else(|| is_event().then(|| NEVER.get_or_init(|| 0.into()))).filter(|value| !value.is_null())
 }
 
-/// Outputs of the models that a run has to compute for the number at a path.
+/// Returns the model outputs that a run has to compute for the number at a path.
 pub(crate) fn outputs_for(path: &str) -> &'static [&'static str] {
     if path == "energy.loop_generated_j" { &["torque", "energy"] } else { &[] }
 }
 
-/// How often an event happened that is not there.
+/// Count of an event that did not happen.
 static NEVER: OnceLock<Value> = OnceLock::new();
 
 fn step<'j>(json: &'j Value, part: &str) -> Option<&'j Value> {
@@ -31,7 +31,7 @@ fn step<'j>(json: &'j Value, part: &str) -> Option<&'j Value> {
     }
 }
 
-/// Why a path leads nowhere in the JSON of a run, with the nearest one that does.
+/// Returns an error message if a path does not exist in the JSON of a run, with the nearest one that does.
 pub(crate) fn misspelt(json: &Value, path: &str) -> Option<String> {
     let mut paths = Vec::new();
     leaves(json, "", &mut paths);
@@ -63,7 +63,7 @@ fn leaves(json: &Value, above: &str, found: &mut Vec<String>) {
     }
 }
 
-/// A hint at the known word most like `word`; empty if none is like it.
+/// Returns a hint at the most similar known word; empty if none is similar.
 pub(crate) fn did_you_mean<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> String {
     let nearest = known
         .map(|known| (strsim::damerau_levenshtein(word, known), known))

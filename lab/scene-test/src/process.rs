@@ -1,4 +1,4 @@
-//! `flotor` as a process of its own.
+//! Child processes of `flotor`.
 
 use flotor_command::separate::{Built, SeparateProgram};
 use flotor_command::{CommandError, PluginProcess};
@@ -8,42 +8,42 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// The program whose commands the checks are made of.
+/// Program that executes the commands of the checks.
 pub(crate) struct Flotor {
-    /// Longest time of one process.
+    /// Timeout of one process.
     pub(crate) limit: Duration,
 }
 
-/// What came of a process.
+/// Result of a process.
 pub(crate) struct Ran {
     /// Exit code; `None` if a signal ended it.
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
-    /// The last line of standard error, or how it ended if it said nothing.
+    /// Last line of standard error, or the process's end if it is empty.
     pub(crate) error: String,
 }
 
 impl Ran {
-    /// The JSON on standard output.
+    /// Parses the JSON on standard output.
     pub(crate) fn json(&self) -> Option<Value> {
         serde_json::from_str(&self.stdout).ok()
     }
 }
 
 impl Flotor {
-    /// The program itself, beside this one.
+    /// Program beside this one.
     const PROGRAM: SeparateProgram<'static> =
         SeparateProgram { program: "flotor", built: Built::WithThis, build: "cargo build --release" };
 
-    /// An error here and now instead of one in every case.
+    /// Checks that the program exists, for one error instead of one in every case.
     pub(crate) fn with_limit(limit: Duration) -> Result<Self, CommandError> {
         Self::PROGRAM.command().map(|_| Self { limit })
     }
 
-    /// Carries out a command.
+    /// Runs a command.
     ///
     /// # Errors
-    /// In words: it could not be started, or took too long and was killed.
+    /// A message if the program could not be started, or timed out and was killed.
     pub(crate) fn run<I: AsRef<OsStr>>(
         &self,
         arguments: impl IntoIterator<Item = I>,
@@ -61,7 +61,7 @@ impl Flotor {
         arguments: impl IntoIterator<Item = I>,
         input: &str,
     ) -> Result<Ran, Trouble> {
-        // Files and not pipes: a process that it leaves behind may hold the other end open for ever.
+        // Files, not pipes: a grandchild process could hold a pipe open for ever.
         let [mut stdin, mut stdout, mut stderr] =
             [tempfile::tempfile()?, tempfile::tempfile()?, tempfile::tempfile()?];
         stdin.write_all(input.as_bytes())?;

@@ -1,6 +1,6 @@
-//! The results: for people, as JSON, and as JUnit XML.
+//! Results as text, JSON, and JUnit XML.
 //!
-//! Nothing in them but the times of JUnit depends on time or on the number of jobs. A file of results appears whole, at the end, or not at all.
+//! Only the times in JUnit depend on time or on the number of jobs. A result file is written atomically at the end.
 
 use crate::check::Outcome;
 use crate::platform::readable_by_all;
@@ -11,7 +11,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
-/// The results of all cases, in the order of the cases.
+/// Results of all cases, in the order of the cases.
 #[derive(Serialize)]
 pub(crate) struct Report {
     pub(crate) passed: usize,
@@ -25,7 +25,7 @@ impl Report {
         Self { passed, failed: cases.len() - passed, cases }
     }
 
-    /// A line for each case, its failures below it, and a summary.
+    /// Formats a line for each case, its failures below, and a summary.
     pub(crate) fn to_text(&self) -> String {
         let mut lines = Vec::new();
         for case in &self.cases {
@@ -43,7 +43,7 @@ impl Report {
         lines.join("\n")
     }
 
-    /// JUnit XML: a suite, and a case for each case, with its file, its time, and on failure its commands and picture.
+    /// Formats JUnit XML: a suite, and a test case for each case, with its file, its time, and on failure its commands and picture.
     pub(crate) fn to_junit(&self) -> String {
         let (tests, failures) = (self.cases.len(), self.failed);
         let seconds = |took: Duration| format!("{:.3}", took.as_secs_f64());
@@ -84,7 +84,7 @@ impl Report {
     }
 }
 
-/// Text of an attribute or an element; a character that XML cannot hold becomes a question mark.
+/// Escapes the text of an attribute or an element; a character that XML does not allow becomes a question mark.
 fn escaped(text: &str) -> String {
     let one = |c: char| match c {
         '&' => "&amp;".to_owned(),
@@ -98,7 +98,7 @@ fn escaped(text: &str) -> String {
     text.chars().map(one).collect()
 }
 
-/// Removes the results of an earlier call: one that is killed must leave none.
+/// Removes the results of an earlier call, so that a killed call leaves none.
 pub(crate) fn remove(path: &Path) -> Result<(), CommandError> {
     if is_special(path) {
         return Ok(());
@@ -111,12 +111,12 @@ pub(crate) fn remove(path: &Path) -> Result<(), CommandError> {
     }
 }
 
-/// A pipe or a device, such as /dev/null: it is written to, and never replaced.
+/// Returns true for a pipe or a device, such as /dev/null, which must not be replaced.
 fn is_special(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|known| !known.is_file() && !known.is_dir())
 }
 
-/// Writes a file that appears whole.
+/// Writes a file atomically.
 pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), CommandError> {
     if is_special(path) {
         return std::fs::write(path, text)
@@ -132,7 +132,7 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), CommandError> {
     written.map(drop).map_err(|cause| CommandError::file(path, "cannot write the result", cause))
 }
 
-/// Prints the results, and writes them where they are wanted.
+/// Prints the results, and writes them to the requested files.
 pub(crate) fn deliver(
     report: &Report,
     json: Option<&Path>,
@@ -149,7 +149,7 @@ pub(crate) fn deliver(
     flotor_command::first_error([printed, json, junit])
 }
 
-/// Whether a path means standard output.
+/// Returns true if a path means standard output.
 pub(crate) fn is_output(path: &Path) -> bool {
     path.as_os_str() == "-"
 }

@@ -1,20 +1,20 @@
-//! What `flotor validate` says of one rule.
+//! Findings of `flotor validate`.
 
 use serde_json::Value;
 
-/// What came of a rule.
+/// Finding of one rule.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Told<'a> {
-    /// It holds.
+    /// The rule holds.
     Holds,
-    /// This system cannot check it for any plugin, or it does not apply to this one, and why.
+    /// The rule cannot be checked on this system, or does not apply to this plugin; with the reason.
     NotJudged { rule: &'a str, why: &'a str },
-    /// It is violated, or was not checked though it could be.
+    /// The rule is violated, or was not checked though it could be.
     Fails { rule: &'a str, text: &'a str, seen: String },
 }
 
 impl<'a> Told<'a> {
-    /// Reads a finding of its JSON.
+    /// Parses a finding from its JSON.
     pub(crate) fn of(finding: &'a Value) -> Self {
         let word = |key: &str| finding.get(key).and_then(Value::as_str);
         let (rule, text) = (word("rule").unwrap_or_default(), word("text").unwrap_or_default());

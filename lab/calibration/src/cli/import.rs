@@ -1,4 +1,4 @@
-//! `flotor calibrate import`: somebody else's numbers as a calibration file.
+//! `flotor calibrate import`: calibration file from an existing polynomial.
 
 use super::{FORCES_N, provenance, write_calibration};
 use crate::thesis;

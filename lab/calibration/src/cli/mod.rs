@@ -1,5 +1,5 @@
-//! `flotor calibrate`: how much of the vertical force arrives, and the correction. The program `flotor-calibration`, which
-//! `flotor` starts.
+//! `flotor calibrate`: measurement and correction of the vertical force. Command line of the program
+//! `flotor-calibration`, which `flotor` starts.
 
 mod import;
 mod rig;
@@ -27,7 +27,7 @@ enum Command {
     Calibrate(CalibrateArguments),
 }
 
-/// The command with its arguments. Not real-time.
+/// Returns the command with its arguments. Not real-time.
 #[must_use]
 pub fn command() -> clap::Command {
     Arguments::command()
@@ -66,7 +66,7 @@ fn run(arguments: &CalibrateArguments) -> Result<(), CommandError> {
     }
 }
 
-/// Legal commanded forces, N.
+/// Range of commanded forces, N.
 const FORCES_N: RangeInclusive<f64> = 1.0..=50.0;
 
 fn provenance(source: Source, note: Option<String>) -> Provenance {

@@ -17,10 +17,10 @@ use indicatif::ProgressBar;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// The device that is calibrated in a simulated rig.
+/// Device plugin of the simulated rig.
 pub(super) const SIMULATED: &str = "simulated";
 
-/// Period of the line below the bar.
+/// Redraw period of the progress bar and the line below it.
 const REDRAWN: Duration = Duration::from_millis(100);
 
 /// Selection of the rig.
@@ -60,11 +60,11 @@ pub(super) struct RigArguments {
     control_group: ControlGroupOption,
 }
 
-/// Shows the next height of the sensor; breaks if the user stops the procedure.
+/// Callback that shows the next height of the sensor; breaks if the user stops the procedure.
 pub(super) type Guide = Box<dyn FnMut(Option<Waiting>) -> ControlFlow<()>>;
 
 impl RigArguments {
-    /// Id of the plugin.
+    /// Returns the id of the device's plugin.
     pub(super) fn plugin(&self) -> &str {
         self.device.as_deref().unwrap_or(SIMULATED)
     }
@@ -74,9 +74,9 @@ impl RigArguments {
         Ok(SimulatedRig::new(registry.load(SIMULATED, PluginKind::Device)?, self.seed))
     }
 
-    /// The device and its sensor, and a progress bar over this many stops that shows the next height of the sensor.
+    /// Opens the device and its sensor, and a progress bar over this many stops that shows the next height of the sensor.
     pub(super) fn device_rig(&self, stops: u64) -> Result<(DeviceRig<Guide>, ProgressBar), CommandError> {
-        // Before a plugin is loaded: a thread that is there already would still take Ctrl-C.
+        // Handle signals before a plugin is loaded: a thread that a plugin starts earlier would still receive Ctrl-C.
         let stop = stop_on_signals()?;
         let registry = self.plugin_path.registry();
         let plugin = registry.load(self.plugin(), PluginKind::Device)?;
@@ -108,7 +108,7 @@ impl RigArguments {
     }
 }
 
-/// The latch is watched for as long as there is a guide, and so a rig.
+/// Creates the guide; it owns the watch of the latch, which therefore lasts as long as the rig.
 fn guide(progress: &ProgressBar, stop: &StopSwitch, watch: LatchWatch) -> Guide {
     let (progress, stop) = (progress.clone(), stop.clone());
     let redrawn = Redrawn::every(REDRAWN, &progress);

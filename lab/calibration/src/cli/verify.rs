@@ -1,4 +1,4 @@
-//! `flotor calibrate verify`: the error of the vertical force without and with a file.
+//! `flotor calibrate verify`: error of the vertical force without and with a calibration file.
 
 use super::rig::RigArguments;
 use super::{FORCES_N, refused};
@@ -28,7 +28,7 @@ pub(super) struct VerifyArguments {
     json: JsonOption,
 }
 
-/// The JSON output of `verify`.
+/// JSON output of `verify`.
 #[derive(Serialize)]
 struct VerifyReport {
     error_before_percent: f64,
@@ -52,7 +52,7 @@ fn usage(error: CalibrationFileError) -> CommandError {
     CommandError::Usage(error.to_string())
 }
 
-/// Nothing is moved with a file that belongs to another device.
+/// Checks that the file belongs to the device, before anything moves.
 fn check(arguments: &VerifyArguments, file: &CalibrationFile, serial: &str) -> Result<(), CommandError> {
     let path = arguments.file.display().to_string();
     file.check_device(&path, arguments.rig.plugin(), serial).map_err(usage)
@@ -89,7 +89,7 @@ fn device(
     for (error, calibration) in errors.iter_mut().zip([&VerticalCalibration::NONE, calibration]) {
         rig.calibrate(calibration).map_err(refused)?;
         let readings = measure(&mut rig, &plan, || progress.inc(1)).map_err(refused)?;
-        // What the moving part weighs shifts every reading alike: the difference of two does not know it.
+        // The weight of the moving part shifts all readings equally and cancels in the difference.
         *error = ErrorCurve::of_readings(&readings, 0.0).error_percent();
     }
     progress.finish_and_clear();

@@ -55,7 +55,7 @@ pub(super) struct VerticalArguments {
     json: JsonOption,
 }
 
-/// The JSON output of `vertical`.
+/// JSON output of `vertical`.
 #[derive(Serialize)]
 struct VerticalReport<'a> {
     device: &'a str,
@@ -76,7 +76,7 @@ struct VerticalReport<'a> {
     seed: Option<u64>,
 }
 
-/// One correction, and the error it leaves.
+/// Correction with its residual error.
 #[derive(Clone, Debug, Serialize)]
 struct ErrorRow {
     correction: &'static str,
@@ -88,9 +88,9 @@ struct Measured {
     serial: String,
     readings: Vec<Reading>,
     fit: Fit,
-    /// The thesis's polynomial.
+    /// Polynomial of the thesis.
     report: VerticalCalibration,
-    /// The error that is left, by name of the correction: first none, last this fit.
+    /// Residual error by name of the correction: first without any, last this fit.
     curves: Vec<(&'static str, ErrorCurve)>,
 }
 
@@ -131,15 +131,15 @@ fn plan(arguments: &VerticalArguments) -> Result<Plan, CommandError> {
 /// Number of corrections that are compared in the simulated rig.
 const CORRECTIONS: u64 = 4;
 
-/// A way to correct the force: by the device, by the command, or not at all.
+/// Correction of the force: by the device, by the command, or none.
 struct Correction<'a> {
     name: &'static str,
     calibration: Option<VerticalCalibration>,
     command_n: &'a dyn Fn(f64) -> f64,
 }
 
-/// In the simulated rig the error is known without the noise of the sensor, and a sweep costs little: the thesis's two
-/// ways are compared as well.
+/// Calibrates the simulated rig. Its error is known without sensor noise, and a sweep is cheap, so the thesis's two
+/// corrections are compared as well.
 fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, CommandError> {
     let mut rig = arguments.rig.simulated_rig()?;
     let serial = rig.serial().map_err(refused)?;
@@ -164,8 +164,8 @@ fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, Com
     Ok(Measured { serial, readings, fit, report, curves })
 }
 
-/// With a device the error is what the force sensor reads: without correction in the readings of the fit, with it in one
-/// more run over all heights.
+/// Calibrates a device. The error is read from the force sensor: without correction in the readings of the fit, with
+/// correction in one more run over all heights.
 fn device(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, CommandError> {
     let check = Plan { forces_n: plan.forces_n.iter().copied().take(1).collect(), runs: 1, ..plan.clone() };
     let (mut rig, progress) = arguments.rig.device_rig(plan.stops() + check.stops())?;

@@ -1,4 +1,4 @@
-//! A real device with a force sensor on a serial port. Somebody, or something, lowers the sensor.
+//! Real device with a force sensor on a serial port; a person or a stage lowers the sensor.
 
 use super::holder::{Guard, Holder, Holding, REST_M, STEADY_N};
 use super::{PERIOD_NS, Rest, Rig};
@@ -16,15 +16,15 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How often it is looked whether the handle rests where it should.
+/// Poll interval while waiting for the handle to rest at its target.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
-/// Where the sensor has to go.
+/// Next height of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waiting {
-    /// Where the handle should rest, m.
+    /// Target height of the handle, m.
     pub target_m: f64,
-    /// Where it is, m.
+    /// Actual height of the handle, m.
     pub height_m: f64,
     /// Upward force on the handle, N.
     pub command_n: f64,
@@ -35,38 +35,38 @@ pub struct Waiting {
 pub struct RigOptions {
     /// Largest distance of the handle at rest from its target, m.
     pub close_m: f64,
-    /// Longest time until the handle rests there.
+    /// Timeout for the handle to rest at its target.
     pub patience: Duration,
-    /// Limits of the device, under the host's ceiling, and the consents of the user.
+    /// Limits of the device, under the host's limit, with the consents of the user.
     pub limits: Limits,
 }
 
-/// A device in the rig.
+/// Device in the rig.
 pub struct DeviceRig<W> {
-    /// Nothing while it is held, and after it was lost.
+    /// Device while not held; `None` while held, and after a loss.
     opened: Option<OpenedDevice>,
     holder: Option<Holder>,
-    /// Most vertical force the device takes and the host sends, N.
+    /// Largest vertical force that the device accepts and the host sends, N.
     most_n: f64,
     stop: StopSwitch,
     sensor: ForceSensor,
-    /// How often the handle was found restless before it came to the rest that is being measured.
+    /// Value of `Report::restless` when the measured rest began.
     restless: u64,
     serial: String,
     options: RigOptions,
     waiting: W,
-    /// Stops the device if this process is gone; dropped after the device.
+    /// Watchdog process, which stops the device if this process ends; dropped after the device.
     watchdog_process: Option<Arc<WatchdogProcess>>,
     guardian: Guardian,
     warnings: Vec<String>,
 }
 
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
-    /// Opens the device and starts its watchdog process. Until the handle rests at its target `waiting` gets its place, then nothing,
-    /// once. When `waiting` breaks off, the handle is let down; at the emergency stop of `stop` the device is stopped.
+    /// Opens the device and starts its watchdog process. `waiting` is called with the handle's position until the handle rests at its
+    /// target, then once with `None`. If `waiting` breaks, the handle is lowered; at an emergency stop of `stop` the device is stopped.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the device refuses, or if it must not be driven without the user's consent.
+    /// [`CalibrationError`] if the device rejects the call, or must not be driven without the user's consent.
     pub fn open(
         plugin: &Plugin,
         settings: &[Setting],
@@ -101,22 +101,22 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         })
     }
 
-    /// Warnings about the device before it is energised, a sentence each.
+    /// Returns warnings about the device before activation, a sentence each.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// Serial number of the device.
+    /// Returns the serial number of the device.
     #[must_use]
     pub fn serial(&self) -> &str {
         &self.serial
     }
 
-    /// That no force of a plan is too strong, before the first of them is measured.
+    /// Checks that no force of a plan is too strong, before the first measurement.
     ///
     /// # Errors
-    /// [`CalibrationError::TooStrong`] with the first that is.
+    /// [`CalibrationError::TooStrong`] with the first excessive force.
     pub fn check(&self, plan: &Plan) -> Result<(), CalibrationError> {
         let too_strong = plan.forces_n.iter().find(|command_n| **command_n > self.most_n);
         too_strong.map_or(Ok(()), |command_n| {
@@ -124,10 +124,10 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         })
     }
 
-    /// Corrects the force by this from now on. The handle is let down before.
+    /// Sets the calibration of the device; lowers the handle first.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the device cannot be calibrated, or was lost.
+    /// [`CalibrationError`] if the device does not support calibration, or was lost.
     pub fn calibrate(&mut self, calibration: &VerticalCalibration) -> Result<(), CalibrationError> {
         if let Some(holder) = self.holder.take() {
             self.opened = holder.end();
@@ -164,7 +164,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     }
 }
 
-/// What the handle rests against is the sensor; a wall would push beside it.
+/// Returns a boundary without stiffness: the handle rests against the sensor, and a wall would push too.
 fn without_wall() -> Boundary {
     Boundary {
         stiffness_n_per_m: 0.0,
@@ -191,7 +191,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
             let report = self.holder()?.look()?;
             let is_close = (report.height_m - target_m).abs() <= close_m;
             if report.state == Holding::Steady(command_n) && is_close && report.moved_m <= REST_M {
-                // Saturated alone may be in another axis: a coil that holds the locked ones, for a tick.
+                // Saturation alone may be in another axis: a coil that holds the locked ones, for a tick.
                 if report.saturated > 0 && report.delivered_n < command_n - STEADY_N {
                     let height_mm = report.height_m * 1.0e3;
                     return Err(CalibrationError::Saturated { command_n, height_mm });
@@ -210,7 +210,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
     }
 
     fn still_rests(&mut self, rest: &Rest) -> Result<bool, CalibrationError> {
-        // What the handle did while the last reading was taken is in the mean that has begun, or in the next.
+        // The means current or next at this point contain the motion during the last reading.
         let (from, until) = (self.holder()?.look()?.means, Instant::now() + self.options.patience);
         loop {
             let report = self.holder()?.look()?;
@@ -226,7 +226,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
     }
 
     fn read_force_n(&mut self, _: &Rest) -> Result<f64, CalibrationError> {
-        // Read while the handle is held: a fault in between says more than a strange force.
+        // Check the handle first: a fault is more specific than an implausible force.
         self.holder()?.look()?;
         self.sensor.read_n()
     }

@@ -1,8 +1,8 @@
-//! A thread that holds a levitating handle in the rig: every axis but the vertical locked, and along that a force.
+//! Thread that holds a levitating handle in the rig: all axes but the vertical locked, a force along the vertical.
 //!
-//! It goes on whatever the procedure does in the meantime: a device without commands removes its force. Nothing in a tick
-//! allocates or waits for anybody. As in a run, nothing reaches the device but through the envelope, a watchdog stops a
-//! device that does not come back, and the emergency stop is for both.
+//! The thread continues during other work of the procedure: a device without commands removes its force. A tick neither
+//! allocates nor blocks. As in a run, all commands pass through the envelope, a watchdog stops a device whose call does
+//! not return, and the emergency stop applies to both.
 
 use super::{AVERAGED_TICKS, Mean, PERIOD_NS, locked};
 use crate::CalibrationError;
@@ -19,32 +19,32 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Fastest change of the vertical force, N a tick: from nothing to 12 N in half a second.
+/// Fastest change of the vertical force, N per tick: from 0 to 12 N in half a second.
 const RAMP_STEP_N: f64 = 0.024;
-/// A handle that moves faster is not held by a sensor, m/s: a hand's breadth per second.
+/// Speed above which the handle is not held by a sensor, m/s: a hand's breadth per second.
 const RUNAWAY_M_PER_S: f64 = 0.1;
-/// Height of two means after each other that is the same height, m: what the device resolves (5 to 10 µm; Varadharajan
-/// 2007, section 2.2).
+/// Difference of two successive mean heights that counts as rest, m: the resolution of the device (5 to 10 µm;
+/// Varadharajan 2007, section 2.2).
 pub(super) const REST_M: f64 = 10.0e-6;
-/// Delivered force of two means after each other that is the same force, N: the noise of the sensor. A single tick without
-/// the force, as a delayed host causes it, is five times that.
+/// Difference of two successive mean delivered forces that counts as steady, N: the noise of the sensor. A single tick
+/// without the force, as on a delayed host, changes a mean by five times that.
 pub(super) const STEADY_N: f64 = 0.02;
-/// Damping that stops it, N·s/m (the locked axes').
+/// Damping that brakes the handle, N·s/m (that of the locked axes).
 const BRAKE_NS_PER_M: f64 = 15.0;
-/// Ticks without a new sample after which there is no force: nobody knows where the handle is (10 ms, as in a run).
+/// Number of ticks without a new sample after which the force is removed, as the position is unknown (10 ms, as in a run).
 const STALE_TICKS_LIMIT: u32 = 10;
-/// Time after which a device that does not come back is stopped, ns. No hand is held here: longer than in a run, so that a
-/// machine with other work does not end a calibration of an hour.
+/// Watchdog timeout, ns. No hand is on the handle: longer than in a run, so that other load on the machine does not end
+/// a calibration of an hour.
 const WATCHDOG_NS: u64 = 500_000_000;
-/// How often it is looked whether the thread is at its end.
+/// Poll interval for the end of the thread.
 const LOOK_FOR_END: Duration = Duration::from_millis(1);
 
-/// What the thread is told.
+/// Command to the thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
-    /// Push up with so many N.
+    /// Upward force, N.
     Push(f64),
-    /// Let the force go, and end.
+    /// Removes the force and ends the thread.
     End,
 }
 
@@ -63,21 +63,21 @@ impl Words<ORDER_WORDS> for Order {
     }
 }
 
-/// How the handle is doing.
+/// State of the handle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Report {
     pub(super) state: Holding,
-    /// Height, mean of the last ticks, m.
+    /// Mean height of the last ticks, m.
     pub(super) height_m: f64,
-    /// Difference of that to the mean before, m.
+    /// Difference to the previous mean height, m.
     pub(super) moved_m: f64,
-    /// Vertical force the device says it delivers, likewise a mean, N.
+    /// Mean of the delivered vertical force as reported by the device, N.
     pub(super) delivered_n: f64,
-    /// How often a mean was complete so far.
+    /// Number of completed means so far.
     pub(super) means: u64,
-    /// How many of them were of another height or force than the one before.
+    /// Number of means that differed from the previous one in height or force.
     pub(super) restless: u64,
-    /// In how many of the ticks of the last two means the device said it exerts less than it was told.
+    /// Number of ticks of the last two means in which the device reported saturation.
     pub(super) saturated: u64,
 }
 
@@ -113,22 +113,22 @@ impl Words<REPORT_WORDS> for Report {
     }
 }
 
-/// What the thread is at.
+/// State of the thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Holding {
-    /// The force is on its way to what was ordered, or was until just now.
+    /// The force is ramping to its target, or has just reached it.
     Changing,
-    /// It has been this many N for a while.
+    /// The force has had this value for a while, N.
     Steady(f64),
-    /// The handle flew off and is braked, without force.
+    /// The handle lost contact and is braked, without vertical force.
     RanAway,
-    /// The force of an axis alternated between its limits, and there is none any more.
+    /// The force of an axis alternated between its limits and was removed.
     Oscillated,
     /// The device faulted.
     Faulted(Fault),
 }
 
-/// What stands between the thread and the device, and who may stop both.
+/// Safety checks between the thread and the device, with the means to stop both.
 pub(super) struct Guard {
     pub(super) envelope: Envelope,
     pub(super) plausibility: PlausibilityCheck,
@@ -137,7 +137,7 @@ pub(super) struct Guard {
     pub(super) watchdog_process: Option<Arc<WatchdogProcess>>,
 }
 
-/// The handle in the hands of the thread.
+/// Owner of the holding thread.
 pub(super) struct Holder {
     orders: Publisher<Order, ORDER_WORDS>,
     reports: Observer<Report, REPORT_WORDS>,
@@ -146,10 +146,10 @@ pub(super) struct Holder {
 }
 
 impl Holder {
-    /// Starts holding, without vertical force. Not real-time.
+    /// Starts the thread, without vertical force. Not real-time.
     ///
     /// # Errors
-    /// What the system says about another thread.
+    /// Errors of the thread's start.
     pub(super) fn start(device: ActiveDevice, guard: Guard) -> std::io::Result<Self> {
         let (orders, ordered) = latest(Order::Push(0.0));
         let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
@@ -159,7 +159,7 @@ impl Holder {
         start_watchdog(heart.clone(), vec![stopper.clone()], stop.clone(), WATCHDOG_NS, signs)?;
         let thread_heart = heart.clone();
         let hold = move || {
-            // The rig notices that the process is gone.
+            // The rig detects if the watchdog process has ended.
             let _ = watchdog_process.as_ref().map(|process| process.follow_this_thread());
             let name = "the device of the rig".to_owned();
             let _last_stop = LastStop::arm(vec![stopper], vec![name], thread_heart.clone());
@@ -172,18 +172,18 @@ impl Holder {
         Ok(Self { orders, reports, heart, thread: Some(thread) })
     }
 
-    /// Pushes up with so many N from now on.
+    /// Ramps the upward force to a new value, N.
     pub(super) fn push(&mut self, force_n: f64) {
         self.orders.publish(&Order::Push(force_n));
     }
 
-    /// How the handle is doing.
+    /// Returns the state of the handle.
     ///
     /// # Errors
-    /// [`CalibrationError`] if it is not held any more.
+    /// [`CalibrationError`] if the handle is not held any more.
     pub(super) fn look(&self) -> Result<Report, CalibrationError> {
         let report = loop {
-            // A publish takes nanoseconds.
+            // A concurrent publish takes nanoseconds: retry.
             if let Some((_, report)) = self.reports.read() {
                 break report;
             }
@@ -199,7 +199,7 @@ impl Holder {
         }
     }
 
-    /// Lets the force go and the device land; the device, unless it has to be opened anew.
+    /// Removes the force and lands the device; returns the device unless it has to be reopened.
     pub(super) fn end(mut self) -> Option<OpenedDevice> {
         self.stop().and_then(ActiveDevice::deactivate)
     }
@@ -208,7 +208,7 @@ impl Holder {
         self.orders.publish(&Order::End);
         let thread = self.thread.take()?;
         while !thread.is_finished() {
-            // Stuck in the device, which the watchdog has stopped: it has to be left behind.
+            // Stuck in a device call after the watchdog stopped the device: abandon the thread.
             if self.heart.bitten().is_some() {
                 return None;
             }
@@ -218,7 +218,7 @@ impl Holder {
     }
 }
 
-/// However the procedure ends, the handle is let down.
+/// Lowers the handle however the procedure ends.
 impl Drop for Holder {
     fn drop(&mut self) {
         let _ = self.stop().and_then(ActiveDevice::deactivate);
@@ -234,7 +234,7 @@ fn hold(
     orders: &Observer<Order, ORDER_WORDS>,
     mut reports: Publisher<Report, REPORT_WORDS>,
 ) -> ActiveDevice {
-    // Refused, it holds all the same: a tick that comes too late shows in the force that was delivered.
+    // Without real-time priority the thread holds too: late ticks show in the delivered force.
     let _ = enter_real_time(None);
     let period = Duration::from_nanos(PERIOD_NS);
     let started = Instant::now();
@@ -255,7 +255,7 @@ fn hold(
         let ordered_n = if let Order::Push(force_n) = order { force_n } else { 0.0 };
         let left_n = ordered_n - pushed_n;
         if left_n != 0.0 {
-            // The last step is what is left, so that it ends at what was ordered to the bit.
+            // The last step is the remainder, so that the force equals its target to the bit.
             pushed_n = if left_n.abs() <= RAMP_STEP_N {
                 ordered_n
             } else {
@@ -266,7 +266,7 @@ fn hold(
         heart.enter(index, Place::DeviceRead(0));
         let last = state;
         let mut read = device.read(&tick, &mut state);
-        // As in a run: what cannot be is as good as nothing, and too much of it a fault.
+        // As in a run: an implausible sample counts as stale, and too many as a fault.
         if read == Cycle::Fresh && plausibility.check(&tick, &state).is_err() {
             state = last;
             read = Cycle::Stale;
@@ -288,7 +288,7 @@ fn hold(
         let (asked, mut events) = (locked(&state, vertical_n), Events::NONE);
         let commanded = envelope.apply(&asked, gate, &state, &tick, &mut events);
         if events.intersects(Events::FORCE_LIMITED) {
-            // Less than was ordered is never taken for it.
+            // A limited force never counts as the commanded one.
             averages.begin_anew();
         }
         heart.enter(index, Place::DeviceWrite(0));
@@ -298,7 +298,7 @@ fn hold(
             Cycle::Fault(fault) => Some(fault),
             Cycle::Fresh | Cycle::Stale => None,
         });
-        // The watchdog has told the device by now, or will within a millisecond.
+        // The watchdog has stopped the device, or will within a millisecond.
         let fault = faulted.or(stop.emergency().map(|_| Fault::EmergencyStop));
         if fault == Some(Fault::EmergencyStop) {
             stop.press(EmergencySource::Device);
@@ -315,17 +315,17 @@ fn hold(
         if fault.is_some() || is_let_go {
             break;
         }
-        // Late ticks are skipped: there is nothing to catch up with.
+        // Skip late ticks: there is nothing to catch up.
         let next = u32::try_from(time_ns / PERIOD_NS + 1).unwrap_or(u32::MAX);
         std::thread::sleep((started + period * next).saturating_duration_since(Instant::now()));
     }
     device
 }
 
-/// Two means, one after the other: what both agree on is at rest.
+/// Two successive means: the handle is at rest if they agree.
 #[derive(Default)]
 struct Averages {
-    /// The last full one, and the one before; nothing until there are two.
+    /// Last complete mean and the one before; `None` until there are two.
     full: Option<[(f64, f64); 2]>,
     last: Option<(f64, f64)>,
     height_m: Mean,
@@ -333,12 +333,12 @@ struct Averages {
     samples: u64,
     means: u64,
     restless: u64,
-    /// Saturated ticks of the mean that grows, and of the last two.
+    /// Saturated ticks of the mean in progress, and of the last two.
     saturated: [u64; 3],
 }
 
 impl Averages {
-    /// Forgets what was measured under another force.
+    /// Discards measurements under another force.
     fn begin_anew(&mut self) {
         *self = Self { means: self.means, restless: self.restless, ..Self::default() };
     }

@@ -1,8 +1,7 @@
-//! The rig: a levitated handle that pushes against a force sensor from below.
+//! Rig: a levitated handle that pushes against a force sensor from below.
 //!
-//! All axes but the vertical are locked by the controller; vertically a constant force is commanded, larger than
-//! the weight, so that the handle follows the sensor wherever it is put. What the sensor reads is the delivered
-//! force less the weight of what moves.
+//! The controller locks all axes but the vertical. Vertically it commands a constant force, larger than the weight, so
+//! that the handle follows the sensor. The sensor reads the delivered force less the weight of the moving part.
 
 mod device;
 mod holder;
@@ -14,19 +13,19 @@ pub use simulated::{RIG_WEIGHT_N, SENSOR_NOISE_N, SimulatedRig};
 use super::CalibrationError;
 use flotor_hal::{DVec3, DeviceState, Wrench, rotation_vector};
 
-/// The handle at rest against the sensor.
+/// Handle at rest against the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rest {
-    /// Height as the device measures it, m.
+    /// Height as measured by the device, m.
     pub height_m: f64,
-    /// Vertical force the device says it delivers, N.
+    /// Delivered vertical force as reported by the device, N.
     pub delivered_n: f64,
 }
 
-/// A device with a force sensor above it.
+/// Device with a force sensor above it.
 pub trait Rig {
-    /// Puts the sensor where the handle then rests at `target_m`, while `command_n` (N, for a measured height in
-    /// m) is commanded.
+    /// Moves the sensor so that the handle rests at `target_m` under the command `command_n` (N, for a measured height
+    /// in m).
     ///
     /// # Errors
     /// [`CalibrationError`] if the device faults or the handle does not come to rest.
@@ -38,7 +37,7 @@ pub trait Rig {
     /// [`CalibrationError`] if the sensor does not answer.
     fn read_force_n(&mut self, rest: &Rest) -> Result<f64, CalibrationError>;
 
-    /// True if the handle has rested there until now. In a simulation it has.
+    /// Returns true if the handle has rested there until now; always true in a simulation.
     ///
     /// # Errors
     /// [`CalibrationError`] if the device faults.
@@ -50,7 +49,7 @@ pub trait Rig {
 
 /// Servo period, ns.
 const PERIOD_NS: u64 = 1_000_000;
-/// Ticks averaged for a measured height: the noise of a micrometre falls to a tenth.
+/// Number of ticks averaged for a measured height: the noise of a micrometre falls to a tenth.
 const AVERAGED_TICKS: u64 = 100;
 /// Gains of a locked axis (client of the device's makers: 4800 N/m, 15 N s/m; 50 N·m/rad, 0.15 N·m s/rad).
 const LOCK_N_PER_M: f64 = 4800.0;
@@ -58,7 +57,7 @@ const LOCK_NS_PER_M: f64 = 15.0;
 const LOCK_NM_PER_RAD: f64 = 50.0;
 const LOCK_NMS_PER_RAD: f64 = 0.15;
 
-/// Every axis but the vertical held at home, and the vertical force as commanded.
+/// Returns the wrench that holds every axis but the vertical at home, with the vertical force as commanded.
 fn locked(state: &DeviceState, vertical_n: f64) -> Wrench {
     let (position_m, rotation_rad) = (state.pose.position(), rotation_vector(state.pose.orientation()));
     let force_n = position_m * -LOCK_N_PER_M - state.twist.linear() * LOCK_NS_PER_M;
@@ -66,7 +65,7 @@ fn locked(state: &DeviceState, vertical_n: f64) -> Wrench {
     Wrench::new(force_n.with_z(vertical_n), torque_nm)
 }
 
-/// A mean that grows.
+/// Running mean.
 #[derive(Default)]
 struct Mean {
     sum: f64,

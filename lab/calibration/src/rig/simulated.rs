@@ -1,4 +1,4 @@
-//! The simulated flotor under a simulated sensor.
+//! Simulated flotor under a simulated sensor.
 
 use super::{AVERAGED_TICKS, Mean, PERIOD_NS, Rest, Rig, locked};
 use crate::CalibrationError;
@@ -10,53 +10,53 @@ use std::f64::consts::TAU;
 
 /// Weight of flotor, plates, screws and bolts in the thesis's rig, N (Varadharajan 2007, section 3.4).
 pub const RIG_WEIGHT_N: f64 = 8.58;
-/// Noise of the force sensor, N, root mean square.
+/// Root mean square noise of the force sensor, N.
 pub const SENSOR_NOISE_N: f64 = 0.02;
 
 /// Standard gravity, m/s² (ISO 80000-3).
 const GRAVITY_M_PER_S2: f64 = 9.806_65;
-/// Time the handle is given to come to rest, ticks. The slowest motion of the rig falls to 1/e within 10 of them.
+/// Settling time of the handle, ticks. The slowest motion of the rig falls to 1/e within 10 of them.
 const SETTLE_TICKS: u64 = 200;
-/// The stand of the sensor, as the simulated hand: stiff and damped, N/m and N s/m.
+/// Stiffness and damping of the sensor's stand, modelled by the simulated hand.
 const STAND_STIFFNESS_N_PER_M: f64 = 20_000.0;
 const STAND_DAMPING_NS_PER_M: f64 = 250.0;
-/// More than this between two halves of the average is motion, m: twenty times the noise.
+/// Difference between two halves of the average that counts as motion, m: twenty times the noise.
 const REST_M: f64 = 4.0e-6;
-/// How often the sensor is moved until the handle is where it should be, and how close that is, m.
+/// Maximum number of adjustments of the sensor's position, and their tolerance, m.
 const ADJUSTMENTS: u32 = 3;
 const CLOSE_M: f64 = 2.0e-6;
 
-/// The simulated flotor under a simulated sensor. Its uneven field is reached as on any device: through the contract.
+/// Simulated flotor under a simulated sensor. Its uneven field acts as on any device: through the contract.
 pub struct SimulatedRig {
     plugin: Plugin,
     calibration: Option<VerticalCalibration>,
     noise: Pcg64Mcg,
     seed: u64,
-    /// Rests so far: each has noise of its own.
+    /// Number of rests so far: each has its own noise.
     rests: u64,
 }
 
 impl SimulatedRig {
-    /// A rig around the plugin `simulated`.
+    /// Creates a rig around the plugin `simulated`.
     #[must_use]
     pub fn new(plugin: Plugin, seed: u64) -> Self {
         Self { plugin, calibration: None, noise: Pcg64Mcg::seed_from_u64(seed), seed, rests: 0 }
     }
 
-    /// What the device corrects its force by from now on.
+    /// Sets the calibration of the device; `None`: uncorrected.
     pub fn calibrate(&mut self, calibration: Option<VerticalCalibration>) {
         self.calibration = calibration;
     }
 
-    /// Serial number of the device.
+    /// Returns the serial number of the device.
     ///
     /// # Errors
-    /// [`CalibrationError`] if it cannot be opened.
+    /// [`CalibrationError`] if the device cannot be opened.
     pub fn serial(&mut self) -> Result<String, CalibrationError> {
         Ok(self.plugin.open_device(&self.settings(0.0)?)?.serial())
     }
 
-    /// The flotor in the rig, with the sensor at a height. Gravity is compensated by nothing but the command.
+    /// Returns the settings of the flotor in the rig, with the sensor at a height. The command alone compensates gravity.
     fn settings(&self, sensor_m: f64) -> Result<Vec<Setting>, CalibrationError> {
         let schema = self.plugin.parameters();
         let settings = [
@@ -84,7 +84,7 @@ impl SimulatedRig {
         device.activate(&config).map_err(|(_, refusal): (_, Refusal)| CalibrationError::Refused(refusal))
     }
 
-    /// Lets the handle come to rest under a sensor at `sensor_m`.
+    /// Simulates the handle until it rests under a sensor at `sensor_m`.
     fn settle(&mut self, sensor_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
         let mut device = self.activate(sensor_m)?;
         let mut state = DeviceState::HOME;
@@ -121,7 +121,7 @@ impl Rig for SimulatedRig {
     fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
         let mut sensor_m = target_m;
         let mut rest = self.settle(sensor_m, command_n)?;
-        // The stand gives way a little: it is moved until the handle is where it should be.
+        // The stand yields slightly: move it until the handle is at its target.
         for _ in 0..ADJUSTMENTS {
             let off_m = target_m - rest.height_m;
             if off_m.abs() <= CLOSE_M {
@@ -134,9 +134,9 @@ impl Rig for SimulatedRig {
     }
 
     fn read_force_n(&mut self, rest: &Rest) -> Result<f64, CalibrationError> {
-        // At rest the sensor holds up what is delivered beyond the weight.
+        // At rest the sensor carries the delivered force beyond the weight.
         let true_n = rest.delivered_n - RIG_WEIGHT_N;
-        // Box and Muller 1958; 1 - u is never zero.
+        // Box-Muller transform (1958); 1 - u is never zero.
         let [u, v] = [(); 2].map(|()| (self.noise.next_u64() >> 11) as f64 / (1_u64 << 53) as f64);
         Ok(true_n + SENSOR_NOISE_N * (-2.0 * math::ln(1.0 - u)).sqrt() * math::cos(TAU * v))
     }

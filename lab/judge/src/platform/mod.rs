@@ -1,9 +1,9 @@
-//! What differs between systems when a plugin is judged in a process of its own. Each system has one module with the same items:
-//! - `anonymous_file`, `standard_input`: what a process says into;
-//! - `ending_signal`, `end_at_once`: how one ends;
-//! - `processor_time`, `used`: what the system counts;
-//! - `state`: what the system tells of this process;
-//! - `locked`: whether a step calls the system.
+//! System interface of the checks in child processes. Each system has one module with the same items:
+//! - `anonymous_file`, `standard_input`: files for results of a process;
+//! - `ending_signal`, `end_at_once`: end of a process;
+//! - `processor_time`, `used`: processor times;
+//! - `state`: state of this process;
+//! - `locked`: check for system calls in a step.
 
 #[cfg(not(windows))]
 mod linux;
@@ -21,10 +21,10 @@ pub(crate) use system::{
 
 use std::time::Duration;
 
-/// What a process did so far, and whether it would do more now.
+/// Processor time of a process, with its readiness to run.
 pub(crate) struct Used {
-    /// Time of a processor that it took.
+    /// Processor time so far.
     pub(crate) ran: Duration,
-    /// Whether it could run, and waits for nothing but its turn.
+    /// True if the process could run and waits only for its turn.
     pub(crate) wants: bool,
 }

@@ -1,18 +1,17 @@
-//! M6, closed loop: the model on a device that is let go.
+//! M6, closed loop: stability of a released device under the model.
 //!
-//! The plainest device (a mass on a damper per axis, [`crate::plant`]) is released away from home and left to
-//! the model: with light and heavy damping, 0 to 3 ticks of delay, quantised sensing and ticks whose wrench
-//! is lost. What comes out are settling time, peak force and buzz (force between 50 and 500 Hz), and whether
-//! it settles at all.
+//! The simplest device (a mass with a damper per axis, [`crate::plant`]) is released away from home under the model's
+//! wrench: with light and heavy damping, 0 to 3 ticks of delay, quantised sensing and ticks whose wrench is lost. The
+//! results are settling time, peak force, buzz (force between 50 and 500 Hz), and whether the device settles at all.
 //!
-//! Not every loop can: a spring of stiffness `K` is stable only up to `K < b / (T/2 + t_d)` (Gil, Sanchez,
-//! Hulin, Preusche and Hirzinger, J. Comput. Inf. Sci. Eng. 9, 2009; without virtual damping). So a release
-//! that diverges although the model was nowhere steeper than that is the model's fault and fails; where the
-//! rule says so too, it is what the stiffness costs. A release that comes to rest away from home is counted; where the
-//! model reports more energy there than at the start, something drove it uphill, and that fails too. A weight has nowhere to come to rest: what goes away
-//! under a pull that keeps its direction is carried off, which no loop could help, and is not judged. The
-//! rule itself is checked near home: the model's wrench is scaled until the loop tips over, and the stiffness
-//! at which it does is reported beside the rule's.
+//! Not every loop can: a spring of stiffness `K` is stable only up to `K < b / (T/2 + t_d)` (Gil, Sanchez, Hulin,
+//! Preusche and Hirzinger, J. Comput. Inf. Sci. Eng. 9, 2009; without virtual damping). A release that diverges
+//! although the model was nowhere steeper is an error of the model and fails; where the rule predicts divergence too,
+//! the stiffness is the cause. A release that comes to rest away from home is counted; if the model reports more energy
+//! there than at the start, its force has done work on the device, and the release fails too. A constant pull, as of a
+//! weight, has no rest position: a device that leaves under a pull of constant direction is not judged, because no loop
+//! could hold it. The rule itself is checked near home: the model's wrench is scaled until the loop becomes unstable,
+//! and the stiffness there is reported beside the rule's.
 
 use super::jacobian::Jacobian;
 use super::measure::{Measure, NO_ANSWER, Verdict};
@@ -34,29 +33,29 @@ const NAME: &str = "closed loop";
 const DELAYS_TICKS: [usize; 4] = [0, 1, 2, 3];
 /// Quantisation of the sensed position, m: none, Maglev 200, prototype.
 const QUANTA_M: [f64; 3] = [0.0, 2.0e-6, 10.0e-6];
-/// Share of ticks whose wrench does not arrive; the device goes on with the last one.
+/// Fractions of ticks whose wrench is lost; the device continues with the previous one.
 const DROPS: [f64; 3] = [0.0, 0.01, 0.05];
-/// Length of a release: an undamped spring with the lightest damping forgets half in a second.
+/// Ticks of a release: with the lightest damping, an oscillation loses half its energy in about a second.
 const TICKS: usize = 10_000;
-/// Releases start within this part of the workspace.
+/// Region of the starts, relative to the workspace.
 const NEAR: f64 = 0.3;
-/// A release is settled where it stays within this part of the start.
+/// Radius of the settled region, relative to the start's distance.
 const SETTLED: f64 = 0.02;
-/// Farther away than this, m, nothing comes back.
+/// Distance beyond which a release counts as diverged, m.
 const LOST_M: f64 = 10.0;
-/// Growth of the energy of motion from one quarter to the next that counts as growth.
+/// Ratio of the kinetic energies of two quarters that counts as growth.
 const GROWING: f64 = 1.01;
-/// Energy of motion, as a part of that at the start, below which a loop buzzes and does not diverge.
+/// Kinetic energy, relative to the first quarter, below which a growing loop buzzes but does not diverge.
 const BUZZ: f64 = 0.05;
-/// Energy of motion, as a part of that before, at which a handle has come to rest.
+/// Kinetic energy, relative to the earlier one, at which a handle counts as at rest.
 const AT_REST: f64 = 1.0e-3;
-/// Energy that a release may not have gained, J: a tenth of a millijoule is a millinewton over ten centimetres.
+/// Largest tolerated gain of energy in a release, J: a tenth of a millijoule is a millinewton over ten centimetres.
 const UPHILL_J: f64 = 1.0e-4;
-/// Energy of motion, as a part of what was gained, of a handle that hardly moves.
+/// Kinetic energy, relative to the gained energy, below which a handle counts as nearly still.
 const NEARLY_STILL: f64 = 0.1;
-/// Cosine of the angle to its first direction that a pull keeps to if it has one direction. What swings or circles has not.
+/// Least cosine of the angle between a pull and its first direction for a constant pull. Oscillation and circling exceed it.
 const STEADY: f64 = 0.5;
-/// Shortest motion in a tick that tells a stiffness, m: far above rounding.
+/// Shortest motion in a tick for a stiffness estimate, m: far above rounding.
 const MOVING_M: f64 = 1.0e-7;
 
 /// Imperfections of a loop.
@@ -71,7 +70,7 @@ struct Loop {
 }
 
 impl Loop {
-    /// Stiffness up to which such a loop is stable without quantisation and drops, N/m.
+    /// Returns the stiffness limit of the loop without quantisation and lost ticks, N/m.
     fn stiffest_n_per_m(&self) -> f64 {
         self.damping_ns_per_m / (PERIOD_S * (0.5 + self.delay_ticks as f64))
     }
@@ -88,27 +87,27 @@ impl Loop {
     }
 }
 
-/// What a release came to.
+/// Result of a release.
 struct Release {
     diverged: bool,
-    /// It went away under a pull that kept its direction.
+    /// True if the device left under a pull of constant direction.
     carried_off: bool,
-    /// It stays away from home.
+    /// True if the device came to rest away from home.
     rests_elsewhere: bool,
-    /// Energy the model stores at the end beyond that at the start, J; not a number where it says nothing.
+    /// Stored energy at the end less that at the start, J; NaN if the model reports none.
     uphill_j: f64,
-    /// Mean energy of motion in the last quarter, J.
+    /// Mean kinetic energy in the last quarter, J.
     restless_j: f64,
-    /// The steepest, as below, until the model first stored that much more than at the start.
+    /// Value of `steepest_n_per_m` up to the first tick whose stored energy is above the start's by the tolerance.
     steepest_below_n_per_m: f64,
     settle_s: f64,
     peak_force_n: f64,
     buzz_n: f64,
-    /// Largest change of wrench per motion on the way, N/m at the lever arm.
+    /// Largest change of wrench per motion on the path, N/m at the lever arm.
     steepest_n_per_m: f64,
 }
 
-/// Lets the device go and watches; nothing if the model gives no answer.
+/// Releases the device and simulates it; `None` if the model gives no answer.
 fn release(subject: &mut Subject<'_>, conditions: Loop, start: Pose, random: &mut Random) -> Option<Release> {
     subject.restart();
     if subject.memory() == Memory::PathDependent {
@@ -152,7 +151,7 @@ fn release(subject: &mut Subject<'_>, conditions: Loop, start: Pose, random: &mu
         if from_home_m > SETTLED * start_m {
             settled_tick = tick + 1;
         }
-        // Written so that NaN is lost too.
+        // Written so that NaN counts as lost too.
         lost = !(from_home_m <= LOST_M && plant.pose().is_finite());
         if lost {
             break;
@@ -175,29 +174,29 @@ fn release(subject: &mut Subject<'_>, conditions: Loop, start: Pose, random: &mu
     })
 }
 
-/// Distance of two poses with turns at the lever arm, m.
+/// Returns the distance between two poses, with rotations at the lever arm, m.
 fn distance_m(from: Pose, to: Pose) -> f64 {
     let turn_m = rotation_vector(to.orientation() * from.orientation().conjugate()) * LEVER_M;
     ((to.position() - from.position()).length_squared() + turn_m.length_squared()).sqrt()
 }
 
-/// Size of a wrench with torques at the lever arm, N.
+/// Returns the magnitude of a wrench, with torques at the lever arm, N.
 fn size_n(wrench: &Wrench) -> f64 {
     product_n2(wrench, wrench).sqrt()
 }
 
-/// Scalar product of two wrenches with torques at the lever arm, N².
+/// Returns the scalar product of two wrenches, with torques at the lever arm, N².
 fn product_n2(one: &Wrench, other: &Wrench) -> f64 {
     one.force().dot(other.force()) + (one.torque() / LEVER_M).dot(other.torque() / LEVER_M)
 }
 
-/// Samples of the last second or so that buzz is taken from.
+/// Number of last samples for the buzz, about a second.
 const BUZZ_WINDOW: usize = 1024;
-/// Where buzz begins, Hz; it ends at half the rate.
+/// Lower end of the buzz band, Hz; the upper end is half the rate.
 const BUZZ_FROM_HZ: f64 = 50.0;
 
-/// Root mean square of the force above 50 Hz over the last second, N: what a Hann window leaves of the whole,
-/// less its slow part (Parseval).
+/// Returns the root mean square of the force above 50 Hz over the last second, N: Hann-windowed total less the slow
+/// part (Parseval).
 fn buzz_n(forces_n: &[DVec3]) -> f64 {
     let Some(last) = forces_n.len().checked_sub(BUZZ_WINDOW).and_then(|from| forces_n.get(from..)) else {
         return f64::NAN;
@@ -217,16 +216,16 @@ fn buzz_n(forces_n: &[DVec3]) -> f64 {
                     let (sine, cosine) = circle[bin * step % BUZZ_WINDOW];
                     (real + windowed[step] * cosine, imaginary + windowed[step] * sine)
                 });
-            // Every frequency but zero stands for itself and its mirror image.
+            // Every frequency but zero counts twice, for its mirror image.
             let images = if bin == 0 { 1.0 } else { 2.0 };
             images * (real.length_squared() + imaginary.length_squared()) / (count * count)
         })
         .sum();
-    // A Hann window takes 3/8 of the power.
+    // A Hann window reduces the power to 3/8.
     ((whole - slow).max(0.0) * 8.0 / 3.0).sqrt()
 }
 
-/// All combinations of imperfections, the clean ones first.
+/// Returns all combinations of imperfections, the clean ones first.
 fn loops() -> Vec<Loop> {
     let mut loops = Vec::new();
     for dropped in DROPS {
@@ -241,7 +240,7 @@ fn loops() -> Vec<Loop> {
     loops
 }
 
-/// A release with the conditions it was made under.
+/// Release with its conditions.
 struct Row {
     conditions: Loop,
     start: Pose,
@@ -257,8 +256,8 @@ impl Row {
         self.release.as_ref().is_some_and(|release| release.carried_off)
     }
 
-    /// True if a device that only dissipates came to where the model stores more than at the start, and hardly moves: a loop
-    /// that is too stiff swings.
+    /// Returns true if the model moved a purely dissipative device to a place of higher stored energy, where it hardly
+    /// moves; a loop that is too stiff would oscillate.
     fn driven_uphill(&self) -> bool {
         self.release.as_ref().is_some_and(|release| {
             let Release { uphill_j, restless_j, steepest_below_n_per_m, .. } = *release;
@@ -270,7 +269,7 @@ impl Row {
         })
     }
 
-    /// True if the rule says this release must settle; 2 % are the rule's own error.
+    /// Returns true if the rule predicts that this release settles; 2 % are the rule's own error.
     fn must_settle(&self) -> bool {
         let steepest = self.release.as_ref().map_or(f64::INFINITY, |release| release.steepest_n_per_m);
         self.conditions.is_clean()
@@ -279,7 +278,7 @@ impl Row {
     }
 }
 
-/// Releases under all conditions, and the stiffness at which the loop tips over.
+/// Measures releases under all conditions, and the stiffness limit of each clean loop.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let loops = loops();
     let count = loops.len() as u64;
@@ -303,12 +302,12 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     Ok(measure)
 }
 
-/// Halvings of the search: two decades to a thousandth.
+/// Number of bisections: two decades to a thousandth.
 const HALVINGS: usize = 12;
-/// Start of the search for the limit, as a part of the workspace: small enough to be linear.
+/// Start of the search for the limit, relative to the workspace: small enough for a linear law.
 const LINEAR: f64 = 1.0e-3;
 
-/// Where each clean loop tips over near home: what it is, N/m as seen, and by the rule.
+/// Returns the stability limit of each clean loop near home, N/m: measured, and by the rule.
 fn limits(setup: &Setup<'_>) -> Result<Vec<(String, f64, f64)>, LoadError> {
     let clean: Vec<Loop> = loops().into_iter().filter(Loop::is_clean).collect();
     let reach = setup.options.reach.scaled(LINEAR);
@@ -320,14 +319,14 @@ fn limits(setup: &Setup<'_>) -> Result<Vec<(String, f64, f64)>, LoadError> {
     })
 }
 
-/// The stiffness at home times the gain at which the loop starts to grow, N/m; nothing without a stiffness.
+/// Returns the stiffness at home times the gain at which the loop starts to grow, N/m; `None` without a stiffness.
 fn limit(subject: &mut Subject<'_>, clean: Loop, start: Pose) -> Option<f64> {
     let stiffness = Jacobian::at(subject, Pose::HOME)?.gain();
     let rule = clean.stiffest_n_per_m();
     if stiffness <= 0.0 {
         return None;
     }
-    let mut random = Random::new(0, 0); // nothing is dropped: never drawn from
+    let mut random = Random::new(0, 0); // never drawn from: no tick is lost
     let mut diverges = |gain| Some(release(subject, Loop { gain, ..clean }, start, &mut random)?.diverged);
     let (mut stable, mut unstable) = (0.1 * rule / stiffness, 10.0 * rule / stiffness);
     if diverges(stable)? || !diverges(unstable)? {

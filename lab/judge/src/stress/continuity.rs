@@ -1,14 +1,12 @@
-//! M1, continuity: how far the wrench jumps between two poses a hair apart.
+//! M1, continuity: jumps of the wrench between very close poses.
 //!
-//! Straight lines cross the workspace in pieces of 0.01 mm. Along each line the pieces whose change of wrench
-//! stands out most against their neighbours' are cut into ten, the piece that stands out among those into ten
-//! again, down to 1e-8 mm: bisection, by tens. What stands out is the second difference of the changes, in
-//! which a smooth slope and curvature vanish and a step does not. `J(h)` is the largest change seen over
-//! pieces of length `h`: for a continuous law it falls in proportion to `h`, at a jump it stays on a plateau.
-//! The thesis's code jumps by 8.6 N at its buckling rule.
+//! Straight lines cross the workspace in pieces of 0.01 mm. On each line the pieces whose change of wrench differs most
+//! from their neighbours' are cut into ten, and the most different of those into ten again, down to 1e-8 mm: bisection,
+//! by tens. The criterion is the second difference of the changes: it vanishes for a smooth slope and curvature, but
+//! not for a step. `J(h)` is the largest change over pieces of length `h`: for a continuous law it falls in proportion
+//! to `h`, at a jump it has a plateau. The thesis's code jumps by 8.6 N at its buckling rule.
 //!
-//! Length of a piece: that of the motion with angles as lengths at the device's lever arm
-//! ([`super::LEVER_M`]).
+//! The length of a piece is that of the motion with angles as lengths at the device's lever arm ([`super::LEVER_M`]).
 
 use super::measure::{Measure, NO_ANSWER, Verdict};
 use super::poses::Reach;
@@ -28,17 +26,16 @@ const NAME: &str = "continuity";
 pub(super) const PIECES_MM: [f64; 7] = [1.0e-2, 1.0e-3, 1.0e-4, 1.0e-5, 1.0e-6, 1.0e-7, 1.0e-8];
 /// Pieces of a line: 10 mm.
 const PIECES_PER_LINE: usize = 1000;
-/// Pieces of a line that are looked at closely.
+/// Number of pieces per line that are refined.
 const SUSPECTS: usize = 3;
-/// Parts a suspect is cut into; one more on either side gives the outermost neighbours to stand out against.
+/// Parts of a refined piece; one more on either side serves as neighbour of the outermost.
 const CUTS: usize = 10;
 
-/// Step of force nobody feels, N: below 1 mN more accuracy is not physical (device 5 to 10 um times
-/// stiffness).
+/// Imperceptible step of force, N: below 1 mN more accuracy is not physical (device 5 to 10 um times stiffness).
 pub(super) const FELT_N: f64 = 1.0e-3;
-/// The same for torque, N·m.
+/// Imperceptible step of torque, N·m.
 pub(super) const FELT_NM: f64 = 2.0e-5;
-/// A jump a thousand times smaller than what is felt is harmless.
+/// Harmless fraction of an imperceptible step.
 pub(super) const HARMLESS: f64 = 1.0e-3;
 
 /// Largest change over one piece length.
@@ -56,9 +53,9 @@ tally! {
     pub(super) struct Jumps {
         pub(super) force: [Worst; PIECES_MM.len()],
         pub(super) torque: [Worst; PIECES_MM.len()],
-        /// Largest force over the shortest piece inside the workspace itself, without the margin around it.
+        /// Largest force over the shortest piece inside the workspace proper, without the margin around it.
         inside: Worst,
-        /// Largest force and torque over the shortest piece if a jump hides in the motion at rest, in what is felt.
+        /// Largest jump over the shortest piece that drift at rest may hide, in units of the perception limit.
         possible: f64,
         pieces: u64,
         shortest_pieces: u64,
@@ -68,9 +65,9 @@ tally! {
 /// Change of wrench over a piece.
 #[derive(Clone, Copy)]
 pub(super) struct Change {
-    /// Beyond that of the model at rest: a mass in motion, or creep, is no jump.
+    /// Change beyond that at rest: a mass in motion or creep is no jump.
     beyond: Wrench,
-    /// Of the model at rest, in a tick.
+    /// Change at rest in a tick.
     at_rest: Wrench,
 }
 
@@ -84,7 +81,7 @@ impl Change {
         Self { beyond: Wrench::new(force, rest_of(change.torque(), at_rest.torque())), at_rest }
     }
 
-    /// The largest jump that it may contain, over what is felt.
+    /// Returns the largest jump that the change may contain, in units of the perception limit.
     fn possible(&self) -> f64 {
         let force_n = self.beyond.force().length() + self.at_rest.force().length();
         let torque_nm = self.beyond.torque().length() + self.at_rest.torque().length();
@@ -108,7 +105,7 @@ impl Jumps {
     }
 }
 
-/// A straight line in position and rotation vector; its parameter is a length, m.
+/// Straight line in position and rotation vector; its parameter is a length, m.
 pub(super) struct Line {
     pub(super) position_m: DVec3,
     pub(super) rotation_rad: DVec3,
@@ -122,7 +119,7 @@ impl Line {
     }
 }
 
-/// Crosses the workspace on straight lines and closes in on whatever stands out.
+/// Crosses the workspace on straight lines and refines the most irregular pieces.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Vec<Jump>), LoadError> {
     let sobol = Sobol::new(setup.options.seed);
     let total = sweep(setup, NAME, setup.share(40_000, 16), |subject, block| {
@@ -144,8 +141,8 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Vec<Jump>), LoadErr
     Ok((judge(&total), curve(&total)))
 }
 
-/// Lines through evenly spread poses, every fourth one through home; along all axes at once, or only
-/// shifting, or only turning, or along one axis.
+/// Returns a line through one of evenly spread poses, every fourth one through home: along all axes at once, or only
+/// translating, or only rotating, or along one axis.
 fn line(setup: &Setup<'_>, sobol: &Sobol, block: u64) -> Line {
     let reach = setup.options.reach.scaled(WIDER);
     let mut random = Random::new(setup.options.seed, block);
@@ -163,14 +160,14 @@ fn line(setup: &Setup<'_>, sobol: &Sobol, block: u64) -> Line {
         _ => ([DVec3::X, DVec3::Y, DVec3::Z][(block / 16 % 3) as usize], DVec3::ZERO),
     };
     if block.is_multiple_of(4) {
-        // Not exactly through the middle: a piece must cross home, not end there.
+        // Offset from the middle: a piece must cross home, not end there.
         let aside_m = PIECES_MM[0] * 1.0e-3 * random.unit();
         (position_m, rotation_rad) = (along * aside_m, around * (aside_m / LEVER_M));
     }
     Line { position_m, rotation_rad, along_m: along, along_rad: around / LEVER_M }
 }
 
-/// Change of wrench over each piece, beyond that of a model with memory at rest; nothing where there was no answer.
+/// Returns the change of wrench over each piece, beyond that of a model with memory at rest; `None` without an answer.
 pub(super) fn changes(
     subject: &mut Subject<'_>,
     line: &Line,
@@ -183,7 +180,7 @@ pub(super) fn changes(
         let here = subject.ask(pose).ok()?.wrench;
         match subject.memory() {
             Memory::Stateless => Some([here; 2]),
-            // A tick later at the same pose.
+            // Step again at the same pose, a tick later.
             Memory::PathDependent => Some([here, subject.advance(pose, Twist::ZERO, PERIOD_NS).ok()?.wrench]),
         }
     };
@@ -199,7 +196,7 @@ pub(super) fn changes(
         .collect()
 }
 
-/// How much a piece stands out: the second difference of the changes around it, N, torque at the lever arm.
+/// Returns the irregularity of a piece: second difference of the changes around it, N, torque at the lever arm.
 pub(super) fn standing_out(changes: &[Option<Change>], index: usize) -> f64 {
     let around = index.checked_sub(1).and_then(|from| changes.get(from..=index + 1));
     let Some([Some(before), Some(here), Some(after)]) = around else { return 0.0 };
@@ -207,7 +204,7 @@ pub(super) fn standing_out(changes: &[Option<Change>], index: usize) -> f64 {
     second.force().length() + second.torque().length() / LEVER_M
 }
 
-/// The pieces that stand out most, no two of them neighbours.
+/// Returns the most irregular pieces, no two of them neighbours.
 fn suspects(changes: &[Option<Change>]) -> Vec<usize> {
     let mut ranked: Vec<(f64, usize)> =
         (0..changes.len()).map(|index| (standing_out(changes, index), index)).collect();
@@ -224,7 +221,7 @@ fn suspects(changes: &[Option<Change>]) -> Vec<usize> {
     chosen
 }
 
-/// From a piece of the first length down to the last, into the tenth that stands out each time.
+/// Refines a piece from the first length down to the last, into the most irregular tenth each time.
 pub(super) fn close_in(subject: &mut Subject<'_>, reach: Reach, line: &Line, from_m: f64, jumps: &mut Jumps) {
     let mut from_m = from_m;
     for (level, length_mm) in PIECES_MM.iter().enumerate().skip(1) {
@@ -261,7 +258,7 @@ fn judge(total: &Jumps) -> Measure {
     let (force, torque) = (total.force[last], total.torque[last]);
     let of_force = Verdict::of(force.value, FELT_N * HARMLESS, FELT_N);
     let verdict = of_force.max(Verdict::of(torque.value, FELT_NM * HARMLESS, FELT_NM));
-    // The graver of the two is the one that is shown.
+    // Report the more severe of the two.
     let torque_is_graver = torque.value / FELT_NM > force.value / FELT_N;
     let (worst, unit, felt) = if torque_is_graver { (torque, "N·m", FELT_NM) } else { (force, "N", FELT_N) };
     let comment = match verdict {

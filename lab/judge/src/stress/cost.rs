@@ -1,11 +1,11 @@
-//! M7, cost: how long a call takes, and which pose takes longest.
+//! M7, cost: duration of a call, and its slowest pose.
 //!
-//! One thread, one call at a time, cold and warm poses of the whole workspace and of the manifolds; a model
-//! with memory is walked there from home, tick by tick. A shared machine interrupts: some calls in a hundred
-//! thousand take milliseconds that are not the model's. So everything is timed three times and the shortest
-//! counts against the bound, while percentiles and the worst are reported as they were seen. A pose whose shortest
-//! is above the bound is timed up to ten times more: an interruption does not come back, a slow call does. That a call
-//! allocates nothing cannot be seen from outside the plugin; the plugin's own tests have to say it.
+//! One thread makes one call at a time, at cold and warm poses of the whole workspace and of the manifolds; a model
+//! with memory is walked there from home, tick by tick. A shared machine interrupts: some calls in a hundred thousand
+//! take milliseconds for reasons outside the model. So every call is timed three times and the shortest counts against
+//! the bound, while percentiles and the maximum are reported as measured. A pose whose shortest time is above the bound
+//! is timed up to ten times more: an interruption does not recur, a slow call does. Allocations of a call are not
+//! visible from outside the plugin; the plugin's own tests have to check them.
 
 use super::measure::{Measure, NO_ANSWER};
 use super::poses::mixed;
@@ -22,17 +22,17 @@ use hdrhistogram::Histogram;
 use std::time::Instant;
 
 const NAME: &str = "cost of a call";
-/// A tenth of a 1 kHz tick, ns: what `flotor run` calls late, and room for everything else in a tick.
+/// Tenth of a 1 kHz tick, ns: threshold of a late call in `flotor run`, which leaves room for everything else in a tick.
 const TENTH_OF_A_TICK_NS: f64 = 100_000.0;
-/// Times each pose is asked.
+/// Number of timings of each pose.
 const REPEATS: usize = 3;
-/// Times more that a pose above the bound is asked, and at how many such poses: a model that is slow everywhere is slow soon.
+/// Number of further timings of a pose above the bound, and of such poses: a model that is slow everywhere shows early.
 const REPEATS_ABOVE: usize = 10;
 const POSES_ABOVE: u32 = 100;
 /// Poses between two updates of the progress line.
 const CHUNK: u64 = 1024;
 
-/// Times calls; with the distribution for the picture, ns.
+/// Times calls; returns also their distribution for the picture, ns.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError> {
     let chunks = setup.share(4_000_000, 0).div_ceil(CHUNK);
     setup.progress.begin(NAME, chunks);
@@ -54,9 +54,9 @@ struct Stopwatch {
     overhead_ns: f64,
     calls: Histogram<u64>,
     spread: Decades,
-    /// Longest of the shortest times, and the evaluated pose.
+    /// Longest of the shortest times, with its pose.
     slowest: Worst,
-    /// Poses above the bound that may still be timed again.
+    /// Remaining poses above the bound that may be timed again.
     poses_above_left: u32,
 }
 
@@ -73,7 +73,7 @@ impl Stopwatch {
         }
     }
 
-    /// Times every call that reaching a pose takes, several times over.
+    /// Times every call on the way to a pose, several times over.
     fn time(&mut self, subject: &mut Subject<'_>, pose: Pose) {
         let mut shortest_ns: Vec<f64> = Vec::new();
         for repeat in 0..REPEATS + REPEATS_ABOVE {
@@ -101,8 +101,8 @@ impl Stopwatch {
         }
     }
 
-    /// One call for a model without history, the ticks of a walk from home for one with it; nothing if the
-    /// model panics, for what a panic costs is not what a call costs.
+    /// Times one call of a stateless model, or the ticks of a walk from home. Returns `None` if the model panics,
+    /// because the cost of a panic is not that of a call.
     fn once(&self, subject: &mut Subject<'_>, pose: Pose) -> Option<Vec<f64>> {
         let net_ns = |begin| net_ns(self.overhead_ns, begin).max(1.0);
         if subject.memory() == Memory::PathDependent {

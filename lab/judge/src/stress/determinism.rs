@@ -1,7 +1,7 @@
-//! M8, determinism: the same poses give the same bits.
+//! M8, determinism: equal bits for equal poses.
 //!
-//! From a second instance, after a reset, and through the batch call. The digest of all answers is printed,
-//! so that runs on two machines or of two builds can be compared by eye.
+//! Compares a second instance, a reset instance, and the batch call. The digest of all answers is printed, to compare
+//! runs on two machines or of two builds by eye.
 
 use super::measure::{Measure, NO_ANSWER};
 use super::poses::mixed;
@@ -18,13 +18,13 @@ use flotor_hal::{Input, Memory, Output, Pose, Twist};
 use xxhash_rust::xxh3::Xxh3;
 
 const NAME: &str = "determinism";
-/// Poses of one block; each block makes a second instance.
+/// Poses per block; each block creates a second instance.
 const BLOCK: u64 = 2048;
 
 /// Bits of an answer.
 type Bits = [u64; 8];
 
-/// Ways to ask again, in the order of [`Tally::differing`].
+/// Repetitions that are compared, in the order of [`Tally::differing`].
 const AGAIN: [&str; 3] = ["second instance", "after reset", "batch"];
 
 tally! {
@@ -32,13 +32,13 @@ tally! {
         compared: u64,
         differing: [u64; AGAIN.len()],
         first: Option<(Pose, &'static str)>,
-        /// Of the answers of each block.
+        /// Digest of the answers of each block.
         digests: Vec<u64>,
         refused: Option<LoadError>,
     }
 }
 
-/// Asks the same poses four ways.
+/// Steps through the same poses in four ways.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let sobol = Sobol::new(setup.options.seed);
     let blocks = setup.share(1_000_000, 0).div_ceil(BLOCK);
@@ -62,13 +62,13 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     }
 }
 
-/// Evenly spread poses and some of the manifolds; a walk from home for a model with memory.
+/// Returns evenly spread poses and some of the manifolds; for a model with memory, a walk from home.
 fn inputs(setup: &Setup<'_>, sobol: &Sobol, subject: &mut Subject<'_>, block: u64) -> Vec<Input> {
     let reach = setup.options.reach.scaled(WIDER);
     let mut random = Random::new(setup.options.seed, block);
     let mut input = |index: u64| {
         if subject.memory() == Memory::PathDependent {
-            // Straight out to a pose of the block's own, in as many ticks as the block has.
+            // Move straight to one pose per block, in as many ticks as the block has.
             let part = (index % BLOCK) as f64 / BLOCK as f64;
             let outward = sobol.point(block).map(|unit| 0.5 + (unit - 0.5) * part);
             return subject.input(reach.pose(outward), Twist::ZERO, PERIOD_NS);
@@ -78,7 +78,7 @@ fn inputs(setup: &Setup<'_>, sobol: &Sobol, subject: &mut Subject<'_>, block: u6
     (block * BLOCK..(block + 1) * BLOCK).map(&mut input).collect()
 }
 
-/// Not a pattern a model writes: stands for "no answer".
+/// Bit pattern for "no answer", which no model writes.
 const UNANSWERED: Bits = [0x0bad_0bad_0bad_0bad; 8];
 
 fn singly(model: &mut Model, inputs: &[Input]) -> Vec<Bits> {
@@ -99,7 +99,7 @@ fn bits(output: &Output) -> Bits {
     let mut bits = [0; 8];
     let numbers = output.wrench.force_n.iter().chain(&output.wrench.torque_nm).chain([&output.energy_j]);
     for (to, number) in bits.iter_mut().zip(numbers) {
-        // Which of its many bit patterns a NaN has means nothing.
+        // Ignore the payload of a NaN.
         *to = if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() };
     }
     bits[7] = output.status().map_or(u64::MAX, |status| status as u64);
@@ -110,7 +110,7 @@ fn compare(inputs: &[Input], reference: &[Bits], again: [&[Bits]; AGAIN.len()]) 
     let mut tally = Tally::default();
     let mut digest = Xxh3::new();
     for (index, (input, expected)) in inputs.iter().zip(reference).enumerate() {
-        // A model that broke answers nothing from there on, to anybody; M0 tells that story.
+        // A broken model answers nothing from there on; M0 reports that.
         if *expected == UNANSWERED {
             break;
         }

@@ -1,18 +1,17 @@
-//! M4: whether the model generates energy.
+//! M4: energy that the model generates on closed paths.
 //!
-//! **Loop energy.** The hand takes the handle around random closed paths in all six dimensions. The
-//! work of the model's force on the hand during a lap, relative to all work exchanged, is zero for a force that
-//! comes from an energy; what is not zero can be pumped. The rectangle rule on a closed smooth path
-//! converges faster than any power of the step, so 1e-9 can be distinguished from zero; where the power has kinks
-//! [`quadrature`](super::quadrature) takes its place. What is uncertain is taken off, and a lap where that exceeds the bound is not
-//! resolved.
+//! **Loop energy.** The hand moves the handle around random closed paths in all six dimensions. The work of the model's
+//! force on the hand during a lap, relative to all work exchanged, is zero for a force that has a potential; any other
+//! energy can be pumped. The rectangle rule on a closed smooth path converges faster than any power of the step, so
+//! 1e-9 can be distinguished from zero; where the power has kinks [`quadrature`](super::quadrature) replaces it. The
+//! uncertainty is subtracted, and a lap whose uncertainty exceeds the bound is not resolved.
 //!
-//! Every path is gone twice: at rest in each of its poses, where the work of a model without memory is zero, and in
-//! [motion](super::motion), with its velocity, where damping and friction may take energy and nothing may give it.
+//! Every path is traversed twice: at rest in each of its poses, where the work of a stateless model is zero, and in
+//! [motion](super::motion), with its velocity, where damping and friction may dissipate energy but nothing may generate it.
 //!
-//! **`energy_j`** of a model that reports it is compared with that work, all along the lap: what is stored may not rise
-//! by more than the hand puts in, and for a model without memory not by less either. One in a thousand of the energy
-//! stored on the lap is tolerated: the trapezoidal rule between two samples, which are doubled until it is met.
+//! **`energy_j`** of a model that reports it is compared with that work, all along the lap: the stored energy may not
+//! rise by more than the hand's input, and for a stateless model not by less either. One in a thousand of the energy
+//! stored on the lap is tolerated; samples for the trapezoidal rule are doubled until it is met.
 
 use super::Setup;
 use super::measure::{Measure, NO_ANSWER, PoseRecord, Verdict};
@@ -27,42 +26,42 @@ use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Memory, Pose};
 
 const LOOPS: &str = "loop energy";
-/// Relative work that counts as none.
+/// Relative work that counts as zero.
 pub(super) const CONSERVATIVE: f64 = 1.0e-9;
-/// Samples of a lap: doubled until the work has settled, or there are [`MOST_SAMPLES`].
+/// Initial number of samples of a lap: doubled until the work has converged, up to [`MOST_SAMPLES`].
 const FEWEST_SAMPLES: usize = 256;
 /// See [`FEWEST_SAMPLES`].
 const MOST_SAMPLES: usize = 16384;
-/// Samples at which the work of a smooth lap has settled.
+/// Number of samples at which the work of a smooth lap has converged.
 const SMOOTH_SAMPLES: usize = 1024;
-/// Relative change between two numbers of samples that counts as settled.
+/// Relative change between two numbers of samples that counts as converged.
 const SETTLED: f64 = 1.0e-12;
-/// Samples of a lap in motion.
+/// Number of samples of a lap in motion.
 const MOVING_SAMPLES: usize = 1024;
-/// Steps a lap may cross: a motion of three harmonics meets a plane six times, and there may be two of them.
+/// Number of steps that a lap may cross: a motion of three harmonics meets a plane six times, and there may be two planes.
 const MOST_STEPS: f64 = 12.0;
 
-/// Difference of stored energy and work, relative to the energy stored on a lap, that counts as none.
+/// Tolerated difference of stored energy and work, relative to the energy stored on a lap.
 const SAME_ENERGY: f64 = 1.0e-3;
-/// Energy too small to be compared, J.
+/// Smallest energy that is compared, J.
 const NO_ENERGY_J: f64 = 1.0e-9;
 
-/// One sample of a lap.
+/// Sample of a lap.
 #[derive(Clone, Copy)]
 pub(super) struct Sample {
     /// Power of the model on the hand, J per lap.
     power_j: f64,
-    /// The most that force and torque could do on the way, J per lap.
+    /// Upper bound of the power of force and torque on the path, J per lap.
     pub(super) most_j: f64,
-    /// What it says it stores, J; not a number where it says nothing.
+    /// Stored energy as reported by the model, J; NaN without a report.
     stored_j: f64,
 }
 
-/// By how much the stored energy of a lap differs from the work, relative to what is stored on it. Zero where the model
-/// says nothing of its energy.
+/// Returns the difference between stored energy and work on a lap, relative to the energy stored on it. Zero where the
+/// model reports no energy.
 fn mismatch(samples: &[Sample], memory: Memory) -> f64 {
     let (mut most_j, mut least_j) = (f64::NEG_INFINITY, f64::INFINITY);
-    // Stored energy and the work that the hand got, together: constant, or falling where something dissipates.
+    // Stored energy plus work on the hand: constant, or falling where energy is dissipated.
     let (mut total_j, mut lowest_j, mut highest_j, mut risen_j) = (0.0, 0.0, 0.0, 0.0);
     for pair in samples.windows(2) {
         let [before, here] = pair else { continue };
@@ -82,17 +81,17 @@ fn mismatch(samples: &[Sample], memory: Memory) -> f64 {
     }
 }
 
-/// Whether a lap may take energy from the hand.
+/// Expectation whether a lap may dissipate energy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Dissipation {
-    /// Gone the other way round, it would give that energy.
+    /// Conservative: traversed in reverse, the lap would generate that energy.
     None,
-    /// By friction, or damping.
+    /// Dissipation by friction or damping is allowed.
     Allowed,
 }
 
 impl Dissipation {
-    /// Of a lap at rest in each of its poses.
+    /// Returns the expectation for a lap at rest in each of its poses.
     pub(super) fn at_rest(memory: Memory) -> Self {
         match memory {
             Memory::Stateless => Self::None,
@@ -101,21 +100,21 @@ impl Dissipation {
     }
 }
 
-/// The work of one lap.
+/// Work of one lap.
 #[derive(Clone, Copy)]
 pub(super) struct Lap {
     /// Work on the hand, J.
     pub(super) net_j: f64,
     /// All work exchanged, J.
     pub(super) gross_j: f64,
-    /// What the samples leave uncertain about the work on the hand, J.
+    /// Uncertainty of the work on the hand, J.
     pub(super) uncertain_j: f64,
-    /// See [`mismatch`].
+    /// Relative difference between stored energy and work; see [`mismatch`].
     pub(super) mismatch: f64,
 }
 
 impl Lap {
-    /// From the power at evenly spaced samples, J per lap.
+    /// Integrates the power at evenly spaced samples, J per lap.
     pub(super) fn from_powers(powers: &[f64]) -> Self {
         let mean =
             |numbers: &mut dyn Iterator<Item = f64>, count: usize| numbers.sum::<f64>() / count.max(1) as f64;
@@ -126,7 +125,7 @@ impl Lap {
         if change_j <= SETTLED * gross_j {
             return Self { net_j, gross_j, uncertain_j: 0.0, mismatch: 0.0 };
         }
-        // Not smooth. Each step between two samples puts the rule off by up to its height times the interval.
+        // Not smooth: each step between two samples offsets the rule by up to its height times the interval.
         let heights = powers.windows(2).map(|pair| (pair[1] - pair[0]).abs());
         let steps_j = MOST_STEPS * heights.fold(0.0, f64::max) / powers.len() as f64;
         Self { net_j, gross_j, uncertain_j: (2.0 * change_j).max(steps_j), mismatch: 0.0 }
@@ -137,7 +136,7 @@ impl Lap {
         Self { mismatch: mismatch(samples, memory), ..Self::from_powers(&powers) }
     }
 
-    /// Returns the lap itself if its work is known to the bound, or its work by [`work`], whose laps `powers` goes.
+    /// Returns the lap itself if its uncertainty is within the bound, else its work by [`work`], which samples `powers`.
     pub(super) fn or_resolved(
         self,
         dissipation: Dissipation,
@@ -150,12 +149,12 @@ impl Lap {
         Some(Self { net_j, gross_j, uncertain_j, mismatch: self.mismatch })
     }
 
-    /// Energy that it generates beyond what is uncertain, J.
+    /// Returns the generated energy beyond the uncertainty, J.
     pub(super) fn made_j(&self, dissipation: Dissipation) -> f64 {
         (self.work_j(dissipation) - self.uncertain_j).max(0.0)
     }
 
-    /// Whether more energy than the bound is generated, or less, beyond what is uncertain.
+    /// Returns true if the uncertainty is small enough to decide between pass and fail.
     pub(super) fn is_resolved(&self, dissipation: Dissipation) -> bool {
         let bound_j = CONSERVATIVE * self.gross_j;
         self.made_j(dissipation) > bound_j || self.work_j(dissipation) + self.uncertain_j <= bound_j
@@ -173,7 +172,7 @@ impl Lap {
     }
 }
 
-/// At a part of a lap, from 0 to 1.
+/// Samples a lap at a fraction of it, from 0 to 1.
 fn sample(subject: &mut Subject<'_>, path: &Trajectory, part: f64) -> Option<Sample> {
     let (pose, motion_m, turn_rad) = path.at(part);
     let answer = subject.ask(pose).ok()?;
@@ -183,12 +182,12 @@ fn sample(subject: &mut Subject<'_>, path: &Trajectory, part: f64) -> Option<Sam
     Some(Sample { power_j, most_j, stored_j: answer.energy_j })
 }
 
-/// Along a lap, at evenly spaced samples.
+/// Samples a lap at evenly spaced points.
 pub(super) fn samples(subject: &mut Subject<'_>, path: &Trajectory, samples: usize) -> Option<Vec<Sample>> {
     (0..samples).map(|index| sample(subject, path, index as f64 / samples as f64)).collect()
 }
 
-/// Twice as many samples of a lap: those that are known, and one between each and the next, in the order of the lap.
+/// Doubles the samples of a lap: inserts one between each known one and the next, in the order of the lap.
 fn doubled(subject: &mut Subject<'_>, path: &Trajectory, known: &[Sample]) -> Option<Vec<Sample>> {
     let count = 2 * known.len();
     let mut samples = Vec::with_capacity(count);
@@ -203,7 +202,7 @@ fn lap(subject: &mut Subject<'_>, path: &Trajectory) -> Option<Lap> {
     let memory = subject.memory();
     let even = match memory {
         Memory::PathDependent => {
-            // The first lap forgets where it came from, the second counts. Steps are short as they are.
+            // The first lap establishes the history, the second counts. The steps are short enough as they are.
             samples(subject, path, 4096)?;
             Lap::from_samples(&samples(subject, path, 4096)?, memory)
         }
@@ -214,12 +213,12 @@ fn lap(subject: &mut Subject<'_>, path: &Trajectory) -> Option<Lap> {
     })
 }
 
-/// A lap of a model without memory, in as many even samples as its stored energy needs to be compared, and its work to settle.
+/// Samples a lap of a stateless model until its work has converged and its stored energy can be compared.
 fn sampled_as_needed(subject: &mut Subject<'_>, path: &Trajectory) -> Option<Lap> {
     let mut samples = samples(subject, path, FEWEST_SAMPLES)?;
     loop {
         let lap = Lap::from_samples(&samples, Memory::Stateless);
-        // The work of a smooth lap settles long before the trapezoidal rule between its samples does; that of another never does.
+        // The work of a smooth lap converges long before the trapezoidal rule does; that of any other lap never does.
         let is_done = (lap.is_settled() || samples.len() >= SMOOTH_SAMPLES) && lap.mismatch <= SAME_ENERGY;
         if is_done || samples.len() >= MOST_SAMPLES {
             return Some(lap);
@@ -232,7 +231,7 @@ tally! {
     struct LoopTally {
         laps: u64,
         unanswered: u64,
-        /// Laps on which work was exchanged, and those of them where the sum is known to the bound.
+        /// Number of laps on which work was exchanged, and of those whose sum is known to the bound.
         comparable: u64,
         resolved: u64,
         beyond: u64,
@@ -267,7 +266,7 @@ impl LoopTally {
     }
 }
 
-/// Around closed paths; with the distribution of relative work for the picture.
+/// Measures closed paths; returns also the distribution of relative work for the picture.
 pub(super) fn measure_loops(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError> {
     let total = sweep(setup, LOOPS, setup.share(20_000, 10), |subject, block| {
         let mut random = Random::new(setup.options.seed, block);

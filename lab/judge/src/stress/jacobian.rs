@@ -1,37 +1,37 @@
-//! Derivative of the wrench by the pose, from differences, with what the differences leave uncertain.
+//! Derivative of the wrench by the pose, from finite differences, with its uncertainty.
 //!
-//! Coordinates are shifts of the handle and small turns in the model frame (from the left, as angular
-//! velocity is), angles as lengths and torques as forces at the device's lever arm: every entry is a
-//! stiffness in N/m.
+//! Coordinates are translations of the handle and small rotations in the model frame (from the left, as angular
+//! velocity), with angles as lengths and torques as forces at the device's lever arm: every entry is a stiffness in
+//! N/m.
 
 use super::LEVER_M;
 use crate::subject::Subject;
 use flotor_hal::{DVec3, Pose, Wrench, orientation_from_rotation_vector};
 
-/// A 6 x 6 matrix, rows first.
+/// Matrix of 6 x 6, by rows.
 pub(super) type Matrix = [[f64; 6]; 6];
 
-/// Half steps to try, m: short ones lose to rounding, long ones to curvature, and which loses less depends on
-/// the model and on the pose.
+/// Half steps to try, m: short ones lose to rounding, long ones to curvature; the best one depends on the model and on
+/// the pose.
 const STEPS_M: [f64; 3] = [1.0e-4, 1.0e-5, 1.0e-6];
 
-/// Relative difference of two answers at one pose up to which they are one: what solvers leave.
+/// Relative difference up to which two answers at one pose count as equal: residual of solvers.
 const SAME: f64 = 1.0e-6;
-/// Of the derivative.
+/// Number of columns of the derivative.
 const COLUMNS: f64 = 6.0;
 
-/// Size of a wrench with its torque at the lever arm, N.
+/// Returns the magnitude of a wrench with its torque at the lever arm, N.
 fn size_n(wrench: &Wrench) -> f64 {
     wrench.force().length() + wrench.torque().length() / LEVER_M
 }
 
-/// Largest central difference along each coordinate, of any step, N/m. Each is a gain that was seen, whether or not there
-/// is a derivative.
+/// Largest central differences along each coordinate, over all steps, N/m: measured gains, with or without a
+/// derivative.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Chords {
     /// Change of the wrench over the motion.
     gains: [f64; 6],
-    /// Change of its component against the motion.
+    /// Change of the wrench's component against the motion.
     against: [f64; 6],
 }
 
@@ -44,37 +44,37 @@ impl Chords {
         }
     }
 
-    /// The largest gain.
+    /// Returns the largest gain, N/m.
     pub(super) fn gain(&self) -> f64 {
         self.gains.into_iter().fold(0.0, f64::max)
     }
 
-    /// Largest stiffness along a coordinate; 0 where the wrench opposes no motion.
+    /// Returns the largest stiffness along a coordinate, N/m; 0 where the wrench opposes no motion.
     pub(super) fn stiffness(&self) -> f64 {
         self.against.into_iter().fold(0.0, f64::max)
     }
 
-    /// Bound of gain and stiffness in every direction, if the gains add at most: their Frobenius norm.
+    /// Returns an upper bound of gain and stiffness in every direction: the Frobenius norm of the gains, N/m.
     pub(super) fn bound(&self) -> f64 {
         self.gains.into_iter().map(|gain| gain * gain).sum::<f64>().sqrt()
     }
 }
 
-/// The derivative at a pose.
+/// Derivative at a pose.
 pub(super) struct Jacobian {
-    /// Row: component of force, then torque; column: shift, then turn; N/m at the lever arm.
+    /// Entries, N/m at the lever arm; row: component of force, then torque; column: translation, then rotation.
     pub(super) entries: Matrix,
-    /// Estimated error, Frobenius norm, N/m; infinite where the answer depends on the way to the pose.
+    /// Estimated error, Frobenius norm, N/m; infinite where the answer depends on the path to the pose.
     pub(super) error: f64,
-    /// The differences themselves.
+    /// Differences along the coordinates.
     pub(super) chords: Chords,
-    /// Wrench at the pose itself.
+    /// Wrench at the pose.
     pub(super) wrench: Wrench,
 }
 
 impl Jacobian {
-    /// By central differences of fourth order, with the step of least uncertainty; nothing if the model gives
-    /// no answer around the pose.
+    /// Computes central differences of fourth order, with the step of least uncertainty; `None` if the model gives no
+    /// answer around the pose.
     pub(super) fn at(subject: &mut Subject<'_>, pose: Pose) -> Option<Self> {
         let wrench = subject.ask(pose).ok()?.wrench;
         let (mut tried, mut apart_n) = (Vec::with_capacity(STEPS_M.len()), 0.0);
@@ -83,27 +83,26 @@ impl Jacobian {
             let coarse = central(subject, pose, step_m)?;
             let fine = central(subject, pose, 0.5 * step_m)?;
             [coarse, fine].iter().for_each(|differences| chords.include(differences));
-            // Richardson: the error of second order cancels, and what it was bounds what is left.
+            // Richardson extrapolation: the error of second order cancels, and its size bounds the remainder.
             let entries = combine(&fine, 4.0 / 3.0, &coarse, -1.0 / 3.0);
             let error = norm(&combine(&entries, 1.0, &fine, -1.0));
             tried.push((step_m, Self { entries, error, chords, wrench }));
             let again = subject.ask(pose).ok()?.wrench;
             apart_n = f64::max(apart_n, size_n(&(again - wrench)));
         }
-        // A model with memory may have gone over to another of its answers on the way: then there is no derivative here.
+        // A model with memory may have switched to another solution meanwhile: then there is no derivative here.
         let is_one_answer = apart_n <= SAME * size_n(&wrench).max(SAME);
         let with_noise = |(step_m, jacobian): (f64, Self)| {
-            // What a solver leaves open of an answer is, over the step, as uncertain in each of the columns.
+            // The residual of a solver over the step is an uncertainty of each column.
             let noise = if is_one_answer { COLUMNS * apart_n / step_m } else { f64::INFINITY };
             Self { error: jacobian.error + noise, chords, ..jacobian }
         };
         tried.into_iter().map(with_noise).min_by(|a, b| a.error.total_cmp(&b.error))
     }
 
-    /// What is left of `J - J^T` when `J` is taken in coordinates: turns do not commute, so even the
-    /// derivative of an energy's torque by turns is only symmetric after half the torque's cross product is
-    /// taken off. (With the turn `d` from this pose the generalised torque is `M(d) - d x M / 2` to first
-    /// order.)
+    /// Returns the norm of `J - J^T` after correction for the coordinates: rotations do not commute, so even the
+    /// derivative of an energy's torque by rotations is symmetric only after half the torque's cross product is
+    /// subtracted. (With the rotation `d` from this pose the generalised torque is `M(d) - d x M / 2` to first order.)
     pub(super) fn asymmetry(&self) -> f64 {
         let half_torque = self.wrench.torque() * (0.5 / (LEVER_M * LEVER_M));
         let mut entries = self.entries;
@@ -116,24 +115,24 @@ impl Jacobian {
         norm(&combine(&entries, 1.0, &transposed(&entries), -1.0))
     }
 
-    /// Frobenius norm, N/m.
+    /// Returns the Frobenius norm, N/m.
     pub(super) fn norm(&self) -> f64 {
         norm(&self.entries)
     }
 
-    /// Largest gain, N/m: the largest singular value.
+    /// Returns the largest gain, N/m: the largest singular value.
     pub(super) fn gain(&self) -> f64 {
         largest_singular_value(&self.entries)
     }
 
-    /// Largest stiffness in any direction, N/m: the largest eigenvalue of the symmetric part of `-J`; 0 where the wrench
-    /// opposes no motion. Turns that do not commute add to the antisymmetric part only.
+    /// Returns the largest stiffness in any direction, N/m: the largest eigenvalue of the symmetric part of `-J`; 0
+    /// where the wrench opposes no motion. Non-commuting rotations contribute to the antisymmetric part only.
     pub(super) fn stiffness(&self) -> f64 {
         let symmetric = combine(&self.entries, -0.5, &transposed(&self.entries), -0.5);
         largest_eigenvalue(symmetric).max(0.0)
     }
 
-    /// Largest gain of one block (0 linear, 1 angular), N/m at the lever arm.
+    /// Returns the largest gain of one block (0 linear, 1 angular), N/m at the lever arm.
     pub(super) fn block_stiffness(&self, rows: usize, columns: usize) -> f64 {
         let inside = |row: usize, column: usize| row / 3 == rows && column / 3 == columns;
         let block: Matrix = std::array::from_fn(|row| {
@@ -185,7 +184,7 @@ fn largest_singular_value(matrix: &Matrix) -> f64 {
     largest_eigenvalue(square).max(0.0).sqrt()
 }
 
-/// By Jacobi's rotations: a dozen sweeps leave nothing off the diagonal.
+/// Returns the largest eigenvalue by Jacobi rotations: a dozen sweeps converge.
 fn largest_eigenvalue(mut symmetric: Matrix) -> f64 {
     for _ in 0..12 {
         for p in 0..6 {
@@ -197,7 +196,7 @@ fn largest_eigenvalue(mut symmetric: Matrix) -> f64 {
     (0..6).map(|i| symmetric[i][i]).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// One rotation of Jacobi's method (Golub and Van Loan, section 8.5).
+/// Applies one rotation of Jacobi's method (Golub and Van Loan, section 8.5).
 fn rotate(matrix: &mut Matrix, p: usize, q: usize) {
     if matrix[p][q] == 0.0 {
         return;

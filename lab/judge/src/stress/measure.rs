@@ -1,20 +1,20 @@
-//! What a measure says: values, the bound it is judged by, a verdict, and where the worst was seen.
+//! Result of a measure: values, bound, verdict, and the pose of the worst value.
 
 use crate::tally::Worst;
 use flotor_hal::{Pose, rotation_vector};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::borrow::Cow;
 
-/// Judgement of one measure, the gravest last.
+/// Verdict of one measure, the most severe last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Verdict {
     /// Within the bound.
     #[serde(rename = "pass")]
     Pass,
-    /// Beyond the bound, short of what is felt or unsafe.
+    /// Beyond the bound, but neither perceptible nor unsafe.
     #[serde(rename = "note")]
     Note,
-    /// The sample has nothing that the bound applies to.
+    /// The sample has nothing to which the bound applies.
     #[serde(rename = "nothing to judge")]
     NothingToJudge,
     /// The uncertainty of the measurement exceeds the bound.
@@ -26,7 +26,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// The word of reports.
+    /// Returns the name in reports.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -38,7 +38,7 @@ impl Verdict {
         }
     }
 
-    /// Pass up to `bound`, fail beyond `limit`, a note between; NaN fails.
+    /// Judges a value: pass up to `bound`, fail beyond `limit`, a note between; NaN fails.
     pub(super) fn of(value: f64, bound: f64, limit: f64) -> Self {
         if value <= bound {
             Verdict::Pass
@@ -50,24 +50,24 @@ impl Verdict {
     }
 }
 
-/// A number with its name and unit.
+/// Number with its name and unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quantity {
-    /// What it is.
+    /// Name of the quantity.
     pub name: String,
-    /// The number; not a number where there is none.
+    /// Value; NaN if there is none.
     #[serde(deserialize_with = "number_or_none")]
     pub value: f64,
-    /// Its unit; empty for a pure number.
+    /// Unit; empty for a pure number.
     pub unit: Cow<'static, str>,
 }
 
-/// JSON has no word for what is no number: `null` stands for it.
+/// Deserialises a number; JSON represents NaN and infinity as `null`.
 fn number_or_none<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
-/// A pose for people and machines: model frame, rotation vector.
+/// Pose in reports: model frame, rotation vector.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseRecord {
     /// Position, m.
@@ -76,7 +76,7 @@ pub struct PoseRecord {
     /// Rotation vector, rad.
     #[serde(deserialize_with = "numbers_or_none")]
     pub rotation_rad: [f64; 3],
-    /// The quaternion as it was given, where it is no rotation.
+    /// Original quaternion, if it is not a rotation.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "quaternion_or_none")]
     pub orientation_xyzw: Option<[f64; 4]>,
 }
@@ -96,7 +96,7 @@ fn quaternion_or_none<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64;
 impl From<Pose> for PoseRecord {
     fn from(pose: Pose) -> Self {
         let norm_error = pose.orientation().length_squared() - 1.0;
-        // Written so that NaN is no rotation either.
+        // Written so that NaN counts as not a rotation.
         let is_rotation = norm_error.abs() < 1.0e-6;
         Self {
             position_m: pose.position_m,
@@ -106,33 +106,33 @@ impl From<Pose> for PoseRecord {
     }
 }
 
-/// One line of the score.
+/// Line of the score.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measure {
-    /// "M0" to "M10".
+    /// Identifier, "M0" to "M10".
     pub id: Cow<'static, str>,
-    /// What is measured.
+    /// Name of the measure.
     pub name: Cow<'static, str>,
-    /// The number that is judged.
+    /// Judged value.
     #[serde(deserialize_with = "number_or_none")]
     pub value: f64,
-    /// Its unit; empty for a pure number.
+    /// Unit of the value; empty for a pure number.
     pub unit: Cow<'static, str>,
-    /// The largest value that passes; absent where the literature gives none.
+    /// Largest value that passes; `None` where the literature gives no bound.
     pub bound: Option<f64>,
-    /// The judgement.
+    /// Verdict on the value.
     pub verdict: Verdict,
-    /// Where the worst was seen.
+    /// Pose of the worst value.
     pub pose: Option<PoseRecord>,
     /// Comment on the number.
     #[serde(rename = "remark")]
     pub comment: String,
-    /// Everything else that was measured.
+    /// Further measured values.
     pub values: Vec<Quantity>,
 }
 
 impl Measure {
-    /// The worst that was seen: it passes up to `bound` and fails beyond `limit`.
+    /// Judges the worst value: passes up to `bound`, fails beyond `limit`.
     pub(super) fn of(
         [id, name, unit]: [&'static str; 3],
         worst: &Worst,
@@ -158,13 +158,13 @@ impl Measure {
         self.with(name, count as f64, "")
     }
 
-    /// A measure that did not come to its end.
+    /// Creates a failed measure that was not completed.
     pub(super) fn broken([id, name]: [&'static str; 2], pose: Option<PoseRecord>, why: &str) -> Self {
         let nothing = Worst { value: f64::NAN, pose: None };
         Self { bound: None, pose, ..Self::of([id, name, ""], &nothing, [0.0, 0.0], why) }
     }
 
-    /// Replaces the number and the judgement of a measure whose sample is empty.
+    /// Replaces value and verdict of a measure with an empty sample.
     #[must_use]
     pub(super) fn unless_empty(mut self, sample: u64, why: &str) -> Self {
         if sample == 0 {
@@ -174,10 +174,10 @@ impl Measure {
         self
     }
 
-    /// Replaces a pass by "not resolved" where the number may be as large as `possible`, beyond the bound.
+    /// Replaces a pass by "not resolved" if the value may be as large as `possible`, beyond the bound.
     #[must_use]
     pub(super) fn unless_uncertain(mut self, possible: f64, why: impl FnOnce() -> String) -> Self {
-        // Written so that NaN is beyond it too.
+        // Written so that NaN counts as beyond the bound.
         let is_within = self.bound.is_some_and(|bound| possible <= bound);
         if self.verdict == Verdict::Pass && !is_within {
             (self.verdict, self.comment) = (Verdict::NotResolved, why());
@@ -186,5 +186,5 @@ impl Measure {
     }
 }
 
-/// The reason of an empty sample where every call failed.
+/// Reason of an empty sample after every call failed.
 pub(super) const NO_ANSWER: &str = "the model gave no answer to judge";

@@ -1,5 +1,5 @@
-//! The numerical stability score of a force model: ten measures that tell whether a law may be let loose on
-//! a hand a thousand times a second.
+//! Numerical stability score of a force model: ten measures of whether a law is safe for a hand at a thousand ticks a
+//! second.
 //!
 //! | measure | question | source |
 //! |---|---|---|
@@ -15,12 +15,12 @@
 //! | M9 `search` | what does a search for the worst find? | evolution strategy, Rechenberg 1973 |
 //! | M10 `symmetry` | does it keep a symmetry that is declared for it? | |
 //!
-//! Each measure is made on instances of its own through the plugin contract, with nothing known about the
-//! model but what the contract says. Data flows one way: `poses` and `trajectory` say where, `subject` asks,
-//! `sweep` shares the work between the processors, each measure's module judges, `parts` runs it in a process of its own,
-//! `score` and `picture` show.
+//! Each measure creates its own instances through the plugin contract, without knowledge of the model beyond the
+//! contract. Data flows one way: `poses` and `trajectory` generate poses, `subject` calls the model, `sweep`
+//! distributes the work over the processors, each measure's module judges, `parts` runs it in its own process, `score`
+//! and `picture` present the result.
 //!
-//! Not real-time: everything here allocates and takes its time.
+//! Not real-time: everything here allocates and may take long.
 
 mod closed_loop;
 mod continuity;
@@ -57,29 +57,29 @@ use crate::{Progress, Size};
 use flotor_hal::Memory;
 use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
 
-/// Period of the loop the score has in mind, s.
+/// Reference period of the loop, s.
 const PERIOD_S: f64 = 1.0e-3;
-/// Damping of the device, N s/m: light eddy-current drag, and the simulated flotor's.
+/// Damping of the device, N s/m: light eddy-current drag, and that of the simulated flotor.
 const DAMPINGS_NS_PER_M: [f64; 2] = [0.5, 2.0];
-/// Lever arm at which the device resists rotation as it resists translation, m: drag spread evenly over a
-/// hemisphere of 115 mm radius, `sqrt(2/3) R`. Angles times this are lengths, torques over this are forces.
+/// Lever arm at which the device resists rotation as it resists translation, m: drag spread evenly over a hemisphere of
+/// 115 mm radius, `sqrt(2/3) R`. Angles times this are lengths, torques over this are forces.
 const LEVER_M: f64 = 0.0939;
-/// Share of a sample that stands for all of it: of a law that is only here and there too stiff for a device with heavy
-/// damping, or has no derivative only here and there.
+/// Fraction of a sample that counts as all of it: tolerates laws that are too stiff for a device with heavy damping, or
+/// without a derivative, in few places only.
 const MOSTLY: f64 = 0.9;
-/// How much wider than the workspace the model is asked: a hand overshoots, a sensor lies.
+/// Size of the tested region relative to the workspace: hands overshoot and sensors err.
 const WIDER: f64 = 1.5;
 
-/// What to ask for.
+/// Settings of a stress test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StressOptions {
-    /// How much is asked.
+    /// Extent of the measurements.
     pub size: Size,
     /// Seed of poses and motions.
     pub seed: u64,
-    /// The workspace in the model frame.
+    /// Workspace in the model frame.
     pub reach: Reach,
-    /// A symmetry that the model declares.
+    /// Symmetry that the model declares.
     pub symmetry: Option<Symmetry>,
 }
 
@@ -89,18 +89,18 @@ impl Default for StressOptions {
     }
 }
 
-/// Everything the measures share.
+/// Context of all measures.
 struct Setup<'a> {
     plugin: &'a Plugin,
     settings: &'a [Setting],
     options: StressOptions,
-    /// Of the full effort one part in so many.
+    /// Divisor of the full effort.
     part: u64,
     progress: &'a dyn Progress,
 }
 
 impl<'a> Setup<'a> {
-    /// How often to ask, of so often in a full run: fewer than the least would be no measurement.
+    /// Returns the number of samples: `full` over the divisor, but at least `least`.
     fn share(&self, full: u64, least: u64) -> u64 {
         (full / self.part).max(least)
     }
@@ -110,8 +110,8 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// In full about 2e8 calls for a model without history. One with history is walked, some hundred calls between two
-/// poses, and gets a hundredth of the poses.
+/// Returns the divisor of the full effort, which is about 2e8 calls for a stateless model. A model with memory is
+/// walked, some hundred calls between two poses, and gets a hundredth of the poses.
 fn part_of(size: Size, memory: Memory) -> u64 {
     let by_size = if size == Size::Full { 1 } else { 100 };
     by_size * if memory == Memory::Stateless { 1 } else { 100 }

@@ -1,7 +1,7 @@
 //! Closed motions of a hand in time, with the velocity that damping and friction depend on.
 //!
-//! A hand hurries on one part of a lap and dawdles on another: what is lost on the fast part of a law with friction and
-//! damping need not come back on the slow one, and a law may confuse the two.
+//! A hand moves fast on one part of a lap and slowly on another: energy lost on the fast part of a law with friction
+//! and damping need not return on the slow one, and a faulty law may confuse the two.
 
 use super::energy::{Dissipation, Lap};
 use crate::sampling::Random;
@@ -10,21 +10,21 @@ use crate::trajectory::Trajectory;
 use flotor_hal::{DVec3, Memory, Pose, Twist, math};
 use std::f64::consts::TAU;
 
-/// Shortest time of a lap, s, and how many times longer the longest is.
+/// Shortest time of a lap, s, and ratio of the longest to the shortest.
 const SHORTEST_LAP_S: f64 = 0.05;
 const LAP_RATIO: f64 = 20.0;
-/// The most uneven pace: 39 times faster at one end of the lap than at the other.
+/// Largest unevenness: 39 times faster at one end of the lap than at the other.
 const MOST_UNEVEN: f64 = 0.95;
-/// Laps after the first, which starts with another history.
+/// Number of laps after the first, which starts with another history.
 const LATER_LAPS: usize = 2;
 
-/// A closed path and its pace.
+/// Closed path with its speed profile.
 pub(super) struct Motion {
     path: Trajectory,
     lap_s: f64,
-    /// From 0 for an even pace to 1 for a stop.
+    /// Unevenness of the speed, from 0 for a constant one to 1 for a stop.
     unevenness: f64,
-    /// Part of the lap of the fastest point, as an angle, rad.
+    /// Position of the fastest point in the lap, as an angle, rad.
     phase_rad: f64,
 }
 
@@ -34,7 +34,7 @@ impl Motion {
         Self { path, lap_s, unevenness: MOST_UNEVEN * random.unit(), phase_rad: TAU * random.unit() }
     }
 
-    /// Pose, motion and turn over a lap, at a part of its time.
+    /// Returns pose, translation and rotation per lap, at a fraction of the lap's time.
     fn at(&self, part: f64) -> (Pose, DVec3, DVec3) {
         let angle = TAU * part + self.phase_rad;
         let place = part + self.unevenness / TAU * math::sin(angle);
@@ -43,7 +43,7 @@ impl Motion {
         (pose, motion_m * pace, turn_rad * pace)
     }
 
-    /// The work of a lap.
+    /// Measures the work of a lap.
     pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         subject.restart();
         if subject.memory() == Memory::PathDependent {
@@ -54,7 +54,7 @@ impl Motion {
         lap.or_resolved(Dissipation::Allowed, |parts| self.powers(subject, parts))
     }
 
-    /// Powers on the hand at increasing parts of the time of a lap, J per lap.
+    /// Returns the powers on the hand at increasing fractions of the lap's time, J per lap.
     fn powers(&self, subject: &mut Subject<'_>, parts: &[f64]) -> Option<Vec<f64>> {
         let mut before = parts.last()? - 1.0;
         let power = |part: &f64| {
@@ -69,7 +69,7 @@ impl Motion {
     }
 }
 
-/// Of the laps after the first that which generates least: a model in motion may return in one what it stored before.
+/// Returns the later lap that generates least: a model in motion may return in one lap energy stored in an earlier one.
 fn least_of_later_laps(mut lap: impl FnMut() -> Option<Lap>) -> Option<Lap> {
     lap()?;
     let mut least = lap()?;
@@ -82,16 +82,16 @@ fn least_of_later_laps(mut lap: impl FnMut() -> Option<Lap>) -> Option<Lap> {
     Some(least)
 }
 
-/// A closed path of three straight edges, each at a speed of its own.
+/// Closed path of three straight edges, each at its own speed.
 pub(super) struct Triangle {
     pub(super) start: Pose,
-    /// They add up to nothing.
+    /// Edges of the triangle, m; their sum is zero.
     pub(super) ways_m: [DVec3; 3],
     pub(super) speeds_m_per_s: [f64; 3],
 }
 
 impl Triangle {
-    /// The work of a lap, with half of the samples of each edge and with all: the difference bounds what is left.
+    /// Measures the work of a lap, with half of the samples of each edge and with all: the difference bounds the error.
     pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         let coarse = self.sampled(subject, samples / 2)?;
         let fine = self.sampled(subject, samples)?;
@@ -115,7 +115,7 @@ impl Triangle {
         })
     }
 
-    /// Work on the hand between the samples of an edge, by the trapezoidal rule, J.
+    /// Returns the work on the hand between the samples of an edge, by the trapezoidal rule, J.
     fn edge(
         &self,
         subject: &mut Subject<'_>,

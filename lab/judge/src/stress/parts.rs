@@ -1,8 +1,8 @@
-//! The measures one by one, each in a process of its own: a call that does not return or a model that brings its process
-//! down costs one measure, and the score goes on.
+//! Measures in separate processes: a call that does not return, or a model that crashes its process, costs one measure,
+//! and the score continues.
 //!
-//! The process of a measure watches its own calls ([`crate::watch`]) and says at which pose one is stuck. What it found
-//! comes back through a file that is its standard input: what a plugin prints goes elsewhere.
+//! The process of a measure watches its own calls ([`crate::watch`]) and reports the pose of a stuck one. Its result
+//! returns through a file on its standard input, apart from the output of the plugin.
 
 use super::measure::{Measure, PoseRecord};
 use super::score::{Distributions, StressReport};
@@ -19,30 +19,30 @@ use std::io::{self, Read, Seek, Write};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// What is measured in one go.
+/// Group of measures that one process takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// M0.
+    /// Measure M0.
     Totality,
-    /// M1.
+    /// Measure M1.
     Continuity,
-    /// M2, M3 and M5.
+    /// Measures M2, M3 and M5.
     Stiffness,
-    /// M4.
+    /// Measure M4.
     Loops,
-    /// M6.
+    /// Measure M6.
     ClosedLoop,
-    /// M7.
+    /// Measure M7.
     Cost,
-    /// M8.
+    /// Measure M8.
     Determinism,
-    /// M9.
+    /// Measure M9.
     Search,
-    /// M10, of a model that declares a symmetry.
+    /// Measure M10, of a model that declares a symmetry.
     Symmetry,
 }
 
-/// Each with its word and its measures.
+/// Parts with their names and measures.
 const PARTS: [(Part, &str, &[[&str; 2]]); 9] = [
     (Part::Totality, "totality", &[["M0", "totality"]]),
     (Part::Continuity, "continuity", &[["M1", "continuity"]]),
@@ -60,32 +60,32 @@ const PARTS: [(Part, &str, &[[&str; 2]]); 9] = [
 ];
 
 impl Part {
-    /// All that these options ask for.
+    /// Returns all parts that the options select.
     pub(super) fn all(options: &StressOptions) -> impl Iterator<Item = Self> + use<> {
         let has_symmetry = options.symmetry.is_some();
         let parts = PARTS.into_iter().map(|(part, ..)| part);
         parts.filter(move |part| *part != Self::Symmetry || has_symmetry)
     }
 
-    /// Its word.
+    /// Returns the name of the part.
     #[must_use]
     pub fn word(self) -> &'static str {
         PARTS.iter().find(|(part, ..)| *part == self).map_or("", |(_, word, _)| word)
     }
 
-    /// The part of a word.
+    /// Finds the part with a name.
     #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
         PARTS.iter().find(|(_, known, _)| *known == word).map(|(part, ..)| *part)
     }
 
-    /// The part with a measure, "M0" to "M10".
+    /// Finds the part of a measure, "M0" to "M10".
     #[must_use]
     pub fn of_measure(id: &str) -> Option<Self> {
         PARTS.iter().find(|(.., names)| names.iter().any(|[known, _]| *known == id)).map(|(part, ..)| *part)
     }
 
-    /// Its measures, none of which came to its end.
+    /// Returns the part's measures as failed ones.
     fn broken(self, pose: Option<PoseRecord>, why: &str) -> Found {
         let names = PARTS.iter().find(|(part, ..)| *part == self).map_or(&[][..], |(.., names)| names);
         let measures = names.iter().map(|names| Measure::broken(*names, pose, why)).collect();
@@ -93,11 +93,11 @@ impl Part {
     }
 }
 
-/// What a part found.
+/// Results of a part.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Found {
     pub(super) measures: Vec<Measure>,
-    /// Of these quantities those that the part knows.
+    /// Distributions measured by the part; the others are empty.
     pub(super) spread: Distributions,
 }
 
@@ -116,7 +116,7 @@ impl Found {
     }
 }
 
-/// Measures a part, in this process.
+/// Runs a part in this process.
 pub(super) fn measure(setup: &Setup<'_>, part: Part) -> Result<Found, LoadError> {
     let none = Distributions::default();
     Ok(match part {
@@ -147,11 +147,11 @@ pub(super) fn measure(setup: &Setup<'_>, part: Part) -> Result<Found, LoadError>
     })
 }
 
-/// What the process of a part says at its end.
+/// Final message of the process of a part.
 #[derive(Serialize, Deserialize)]
 enum Delivery {
     Found(Found),
-    /// A step did not return, at this pose; and which.
+    /// Pose and description of a step that did not return.
     Stuck(PoseRecord, String),
     Refused(String),
 }
@@ -162,12 +162,11 @@ impl Delivery {
     }
 }
 
-/// Measures one part in this process, which is there for that alone, and writes what it found into the file that is standard
-/// input. A step that takes longer than `limit` of
-/// processor time, or waits ten times as long, ends the process. Not real-time.
+/// Runs one part in this process, which was started for it, and writes the results into the file on standard input. A
+/// step that exceeds `limit` of processor time, or ten times that in waiting, ends the process. Not real-time.
 ///
 /// # Errors
-/// Standard input is no such file, or the system has no thread.
+/// If standard input is no such file, or no thread can be started.
 pub fn deliver(
     plugin: &Plugin,
     settings: &[Setting],
@@ -177,7 +176,7 @@ pub fn deliver(
     progress: &dyn Progress,
 ) -> io::Result<()> {
     watch::start(limit, |stuck| {
-        // Whether or not that can be told: nothing else ends a call that does not return.
+        // End the process even if the write fails: nothing else ends a call that does not return.
         Delivery::Stuck(PoseRecord::from(stuck.pose), stuck.to_string()).write().ok();
         end_at_once();
     })?;
@@ -192,12 +191,12 @@ pub fn deliver(
     .write()
 }
 
-/// Scores a model with these settings, each part in a process that `program` starts and that [delivers](deliver). Not
-/// real-time; takes seconds (short) to minutes (full), on all processors. `only` names the parts; empty: all.
+/// Scores a model with these settings; `program` starts the process of each part, which has to [deliver](deliver). Not
+/// real-time: seconds (short) to minutes (full), on all processors. `only` selects parts; empty: all.
 ///
 /// # Errors
-/// [`LoadError`] if the plugin is no model or refuses the settings. A model that breaks while it is measured, hangs or brings
-/// its process down is no error: a measure says so and fails.
+/// [`LoadError`] if the plugin is no model or rejects the settings. A model that fails, hangs or crashes during a
+/// measure is no error: the measure reports it and fails.
 pub fn score_in_processes(
     plugin: &Plugin,
     settings: &[Setting],
@@ -225,7 +224,7 @@ pub fn score_in_processes(
     Ok(StressReport { stuck, ..StressReport::new(&setup, found.measures, found.spread) })
 }
 
-/// What the process of a part says, or how it ended without a word.
+/// Returns the result of the process of a part, or a description of its end without one.
 fn in_own_process(mut command: Command) -> io::Result<Result<Delivery, String>> {
     let mut told = anonymous_file("flotor-stress")?;
     let end = PluginProcess::start(command.stdin(told.try_clone()?).stdout(Stdio::null()))?.wait()?;

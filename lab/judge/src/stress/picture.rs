@@ -1,13 +1,13 @@
-//! The score as a picture: jumps over piece length, gains over the workspace, loop energies, call times.
+//! Picture of the score: jumps over piece length, gains over the workspace, loop energies, call times.
 
 use super::{DAMPINGS_NS_PER_M, Decades, PERIOD_S, StressReport};
 use flotor_plot::{Axis, Bin, Figure, Mark, Panel, Series};
 
-/// The largest relative loop energy that passes, for the mark.
+/// Largest relative loop energy that passes, for the mark.
 const CONSERVATIVE: f64 = 1.0e-9;
 
 impl StressReport {
-    /// Draws the score. Not real-time.
+    /// Draws the score as SVG. Not real-time.
     #[must_use]
     pub fn to_svg(&self) -> String {
         let verdicts: Vec<String> = self

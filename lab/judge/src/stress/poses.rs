@@ -1,9 +1,8 @@
-//! Where a model is asked: evenly through the workspace, and on the sets of measure zero where formulas
-//! break.
+//! Poses of the tests: evenly through the workspace, and on the sets of measure zero where formulas break.
 //!
-//! Even coverage is [Sobol's sequence](crate::sampling): any first part of it covers the space evenly, so a short
-//! run asks the first poses of a full one. No sequence ever hits home exactly, or a coordinate plane, or a number
-//! that is not finite: those are [`MANIFOLDS`] with names.
+//! Even coverage is [Sobol's sequence](crate::sampling): any first part of it covers the space evenly, so a short run
+//! takes the first poses of a full one. No sequence ever hits home exactly, or a coordinate plane, or a non-finite
+//! number: those are the named [`MANIFOLDS`].
 
 use crate::sampling::{Random, Sobol};
 use crate::trajectory::at;
@@ -11,51 +10,51 @@ use flotor_hal::{DQuat, DVec3, Pose, Twist, math, rotation_vector};
 use serde::Serialize;
 use std::f64::consts::PI;
 
-/// How far a handle gets from home in the model frame.
+/// Workspace of the handle around home, in the model frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Reach {
-    /// Along each axis, m.
+    /// Limit along each axis, m.
     pub position_m: f64,
-    /// Along each component of the rotation vector, rad.
+    /// Limit of each component of the rotation vector, rad.
     pub rotation_rad: f64,
 }
 
 impl Default for Reach {
-    /// 12 mm and 7 degrees of the thesis's device (section 2.1), seen through its motion scale L0/V = 25/15.
+    /// Returns 12 mm and 7 degrees of the thesis's device (section 2.1), through its motion scale L0/V = 25/15.
     fn default() -> Self {
         Self { position_m: 12.0e-3 * 25.0 / 15.0, rotation_rad: 7.0 * PI / 180.0 }
     }
 }
 
 impl Reach {
-    /// A larger or smaller workspace of the same shape.
+    /// Scales the workspace by a factor.
     pub(super) fn scaled(self, factor: f64) -> Self {
         Self { position_m: self.position_m * factor, rotation_rad: self.rotation_rad * factor }
     }
 
-    /// Along the axes and about them, m and rad.
+    /// Returns the limits of position, m, and rotation, rad.
     pub(super) fn sizes(self) -> [f64; 2] {
         [self.position_m, self.rotation_rad]
     }
 
-    /// True if a pose lies in the workspace.
+    /// Returns true if a pose lies in the workspace.
     pub(super) fn holds(self, pose: Pose) -> bool {
         let rotation_rad = rotation_vector(pose.orientation());
         pose.position().abs().max_element() <= self.position_m
             && rotation_rad.abs().max_element() <= self.rotation_rad
     }
 
-    /// The pose at six coordinates in 0..1 across the workspace.
+    /// Returns the pose at six coordinates in 0..1 across the workspace.
     pub(super) fn pose(self, unit: [f64; 6]) -> Pose {
         let [x, y, z, rx, ry, rz] = unit.map(|u| 2.0 * u - 1.0);
         at(DVec3::new(x, y, z) * self.position_m, DVec3::new(rx, ry, rz) * self.rotation_rad)
     }
 }
 
-/// Sample so much of a set: a pose and a twist.
+/// Sampler of a set: pose and twist by index.
 type Sample = fn(Reach, &mut Random, u64) -> (Pose, Twist);
 
-/// Sets of poses where a formula may break and no even coverage would find it, with the words of a report.
+/// Sets of poses that may break a formula but have measure zero in even coverage, with their names in reports.
 pub(super) const MANIFOLDS: [(&str, Sample); 9] = [
     ("home", |_, _, index| still(home(index))),
     ("tiny displacements", |_, random, index| still(tiny(random, index))),
@@ -72,10 +71,10 @@ fn still(pose: Pose) -> (Pose, Twist) {
     (pose, Twist::ZERO)
 }
 
-/// Every how many poses one is of a manifold.
+/// Period of manifold poses in a mixed sequence.
 const MANIFOLD_EVERY: u64 = 8;
 
-/// Pose number `index` of an even coverage that now and then has one of the manifolds, in turns.
+/// Returns pose `index` of an even coverage in which every eighth pose is from a manifold, in rotation.
 pub(super) fn mixed(reach: Reach, sobol: &Sobol, random: &mut Random, index: u64) -> Pose {
     if !index.is_multiple_of(MANIFOLD_EVERY) {
         return reach.pose(sobol.point(index));
@@ -89,12 +88,12 @@ fn anywhere(reach: Reach, random: &mut Random) -> Pose {
     at(random.vector() * reach.position_m, random.vector() * reach.rotation_rad)
 }
 
-/// Uniform in the exponent.
+/// Draws a number uniform in the exponent.
 fn decades(random: &mut Random, from: f64, to: f64) -> f64 {
     math::pow(10.0, from + (to - from) * random.unit())
 }
 
-/// Home itself, with every sign of zero and both quaternions.
+/// Returns home with every sign of zero and both quaternions.
 fn home(index: u64) -> Pose {
     let sign = |bit: u32| if index >> bit & 1 == 1 { -1.0 } else { 1.0 };
     Pose {
@@ -103,7 +102,7 @@ fn home(index: u64) -> Pose {
     }
 }
 
-/// 1e-15 to 1e-3 m and rad from home, logarithmically even.
+/// Returns poses 1e-15 to 1e-3 m and rad from home, logarithmically uniform.
 fn tiny(random: &mut Random, index: u64) -> Pose {
     let position_m = random.direction() * decades(random, -15.0, -3.0);
     let rotation_rad = random.direction() * decades(random, -15.0, -3.0);
@@ -114,7 +113,7 @@ fn tiny(random: &mut Random, index: u64) -> Pose {
     }
 }
 
-/// On spheres of exactly 10^-k m around home, and a rounding beside them.
+/// Returns poses on spheres of exactly 10^-k m around home, and a rounding beside them.
 fn shell(random: &mut Random, index: u64) -> Pose {
     #[allow(clippy::cast_possible_truncation)] // 1..=15
     let exponent = 1 + (index % 15) as i32;
@@ -129,7 +128,7 @@ fn shell(random: &mut Random, index: u64) -> Pose {
     at(position_m, rotation_rad)
 }
 
-/// One coordinate of six, the others exactly zero.
+/// Returns poses with one non-zero coordinate of six.
 fn axis(reach: Reach, random: &mut Random, index: u64) -> Pose {
     let only = [DVec3::X, DVec3::Y, DVec3::Z][(index % 3) as usize] * random.symmetric();
     match index / 3 % 2 {
@@ -138,7 +137,7 @@ fn axis(reach: Reach, random: &mut Random, index: u64) -> Pose {
     }
 }
 
-/// One or two coordinates exactly zero.
+/// Returns poses with one or two coordinates exactly zero.
 fn plane(reach: Reach, random: &mut Random, index: u64) -> Pose {
     let (mut position_m, mut rotation_rad) =
         (random.vector() * reach.position_m, random.vector() * reach.rotation_rad);
@@ -155,7 +154,7 @@ fn plane(reach: Reach, random: &mut Random, index: u64) -> Pose {
     at(position_m, rotation_rad)
 }
 
-/// Any rotation up to half a turn, and exactly that.
+/// Returns any rotation up to half a turn, and exactly half a turn.
 fn large_rotation(reach: Reach, random: &mut Random, index: u64) -> Pose {
     let axis = match index / 4 % 4 {
         0 => DVec3::X,
@@ -172,7 +171,7 @@ fn large_rotation(reach: Reach, random: &mut Random, index: u64) -> Pose {
     at(random.vector() * reach.position_m, axis * angle_rad)
 }
 
-/// Coordinates too small for full precision.
+/// Returns poses with coordinates too small for full precision.
 fn denormal(random: &mut Random) -> Pose {
     // The smallest normal number is 2.2e-308.
     let mut number =
@@ -180,14 +179,14 @@ fn denormal(random: &mut Random) -> Pose {
     Pose { position_m: [number(), number(), number()], orientation_xyzw: [number(), number(), number(), 1.0] }
 }
 
-/// Coordinates up to 1e300.
+/// Returns poses with coordinates up to 1e300.
 fn huge(random: &mut Random) -> Pose {
     let mut number = || random.symmetric() * decades(random, 0.0, 300.0);
     let position_m = DVec3::new(number(), number(), number());
     at(position_m, random.direction() * PI * random.unit())
 }
 
-/// NaN and infinity in pose or twist, quaternions that are not of unit length.
+/// Returns inputs with NaN and infinity in pose or twist, and quaternions not of unit length.
 fn malformed(reach: Reach, random: &mut Random, index: u64) -> (Pose, Twist) {
     let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -f64::NAN][(index % 4) as usize];
     let mut pose = anywhere(reach, random);

@@ -1,21 +1,21 @@
-//! The work of a lap by Romberg's rule, on intervals that are split where the rule is uncertain.
+//! Work of a lap by Romberg's rule, on intervals that are split adaptively.
 //!
-//! A sum of evenly spaced samples converges faster than any power of their distance where the power is smooth, and with the
-//! square of it where the power has a kink, as on the surface of a wall. Here a kink ends up in an interval of a
-//! two-millionth of the lap, so that 1e-9 of the work can be distinguished from zero. Every lap goes through all samples in
-//! their order, because a model may remember.
+//! A sum of evenly spaced samples converges faster than any power of their distance where the power is smooth, but only
+//! quadratically where it has a kink, as on the surface of a wall. Here the splitting confines a kink to an interval of
+//! a two-millionth of the lap, so that 1e-9 of the work can be distinguished from zero. Every lap takes all samples in
+//! their order, because a model may have memory.
 
-/// Intervals of the first lap.
+/// Number of intervals of the first lap.
 const INTERVALS: usize = 256;
-/// Samples of an interval.
+/// Number of samples of an interval.
 const SAMPLES: usize = 8;
-/// Parts of an interval that is split.
+/// Number of parts of a split interval.
 const PARTS: usize = 8;
-/// Laps at most, each with shorter intervals where they are needed.
+/// Maximum number of laps, each with more intervals split.
 const MOST_LAPS: usize = 5;
-/// Part of the bound that the intervals together may leave uncertain.
+/// Fraction of the bound that the total uncertainty may reach.
 const ALLOWED: f64 = 0.1;
-/// Factor from the difference of two orders of the rule to what is uncertain: a kink may lie where both are wrong alike.
+/// Safety factor on the difference of two orders of the rule: at a kink both may have the same error.
 const CAUTION: f64 = 2.0;
 
 /// Work of a lap, or of an interval of it.
@@ -38,10 +38,10 @@ impl Work {
         }
     }
 
-    /// Of an interval from its length and the powers from its one end to the other.
+    /// Integrates an interval from its length and the powers from end to end.
     fn of_interval(length: f64, powers: &[f64]) -> Self {
         let &[p0, p1, p2, p3, p4, p5, p6, p7, p8] = powers else { return Self::default() };
-        // Trapezoids of 1, 2, 4 and 8 steps, and what is left of their errors of order 2, 4 and 6.
+        // Trapezoids of 1, 2, 4 and 8 steps, extrapolated to orders 4, 6 and 8.
         let t0 = 0.5 * (p0 + p8);
         let t1 = 0.5 * (t0 + p4);
         let t2 = 0.5 * (t1 + 0.5 * (p2 + p6));
@@ -57,15 +57,15 @@ impl Work {
     }
 }
 
-/// Returns the work of a lap to a part `bound` of all work exchanged, or as well as [`MOST_LAPS`] tell it. `powers` goes a lap,
-/// and returns the powers (J per lap) at increasing parts of it, from 0 on and short of 1; `None` without an answer. Not
-/// real-time.
+/// Returns the work of a lap, with an uncertainty of `bound` of all work exchanged if [`MOST_LAPS`] suffice. `powers`
+/// runs a lap and returns the powers (J per lap) at increasing fractions of it, from 0 on and below 1; `None` without
+/// an answer. Not real-time.
 pub(super) fn work(bound: f64, mut powers: impl FnMut(&[f64]) -> Option<Vec<f64>>) -> Option<Work> {
     let mut ends: Vec<f64> = (0..=INTERVALS).map(|index| index as f64 / INTERVALS as f64).collect();
     for lap in 1.. {
         let parts: Vec<f64> = ends.windows(2).flat_map(|pair| between(pair, SAMPLES)).collect();
         let mut powers = powers(&parts)?;
-        // The end of a lap is its beginning.
+        // A lap is closed: append its first power.
         powers.extend(powers.first().copied());
         let intervals = ends.windows(2).zip(powers.windows(SAMPLES + 1).step_by(SAMPLES));
         let works: Vec<Work> =
@@ -84,7 +84,7 @@ pub(super) fn work(bound: f64, mut powers: impl FnMut(&[f64]) -> Option<Vec<f64>
     None
 }
 
-/// Evenly spaced parts of an interval, from its beginning on and short of its end.
+/// Returns evenly spaced points of an interval, including its start, excluding its end.
 fn between(pair: &[f64], count: usize) -> impl Iterator<Item = f64> + use<> {
     let (from, to) = (pair[0], pair[1]);
     (0..count).map(move |index| from + (to - from) * index as f64 / count as f64)

@@ -1,4 +1,4 @@
-//! The score as a whole: numbers for machines, a table for people.
+//! Stability score: JSON fields and text table.
 
 use super::continuity::Jump;
 use super::measure::{Measure, PoseRecord, Verdict};
@@ -7,33 +7,33 @@ use super::{Decades, Setup, Size};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The stability score of a force model. The names are a contract: scripts rely on them.
+/// Stability score of a force model. The names are a contract: scripts rely on them.
 #[derive(Clone, Debug, Serialize)]
 pub struct StressReport {
     /// Id of the model.
     pub model: String,
     /// Version of the plugin.
     pub version: String,
-    /// What was set, as a person would type it.
+    /// Settings by parameter id, as text.
     pub settings: BTreeMap<String, String>,
-    /// How much was asked.
+    /// Extent of the measurements.
     pub size: Size,
     /// Seed of poses and motions.
     pub seed: u64,
     /// Workspace in the model frame.
     pub reach: Reach,
-    /// Share of the measures that passed.
+    /// Fraction of the measures that passed.
     pub score: f64,
-    /// The measures, M0 to M10.
+    /// Measures, M0 to M10.
     pub measures: Vec<Measure>,
-    /// How quantities are spread, for pictures.
+    /// Distributions for pictures.
     pub distributions: Distributions,
-    /// The first step that did not return, which a measure names.
+    /// First step that did not return, which a measure reports.
     #[serde(skip)]
     pub stuck: Option<String>,
 }
 
-/// How quantities are spread.
+/// Distributions of measured quantities.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Distributions {
     /// M1: largest change of wrench over pieces of each length.
@@ -48,7 +48,7 @@ pub struct Distributions {
 
 impl StressReport {
     pub(super) fn new(setup: &Setup<'_>, mut measures: Vec<Measure>, distributions: Distributions) -> Self {
-        // "M2" before "M10".
+        // Sorts "M2" before "M10".
         measures.sort_by_key(|measure| (measure.id.len(), measure.id.clone()));
         let schema = setup.plugin.parameters();
         let named = |setting: &flotor_hal::abi::loader::Setting| {
@@ -71,7 +71,7 @@ impl StressReport {
         }
     }
 
-    /// What was scored, in one line.
+    /// Returns the scored model with its settings, in one line.
     #[must_use]
     pub fn subject(&self) -> String {
         let settings = self.settings_text();
@@ -85,7 +85,7 @@ impl StressReport {
         settings.join(", ")
     }
 
-    /// The table for people.
+    /// Formats the table for people.
     #[must_use]
     pub fn to_text(&self) -> String {
         let width = self.measures.iter().map(|measure| measure.verdict.word().len()).fold(5, usize::max);
@@ -109,7 +109,7 @@ fn rows(measure: &Measure, width: usize) -> Vec<String> {
     let Measure { id, name, verdict, comment, pose, .. } = measure;
     let mut rows =
         vec![format!("  {:<width$} {id}  {name:<19} {value:>15}  {bound:<18} {comment}", verdict.word())];
-    // Where to look is only worth a line when there is something to look at.
+    // The worst pose is printed only if the measure did not pass.
     if let (Some(pose), true) = (pose, *verdict != Verdict::Pass) {
         rows.push(format!("            worst at {}", place(pose)));
     }
@@ -126,7 +126,7 @@ fn place(pose: &PoseRecord) -> String {
     format!("({x}, {y}, {z}) mm, ({rx}, {ry}, {rz}) rad")
 }
 
-/// Four digits, with an exponent only where it helps.
+/// Formats a number with four digits, with an exponent only for very small or large ones.
 fn short(number: f64) -> String {
     match number.abs() {
         magnitude if magnitude == 0.0 || (1.0e-3..1.0e4).contains(&magnitude) => {

@@ -1,22 +1,22 @@
-//! M9, search: the worst that an opponent finds who looks for it.
+//! M9, search: worst case found by optimisation.
 //!
-//! Even coverage finds what fills a share of the workspace. What is worse the nearer one comes (a pole, a handing over
-//! between two formulas, a swirl around an axis) is found sooner by going uphill. No derivative is needed: of many points
-//! the best is varied at random, what is better replaces it, and the size of the variations follows the share that is (a
+//! Even coverage finds faults that fill part of the workspace. A fault that grows towards a point (a pole, a transition
+//! between two formulas, a swirl around an axis) is found faster by ascent. No derivative is needed: the best of many
+//! points is varied at random, a better point replaces it, and the size of the variations follows the success rate (a
 //! (1+1) evolution strategy with the rule of one success in five; Rechenberg, *Evolutionsstrategie*, 1973).
 //!
-//! Four goals, each from several starts with seeds of their own:
-//! - *step*: what stands out along a short line, in pieces of 1, 0.1 and 0.01 mm; then closed in on as in M1, to 1e-8 mm;
-//! - *energy*: the work of a small closed ellipse in any two of all directions, over the most that forces as large could
-//!   have done on it, at rest in each of its poses;
-//! - *energy in motion*: the work of a triangle, over all work exchanged: out along the force and sideways in one fast
-//!   motion, sideways back, and in again slowly. What friction, damping or a clamp takes off a force that gives way must be
-//!   gone when the handle is back.
-//! - *size*: the largest wrench, next to which numbers stop being finite.
+//! Four goals, each from several starts with their own seeds:
+//! - *step*: irregularity along a short line, in pieces of 1, 0.1 and 0.01 mm; then refined as in M1, to 1e-8 mm;
+//! - *energy*: work of a small closed ellipse in any two of all directions, relative to the most that forces of its
+//! size could have done, at rest in each of its poses;
+//! - *energy in motion*: work of a triangle, relative to all work exchanged: out along the force and sideways in one
+//! fast motion, sideways back, and in again slowly. Energy that friction, damping or a clamp removes from a yielding
+//! force must be gone when the handle is back;
+//! - *size*: the largest wrench, near which numbers stop being finite.
 //!
-//! It stays in the workspace, and where the model says it ends: what that does not mean to answer is nobody's to find.
+//! The search stays in the workspace and inside the model's declared bounds: answers beyond them are not judged.
 //!
-//! What lies alone in a flat field, as a hole of a tenth of a millimetre does, no search can find faster than chance.
+//! An isolated fault in a flat field, such as a hole of a tenth of a millimetre, cannot be found faster than by chance.
 
 use super::continuity::{FELT_N, FELT_NM, HARMLESS, Jumps, Line, PIECES_MM, changes, close_in, standing_out};
 use super::energy::{CONSERVATIVE, Dissipation, Lap, samples};
@@ -35,25 +35,25 @@ use flotor_hal::{DVec3, Memory, Pose, Twist, WorkspaceBounds, math, rotation_vec
 use std::array::from_fn;
 
 const NAME: &str = "search";
-/// Numbers of a point: a pose, and two directions or a direction, two sizes and a speed.
+/// Number of coordinates of a point: a pose, and two directions, or a direction, two sizes and a speed.
 const NUMBERS: usize = 18;
-/// Variations of a start; a model with memory, which is walked to each, gets fewer.
+/// Number of variations of a start; fewer for a model with memory, which is walked to each.
 const TRIES: usize = 240;
 const TRIES_WITH_MEMORY: usize = 60;
-/// Share of the tries that are points anywhere, before the best is varied.
+/// Divisor of the tries that are random points, before the best is varied.
 const ANYWHERE: usize = 4;
-/// Size of the first variations, of the workspace; what it grows by after a success, and how many failures take that back.
+/// Size of the first variations, relative to the workspace; least size; growth after a success, taken back by four failures.
 const FIRST_SIZE: f64 = 0.3;
 const LEAST_SIZE: f64 = 1.0e-6;
 const GROWTH: f64 = 1.5;
-/// Pieces of a line, m, from stage to stage, and how many are looked at.
+/// Lengths of a line's pieces by stage, m, and their number.
 const STAGES_M: [f64; 3] = [1.0e-3, 1.0e-4, 1.0e-5];
 const PIECES: usize = 12;
-/// Samples of an ellipse, and its largest half axis, of the workspace.
+/// Number of samples of an ellipse, and its largest half axis relative to the workspace.
 const SAMPLES: usize = 64;
 const ELLIPSE: f64 = 0.1;
-/// Samples of an edge of a triangle, first and of the best; its longest sides, of the workspace, how much shorter they may
-/// be, and the speeds, m/s.
+/// Samples of a triangle's edge, in the search and for the best; longest side relative to the workspace and ratio to
+/// the shortest, and the speeds, m/s.
 const EDGE_SAMPLES: usize = 64;
 const EDGE_SAMPLES_OF_THE_BEST: usize = 1024;
 const SIDE: f64 = 0.25;
@@ -71,7 +71,7 @@ tally! {
         jumps: Jumps,
         energy: Worst,
         energy_in_motion: Worst,
-        /// Laps where the energy is known to the bound.
+        /// Number of laps whose energy is known to the bound.
         laps_resolved: u64,
         size: Worst,
         troubles: u64,
@@ -79,11 +79,11 @@ tally! {
     }
 }
 
-/// One opponent: what it may ask, and where.
+/// Optimiser of one goal from one start.
 struct Opponent<'a, 'b> {
     subject: &'a mut Subject<'b>,
     reach: Reach,
-    /// Where the model ends: what it says beyond, nobody feels.
+    /// Bounds of the model; its answers beyond them never reach the hand.
     bounds: WorkspaceBounds,
     random: Random,
     tries: usize,
@@ -91,7 +91,7 @@ struct Opponent<'a, 'b> {
 }
 
 impl Opponent<'_, '_> {
-    /// The best point for a goal: from the best of many, or from a known one.
+    /// Maximises a goal: starts from the best of many random points, or from a known one.
     fn climb(&mut self, from: Option<Point>, mut goal: impl FnMut(&mut Self, &Point) -> f64) -> (Point, f64) {
         let anywhere = if from.is_some() { 0 } else { self.tries / ANYWHERE };
         let mut best = from.unwrap_or([0.0; NUMBERS]);
@@ -110,7 +110,7 @@ impl Opponent<'_, '_> {
             if here > height {
                 (best, height, size) = (point, here, (size * GROWTH).min(1.0));
             } else {
-                // Four failures take back what one success gave.
+                // Four failures cancel the growth of one success.
                 size = (size / GROWTH.sqrt().sqrt()).max(LEAST_SIZE);
             }
         }
@@ -123,7 +123,7 @@ impl Opponent<'_, '_> {
         Pose::new(pose.position() - self.bounds.beyond(pose.position()), pose.orientation())
     }
 
-    /// A line in the middle of the point's pose, in the direction of its second six numbers.
+    /// Returns a line through the point's pose, in the direction of its second six coordinates.
     fn line(&self, point: &Point) -> Line {
         let pose = self.pose(point);
         let [_, _, _, _, _, _, x, y, z, rx, ry, rz, ..] = *point;
@@ -138,7 +138,7 @@ impl Opponent<'_, '_> {
         }
     }
 
-    /// The piece that stands out most along a line, and by how much.
+    /// Returns the most irregular piece along a line, with its irregularity.
     fn outstanding(&mut self, line: &Line, piece_m: f64) -> (usize, f64) {
         let start_m = -0.5 * piece_m * PIECES as f64;
         let changes = changes(self.subject, line, start_m, piece_m, PIECES);
@@ -156,7 +156,7 @@ impl Opponent<'_, '_> {
         for piece_m in STAGES_M {
             let goal = |own: &mut Self, point: &Point| own.outstanding(&own.line(point), piece_m).1;
             let (mut best, _) = self.climb(from, goal);
-            // The piece in the middle of the next, shorter line.
+            // Centre the next, shorter line on this piece.
             let line = self.line(&best);
             let (index, _) = self.outstanding(&line, piece_m);
             let start_m = (index as f64 - 0.5 * PIECES as f64) * piece_m;
@@ -176,7 +176,7 @@ impl Opponent<'_, '_> {
         }
     }
 
-    /// An ellipse about the point's pose, in the directions of its further twelve numbers.
+    /// Returns an ellipse about the point's pose, in the directions of its further twelve coordinates.
     fn ellipse(&self, point: &Point) -> Trajectory {
         let pose = self.pose(point);
         let [_, _, _, _, _, _, x, y, z, rx, ry, rz, u, v, w, ru, rv, rw] = *point;
@@ -195,7 +195,7 @@ impl Opponent<'_, '_> {
         }
     }
 
-    /// Energy that a lap of an ellipse generates, of the most that its forces could have done.
+    /// Returns the energy generated on a lap of an ellipse, relative to the most that its forces could have done.
     fn made(&mut self, point: &Point) -> f64 {
         let path = self.ellipse(point);
         let memory = self.subject.memory();
@@ -218,10 +218,10 @@ impl Opponent<'_, '_> {
         self.tally.energy.offer(made, pose);
     }
 
-    /// A triangle from the point's pose; nothing where there is no force to give way to.
+    /// Returns a triangle from the point's pose; `None` where there is no force.
     fn triangle(&mut self, point: &Point) -> Option<Triangle> {
         let pose = self.pose(point);
-        // Not walked to: friction would turn the force.
+        // Jump there without a walk: friction on the way would rotate the force.
         self.subject.restart();
         let there = self.subject.advance(pose, Twist::ZERO, PERIOD_NS).ok()?;
         let out = there.wrench.force().try_normalize()?;
@@ -237,7 +237,7 @@ impl Opponent<'_, '_> {
 
     fn energy_in_motion(&mut self) {
         self.tries = TRIES;
-        // The least that is dissipated shows the way to what is generated; without force there is nothing to climb.
+        // Minimal dissipation guides towards generated energy; without force there is no gradient.
         let (best, _) = self.climb(None, |own, point| {
             let lap = own.triangle(point).and_then(|triangle| triangle.lap(own.subject, EDGE_SAMPLES));
             lap.filter(|lap| lap.gross_j > 0.0).map_or(f64::NEG_INFINITY, |lap| lap.net_j / lap.gross_j)
@@ -268,10 +268,10 @@ impl Opponent<'_, '_> {
     }
 }
 
-/// Goals of an opponent.
+/// Number of goals.
 const GOALS: u64 = 4;
 
-/// Sends an opponent for each goal from several starts.
+/// Runs an optimiser for each goal from several starts.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let reach = setup.options.reach;
     let total = sweep(setup, NAME, GOALS * setup.share(800, 2), |subject, block| {
@@ -296,7 +296,7 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
 fn judge(total: &Tally) -> Measure {
     let last = PIECES_MM.len() - 1;
     let (force, torque) = (total.jumps.force[last], total.jumps.torque[last]);
-    // Each in its own bound: the graver is shown.
+    // Judge each value by its own bound, and report the most severe.
     let graded = [
         (force, FELT_N * HARMLESS, Verdict::of(force.value, FELT_N * HARMLESS, FELT_N), "step of force"),
         (

@@ -1,21 +1,20 @@
-//! M2, M3 and M5: what the derivative of the wrench by the pose says.
+//! M2, M3 and M5: measures of the derivative of the wrench by the pose.
 //!
-//! **M2, Lipschitz constant.** A sampled loop of period `T` stays passive on a device with damping `b` as
-//! long as the stiffness does not exceed `2 b / T` (Colgate and Schenkel, J. Robotic Systems 14, 1997,
-//! without virtual damping; Abbott and Okamura, IEEE T-RO 21, 2005). The share of the workspace where the
-//! largest gain of the derivative, in all six degrees of freedom at the device's lever arm, keeps to that is
-//! the renderable share.
+//! **M2, Lipschitz constant.** A sampled loop of period `T` is passive on a device with damping `b` as long as the
+//! stiffness does not exceed `2 b / T` (Colgate and Schenkel, J. Robotic Systems 14, 1997, without virtual damping;
+//! Abbott and Okamura, IEEE T-RO 21, 2005). The renderable part is the fraction of the workspace where the largest gain
+//! of the derivative, in all six degrees of freedom at the device's lever arm, is within this limit.
 //!
-//! **M3, reciprocity.** Force and torque that come from one energy have a symmetric derivative (Maxwell's
-//! reciprocity); `|J - J^T| / |J|` measures how far a model is from that. The part above the uncertainty of the finite
-//! differences fails; where that uncertainty exceeds the bound, the pose is not resolved.
+//! **M3, reciprocity.** Force and torque with a common potential have a symmetric derivative (Maxwell's reciprocity);
+//! `|J - J^T| / |J|` measures the deviation. The part above the uncertainty of the finite differences fails; where that
+//! uncertainty exceeds the bound, the pose is not resolved.
 //!
-//! **M5, sampled energy.** A loop holds each force for a period `T`, so even a conservative spring returns more than it took:
-//! for a motion `v` at a pose `T/2 v.S v` a second, `S` the symmetric part of the stiffness. The device damping that
+//! **M5, sampled energy.** A loop holds each force for a period `T`, so even a conservative spring returns more energy than it
+//! received: `T/2 v.S v` per second for a motion `v`, `S` being the symmetric part of the stiffness. The device damping that
 //! dissipates it for every motion is the largest eigenvalue of `S` times `T/2` (Colgate and Schenkel 1997).
 //!
-//! Where the answer depends on the way (friction), or bends within the shortest difference, there is no derivative. M2 and
-//! M5 are then judged by the differences that were seen along the six coordinates, M3 has nothing to judge.
+//! Where the answer depends on the path (friction), or has a kink within the shortest difference, there is no
+//! derivative. M2 and M5 are then judged by the differences along the six coordinates; M3 has nothing to judge.
 
 use super::jacobian::Jacobian;
 use super::measure::{Measure, NO_ANSWER, Verdict};
@@ -26,34 +25,33 @@ use crate::tally::{Decades, Worst, tally};
 use flotor_hal::abi::loader::LoadError;
 
 const NAME: &str = "Lipschitz constant, reciprocity and sampled energy";
-/// Poses of one block.
+/// Poses per block.
 const BLOCK: u64 = 32;
-/// Largest asymmetry that passes. Differences resolve 1e-9; a real coupling that is forgotten makes percents.
+/// Largest asymmetry that passes. Differences resolve 1e-9; a missing coupling term gives percents.
 const RECIPROCAL: f64 = 1.0e-6;
-/// Relative uncertainty from which on there is no derivative to speak of: a step or a bend lies within the
-/// shortest difference.
+/// Relative uncertainty above which there is no derivative: a step or a kink lies within the shortest difference.
 const ROUGH: f64 = 0.1;
 
-/// Periods of the loop for which M5 is reported, s; the last is judged.
+/// Loop periods for which M5 is reported, s; the last is judged.
 const PERIODS_S: [f64; 3] = [0.25e-3, 0.5e-3, PERIOD_S];
 
 tally! {
     struct Tally {
         poses: u64,
         unanswered: u64,
-        /// Poses without a derivative.
+        /// Number of poses without a derivative.
         rough: u64,
         gain: Gain,
         stiffness: Gain,
-        /// Gains of the blocks force-shift, force-turn, torque-shift, torque-turn, N/m.
+        /// Gains of the blocks force-translation, force-rotation, torque-translation, torque-rotation, N/m.
         blocks: [f64; 4],
         gains: Decades,
-        /// Beyond the uncertainty.
+        /// Largest asymmetry beyond the uncertainty.
         asymmetry: Worst,
         /// Largest relative uncertainty of a derivative.
         uncertain: f64,
-        /// Poses whose wrench depends on the pose, those of them with a derivative, and those where the asymmetry is known to the
-        /// bound.
+        /// Number of poses whose wrench depends on the pose, of those with a derivative, and of those whose asymmetry
+        /// is known to the bound.
         comparable: u64,
         differentiable: u64,
         resolved: u64,
@@ -61,8 +59,8 @@ tally! {
 }
 
 tally! {
-    /// A gain over the workspace, N/m: the largest that was seen, the largest that is possible, and at how many poses each
-    /// damping of [`DAMPINGS_NS_PER_M`] allows it.
+    /// Gain over the workspace, N/m: largest measured, largest possible, and number of poses within the limit of each
+    /// damping of [`DAMPINGS_NS_PER_M`].
     struct Gain {
         seen: Worst,
         possible: f64,
@@ -79,13 +77,13 @@ impl Gain {
         }
     }
 
-    /// Shares of the poses, by damping.
+    /// Returns the fraction of poses within the limit, by damping.
     fn shares(&self, poses: u64) -> [f64; DAMPINGS_NS_PER_M.len()] {
         self.allowed.map(|count| count as f64 / poses.max(1) as f64)
     }
 
-    /// A measure of this gain times `unit_of_gain`, judged by the bounds of the two dampings. A gain that is too large only
-    /// here and there, as where coils touch, is noted: the device's limit, which its loop has to keep.
+    /// Judges this gain times `unit_of_gain` by the bounds of the two dampings. A gain that is too large in few places
+    /// only, as where coils touch, is noted: the device's limit, which its loop has to respect.
     fn judge(&self, named: [&'static str; 3], unit_of_gain: f64, poses: u64, comment: String) -> Measure {
         let bounds = DAMPINGS_NS_PER_M.map(|damping| stiffest_n_per_m(damping) * unit_of_gain);
         let worst = Worst { value: self.seen.value * unit_of_gain, ..self.seen };
@@ -105,7 +103,7 @@ impl Gain {
 impl Tally {
     fn take(&mut self, jacobian: &Jacobian, pose: flotor_hal::Pose) {
         let norm = jacobian.norm();
-        // Both the derivative and its transpose are that uncertain.
+        // Derivative and transpose each contribute this error.
         let uncertain = 2.0 * jacobian.error;
         if uncertain > ROUGH * norm {
             let chords = jacobian.chords;
@@ -140,12 +138,12 @@ impl Tally {
     }
 }
 
-/// `2 b / T`.
+/// Returns the stiffness limit `2 b / T`, N/m.
 fn stiffest_n_per_m(damping_ns_per_m: f64) -> f64 {
     2.0 * damping_ns_per_m / PERIOD_S
 }
 
-/// M2, M3 and M5, and the gains over the workspace for the picture.
+/// Measures M2, M3 and M5; returns also the gains over the workspace for the picture.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<([Measure; 3], Decades), LoadError> {
     let sobol = Sobol::new(setup.options.seed);
     let blocks = setup.share(400_000, 32).div_ceil(BLOCK);
@@ -171,7 +169,7 @@ fn lipschitz(total: &Tally) -> Measure {
         "renderable at 1 kHz: {:.4} of the workspace with b = {lightly} N s/m, {:.4} with {heavily}",
         shares[0], shares[1]
     );
-    // Blocks are those of derivatives: unknown where there is none.
+    // Block gains need derivatives: unknown where there is none.
     let has_derivative = total.answered() > total.rough;
     let [force_shift, force_turn, torque_shift, torque_turn] =
         total.blocks.map(|gain| if has_derivative { gain } else { f64::NAN });

@@ -1,7 +1,7 @@
-//! Work in blocks on all processors, with a result that does not depend on who did what.
+//! Parallel work in blocks, with a result independent of the schedule.
 //!
-//! Every block starts with the model at home and its history forgotten, draws its poses from its own number,
-//! and results are put together in the order of the blocks.
+//! Every block starts with the model at home and reset, draws its poses from its own number, and results are merged in
+//! the order of the blocks.
 
 use super::Setup;
 use crate::subject::Subject;
@@ -9,7 +9,7 @@ use crate::tally::Merge;
 use flotor_hal::abi::loader::LoadError;
 use rayon::prelude::*;
 
-/// Does `work` for every block, and puts the results together.
+/// Runs `work` for every block and merges the results in order.
 pub(super) fn sweep<'a, T: Merge + Send>(
     setup: &Setup<'a>,
     name: &str,

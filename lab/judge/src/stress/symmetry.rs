@@ -1,8 +1,8 @@
-//! M10, symmetry: whether a law keeps a symmetry that is declared for it.
+//! M10, symmetry: deviation of a law from its declared symmetry.
 //!
-//! A law need not have any, so nothing is asked where nothing is declared. Where one is, the answer at the image of a pose
-//! must be the image of the answer: a mirror turns a force as it turns a position, and a torque as it turns a rotation,
-//! the other way round in the plane of the mirror.
+//! A law need not have a symmetry; without a declaration nothing is measured. With one, the answer at the image of a
+//! pose must be the image of the answer: a mirror maps a force like a position, and a torque like a rotation, with the
+//! opposite sign.
 
 use super::measure::{Measure, NO_ANSWER, Verdict};
 use super::sweep::sweep;
@@ -18,14 +18,14 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 const NAME: &str = "symmetry";
-/// Largest difference that passes, of the wrench: what M3 tolerates.
+/// Largest relative difference of the wrench that passes: that of M3.
 const SYMMETRIC: f64 = 1.0e-6;
-/// Wrench too small to be compared, N.
+/// Smallest wrench that is compared, N.
 const NOTHING_N: f64 = 1.0e-6;
-/// Poses of a block.
+/// Poses per block.
 const BLOCK: u64 = 16;
 
-/// What leaves a law as it is.
+/// Transformation that leaves a law unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Symmetry {
@@ -39,10 +39,10 @@ pub enum Symmetry {
     AroundZ,
 }
 
-/// One of the maps of a symmetry.
+/// Map of a symmetry.
 #[derive(Clone, Copy)]
 enum Map {
-    /// The axis across the mirror.
+    /// Reflection; the axis normal to the mirror.
     Mirror(DVec3),
     Turn(DQuat),
 }
@@ -59,7 +59,7 @@ impl Symmetry {
 }
 
 impl Map {
-    /// Of positions and forces.
+    /// Maps positions and forces.
     fn shift(self, vector: DVec3) -> DVec3 {
         match self {
             Self::Mirror(across) => vector - across * (2.0 * across.dot(vector)),
@@ -67,7 +67,7 @@ impl Map {
         }
     }
 
-    /// Of rotations and torques.
+    /// Maps rotations and torques.
     fn turn(self, vector: DVec3) -> DVec3 {
         match self {
             Self::Mirror(across) => across * (2.0 * across.dot(vector)) - vector,
@@ -88,13 +88,13 @@ tally! {
     struct Tally {
         poses: u64,
         unanswered: u64,
-        /// Poses with a wrench there or at the image.
+        /// Number of poses with a wrench there or at the image.
         comparable: u64,
         difference: Worst,
     }
 }
 
-/// The answer at a pose; a model with memory comes from home each time, the image on the image of the way.
+/// Returns the answer at a pose; a model with memory comes from home each time, on the image of the path for the image.
 fn answer(subject: &mut Subject<'_>, pose: Pose) -> Option<Wrench> {
     if subject.memory() == Memory::PathDependent {
         subject.restart();

@@ -1,9 +1,9 @@
-//! M0, totality: an answer for every input.
+//! M0, totality: an answer to every input.
 //!
-//! A model is called thousands of times a second with whatever the sensors say. At each pose of an even
-//! coverage and of the named manifolds it must give a finite wrench with a status the contract knows, and say
-//! so where the input was not finite. A model that panics is named with the pose and replaced. The thesis's
-//! code gives NaN at the exact rest pose, 0/0 in its moments.
+//! A model is called thousands of times a second with any sensor values. At each pose of an even coverage and of the
+//! named manifolds it must return a finite wrench with a status of the contract, and report inputs that are not finite.
+//! A model that panics is reported with the pose and replaced. The thesis's code gives NaN at the exact rest pose, 0/0
+//! in its moments.
 
 use super::measure::Measure;
 use super::poses::MANIFOLDS;
@@ -18,13 +18,13 @@ use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Input, Memory, Pose, StepStatus, Twist};
 
 const NAME: &str = "totality";
-/// Poses of one block.
+/// Poses per block.
 const BLOCK: u64 = 256;
-/// Troubles after which a block stops asking: enough to know, and a panic costs microseconds.
+/// Number of failures after which a block stops: enough to judge, and a panic costs microseconds.
 const ENOUGH_TROUBLES: u64 = 64;
 
 tally! {
-    /// What was seen so far.
+    /// Counts of answers and failures.
     struct Tally {
         asked: u64,
         panics: u64,
@@ -66,14 +66,14 @@ impl Tally {
     }
 }
 
-/// Asks for the wrench everywhere.
+/// Steps the model at poses everywhere.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let reach = setup.options.reach.scaled(WIDER);
     let sobol = Sobol::new(setup.options.seed);
     let even_blocks = setup.share(10_000_000, 0).div_ceil(BLOCK);
     let blocks_per_manifold = setup.share(160_000, 0).div_ceil(BLOCK);
     let manifolds = MANIFOLDS.len() as u64;
-    // The manifolds first: what breaks there, breaks at once.
+    // Manifolds first: they fail early.
     let manifold_blocks = blocks_per_manifold * manifolds;
 
     let total = sweep(setup, NAME, manifold_blocks + even_blocks, |subject, block| {

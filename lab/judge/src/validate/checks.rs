@@ -1,4 +1,4 @@
-//! One rule, checked in this process.
+//! Check of one rule in this process.
 
 use super::path::CONFIG;
 use super::rule::Check;
@@ -15,11 +15,11 @@ use flotor_session::registry::load_file;
 use flotor_session::scene::KeyValue;
 use std::path::Path;
 
-/// Checks one rule, of instances with these settings; what was measured on the way, if anything was. Not
-/// real-time; runs the plugin's code in this process, which it may hang or end.
+/// Checks one rule on instances with these settings; returns measured figures, if any. Not real-time; runs the plugin's
+/// code in this process, which may hang or crash.
 ///
 /// # Errors
-/// What was seen that violates the rule, or what is missing to check it.
+/// The violation of the rule, or the reason why it could not be checked.
 pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option<Figures>, Seen> {
     if wanted == Check::Contract(Rule::Metadata) {
         read_metadata(path)?;
@@ -69,12 +69,12 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
 }
 
 impl Seen {
-    /// Nothing is known of the rule where the system has no thread for its check.
+    /// Returns the finding for a check whose thread could not be started.
     pub(crate) fn no_thread(cause: &std::io::Error) -> Self {
         Self::Missing(format!("the check needs a thread: {cause}; {THREAD_ADVICE}"))
     }
 
-    /// The rule does not apply, for this reason.
+    /// Returns the finding that the rule does not apply, for this reason.
     pub(super) fn nothing_to_judge(why: &str) -> Self {
         Self::NothingToJudge(why.to_owned())
     }
@@ -86,7 +86,7 @@ impl From<String> for Seen {
     }
 }
 
-/// What a device needs and does not have, is busy or forbidden, is nobody's violation.
+/// Converts a load error; a missing, busy or forbidden resource is no violation.
 impl From<LoadError> for Seen {
     fn from(error: LoadError) -> Self {
         match error {
@@ -100,19 +100,19 @@ impl From<LoadError> for Seen {
     }
 }
 
-/// Whether a refusal says what is missing. The loader puts words in the place of none, and a sign in that of no text.
+/// Returns true if a refusal names a reason; the loader replaces a missing one, or invalid text.
 fn is_told(reason: &str) -> bool {
     !reason.starts_with("no reason given") && !reason.contains(char::REPLACEMENT_CHARACTER)
 }
 
-/// What is checked: a plugin, and how its instances are set.
+/// Checked plugin with the settings of its instances.
 pub(super) struct Subject {
     pub(super) plugin: Plugin,
     settings: Vec<Setting>,
 }
 
 impl Subject {
-    /// An instance as a loop meets it.
+    /// Creates and prepares an instance, as for a loop.
     pub(super) fn prepared_model(&self) -> Result<Model, String> {
         prepared(&self.plugin, &self.settings, CONFIG.seed).map_err(|error| error.to_string())
     }

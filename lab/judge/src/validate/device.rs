@@ -1,4 +1,4 @@
-//! Rules of a device: its description, its life cycle, and its stop.
+//! Rules of a device: description, life cycle, stop.
 
 use super::Seen;
 use super::path::CONFIG;
@@ -9,21 +9,21 @@ use flotor_hal::{Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Faul
 use flotor_session::LatchGuard;
 use std::time::{Duration, Instant};
 
-/// How long a device may take for what is to happen soon: a sample, a force, its end.
+/// Timeout of a device for a sample, a force, or a stop.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Time between two ticks that wait for something, roughly.
+/// Approximate time between two ticks that wait for something.
 const TICK: Duration = Duration::from_millis(1);
 
-/// How often a device is asked what it can do, before it is energised and after.
+/// Number of capability queries, before and after activation.
 const ASKED: usize = 10;
 
-/// The loader refuses what no host can enforce, and what is not what was told before.
+/// Queries the capabilities; the loader rejects unenforceable and inconsistent ones.
 pub(super) fn capabilities(mut device: OpenedDevice) -> Result<(), String> {
     let ask = |device: &mut OpenedDevice| {
         (0..ASKED).try_for_each(|_| device.capabilities().map(drop)).map_err(|refusal| refusal.to_string())
     };
     ask(&mut device)?;
-    // One that cannot be energised breaks another rule.
+    // A failed activation violates another rule.
     let Ok(active) = device.activate(&CONFIG) else { return Ok(()) };
     active.deactivate().map_or(Ok(()), |mut device| ask(&mut device))
 }
@@ -34,7 +34,7 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
         let mut running = Running::start(device)?;
         let started = Instant::now();
         let mut samples = 0;
-        // One sample may be what the device had before; another shows that they come.
+        // The first sample may be an old one of the device; a second proves that samples arrive.
         while running.ticks < TICKS || samples < 2 || !running.takes_commands() {
             samples += u64::from(running.turn(&Wrench::ZERO)? == Cycle::Fresh);
             if running.ticks >= TICKS {
@@ -58,8 +58,8 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
     Ok(())
 }
 
-/// Times each call as a loop would feel it. A machine under load delays some of them: of reads and writes the fastest
-/// quarter counts, of stops the fastest of three.
+/// Times each call of a device. A machine under load delays some calls: of reads and writes the fastest quarter counts,
+/// of stops the fastest of three.
 pub(super) fn time(mut device: OpenedDevice) -> Result<(), String> {
     const TICKS: u64 = 200;
     const STOP: Duration = Duration::from_millis(100);
@@ -72,7 +72,7 @@ pub(super) fn time(mut device: OpenedDevice) -> Result<(), String> {
         for _ in 0..TICKS {
             let _ = running.turn(&Wrench::ZERO)?;
         }
-        // What is slower than 1 kHz has the time of its own rate.
+        // A device slower than 1 kHz has the period of its own rate.
         let period_s = (CONFIG.period_ns as f64 * 1.0e-9).max(1.0 / running.told.rate_hz[1]);
         let limit = Duration::from_secs_f64(period_s / 2.0);
         for (call, took) in ["read", "write"].into_iter().zip(&mut running.took) {
@@ -99,7 +99,7 @@ fn within(call: &str, took: Duration, limit: Duration) -> Result<(), String> {
 
 pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Seen> {
     let push = push(&device.capabilities().map_err(|refusal| refusal.to_string())?);
-    // Only its description is checked: the message is for a device that has no host any more.
+    // Check only its description: its message is for a device without a host.
     let _ = device.independent_stop().map_err(|refusal| refusal.to_string())?;
     let stopper = device.stopper();
     let mut running = Running::start(device)?;
@@ -112,7 +112,7 @@ pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Seen> {
     Ok(running.feel_nothing(&push)?)
 }
 
-/// What to push with: no more than a newton, along the first axis that is driven; nothing where none is.
+/// Returns the wrench to push with: at most a newton along the first actuated axis; zero without one.
 fn push(told: &Capabilities) -> Wrench {
     let axes = [(Axes::Z, DVec3::Z), (Axes::X, DVec3::X), (Axes::Y, DVec3::Y)];
     let limit_n = DVec3::from_array(told.max_force_n).min(DVec3::ONE);
@@ -121,7 +121,7 @@ fn push(told: &Capabilities) -> Wrench {
     driven.map_or(Wrench::ZERO, |(_, unit)| Wrench::from_force(unit * limit_n))
 }
 
-/// A device in a loop without a model.
+/// Active device in a loop without a model.
 pub(super) struct Running {
     pub(super) device: ActiveDevice,
     stopper: Stopper,
@@ -131,11 +131,11 @@ pub(super) struct Running {
     ticks: u64,
     commands_taken: u64,
     sampled: Sampled,
-    /// Of reads and of writes.
+    /// Durations of reads and of writes.
     took: [Vec<Duration>; 2],
 }
 
-/// What fresh samples say about their time.
+/// Sequence and times of fresh samples.
 #[derive(Clone, Copy, Default)]
 struct Sampled {
     count: u64,
@@ -143,13 +143,13 @@ struct Sampled {
     last: u64,
 }
 
-/// All conditions of the contract.
+/// Conditions defined by the contract.
 const KNOWN: Conditions = Conditions::SATURATED.with(Conditions::EXCESS_FORCE).with(Conditions::NOISY);
 
-/// How far ahead of its tick a sample may be, ns: a tick is scheduled, and here no clock waits for it.
+/// Largest time of a sample ahead of its tick, ns: ticks are scheduled, and here none waits for the clock.
 const AHEAD_NS: u64 = 60_000_000_000;
 
-/// Why a tick could not be used.
+/// Reason why a tick failed.
 pub(super) struct Trouble {
     fault: Option<Fault>,
     words: String,
@@ -181,13 +181,13 @@ impl Running {
         })
     }
 
-    /// One tick: a sample, and a wrench.
+    /// Runs one tick: reads a sample, writes a wrench.
     pub(super) fn turn(&mut self, wrench: &Wrench) -> Result<Cycle, Trouble> {
         let index = self.ticks;
         let dt_ns = if index == 0 { 0 } else { CONFIG.period_ns };
         let tick = Tick { index, time_ns: index * CONFIG.period_ns, dt_ns };
         self.ticks += 1;
-        // Not real-time: whoever presses the emergency stop of the machine means this device, too.
+        // Not real-time: the machine's emergency stop applies to this device too.
         if let Err(pressed) = self.latch.check() {
             self.stopper.safe_stop();
             return Err(Trouble { fault: None, words: pressed.to_string() });
@@ -216,13 +216,13 @@ impl Running {
         Ok(sampled)
     }
 
-    /// Whether a sample can be.
+    /// Checks that a sample is plausible.
     fn plausible(&mut self, sampled: Cycle, tick: &Tick) -> Result<(), String> {
         let state = &self.state;
         if !state.is_finite() || !state.delivered.is_finite() {
             return Err(format!("{} is not finite", wording::sample(state)));
         }
-        // A sensor without a pose may leave it as it likes.
+        // A sensor without a pose need not set one.
         if sampled != Cycle::Fresh || self.told.sensed == Axes::NONE {
             return Ok(());
         }
@@ -254,7 +254,7 @@ impl Running {
         Ok(())
     }
 
-    /// Whether it has taken a command; one that drives nothing need not.
+    /// Returns true if the device has taken a command, or has no actuated axis.
     fn takes_commands(&self) -> bool {
         self.commands_taken > 0 || self.told.actuated == Axes::NONE
     }
@@ -263,7 +263,7 @@ impl Running {
         self.state.delivered != Wrench::ZERO
     }
 
-    /// Pushes until the device says that it does. One that never says so would pass every stop.
+    /// Pushes until the device reports a force; without a report its stop could not be checked.
     fn feel(&mut self, push: &Wrench) -> Result<(), String> {
         let started = Instant::now();
         while !self.delivers() {
@@ -280,7 +280,7 @@ impl Running {
         Ok(())
     }
 
-    /// Goes on pushing a device that was stopped: it has to answer, and to give nothing.
+    /// Pushes on after a stop: the device has to answer, and to deliver no force.
     fn feel_nothing(&mut self, push: &Wrench) -> Result<(), String> {
         const SAMPLES: u64 = 20;
         let started = Instant::now();
@@ -296,7 +296,7 @@ impl Running {
                 });
             }
             match self.turn(push) {
-                // A stop that says so is an answer, and gives no force.
+                // A fault that reports the stop is a valid answer, without force.
                 Err(Trouble { fault: Some(Fault::EmergencyStop), .. }) => return Ok(()),
                 Err(trouble) => return Err(format!("after safe_stop, {}", trouble.words)),
                 Ok(Cycle::Fresh) if !self.delivers() => at_rest += 1,

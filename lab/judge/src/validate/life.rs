@@ -1,5 +1,5 @@
-//! One life of an instance: every call that a host makes of it, in a host's order, what it offers beside its main
-//! interface included. Three rules share it; each looks at something else between the calls.
+//! Complete life of an instance: all calls of a host, in a host's order, including extensions. Three rules share it;
+//! each checks something else between the calls.
 
 use super::Seen;
 use super::checks::Subject;
@@ -12,16 +12,16 @@ use flotor_hal::abi::loader::{Model, OpenedDevice};
 use flotor_hal::extension::linear_field::LinearField;
 use flotor_hal::{Input, Mutability, Output, Parameter, Pose, Wrench};
 
-/// Steps of a model, and ticks of a device.
+/// Number of steps of a model, and of ticks of a device.
 const STEPS: u64 = 300;
-/// Points of a centerline: what the viewer asks for at most.
+/// Number of points of a centreline: the maximum of the viewer.
 const POINTS: usize = 65;
 
-/// Hears the name of each call when it is over, and how many calls so far left the floating-point mode changed: the loader puts it
-/// back at once.
+/// Callback after each call: name of the call, and number of calls so far that changed the floating-point mode, which
+/// the loader restores at once.
 pub(super) type After<'a> = &'a mut dyn FnMut(&str, u64) -> Result<(), String>;
 
-/// Lives it. Fails if a call fails, or `after` does.
+/// Runs the life of an instance. Fails if a call or `after` fails.
 pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Seen> {
     if subject.is_device() {
         return device(subject.device()?, after);
@@ -47,7 +47,7 @@ pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Seen> {
     Ok(after("destroy", 0)?)
 }
 
-/// One by one, and as a batch. Input and output are blocks of memory of their own: what is written beside them is seen.
+/// Steps singly and as a batch. Input and output are separate blocks of memory, so that writes beside them are detected.
 fn steps(model: &mut Model) -> Result<(), String> {
     for sent in walk(STEPS) {
         let (input, mut output) = (Box::new(sent), Box::<Output>::default());
@@ -75,14 +75,14 @@ fn settings(model: &mut Model, parameters: &[Parameter]) -> Result<(), String> {
     for (index, parameter) in parameters.iter().enumerate() {
         let value = model.parameter(index);
         if parameter.mutability() == Mutability::Live && value.is_finite() {
-            // A number that follows from others may be refused; `live-parameters` looks at that.
+            // A value that depends on others may be rejected; `live-parameters` checks that.
             let _ = model.set_parameter(index, value);
         }
     }
     works(model, "set_parameter")
 }
 
-/// What it offers, each twice: at home, and on its path.
+/// Calls each extension twice: at home, and on the path.
 fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
     for input in [Some(Input::at_rest(Pose::HOME)), walk(100).last()].into_iter().flatten() {
         let _ = model.active_region();
@@ -124,7 +124,7 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
     after("an extension", model.float_changes())
 }
 
-/// An instance that has panicked answers nothing any more; its next step has the message.
+/// Checks that the instance still answers: after a panic its next step returns the message.
 fn works(model: &mut Model, asked: &str) -> Result<(), String> {
     let answer = finite(model, &Input::at_rest(Pose::HOME));
     answer.map(|_| ()).map_err(|words| format!("after {asked}, {words}"))

@@ -1,4 +1,4 @@
-//! Live parameters: whether a new value takes effect.
+//! Live parameters: range, effect and duration of changes.
 
 use super::Seen;
 use super::checks::Subject;
@@ -10,11 +10,11 @@ use flotor_hal::abi::loader::Model;
 use flotor_hal::{Mutability, Parameter};
 use std::time::Duration;
 
-/// How often a value is set, to tell how long that takes.
+/// Number of repetitions of a change, for its duration.
 const TIMES: usize = 33;
 
-/// Sets each live parameter to its value, to the ends of its range and to its default. Each has its own instance, because
-/// the value of one may change the range of another.
+/// Sets each live parameter to its value, to the ends of its range and to its default. Each has its own instance,
+/// because the value of one may change the range of another.
 pub(super) fn live_parameters(subject: &Subject) -> Result<(), Seen> {
     let is_live = |(_, parameter): &(usize, &Parameter)| parameter.mutability() == Mutability::Live;
     let mut taken = Vec::new();
@@ -23,7 +23,7 @@ pub(super) fn live_parameters(subject: &Subject) -> Result<(), Seen> {
         walk(10).try_for_each(|input| finite(&mut model, &input).map(|_| ()))?;
         let own = model.parameter(index);
         let own = if own.is_finite() { own } else { parameter.default() };
-        // Where a number follows from others, a model refuses it whatever its value.
+        // A model rejects any value of a parameter that depends on others.
         taken.push(set(&mut model, index, parameter, own)?);
         for value in [parameter.min(), parameter.max(), parameter.default()] {
             let _ = set(&mut model, index, parameter, value)?;
@@ -43,9 +43,9 @@ pub(super) fn live_parameters(subject: &Subject) -> Result<(), Seen> {
 /// Result of setting a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Took {
-    /// It is in force.
+    /// The value is in use.
     Taken,
-    /// It does not fit the others, and the one before stays.
+    /// The value does not fit the others; the previous one stays in use.
     Refused,
 }
 
@@ -71,14 +71,14 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
         }
     };
     took.sort_unstable();
-    // The one in the middle: what disturbs this process for a moment does not count.
+    // Take the median: short disturbances of this process do not count.
     let usual = took.get(TIMES / 2).copied().unwrap_or_default();
     let limit = Duration::from_nanos(CONFIG.period_ns / 2);
     if usual > limit {
         let [usual, limit] = [usual, limit].map(wording::time);
         return Err(format!("setting `{id}` to {value} takes {usual}, above the limit of {limit}"));
     }
-    // A model need not tell the value in force; if it does, it is the one. A conversion of units may round.
+    // A model need not report its value; if it does, the value must match, up to rounding of a unit conversion.
     let read_back = model.parameter(index);
     let is_told = read_back.is_finite() && expected.is_finite();
     if is_told && (read_back - expected).abs() > 1.0e-9 * read_back.abs().max(expected.abs()) {

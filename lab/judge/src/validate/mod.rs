@@ -1,10 +1,10 @@
-//! Checks a plugin against the rules of the contract, from outside as a host does: each rule in its own process, so that a
+//! Checks a plugin against the rules of the contract, from outside as a host: each rule in its own process, so that a
 //! plugin that crashes or hangs costs one rule.
 //!
-//! - `rule`: what is checked; `checks`: one of it, in this process; `patience`: how long that may take.
-//! - `life`: every call of an instance; `untouched` and `guarded` look at what each leaves behind.
-//! - `path`: where a model is asked; `model`, `live_parameters`, `passive`, `locked`: what is asked of it.
-//! - `device`: what is asked of a device.
+//! - `rule`: list of rules; `checks`: check of one, in this process; `patience`: its timeout.
+//! - `life`: all calls of an instance; `untouched` and `guarded` check their side effects.
+//! - `path`: poses of the checks; `model`, `live_parameters`, `passive`, `locked`: checks of a model.
+//! - `device`: checks of a device.
 
 mod checks;
 mod device;
@@ -39,19 +39,19 @@ use std::time::Duration;
 pub struct Finding {
     /// Short name of the rule.
     pub rule: &'static str,
-    /// What it demands.
+    /// Requirement of the rule.
     pub text: &'static str,
-    /// The violation.
+    /// Violation that was found.
     pub violation: Option<String>,
-    /// Why it could not be checked here.
+    /// Reason why the rule could not be checked here.
     pub unchecked: Option<String>,
-    /// What was in the way then.
+    /// Kind of that reason.
     pub obstacle: Option<Obstacle>,
-    /// What was measured on the way.
+    /// Figures measured by the check.
     pub figures: Option<Figures>,
 }
 
-/// What was in the way of a rule that could not be checked.
+/// Reason category of a rule that could not be checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Obstacle {
@@ -63,8 +63,8 @@ pub enum Obstacle {
     Subject,
 }
 
-/// Measurements of a model without memory near home. No contract limits them, but a person can distinguish newtons per
-/// metre from newtons per millimetre.
+/// Measurements of a stateless model near home. No contract limits them; they reveal a confusion of newtons per metre
+/// with newtons per millimetre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// Largest stiffness, N/m.
@@ -74,7 +74,7 @@ pub struct Figures {
 }
 
 impl Finding {
-    /// Returns true if the rule says nothing about this plugin: neither that it holds nor that it does not.
+    /// Returns true if the rule does not apply to this plugin.
     #[must_use]
     pub fn has_nothing_to_judge(&self) -> bool {
         self.obstacle == Some(Obstacle::Subject)
@@ -93,34 +93,34 @@ impl Finding {
     }
 }
 
-/// Why a rule is not known to hold.
+/// Outcome of a rule that is not known to hold.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Seen {
-    /// It does not.
+    /// The rule is violated.
     Violation(String),
-    /// Nor will it ever be known: a step did not return.
+    /// A step did not return, so the outcome is unknown.
     Stuck(String),
-    /// The plugin needs something that is not there (a device, a permission): neither its fault nor a proof.
+    /// The plugin needs something that is missing (a device, a permission): no violation, no proof.
     Missing(String),
-    /// This system cannot tell, whatever the plugin does.
+    /// This system cannot check the rule for any plugin.
     NotOnThisSystem(String),
-    /// The rule does not apply to this plugin, or nothing of the sample could have violated it.
+    /// The rule does not apply to this plugin, or nothing in the sample could violate it.
     NothingToJudge(String),
 }
 
 /// Result of the process that checks one rule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// `None` if the rule holds, else what was seen.
+    /// Outcome; `None` if the rule holds.
     pub seen: Option<Seen>,
-    /// What was measured on the way.
+    /// Figures measured by the check.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub figures: Option<Figures>,
 }
 
 impl Verdict {
-    /// The verdict on one rule, of this process.
+    /// Converts the result of a check.
     pub fn of(checked: Result<Option<Figures>, Seen>) -> Self {
         match checked {
             Ok(figures) => Self { seen: None, figures },
@@ -132,31 +132,31 @@ impl Verdict {
         Self { seen: Some(Seen::Violation(seen)), figures: None }
     }
 
-    /// Writes it into the file that is standard input, where the process that started this one reads it: a plugin prints
-    /// elsewhere.
+    /// Writes the verdict into the file on standard input, where the parent process reads it, apart from the plugin's
+    /// output.
     fn deliver(&self) -> io::Result<()> {
         standard_input()?.write_all(&serde_json::to_vec(self)?)
     }
 }
 
-/// Checks one rule, of instances with these settings, in this process, which is there for that alone, and writes the verdict into the
-/// file that is standard input. A step that takes longer than `limit` of processor time, or waits ten times as long, ends the
-/// process. Not real-time.
+/// Checks one rule on instances with these settings in this process, which was started for it, and writes the verdict
+/// into the file on standard input. A step that exceeds `limit` of processor time, or ten times that in waiting, ends
+/// the process. Not real-time.
 ///
 /// # Errors
-/// Standard input is no such file, or the system has no thread.
+/// If standard input is no such file, or no thread can be started.
 pub fn deliver(path: &Path, settings: &[KeyValue], wanted: Check, limit: Duration) -> io::Result<()> {
     watch::start(limit, |stuck| {
-        // Whether or not that can be told: nothing else ends a call that does not return.
+        // End the process even if the write fails: nothing else ends a call that does not return.
         let _ = Verdict::of(Err(Seen::Stuck(stuck.to_string()))).deliver();
         end_at_once();
     })?;
     Verdict::of(check(path, settings, wanted)).deliver()
 }
 
-/// Checks a plugin file against every rule that applies; stops at the first that makes the rest pointless. Not
-/// real-time. A rule may take `patience` of a processor, and wait as long; `program` starts this program once more, to check one rule of the file and
-/// to [deliver](deliver()) the verdict. `only` names the rules to check; empty: all.
+/// Checks a plugin file against every rule that applies; stops at the first failure that makes the rest pointless. Not
+/// real-time. A rule may take `patience` of processor time, and wait as long; `program` starts this program again, to
+/// check one rule of the file and to [deliver](deliver()) the verdict. `only` selects rules; empty: all.
 #[must_use]
 pub fn validate(
     path: &Path,
@@ -170,7 +170,7 @@ pub fn validate(
         findings.push(Finding::new(check, verdict));
         is_violated
     };
-    // Reads the file and runs nothing of it.
+    // Reads the file without running its code.
     let metadata = Check::Contract(Rule::Metadata);
     let read = read_metadata(path);
     let verdict = read.as_ref().map(|_| None).map_err(|error| Seen::Violation(error.to_string()));
@@ -201,7 +201,7 @@ pub fn validate(
                 Verdict::violated(format!("{step}; the rules after it were not checked"))
             }
             Ok(Some(verdict)) => verdict,
-            // Its allocator is slow, and whether a call ends is seen without it.
+            // Not a violation: the guarding allocator is slow, and other rules check that calls end.
             Ok(None) if check == Check::Contract(Rule::InsideMemory) => {
                 let patience = wording::time(patience);
                 let late =
@@ -221,7 +221,7 @@ pub fn validate(
     findings
 }
 
-/// Explains an end without a verdict.
+/// Describes an end without a verdict.
 fn died(check: Check, end: ExitStatus) -> String {
     let Some(signal) = ending_signal(end) else {
         return format!("the process ended without a verdict ({end})");
@@ -230,7 +230,7 @@ fn died(check: Check, end: ExitStatus) -> String {
         return "a step allocated memory or made another system call".to_owned();
     }
     let hint = match check {
-        // A thread that is locked in may not read the clock of the processor either.
+        // A sandboxed thread may not read the processor's clock either.
         Check::SystemCalls => "; here a step that reads the time causes this",
         Check::Contract(Rule::InsideMemory) => ": a call left its memory, or damaged a block",
         _ => "",
@@ -238,25 +238,25 @@ fn died(check: Check, end: ExitStatus) -> String {
     format!("the process died by signal {signal}{hint}")
 }
 
-/// So many times longer than the other rules may the first instance take: models prepare once, and keep what they found.
+/// Timeout factor of the first instance: models prepare once and cache the result.
 const PREPARATION: u32 = 6;
-/// Most instances that a rule creates one after the other: where nothing can be kept, each takes as long as the first.
+/// Maximum number of instances that a rule creates in turn: without a cache, each takes as long as the first.
 const INSTANCES: u32 = 4;
 
-/// The patience of the rules after the first instance, which ran for so long: what was requested, unless the instances that a rule
-/// creates would use up much of it.
+/// Returns the timeout of the rules after the first instance, which ran for so long: the requested one, plus the
+/// preparation of a rule's instances if that is a substantial part.
 fn with_preparations(patience: Duration, first_instance: Duration) -> Duration {
     let preparations = first_instance * INSTANCES;
     if preparations > patience / 10 { patience + preparations } else { patience }
 }
 
-/// Runs the check of one rule in its own process, and tells how long that ran; `None` if it took too long.
+/// Runs the check of one rule in its own process; returns verdict and duration, or `None` on timeout.
 fn in_own_process(
     check: Check,
     mut command: Command,
     patience: Duration,
 ) -> io::Result<Option<(Verdict, Duration)>> {
-    // A file, not a pipe: nobody has to empty it. What a plugin prints is its own business.
+    // A file, not a pipe, which would need a reader. The plugin's output is discarded.
     let mut told = anonymous_file("flotor-verdict")?;
     command.stdin(told.try_clone()?).stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = PluginProcess::start(&mut command)?;

@@ -1,4 +1,4 @@
-//! Rules of a force model: numbers, repeatability, time, threads, energy, activity.
+//! Rules of a force model: finite numbers, repeatability, time, threads, energy, active region.
 
 use super::Seen;
 use super::checks::Subject;
@@ -36,8 +36,8 @@ pub(super) fn finite_in_motion(model: &mut Model) -> Result<(), String> {
 /// Demand in each tick of a path.
 type DemandOfTick = fn(u64) -> Demand;
 
-/// Compares the answers on a path with everything demanded, to those with less demanded, and to those with a demand that
-/// changes from step to step, as of a viewer that comes and goes.
+/// Compares the answers on a path with everything demanded to those with less demanded, and to those with a demand that
+/// changes from step to step, as with a viewer that connects and disconnects.
 pub(super) fn demand(model: &mut Model) -> Result<(), String> {
     let all = demanded(model, |_| Demand::ALL)?;
     let fewer: [(&str, DemandOfTick); 4] = [
@@ -65,12 +65,12 @@ pub(super) fn demand(model: &mut Model) -> Result<(), String> {
     Ok(())
 }
 
-/// True if a number differs; one NaN is like another, and found by another rule.
+/// Returns true if a number differs; two NaNs count as equal, because another rule finds them.
 fn is_other(first: [f64; 3], second: [f64; 3]) -> bool {
     first.into_iter().zip(second).any(|(a, b)| a != b && !(a.is_nan() && b.is_nan()))
 }
 
-/// The answers on a path from the start, with a demand for each step.
+/// Returns the answers on a path from the start, with a demand for each step.
 fn demanded(model: &mut Model, of: impl Fn(u64) -> Demand) -> Result<Vec<Output>, String> {
     match model.reset() {
         CallStatus::Ok => {}
@@ -91,7 +91,7 @@ pub(super) fn not_finite(model: &mut Model) -> Result<(), String> {
             finite_at(model, pose)?;
         }
     }
-    finite_at(model, Pose::HOME) // and it still works afterwards
+    finite_at(model, Pose::HOME) // and the model still works afterwards
 }
 
 pub(super) fn far_poses(model: &mut Model) -> Result<(), String> {
@@ -102,7 +102,7 @@ pub(super) fn far_poses(model: &mut Model) -> Result<(), String> {
 }
 
 pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
-    // In motion first, with the time of a loop: what is integrated shows there and nowhere else.
+    // In motion first, with the time of a loop: only there do integrated states show.
     let run = |model: &mut Model| -> Result<Vec<Output>, String> {
         let at_rest = grid(2.0e-3, 0.05).map(Input::at_rest);
         walk(500).chain(at_rest).map(|input| step(model, &input)).collect()
@@ -123,7 +123,7 @@ pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
     let mut took = Vec::with_capacity(STEPS);
     for input in walk(STEPS as u64) {
         let started = processor_time();
-        // Failing is quick: it would pass.
+        // A failed step is fast and must not pass.
         step(model, &input)?;
         took.push(processor_time().saturating_sub(started));
     }
@@ -137,7 +137,7 @@ pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
     Err(format!("the 99th percentile of a step is {usual} of a processor, above the limit of {limit}"))
 }
 
-/// Wrenches of a walk; two models may be walked in turns.
+/// Returns the wrenches of a walk of each model, stepped alternately.
 fn walked(models: &mut [&mut Model]) -> Result<Vec<Vec<Wrench>>, String> {
     let mut wrenches = vec![Vec::new(); models.len()];
     for input in walk(500) {
@@ -156,7 +156,7 @@ pub(super) fn independent(subject: &Subject) -> Result<(), Seen> {
     if in_turns.iter().any(|wrenches| *wrenches != alone) {
         return Err("two instances stepped alternately give other answers than one alone".to_owned().into());
     }
-    // Made here, used there: a loop has a thread of its own.
+    // Created here, stepped on another thread: as in a loop.
     let start = |mut model: Model| {
         let thread = std::thread::Builder::new().spawn(move || walked(&mut [&mut model]));
         thread.map_err(|cause| Seen::no_thread(&cause))
@@ -173,7 +173,7 @@ pub(super) fn independent(subject: &Subject) -> Result<(), Seen> {
     Ok(())
 }
 
-/// Compares with the number of threads before the library was loaded.
+/// Compares the number of threads with that before the library was loaded.
 pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Seen> {
     let more = |when: &str| match threads()?.saturating_sub(before) {
         0 => Ok(()),
@@ -186,8 +186,8 @@ pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Seen> {
     more("destroy")
 }
 
-/// Compares force and torque with the energy over steps of a micrometre and of a hundredth of a milliradian at poses of a
-/// walk. A kink in the law may lie between two of them, so that a few may differ, but not one in ten.
+/// Compares force and torque with the energy's slope over a micrometre and a hundredth of a milliradian, at poses of a
+/// walk. A kink of the law may lie in between, so a few places may differ, but not one in ten.
 pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Seen> {
     const STEP_M: f64 = 1.0e-6;
     const STEP_RAD: f64 = 1.0e-5;
@@ -199,7 +199,7 @@ pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Seen> {
     if !model.serves().contains(Demand::ENERGY) {
         return Err(Seen::nothing_to_judge("the model serves no energy"));
     }
-    // Components of force and of torque, each with what the energy says of it.
+    // Components of force and of torque, each with the energy's slope.
     let (mut forces, mut torques) = (Vec::new(), Vec::new());
     for input in walk(2000).step_by(20) {
         let (position, orientation) = (input.pose.position(), input.pose.orientation());
@@ -227,8 +227,8 @@ pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Seen> {
     Ok(agree(&torques, ["torque", "N·m"])?)
 }
 
-/// Whether components and those of the energy's gradient are the same, to a five hundredth of the largest: rounding of the
-/// energy over the step and the curvature of the law are far below that.
+/// Compares components with the energy's gradient, to a five hundredth of the largest: rounding of the energy over the
+/// step and the curvature of the law are far below that.
 fn agree(seen: &[(f64, f64)], [what, unit]: [&str; 2]) -> Result<(), String> {
     const TOLERATED: usize = 10;
     const SAME: f64 = 0.002;
@@ -245,7 +245,7 @@ fn agree(seen: &[(f64, f64)], [what, unit]: [&str; 2]) -> Result<(), String> {
     Err(format!("{what} and energy disagree in {different} of {} places{example}", seen.len()))
 }
 
-/// Steps the model around its active region: a host does not step it there and assumes zero.
+/// Steps the model around its active region, where a host does not step it and assumes zero.
 pub(super) fn activity(model: &mut Model) -> Result<(), Seen> {
     let region = model.active_region();
     if region.shape() == RegionShape::Everywhere {
@@ -256,7 +256,7 @@ pub(super) fn activity(model: &mut Model) -> Result<(), Seen> {
     for position_m in around(&region).filter(|position_m| !region.contains(*position_m)) {
         let outwards = (position_m - region.center()).normalize_or_zero();
         for velocity_m_per_s in [DVec3::ZERO, outwards * 0.1, outwards * -0.1] {
-            // From the middle each time: what was felt inside must be over outside.
+            // Start from the middle each time: a force inside must have ended outside.
             for pose in [Pose::new(region.center(), DQuat::IDENTITY), Pose::new(position_m, turned)] {
                 let tick = ticks.next().unwrap_or(0);
                 let twist = Twist::new(velocity_m_per_s, DVec3::ZERO);
@@ -274,12 +274,12 @@ pub(super) fn activity(model: &mut Model) -> Result<(), Seen> {
     Ok(())
 }
 
-/// Positions around a region: a hair outside, a little, and far.
+/// Returns positions around a region: barely outside, a little, and far.
 fn around(region: &ActiveRegion) -> impl Iterator<Item = DVec3> {
     let (center_m, half_m, shape) = (region.center(), region.half_sides(), region.shape());
     directions().filter(|direction| *direction != DVec3::ZERO).flat_map(move |direction| {
         [1.0e-9, 1.0e-3, 1.0].map(move |gap| {
-            // Relative as well: a hair of a large region is more than rounding takes away.
+            // Relative as well: in a large region the absolute gap is below rounding.
             let outside_m = half_m * (1.0 + gap) + DVec3::splat(gap);
             let direction = if shape == RegionShape::Sphere { direction.normalize() } else { direction };
             center_m + direction * outside_m

@@ -1,14 +1,14 @@
-//! Whether a law without memory generates energy, and its stiffness near home.
+//! Passivity of a stateless law, and its stiffness near home.
 //!
-//! A law that answers from pose and velocity alone is asked for two things:
+//! A law of pose and velocity alone is checked in two ways:
 //!
-//! - *On a closed path at rest* the work must be zero: walked the other way round, it has the other sign. The circles
-//!   lie in all fifteen planes of the three directions and three rotations.
-//! - *Forward and back* through one pose, at the same speed, what depends on the pose cancels. What is left is the work of
-//!   the damping, which must take energy away.
+//! - *On a closed path at rest* the work must be zero: traversed in reverse, it has the other sign. The circles lie in
+//! all fifteen planes of the three directions and three rotations.
+//! - *Forward and back* through one pose, at the same speed, the part that depends on the pose cancels. The rest is the
+//! work of the damping, which must dissipate energy.
 //!
-//! Both are exact but for rounding and for what a law does between two points of the circle, which its change
-//! from one to the next bounds.
+//! Both are exact but for rounding and for the law between two points of the circle, which its change from one to the
+//! next bounds.
 
 use super::path::{FAST, finite, walk_at};
 use super::{Figures, Seen};
@@ -19,15 +19,15 @@ use flotor_hal::{
 };
 use std::f64::consts::TAU;
 
-/// Points of a circle: enough to see a gain of a hundredth of the stiffness.
+/// Points of a circle: enough to detect a gain of a hundredth of the stiffness.
 const POINTS: usize = 1024;
-/// Its radius, where a coordinate is a direction or a rotation.
+/// Radius along directions, m, and about axes, rad.
 const RADIUS_M: f64 = 1.0e-3;
 const RADIUS_RAD: f64 = 1.0e-2;
-/// Some thousand roundings of the largest term.
+/// Relative rounding tolerance: some thousand roundings of the largest term.
 const ROUNDING: f64 = 1.0e-12;
 
-/// Checks both, and measures.
+/// Checks both paths, and measures stiffness and damping.
 pub(super) fn passive(model: &mut Model) -> Result<Option<Figures>, Seen> {
     if model.memory() != Memory::Stateless {
         return Err(Seen::nothing_to_judge(
@@ -63,7 +63,7 @@ fn on_circle(plane: [usize; 2], index: usize) -> Pose {
     Pose::new(DVec3::new(x, y, z), orientation_from_rotation_vector(DVec3::new(a, b, c)))
 }
 
-/// Checks the work on the hand once round the circle, by the trapezoidal rule: a segment is wrong by no more than the
+/// Checks the work on the hand once round the circle, by the trapezoidal rule: the error of a segment is at most the
 /// change of the wrench over it times its length. Returns the largest wrench, its torque at an arm of a metre, N.
 fn circle(model: &mut Model, plane: [usize; 2]) -> Result<f64, String> {
     let (mut given_j, mut uncertain_j, mut largest_n) = (0.0, 0.0, 0.0_f64);
@@ -95,12 +95,12 @@ fn circle(model: &mut Model, plane: [usize; 2]) -> Result<f64, String> {
     ))
 }
 
-/// Power of a wrench at a twist, W.
+/// Returns the power of a wrench at a twist, W.
 fn power_w(wrench: Wrench, twist: &Twist) -> f64 {
     wrench.force().dot(twist.linear()) + wrench.torque().dot(twist.angular())
 }
 
-/// The strongest damping seen, N·s/m.
+/// Checks forward and back; returns the strongest damping, N·s/m.
 fn there_and_back(model: &mut Model) -> Result<f64, String> {
     let mut strongest_ns_per_m: f64 = 0.0;
     for speed in [1.0, FAST] {
@@ -126,7 +126,7 @@ fn there_and_back(model: &mut Model) -> Result<f64, String> {
     Ok(strongest_ns_per_m)
 }
 
-/// The largest change of force for a hundredth of a millimetre away from home, N/m.
+/// Returns the largest change of force for a hundredth of a millimetre away from home, N/m.
 fn steepest(model: &mut Model) -> Result<f64, String> {
     const STEP_M: f64 = 1.0e-5;
     let home = finite(model, &Input::at_rest(Pose::HOME))?.wrench;

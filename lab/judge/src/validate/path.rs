@@ -1,4 +1,4 @@
-//! Poses a model is asked at: at rest on a grid, and on the way along a smooth path.
+//! Poses for checks of a model: at rest on a grid, and in motion along a smooth path.
 
 use crate::subject::{call, input_of};
 use crate::trajectory::{Series, Trajectory};
@@ -7,21 +7,20 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{DQuat, DVec3, Input, LoopConfig, Output, Pose, Twist};
 
-/// Rate a plugin is checked at.
+/// Loop configuration of the checks.
 pub(super) const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };
 
-/// How fast the path is walked when it is walked fast: up to 0.8 m/s and 8 rad/s, what a hand does at its
-/// wildest.
+/// Speed factor of the fast walk: up to 0.8 m/s and 8 rad/s, the maximum of a hand.
 pub(super) const FAST: f64 = 20.0;
 
-/// Angular frequencies, rad/s, and sizes of the path. The frequencies have no common divisor, so that in a
-/// few seconds no pose comes twice.
+/// Angular frequencies, rad/s, and amplitudes of the path. The frequencies have no common divisor, so no pose recurs
+/// within a few seconds.
 const POSITION_RAD_PER_S: DVec3 = DVec3::new(7.0, 11.0, 5.0);
 const ROTATION_RAD_PER_S: DVec3 = DVec3::new(3.0, 13.0, 2.0);
 const POSITION_M: f64 = 3.0e-3;
 const ROTATION_RAD: f64 = 0.03;
 
-/// Poses on a grid of `size_m` and `size_rad`, all 27 x 27 corners, edges and centres.
+/// Returns the poses on a grid of `size_m` and `size_rad`, all 27 x 27 corners, edges and centres.
 pub(super) fn grid(size_m: f64, size_rad: f64) -> impl Iterator<Item = Pose> {
     directions().flat_map(move |position| {
         directions().map(move |rotation| {
@@ -31,19 +30,19 @@ pub(super) fn grid(size_m: f64, size_rad: f64) -> impl Iterator<Item = Pose> {
     })
 }
 
-/// Centre, corners, edges and sides of a cube of half-edge one.
+/// Returns centre, corners, edges and sides of a cube of half-edge one.
 pub(super) fn directions() -> impl Iterator<Item = DVec3> {
     let three = [-1.0, 0.0, 1.0];
     let pairs = move || three.into_iter().flat_map(move |x| three.map(move |y| (x, y)));
     pairs().flat_map(move |(x, y)| three.map(move |z| DVec3::new(x, y, z)))
 }
 
-/// A walk near home, as inputs of a loop.
+/// Returns a walk near home, as inputs of a loop.
 pub(crate) fn walk(steps: u64) -> impl Iterator<Item = Input> {
     walk_at(1.0, steps)
 }
 
-/// The same path, `speed` times as fast: the twist of each input is the derivative of its pose.
+/// Returns the walk `speed` times as fast: the twist of each input is the derivative of its pose.
 pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
     let path = Trajectory {
         position: Series::sines(DVec3::splat(POSITION_M), POSITION_RAD_PER_S),
@@ -57,7 +56,7 @@ pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
     })
 }
 
-/// One step; the answer, or what went wrong.
+/// Makes one step; returns the answer, or a description of the failure.
 pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
     call(model, input).map_err(|status| match status {
         CallStatus::Panicked => format!("{} it {}", place(input), model.last_message()),
@@ -65,7 +64,7 @@ pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
     })
 }
 
-/// One step whose answer must be made of numbers.
+/// Makes one step whose answer must be finite.
 pub(super) fn finite(model: &mut Model, input: &Input) -> Result<Output, String> {
     let output = step(model, input)?;
     if output.wrench.is_finite() && !output.energy_j.is_infinite() && output.status().is_some() {

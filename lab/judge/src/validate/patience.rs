@@ -1,5 +1,5 @@
-//! How long the process of one rule may take: so much time of a processor, or so much in which it could have run and
-//! did not want to. Time in which others have the processor is nobody's violation.
+//! Timeout of the process of one rule: a limit of its processor time, and one of the time in which it was idle by
+//! choice. Time in which other processes have the processor does not count.
 
 use crate::platform::used;
 use flotor_session::PluginProcess;
@@ -7,20 +7,20 @@ use std::io;
 use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
-/// How often a process is looked at.
+/// Poll interval of a process.
 const LOOK: Duration = Duration::from_millis(2);
-/// The longest time between two looks that is believed: a longer one says that this process had to wait as well.
+/// Longest credible poll interval: after a longer one this process itself had to wait.
 const LONGEST_LOOK: Duration = Duration::from_millis(20);
 
-/// How a process has ended.
+/// End of a process.
 #[derive(Debug)]
 pub(crate) struct Ended {
     pub(crate) status: ExitStatus,
-    /// Time of a processor that it took, as far as was seen.
+    /// Processor time used, as of the last poll.
     pub(crate) ran: Duration,
 }
 
-/// Waits for the end of a process; `None` if it took too long and was ended.
+/// Waits for the end of a process; ends it on timeout and returns `None`.
 pub(crate) fn wait(child: &mut PluginProcess, patience: Duration) -> io::Result<Option<Ended>> {
     let (mut idle, mut looked) = (Duration::ZERO, Instant::now());
     let mut ran = Duration::ZERO;

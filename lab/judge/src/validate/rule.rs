@@ -1,29 +1,29 @@
-//! What is checked: the rules of the contract, and what this host finds out beside them.
+//! Rules of the contract, and further checks of this host.
 
 use flotor_hal::abi::PluginKind;
 use flotor_hal::conformance::Rule;
 
-/// One thing that is checked of a plugin.
+/// Single check of a plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
-    /// A rule of the contract's own list.
+    /// Rule of the contract's own list.
     Contract(Rule),
-    /// A handle that moves gets finite numbers as well.
+    /// The wrench is finite in motion too.
     FiniteInMotion,
-    /// The force of a model is the same whatever else is demanded.
+    /// The force of a model does not depend on the rest of the demand.
     Demand,
-    /// Live parameters can be set, answer in time and are reported back.
+    /// Live parameters can be set in time and report their value.
     LiveParameters,
-    /// Outside the region that a model declares it does nothing.
+    /// The wrench is zero outside the declared active region.
     Activity,
-    /// A law without memory gives out no energy.
+    /// A stateless law generates no energy.
     Passive,
-    /// A step computes and does nothing else.
+    /// A step makes no system call.
     SystemCalls,
 }
 
 impl Check {
-    /// What this host checks beside the contract's list, in this order.
+    /// Checks of this host beyond the contract's list, in this order.
     const OF_THE_HOST: [Self; 6] = [
         Self::FiniteInMotion,
         Self::Demand,
@@ -33,12 +33,12 @@ impl Check {
         Self::SystemCalls,
     ];
 
-    /// Everything, in the order it is checked.
+    /// Returns all checks in their order.
     pub fn all() -> impl Iterator<Item = Self> {
         Rule::ALL.into_iter().map(Self::Contract).chain(Self::OF_THE_HOST)
     }
 
-    /// Short name in reports.
+    /// Returns the short name in reports.
     #[must_use]
     pub const fn id(self) -> &'static str {
         match self {
@@ -52,7 +52,7 @@ impl Check {
         }
     }
 
-    /// What is demanded, for people.
+    /// Returns the requirement as text.
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
@@ -70,13 +70,13 @@ impl Check {
         }
     }
 
-    /// The check with a short name, if there is one.
+    /// Finds the check with a short name.
     #[must_use]
     pub fn from_id(id: &str) -> Option<Self> {
         Self::all().find(|check| check.id() == id)
     }
 
-    /// Whether it is about plugins of this kind.
+    /// Returns true if the check applies to plugins of this kind.
     #[must_use]
     pub const fn applies_to(self, kind: PluginKind) -> bool {
         match self {

@@ -1,6 +1,6 @@
-//! What belongs to the host's process and a plugin has to leave alone, as the system tells it.
+//! Process state of the host that a plugin must not change, as reported by the system.
 //!
-//! What loading does to the floating-point mode is seen in the results of a few sums; what a call does, the loader counts.
+//! A few sums reveal a change of the floating-point mode by loading; changes by calls are counted by the loader.
 
 use super::Seen;
 use super::checks::Subject;
@@ -9,31 +9,31 @@ use crate::platform::state;
 use std::hint::black_box;
 use std::time::Duration;
 
-/// How long the process is left alone at the end: a timer or a signal that was left behind comes by then.
+/// Waiting time at the end, in which a leftover timer or signal would fire.
 const REST: Duration = Duration::from_millis(300);
 
-/// How one part of the state may change.
+/// Permitted change of a part of the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(dead_code)] // a system that tells of no files has none that grows
 pub(crate) enum May {
-    /// Not at all.
+    /// No change.
     Stay,
-    /// Lines may come, none may go.
+    /// New lines, but none removed.
     Grow,
 }
 
-/// One part of the state: its name, how it may change, and the lines that describe it.
+/// Part of the state: name, permitted change, and descriptive lines.
 pub(crate) type Part = (&'static str, May, Vec<String>);
 
-/// The state of this process and thread.
+/// State of this process and thread.
 pub(super) struct Host {
     parts: Vec<Part>,
-    /// Why the rest of the state is not known, if it is not.
+    /// Reason why the rest of the state is unknown, if so.
     unknown: Option<Seen>,
     threads: Result<usize, Seen>,
 }
 
-/// Lives one life of an instance, and looks after each call.
+/// Runs the life of an instance, and compares the state after each call.
 pub(super) fn untouched(subject: &Subject, before: &Host) -> Result<(), Seen> {
     before.compare("loading")?;
     live(subject, &mut |call, float_changes| match float_changes {
@@ -66,12 +66,12 @@ impl Host {
         Self { parts, unknown, threads: state::threads() }
     }
 
-    /// Threads at that time, if the system tells.
+    /// Returns the number of threads at that time, if known.
     pub(super) fn threads(&self) -> Result<usize, Seen> {
         self.threads.clone()
     }
 
-    /// Fails if a part of the state is not known.
+    /// Fails if a part of the state is unknown.
     fn known(&self) -> Result<(), Seen> {
         self.unknown.clone().map_or(Ok(()), Err)
     }
@@ -80,7 +80,7 @@ impl Host {
         self.difference(&Self::now()).map_or(Ok(()), |difference| Err(format!("{call} changed {difference}")))
     }
 
-    /// The first part that is not as it was.
+    /// Returns the first part that has changed.
     fn difference(&self, now: &Self) -> Option<String> {
         let missing = |from: &[String], of: &[String]| of.iter().find(|line| !from.contains(line)).cloned();
         let mut parts = self.parts.iter().zip(&now.parts);
@@ -93,12 +93,12 @@ impl Host {
     }
 }
 
-/// Threads of this process, if the system tells.
+/// Returns the number of threads of this process, if known.
 pub(super) fn threads() -> Result<usize, Seen> {
     state::threads()
 }
 
-/// What a few sums say about the mode of this thread.
+/// Describes the floating-point mode of this thread by a few sums.
 fn arithmetic() -> Vec<String> {
     let (one, little, least) = (black_box(1.0_f64), black_box(1.0e-17_f64), black_box(f64::MIN_POSITIVE));
     let denormal = black_box(5.0e-324_f64);

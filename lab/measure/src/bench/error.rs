@@ -1,14 +1,14 @@
-//! How far answers lie from the reference's.
+//! Distance of answers from those of the reference.
 
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Pose, StepStatus, Wrench};
 use flotor_judge::subject::{call, input_of};
 use serde::Serialize;
 
-/// Answers a model may need at the first pose until it has converged, ticks.
+/// Number of ticks for a model to converge at the first pose.
 const SETTLING_TICKS: u64 = 500;
 
-/// Error of a case along the path: NaN without a pose to compare. Poses where either has no answer are counted, not compared.
+/// Error of a case along the path; NaN without a pose to compare. Poses without an answer of both are counted, not compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Distance {
     /// Largest error of the force, N.
@@ -19,12 +19,12 @@ pub struct Distance {
     pub torque_max_nm: f64,
     /// Root mean square of the torque's error, N·m.
     pub torque_rms_nm: f64,
-    /// Poses without a sound answer of both.
+    /// Number of poses without a valid answer of both.
     pub unanswered: usize,
 }
 
 impl Distance {
-    /// Between the answers of a case and those of the reference.
+    /// Compares the answers of a case with those of the reference.
     pub(super) fn between(answers: &[Option<Wrench>], truth: &[Option<Wrench>]) -> Self {
         let mut distance = Self { force_max_n: f64::NAN, torque_max_nm: f64::NAN, ..Self::default() };
         let mut compared = 0.0_f64;
@@ -41,14 +41,14 @@ impl Distance {
             distance.torque_rms_nm += torque_nm * torque_nm;
             compared += 1.0;
         }
-        // No number without a pose: 0 / 0.
+        // NaN without a compared pose: 0 / 0.
         distance.force_rms_n = (distance.force_rms_n / compared).sqrt();
         distance.torque_rms_nm = (distance.torque_rms_nm / compared).sqrt();
         distance
     }
 }
 
-/// Answers tick by tick, after settling at the first pose; `None` where a model has none.
+/// Returns the answers tick by tick, after settling at the first pose; `None` where a model has none.
 pub(super) fn walk(model: &mut Model, path: &[Pose]) -> Vec<Option<Wrench>> {
     settle(model, path);
     (SETTLING_TICKS..).zip(path).map(|(tick, pose)| answer(model, *pose, tick)).collect()
@@ -64,7 +64,7 @@ pub(super) fn settle(model: &mut Model, path: &[Pose]) {
     }
 }
 
-/// The answer at a pose, if it is one.
+/// Returns the answer at a pose; `None` if it is invalid.
 pub(super) fn answer(model: &mut Model, pose: Pose, tick: u64) -> Option<Wrench> {
     let demand = Demand::WRENCH.limited_to(model.serves());
     let input = Input { demand, ..input_of(tick, pose) };

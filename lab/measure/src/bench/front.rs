@@ -1,4 +1,4 @@
-//! The Pareto front of a model's settings over a whole workspace: cost against error, and which cases others dominate.
+//! Pareto front of a model's settings over a whole workspace: cost against error, and dominated cases.
 
 use super::error::{Distance, walk};
 use super::path::Workspace;
@@ -7,33 +7,33 @@ use flotor_hal::Demand;
 use flotor_hal::abi::loader::Model;
 use serde::Serialize;
 
-/// All cases over one workspace.
+/// Cases over one workspace.
 #[derive(Clone, Debug, Serialize)]
 pub struct Front {
     /// Radius of the workspace, m.
     pub radius_m: f64,
-    /// Largest angle of a rotation in it, rad.
+    /// Largest angle of a rotation in the workspace, rad.
     pub rotation_rad: f64,
-    /// The cases.
+    /// Results of the cases.
     pub rows: Vec<FrontRow>,
 }
 
-/// A case over the workspace.
+/// Result of a case over the workspace.
 #[derive(Clone, Debug, Serialize)]
 pub struct FrontRow {
-    /// Its name.
+    /// Name of the case.
     pub name: String,
     /// Times for force and torque.
     pub times: Times,
     /// Distance from the reference.
     pub distance: Distance,
-    /// The most accurate case that takes no more time for no larger error; `None` on the Pareto front, and for a case that is
+    /// Most accurate case that is no slower and no less accurate; `None` on the Pareto front, and for a case that is
     /// not judged.
     pub dominated_by: Option<String>,
 }
 
 impl Front {
-    /// Walks through the workspace with all cases in turns, and with the reference.
+    /// Moves all cases in turns, and the reference, through the workspace.
     pub(super) fn measure(
         named: &[&str],
         models: &mut [Model],
@@ -69,7 +69,7 @@ impl Front {
     }
 }
 
-/// Whether a case has answered all poses that any case has: an error over the others alone is no measure of it.
+/// Returns true if a case has answered all poses that any case has: an error over fewer poses is not comparable.
 pub(super) fn is_judged<'d>(distance: &Distance, all: impl IntoIterator<Item = &'d Distance>) -> bool {
     all.into_iter().all(|other| distance.unanswered <= other.unanswered) && !distance.force_max_n.is_nan()
 }
@@ -82,13 +82,13 @@ struct Point {
 }
 
 impl Point {
-    /// Whether a point is no worse than another in both respects, and better in one. NaN is neither.
+    /// Returns true if a point is no worse than another in both respects, and better in one. NaN compares false.
     fn dominates(self, other: Self) -> bool {
         self.time_ns <= other.time_ns && self.error_n <= other.error_n && self != other
     }
 }
 
-/// The index of the most accurate of the points that dominate this one.
+/// Returns the index of the most accurate of the points that dominate this one.
 fn dominator(point: Point, points: &[Point]) -> Option<usize> {
     let better = points.iter().enumerate().filter(|(_, other)| other.dominates(point));
     better.min_by(|(_, a), (_, b)| a.error_n.total_cmp(&b.error_n)).map(|(index, _)| index)

@@ -1,16 +1,16 @@
-//! Work against precision: what an evaluation of a force model costs, and how wrong it is, for many settings of it.
+//! Work against precision: cost and error of an evaluation of a force model, for many of its settings.
 //!
-//! Every case goes along one smooth path (1 to 3 Hz in all six coordinates, 1 kHz) and through a whole workspace, and is timed four
-//! ways: without interruption (the mean of a tick), in a batch, call by call (median and p99.9), and cold (after a reset, each call at
-//! another pose). All cases take turns, so that what is reported of one against another does not depend on what else the
-//! machine does. An error is the distance from a reference that walks the same path: another setting of the same model,
-//! computed in this run, not a table.
+//! Every case is evaluated along one smooth path (1 to 3 Hz in all six coordinates, 1 kHz) and through a whole
+//! workspace, and is timed four ways: continuously (the mean of a tick), in a batch, call by call (median and p99.9),
+//! and cold (after a reset, each call at another pose). All cases take turns, so that comparisons between them do not
+//! depend on other load of the machine. An error is the distance from a reference on the same path: another setting of
+//! the same model, computed in this run, not a table.
 //!
-//! - `path`: the motions. `times`: the times. `split`: times of two kinds of calls. `error`: the distance from the
-//!   reference. `front`: which cases are worth their time over the workspace.
-//! - `reach_hand`: the whole loop: what of the reference's force reaches a hand, through sampling and delay.
+//! - `path`: motions. `times`: timing. `split`: times of two kinds of calls. `error`: distance from the reference.
+//! `front`: Pareto front of the cases over the workspace.
+//! - `reach_hand`: error of the force on a hand, through sampling and delay of the whole loop.
 //! - `tables`: table, CSV and picture.
-//! - `whole_tick`: what the loop around a model costs with it, on a [`scripted`] device and on the simulated flotor.
+//! - `whole_tick`: cost of the loop around a model, on a [`scripted`] device and on the simulated flotor.
 //!
 //! Not real-time.
 
@@ -40,18 +40,18 @@ use flotor_hal::Demand;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_judge::subject::prepared;
 
-/// One setting of the model.
+/// Setting of the model.
 #[derive(Clone)]
 pub struct Case {
-    /// What the table calls it.
+    /// Name in the table.
     pub name: String,
-    /// Its settings.
+    /// Settings of the model.
     pub settings: Vec<Setting>,
-    /// Another model that is measured beside, along the same path; none: that of all cases.
+    /// Plugin of a different model on the same path; `None`: that of all cases.
     pub other: Option<Plugin>,
 }
 
-/// Length of the path, ticks, and how often it is walked: enough for a median, or for p99.9.
+/// Returns length of the path, ticks, and number of repetitions: enough for a median, or for p99.9.
 const fn extent(size: Size) -> (usize, usize) {
     match size {
         Size::Short => (2_000, 5),
@@ -59,42 +59,42 @@ const fn extent(size: Size) -> (usize, usize) {
     }
 }
 
-/// What is measured.
+/// Plan of a measurement.
 #[derive(Clone)]
 pub struct Plan {
-    /// The cases.
+    /// Measured cases.
     pub cases: Vec<Case>,
-    /// The baseline of the times.
+    /// Index of the baseline case of the times.
     pub baseline: usize,
     /// Reference case of the errors.
     pub reference: Option<Case>,
-    /// The hand's motion.
+    /// Motion of the hand.
     pub hand: Hand,
-    /// The workspace of the Pareto front; `None` without a reference.
+    /// Workspace of the Pareto front; `None` without a reference.
     pub workspace: Option<Workspace>,
-    /// Calls to split.
+    /// Detail that splits calls; `None`: no split.
     pub split: Option<Split>,
-    /// How much is timed.
+    /// Extent of the measurement.
     pub size: Size,
 }
 
-/// Calls to split by a detail of the answer.
+/// Detail that splits calls, and where to measure.
 #[derive(Clone)]
 pub struct Split {
-    /// Id of the detail: above zero, or not.
+    /// Id of the detail: calls with a value above zero, and the others.
     pub detail: String,
-    /// In which cases, each through its workspace.
+    /// Cases, each with its workspace.
     pub walks: Vec<(Case, Workspace)>,
 }
 
-/// Force only, force and torque, and all that a case serves.
+/// Measured demands: force only, force and torque, and all outputs of a case.
 const DEMANDS: [(&str, Demand); 3] =
     [("force", Demand::FORCE), ("wrench", Demand::WRENCH), ("all", Demand::ALL)];
 
-/// Measures what is planned.
+/// Measures the cases of a plan.
 ///
 /// # Errors
-/// [`LoadError`] if the plugin refuses a case or the reference.
+/// [`LoadError`] if the plugin rejects a case or the reference.
 pub fn measure(plugin: &Plugin, plan: &Plan, progress: &dyn Progress) -> Result<BenchReport, LoadError> {
     let Plan { cases, baseline, reference, hand, workspace, split, size } = plan;
     let (ticks, rounds) = extent(*size);

@@ -1,40 +1,40 @@
-//! The motions that every case goes along, in all six coordinates: a hand's about a point, and one through the workspace.
+//! Motions of the cases in all six coordinates: of a hand about a point, and through the workspace.
 
 use flotor_hal::{DVec3, Pose, math, orientation_from_rotation_vector};
 use flotor_judge::trajectory::{Series, Trajectory};
 use std::f64::consts::TAU;
 
-/// Amplitudes and frequencies of a hand that explores an object (the thesis's subjects moved at 1 to 3 Hz, section 4): at
-/// most 3.6 mm from the middle, and 3.0° turned. The frequencies have no common period shorter than 100 s, so no two
+/// Amplitudes and frequencies of a hand that explores an object (the thesis's subjects moved at 1 to 3 Hz, section 4):
+/// at most 3.6 mm from the middle, and 3.0° of rotation. The frequencies have no common period below 100 s, so no two
 /// ticks are alike.
 const POSITION_M: DVec3 = DVec3::new(1.5e-3, 1.2e-3, 3.0e-3);
 const POSITION_HZ: DVec3 = DVec3::new(1.37, 2.11, 1.03);
 const ROTATION_RAD: DVec3 = DVec3::new(0.030, 0.025, 0.035);
 const ROTATION_HZ: DVec3 = DVec3::new(1.71, 2.53, 2.97);
 
-/// The motion about a point below home.
+/// Motion of a hand about a point below home.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hand {
-    /// How far below home the middle of the motion lies, m.
+    /// Depth of the middle of the motion below home, m.
     pub depth_m: f64,
 }
 
 impl Default for Hand {
-    /// About 4 mm below home: a spring of the thesis between free and a third of its length.
+    /// Returns a depth of 4 mm below home: a spring of the thesis between free and a third of its length.
     fn default() -> Self {
         Self { depth_m: 4.0e-3 }
     }
 }
 
 impl Hand {
-    /// Its poses, by time in s.
+    /// Returns the trajectory by time in s.
     pub(super) fn trajectory(self) -> Trajectory {
         let mut position = Series::sines(POSITION_M, POSITION_HZ * TAU);
         position.mean = DVec3::Z * -self.depth_m;
         Trajectory { position, rotation: Series::sines(ROTATION_RAD, ROTATION_HZ * TAU) }
     }
 
-    /// The poses of the first ticks, at 1 kHz.
+    /// Returns the poses of the first ticks, at 1 kHz.
     #[must_use]
     pub fn poses(self, ticks: usize) -> Vec<Pose> {
         let trajectory = self.trajectory();
@@ -42,8 +42,8 @@ impl Hand {
     }
 }
 
-/// A motion through all of a workspace, a ball of positions and a ball of rotations about home. The time in each part of
-/// it is proportional to the part's volume, so a mean over many sweeps is one over uniformly distributed poses.
+/// Motion through a whole workspace, a ball of positions and a ball of rotations about home. The time in each part is
+/// proportional to its volume, so a mean over many sweeps is one over uniformly distributed poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workspace {
     /// Radius of the ball of positions, m.
@@ -56,13 +56,13 @@ pub struct Workspace {
 const SWEEPS_HZ: [[f64; 3]; 2] = [[0.618, 1.303, 1.732], [0.541, 1.618, 2.236]];
 
 impl Workspace {
-    /// The workspace shrunk about home.
+    /// Scales the workspace about home.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self { radius_m: self.radius_m * factor, rotation_rad: self.rotation_rad * factor }
     }
 
-    /// The poses of the first ticks, at 1 kHz.
+    /// Returns the poses of the first ticks, at 1 kHz.
     #[must_use]
     pub fn poses(self, ticks: usize) -> Vec<Pose> {
         let pose = |tick: usize| {
@@ -76,8 +76,8 @@ impl Workspace {
     }
 }
 
-/// A point that spends equal times in equal volumes of the unit ball: the cube of its radius and the cosine of its polar angle rise
-/// and fall evenly, and its azimuth turns evenly.
+/// Returns a point that spends equal times in equal volumes of the unit ball: the cube of its radius and the cosine of
+/// its polar angle rise and fall linearly, and its azimuth turns at constant speed.
 fn in_unit_ball(time_s: f64, [radius_hz, polar_hz, azimuth_hz]: [f64; 3]) -> DVec3 {
     let rise_and_fall = |rate_hz: f64| {
         let phase = rate_hz * time_s % 1.0;

@@ -1,13 +1,13 @@
-//! The whole loop: how far the force that reaches the hand lies from the reference's force at the true pose.
+//! Whole loop: distance of the force on the hand from the reference's force at the true pose.
 //!
-//! A hand moves along the smooth path. The device sees it through its sensor (steps of a quantum), the model answers,
-//! the device holds that force from a delay later until the next answer. In between the hand moves on, and the true
-//! force changes: that, too, is an error the hand feels. Each cause is measured alone, and all together; a model more
-//! exact than what sampling and sensing lose anyway buys nothing.
+//! A hand moves along the smooth path. The device measures it through its sensor (with a quantum), the model answers,
+//! and the device holds that force, after a delay, until the next answer. Meanwhile the hand moves on, and the true
+//! force changes: that is an error on the hand too. Each cause is measured alone, and all together; model accuracy
+//! beyond the losses of sampling and sensing has no benefit.
 //!
-//! The path is thirty periods of its slowest sine long. Within a period of the loop the square of the error is integrated by
-//! Gauss's rule of two points, exact for a force that changes linearly: a held force then errs by its rate times the
-//! period over √3, and by √(7/3) of that a period late.
+//! The path is thirty periods of its slowest sine long. Within a period of the loop the squared error is integrated by
+//! Gauss's rule of two points, exact for a force that changes linearly: a held force then has an error of its rate
+//! times the period over √3, and √7 times that with a delay of a period.
 
 use super::error::{Distance, answer, settle, walk};
 use super::path::Hand;
@@ -16,10 +16,10 @@ use flotor_hal::{DVec3, Pose, Wrench};
 use flotor_judge::trajectory::sensed;
 use serde::Serialize;
 
-/// How a device samples a hand.
+/// Sampling of a hand by a device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sampling {
-    /// Whole periods between a sample and the force that answers it.
+    /// Whole periods between a sample and its force.
     pub delay_ticks: usize,
     /// Step of the position sensor, m.
     pub quantum_m: f64,
@@ -28,8 +28,8 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// Preset `full` of the simulated flotor: one tick, 2 µm; over an arm of 50 mm between light and axis that is
-    /// 0.04 mrad (literature A2).
+    /// Preset `full` of the simulated flotor: one tick, 2 µm; over an arm of 50 mm between light and axis that is 0.04
+    /// mrad (literature A2).
     pub const FULL: Sampling = Sampling { delay_ticks: 1, quantum_m: 2.0e-6, quantum_rad: 4.0e-5 };
 
     fn sees(self, pose: Pose) -> Pose {
@@ -40,15 +40,15 @@ impl Sampling {
 /// Root mean square error of the force on the hand, N, by cause.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Losses {
-    /// The model, asked at the true pose.
+    /// Error of the model at the true pose.
     pub model_n: f64,
-    /// An exact model whose force is held for a period.
+    /// Error of an exact model whose force is held for a period.
     pub hold_n: f64,
-    /// The same, and late.
+    /// Error of an exact model whose force is held for a period, and delayed.
     pub delay_n: f64,
-    /// An exact model that sees the sensor's steps.
+    /// Error of an exact model that sees the sensor's steps.
     pub quantum_n: f64,
-    /// Everything together.
+    /// Error with all causes together.
     pub all_n: f64,
 }
 
@@ -56,14 +56,14 @@ pub struct Losses {
 const TICKS: u64 = 30_000;
 /// Period of the loop, s.
 const PERIOD_S: f64 = 1.0e-3;
-/// Gauss's points within a period, as parts of it: (1 - 1/√3)/2 and (1 + 1/√3)/2, each with half of the weight.
+/// Gauss's points within a period, as fractions: (1 - 1/√3)/2 and (1 + 1/√3)/2, each with half of the weight.
 const MOMENTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// The answers of the reference along the path, and the losses that depend on no model in the loop.
+/// Answers of the reference along the path, with the losses that are independent of the model in the loop.
 pub(super) struct Truth {
     path: Vec<Pose>,
     sampling: Sampling,
-    /// At each tick.
+    /// Answer at each tick.
     at_ticks: Vec<Option<Wrench>>,
     /// Forces between each tick and the next.
     between: Vec<[Option<DVec3>; 2]>,
@@ -73,7 +73,7 @@ pub(super) struct Truth {
 }
 
 impl Truth {
-    /// Walks the path with the reference, of true and of sensed poses.
+    /// Evaluates the reference along the path, at true and at sensed poses.
     pub(super) fn new(exact: &mut Model, hand: Hand, sampling: Sampling) -> Self {
         let trajectory = hand.trajectory();
         let pose = |tick: u64, part: f64| trajectory.pose((tick as f64 + part) * PERIOD_S);
@@ -103,13 +103,13 @@ impl Truth {
         Distance::between(answers, &self.at_ticks)
     }
 
-    /// Answers of a model at the poses that a sensor shows.
+    /// Returns the answers of a model at the sensed poses.
     fn sensed(&self, model: &mut Model) -> Vec<Option<Wrench>> {
         let path: Vec<Pose> = self.path.iter().map(|pose| self.sampling.sees(*pose)).collect();
         walk(model, &path)
     }
 
-    /// Returns the error throughout of a force that is held for a period, from `delay_ticks` after its sample.
+    /// Returns the error of a force that is held for a period, from `delay_ticks` after its sample.
     fn held(&self, answers: &[Option<Wrench>], delay_ticks: usize) -> f64 {
         let periods = answers.iter().zip(self.between.iter().skip(delay_ticks));
         let squares = periods.flat_map(|(wrench, truths)| {

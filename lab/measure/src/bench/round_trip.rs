@@ -1,5 +1,5 @@
-//! What it takes this machine to wake another thread and be woken by it: the yardstick for a model in a process of its own,
-//! whose step is such a round trip through the system's futexes.
+//! Round trip of waking another thread and being woken by it: baseline for a model in its own process, whose step is
+//! such a round trip through the system's futexes.
 
 use super::TickCost;
 use crate::platform::{wait, wake};
@@ -9,25 +9,25 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
 
-/// Round trips that are timed together.
+/// Number of round trips that are timed together.
 const BATCH: u32 = 64;
-/// What tells the other thread to end.
+/// Value that ends the other thread.
 const OVER: u32 = u32::MAX;
 
-/// Two words, each awaited by one side.
+/// Two futex words, one per direction.
 #[derive(Default)]
 struct Words {
     there: AtomicU32,
     back: AtomicU32,
 }
 
-/// Stores a word and wakes who sleeps on it.
+/// Stores a word and wakes its waiter.
 fn send(word: &AtomicU32, value: u32) {
     word.store(value, Ordering::Release);
     wake(word);
 }
 
-/// Sleeps until the word is no longer `last`.
+/// Waits until the word differs from `last`.
 fn await_other(word: &AtomicU32, last: u32) -> u32 {
     loop {
         let value = word.load(Ordering::Acquire);
@@ -38,10 +38,10 @@ fn await_other(word: &AtomicU32, last: u32) -> u32 {
     }
 }
 
-/// Times so many batches of round trips between two threads, ns each. Not real-time.
+/// Times batches of round trips between two threads, ns each. Not real-time.
 ///
 /// # Errors
-/// The system's, if there can be no second thread.
+/// Errors of starting the second thread.
 pub fn time_round_trips(batches: usize) -> io::Result<TickCost> {
     let words = Arc::new(Words::default());
     let other = Arc::clone(&words);

@@ -1,7 +1,7 @@
-//! A device that costs next to nothing: its handle follows a script, whatever it is told.
+//! Device of almost no cost: its handle follows a script and ignores commands.
 //!
-//! With it a bench times the loop and not a simulated plant. It is linked in and behind the same function table as a
-//! device from a file.
+//! A bench on this device times the loop and not a simulated plant. The device is linked in, behind the same function
+//! table as a device from a file.
 
 use flotor_hal::abi::{Entry, device_entry};
 use flotor_hal::{
@@ -10,13 +10,13 @@ use flotor_hal::{
 };
 use std::f64::consts::TAU;
 
-/// What a scene calls it.
+/// Name in a scene.
 pub const SCRIPTED: &str = "scripted";
 
-/// The device as a plugin that is linked in.
+/// Entry of the device as a linked-in plugin.
 pub static SCRIPTED_ENTRY: Entry = device_entry::<Scripted>();
 
-/// How often the script repeats itself, Hz.
+/// Repetition rate of the script, Hz.
 const SCRIPT_HZ: f64 = 1.0;
 /// Amplitudes of x and y and of z about its mean, m, and that mean: as the path of the benches, within the range of the
 /// thesis's spring.
@@ -25,16 +25,16 @@ const MEAN_Z_M: f64 = -4.0e-3;
 /// Amplitudes of the tilts and of the yaw, rad.
 const AMPLITUDE_RAD: DVec3 = DVec3::new(0.030, 0.025, 0.035);
 
-/// The device, opened.
+/// Opened device.
 struct Scripted;
 
-/// The device, active: where it is on its script, as cosine and sine, and how far it goes in a period.
+/// Active device: phase of the script, and phase per period.
 struct Following {
     at: Phase,
     step: Phase,
 }
 
-/// A phase of the script. Turning it on costs four multiplications, a sine of the time ten times as much.
+/// Phase of the script as cosine and sine. A rotation costs four multiplications, a sine of the time ten times as much.
 #[derive(Clone, Copy)]
 struct Phase {
     cos: f64,
@@ -52,25 +52,25 @@ impl Phase {
         Self { cos: self.cos * by.cos - self.sin * by.sin, sin: self.sin * by.cos + self.cos * by.sin }
     }
 
-    /// Where the handle is, and how fast.
+    /// Returns pose and twist of the handle.
     #[inline]
     fn state(self) -> (Pose, Twist) {
         let Self { cos, sin } = self;
         let twice = self.turned(self);
-        // x and the first tilt once in a period of the script, y and the second twice, z and the yaw once.
+        // Per period of the script: x, the first tilt, z and the yaw once, y and the second tilt twice.
         let (wave, slope) = (DVec3::new(sin, twice.sin, cos), DVec3::new(cos, 2.0 * twice.cos, -sin));
         let rate = TAU * SCRIPT_HZ;
         let half = AMPLITUDE_RAD * wave * 0.5;
         let w = (1.0 - half.length_squared()).sqrt();
         let orientation_xyzw = [half.x, half.y, half.z, w];
         let position_m = (AMPLITUDE_M * wave + DVec3::Z * MEAN_Z_M).to_array();
-        // The angular velocity to first order in the tilts, which are small.
+        // Angular velocity to first order in the tilts, which are small.
         let twist = Twist::new(AMPLITUDE_M * slope * rate, AMPLITUDE_RAD * slope * rate);
         (Pose { position_m, orientation_xyzw }, twist)
     }
 }
 
-/// Nothing moves, so nothing has to be stopped.
+/// Stop without effect: nothing moves.
 struct NothingMoves;
 
 impl SafeStop for NothingMoves {
@@ -87,7 +87,7 @@ impl Device for Scripted {
         Ok(Self)
     }
 
-    /// Range and limits of the machine of the thesis.
+    /// Returns range and limits of the thesis's machine.
     fn capabilities(&self) -> Capabilities {
         Capabilities {
             sensed: Axes::ALL,
@@ -97,7 +97,7 @@ impl Device for Scripted {
             resolution_m: 0.0,
             max_force_n: [55.0, 55.0, 140.0],
             max_torque_nm: [6.3, 6.3, 12.2],
-            max_force_slew_n_per_s: 1.0e9, // nothing is limited
+            max_force_slew_n_per_s: 1.0e9, // no limit
             max_torque_slew_nm_per_s: 1.0e9,
             max_stiffness_n_per_m: 25.0e3,
             rate_hz: [100.0, 10_000.0],

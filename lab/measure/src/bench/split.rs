@@ -1,5 +1,5 @@
-//! Calls split by a detail of the answer: a model that solves for some poses and evaluates a formula for the others
-//! has two speeds, and a mean of both describes neither.
+//! Call times split by a detail of the answer: a model that solves for some poses and evaluates a formula for the
+//! others has two speeds, and a mean of both describes neither.
 
 use super::times::{call_ns, inputs};
 use flotor_hal::abi::loader::Model;
@@ -7,27 +7,27 @@ use flotor_hal::{Demand, Pose};
 use flotor_judge::call_timer::{overhead_ns, quantile};
 use serde::Serialize;
 
-/// Calls for which a detail is above zero, and the others.
+/// Times of calls with a detail above zero, and of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SplitTimes {
-    /// Share of the ticks for which it is above zero, 0 to 1.
+    /// Fraction of the ticks with the detail above zero, 0 to 1.
     pub share: f64,
-    /// Those calls; `None` if there are none.
+    /// Times of those ticks; `None` if there are none.
     pub above: Option<Speed>,
-    /// The others; `None` if there are none.
+    /// Times of the other ticks; `None` if there are none.
     pub others: Option<Speed>,
 }
 
-/// How long calls take, ns; of every tick the fastest walk.
+/// Duration of calls, ns; the fastest repetition of every tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Speed {
-    /// Mean.
+    /// Mean duration, ns.
     pub mean_ns: f64,
-    /// One in a hundred takes longer.
+    /// 99th percentile, ns.
     pub p99_ns: f64,
 }
 
-/// Walks along the path, force and torque demanded; `None` for a model without that detail.
+/// Times calls along the path, force and torque demanded; `None` for a model without that detail.
 pub(super) fn split_times(
     model: &mut Model,
     detail: &str,

@@ -1,4 +1,4 @@
-//! The measurements as a table, as CSV, as a picture.
+//! Results as table, CSV and picture.
 
 use super::front::is_judged;
 use super::{DEMANDS, Distance, Front, FrontRow, Losses, Sampling, Speed, SplitTimes, Times};
@@ -6,12 +6,12 @@ use flotor_command::tables::{table, to_csv};
 use flotor_plot::{Axis, Bin, Figure, Mark, Panel, Series};
 use serde::Serialize;
 
-/// Everything that was measured.
+/// Results of a bench.
 #[derive(Clone, Debug, Serialize)]
 pub struct BenchReport {
     /// Id of the model.
     pub model: String,
-    /// Version of its plugin.
+    /// Version of the plugin.
     pub version: String,
     /// Reference case of the errors.
     pub reference: Option<String>,
@@ -19,37 +19,37 @@ pub struct BenchReport {
     pub yardstick: Option<String>,
     /// Length of the path, ticks of 1 ms.
     pub ticks: usize,
-    /// The cases.
+    /// Results of the cases.
     pub rows: Vec<CaseRow>,
-    /// Each case in a whole loop: error of the force at the hand by cause.
+    /// Error of the force on the hand by cause, of each case in a whole loop.
     pub losses: Vec<(String, Losses)>,
-    /// The cases over the whole workspace; none without a reference.
+    /// Results over the whole workspace; `None` without a reference.
     pub front: Option<Front>,
     /// Times of calls of two kinds.
     pub apart: Vec<SplitRow>,
 }
 
-/// A case.
+/// Result of a case.
 #[derive(Clone, Debug, Serialize)]
 pub struct CaseRow {
-    /// Its name.
+    /// Name of the case.
     pub name: String,
     /// Distance from the reference.
     pub distance: Option<Distance>,
-    /// Times for force only, force and torque, and everything the case serves.
+    /// Times for force only, force and torque, and all outputs of the case.
     pub times: [Times; 3],
 }
 
-/// Two kinds of calls of a case.
+/// Times of two kinds of calls of a case.
 #[derive(Clone, Debug, Serialize)]
 pub struct SplitRow {
     /// Name of the case.
     pub name: String,
     /// Radius of the workspace of its path, m.
     pub radius_m: f64,
-    /// The detail that splits them.
+    /// Detail that splits the calls.
     pub detail: String,
-    /// The times.
+    /// Times of the two kinds.
     pub apart: SplitTimes,
 }
 
@@ -61,14 +61,14 @@ enum Errors {
     Unknown([(); 5]),
 }
 
-/// A row of a table: a name and numbers.
+/// Formats a table row: a name and numbers.
 fn named<const N: usize, const M: usize>(name: &str, numbers: [f64; M]) -> [String; N] {
     let mut cells = std::iter::once(name.to_owned()).chain(numbers.map(|number| format!("{number:.1e}")));
     std::array::from_fn(|_| cells.next().unwrap_or_default())
 }
 
 impl BenchReport {
-    /// The tables for people.
+    /// Formats the tables for people.
     #[must_use]
     pub fn to_text(&self) -> String {
         let tables =
@@ -180,7 +180,7 @@ impl BenchReport {
         [vec![title], table(head, rows)].concat()
     }
 
-    /// One line a case and demand, for other programs.
+    /// Formats one line per case and demand as CSV.
     #[must_use]
     pub fn to_csv(&self) -> String {
         const ERRORS: [&str; 6] =
@@ -206,7 +206,7 @@ impl BenchReport {
         )
     }
 
-    /// Error over time, a point a case: the further down and left, the better. Without errors, the times of each case.
+    /// Draws error over time, a point per case: the lower and the farther left, the better. Without errors, draws the times.
     #[must_use]
     pub fn to_svg(&self) -> String {
         if self.rows.iter().all(|row| row.distance.is_none()) {
@@ -230,7 +230,7 @@ impl BenchReport {
             .iter()
             .filter_map(|row| Some((row, row.distance.filter(|distance| distance.force_rms_n > 0.0)?)))
             .collect();
-        // One legend is enough.
+        // Only one panel has a legend.
         let drawn = |panel: Panel, has_legend: bool, error: fn(&Distance) -> f64| {
             let name = |name: &str| if has_legend { name.to_owned() } else { String::new() };
             let in_batches =
@@ -265,7 +265,7 @@ impl BenchReport {
         figure.to_svg()
     }
 
-    /// The times of each case as bars: as many as there are cases, in the order of the table.
+    /// Draws the times of each case as bars, in the order of the table.
     fn times_to_svg(&self) -> String {
         let panel = |title: &str, time: fn(&Times) -> f64| {
             let rows = self.rows.iter().zip(1_u32..);

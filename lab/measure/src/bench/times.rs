@@ -1,7 +1,7 @@
-//! What a call takes: along the path without interruption, in a batch, call by call, and cold.
+//! Duration of a call: continuously along the path, in a batch, call by call, and cold.
 //!
-//! A machine is never alone with one case. So the cases take turns: each walks a slice of the path, then the next, and
-//! so on to the end of it, round after round. What disturbs one slice disturbs its neighbours too, and quotients of
+//! A shared machine disturbs measurements. So the cases take turns: each runs a slice of the path, then the next case,
+//! and so on to its end, round after round. A disturbance of one slice affects its neighbours too, and quotients of
 //! neighbouring slices are those of a quiet machine.
 
 use flotor_hal::abi::loader::Model;
@@ -15,32 +15,32 @@ use std::time::Instant;
 /// Times of an evaluation with one demand, ns. Wall clock: compare within a run, not between machines.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Times {
-    /// A tick of the path, nothing between the calls; of every slice its fastest walk.
+    /// Mean of a tick of the path, with nothing between the calls; fastest repetition of every slice.
     pub mean_ns: f64,
-    /// Mean over that of the baseline: median of all turns.
+    /// Ratio of `mean_ns` to that of the baseline: median of all turns.
     pub of_yardstick: f64,
-    /// A pose in a batch, the same way; `None` for a model whose answers depend on the way to the pose.
+    /// Mean of a pose in a batch, from the fastest repetitions; `None` for a model with memory.
     pub batch_ns: Option<f64>,
-    /// How many times faster that is than tick by tick: median of all turns.
+    /// Speed-up of a batch over tick by tick: median of all turns.
     pub batch_gain: Option<f64>,
-    /// Median of single calls along the path, what the clock costs taken off.
+    /// Median of single calls along the path, less the overhead of the clock.
     pub warm_median_ns: f64,
-    /// One call in a thousand takes longer (interruptions of the machine included).
+    /// 99.9th percentile of single calls (interruptions of the machine included).
     pub warm_p999_ns: f64,
     /// Median of single calls after a reset, each at another pose and after a call of every other case.
     pub cold_median_ns: f64,
-    /// One of those in a thousand takes longer.
+    /// 99.9th percentile of calls after a reset.
     pub cold_p999_ns: f64,
 }
 
-/// Ticks a case walks when it is its turn, and how many of them are not timed: they bring the model back into the caches.
+/// Number of ticks of a turn, and of those not timed: they bring the model back into the caches.
 const SLICE_TICKS: usize = 100;
 const UNTIMED_TICKS: usize = 20;
 
-/// Cold calls are far apart on the path: a stride that shares no factor with any length used.
+/// Stride of cold calls along the path, coprime to every path length in use.
 const COLD_STRIDE: usize = 617;
 
-/// What the clock said about a case. Slices in the order of their turns, all rounds one after the other.
+/// Measured durations of a case. Slices in the order of their turns, all rounds in sequence.
 #[derive(Clone, Default)]
 struct Clocked {
     walks_ns: Vec<f64>,
@@ -116,7 +116,7 @@ impl Clocked {
     }
 }
 
-/// Inputs of consecutive ticks.
+/// Returns the inputs of consecutive ticks.
 pub(super) fn inputs(path: &[Pose], demand: Demand) -> Vec<Input> {
     (0..).zip(path).map(|(tick, pose)| Input { demand, ..input_of(tick, *pose) }).collect()
 }
@@ -139,7 +139,7 @@ fn per_pose_ns(inputs: &[Input], work: impl FnOnce(&[Input])) -> f64 {
     begin.elapsed().as_nanos() as f64 / inputs.len().max(1) as f64
 }
 
-/// One call, ns, what the clock costs taken off.
+/// Times one call, ns, less the overhead of the clock.
 pub(super) fn call_ns(overhead_ns: f64, model: &mut Model, input: &Input) -> f64 {
     let mut output = Output::default();
     let begin = Instant::now();
@@ -149,7 +149,7 @@ pub(super) fn call_ns(overhead_ns: f64, model: &mut Model, input: &Input) -> f64
     call_ns
 }
 
-/// Mean over the slices of a round, each taken from the round in which it was fastest.
+/// Returns the mean over the slices of a round, each from the round in which it was fastest.
 fn mean_of_fastest(times_ns: &[f64], slices: usize) -> f64 {
     let fastest = |slice: usize| {
         times_ns.iter().skip(slice).step_by(slices.max(1)).copied().fold(f64::INFINITY, f64::min)
@@ -158,7 +158,7 @@ fn mean_of_fastest(times_ns: &[f64], slices: usize) -> f64 {
     (0..slices).map(fastest).sum::<f64>() / count
 }
 
-/// Median of the quotients of numbers that belong together; NaN of nothing.
+/// Returns the median of the quotients of corresponding numbers; NaN without numbers.
 fn median_quotient(numbers: &[f64], by: &[f64]) -> f64 {
     let mut quotients: Vec<f64> = numbers.iter().zip(by).map(|(number, by)| number / by).collect();
     quantile(&mut quotients, 0.5)

@@ -1,8 +1,8 @@
-//! What a whole tick costs: device, mapping, model, envelope, and the record of it through the trace ring.
+//! Cost of a whole tick: device, mapping, model, envelope, and its record through the trace ring.
 //!
-//! On the virtual clock, so that nothing waits, and otherwise the loop of every run. Ticks are timed a batch at a time,
-//! what the clock costs being spread over the batch; the ring is emptied between batches, as observers do on a thread of
-//! their own. The middle of many batches counts: a neighbour on the machine spoils some of them.
+//! The loop is that of every run, on the virtual clock, so that nothing waits. Ticks are timed in batches, over which
+//! the clock's overhead is spread; the ring is emptied between batches, as observers do on their own thread. The median
+//! of many batches counts, because other load on the machine delays some.
 
 use super::scripted::{SCRIPTED, SCRIPTED_ENTRY};
 use flotor_core::trace::TickRecord;
@@ -18,28 +18,28 @@ use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 
-/// Ticks that are timed together: some 20 µs, short against a time slice of the system.
+/// Number of ticks timed together: some 20 µs, short against a time slice of the system.
 const BATCH: usize = 64;
-/// Ticks before the first that is timed: the force has faded in, caches and branch predictors are warm.
+/// Number of untimed ticks at the start: the force fades in, caches and branch predictors warm up.
 const WARM_UP: usize = 2000;
 
-/// What the model acts on.
+/// Device under the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BenchDevice {
-    /// A handle that follows a script, which costs next to nothing: what is left is the loop.
+    /// Handle that follows a script at almost no cost, to isolate the cost of the loop.
     Scripted,
-    /// The simulated flotor, preset `plain`, in its hand.
+    /// Simulated flotor, preset `plain`, in its hand.
     Simulated,
-    /// The scripted handle, with the model in a process of its own.
+    /// Scripted handle, with the model in its own process.
     Isolated,
 }
 
 impl BenchDevice {
-    /// All of them.
+    /// All devices.
     pub const ALL: [BenchDevice; 3] = [BenchDevice::Scripted, BenchDevice::Simulated, BenchDevice::Isolated];
 
-    /// Name in a table.
+    /// Returns the name in a table.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -49,7 +49,7 @@ impl BenchDevice {
         }
     }
 
-    /// The scene: one device, one model with its defaults.
+    /// Returns the scene: one device, one model with its defaults.
     fn scene(self, model: &str) -> String {
         let device = match self {
             Self::Scripted | Self::Isolated => SCRIPTED,
@@ -62,18 +62,18 @@ impl BenchDevice {
     }
 }
 
-/// What a tick takes, ns. Wall clock: compare within a run, not between machines.
+/// Duration of a tick, ns. Wall clock: compare within a run, not between machines.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TickCost {
-    /// Middle of all batches.
+    /// Median of all batches.
     pub median_ns: f64,
-    /// The fastest batch.
+    /// Fastest batch.
     pub fastest_ns: f64,
-    /// One batch in a hundred takes longer, interruptions of the machine included.
+    /// 99th percentile of the batches, interruptions of the machine included.
     pub p99_ns: f64,
 }
 
-/// A loop that is advanced by hand, with its trace.
+/// Loop that is advanced step by step, with its trace.
 pub struct WholeTick {
     servo: Servo,
     schedule: Schedule,
@@ -84,10 +84,10 @@ pub struct WholeTick {
 }
 
 impl WholeTick {
-    /// A model of the registry, by id or file, on a device. Not real-time.
+    /// Prepares a model of the registry, by id or file, on a device. Not real-time.
     ///
     /// # Errors
-    /// [`RunError`] if the model is unknown, refused, or does not fit.
+    /// [`RunError`] if the model is unknown, rejected, or does not fit.
     pub fn prepare(device: BenchDevice, registry: Registry, model: &str) -> Result<Self, RunError> {
         let registry = registry.with_linked(&SCRIPTED_ENTRY)?;
         let scene = Scene::parse(Path::new("bench"), &device.scene(model))?;
@@ -100,7 +100,7 @@ impl WholeTick {
         Ok(Self { servo, schedule, stoppers, stop: StopSwitch::default(), sender, receiver })
     }
 
-    /// Runs ticks, a batch at least; what they left behind is taken out of the ring and thrown away.
+    /// Runs at least `ticks` ticks, in whole batches; discards their records.
     pub fn run(&mut self, ticks: usize) {
         for _ in 0..ticks.div_ceil(BATCH) {
             self.batch();
@@ -108,7 +108,7 @@ impl WholeTick {
         }
     }
 
-    /// Times so many batches.
+    /// Times a number of batches.
     #[must_use]
     pub fn time(&mut self, batches: usize) -> TickCost {
         self.run(WARM_UP);
@@ -124,14 +124,14 @@ impl WholeTick {
         TickCost { median_ns, fastest_ns, p99_ns }
     }
 
-    /// A batch of ticks, each with its record pushed. Real-time: bounded, no allocation.
-    #[inline(never)] // where a counter of instructions cuts
+    /// Runs a batch of ticks, each with its record pushed. Real-time: bounded, no allocation.
+    #[inline(never)] // separate function for a counter of instructions
     fn batch(&mut self) {
         let Self { servo, schedule, stop, sender, .. } = self;
         for _ in 0..BATCH {
             let Ok(due) = schedule.wait(|_| SampleWait::NotPaced) else { return };
             servo.tick(&due, stop, |record| {
-                let _ = sender.push(*record); // it has room for two batches
+                let _ = sender.push(*record); // the ring has room for two batches
             });
         }
     }

@@ -79,7 +79,7 @@ pub(crate) struct BenchArguments {
     plugin_path: PluginPathOption,
 }
 
-/// Cases of the spring that ships with Flotor: every variant and setting of it.
+/// Default cases of the spring that ships with Flotor: every variant and setting.
 const SPRING_CASES: [&str; 9] = [
     "variant=thesis",
     "variant=thesis,precision=f32",
@@ -91,23 +91,23 @@ const SPRING_CASES: [&str; 9] = [
     "variant=rod,accuracy=servo",
     "variant=rod,accuracy=tight",
 ];
-/// Their reference.
+/// Reference case of the spring.
 const SPRING_REFERENCE: &str = "variant=rod,accuracy=tight";
-/// Cases of the solid: its resolutions under a sphere, with the membrane beside; under a plate, with linear tetrahedra beside.
+/// Default cases of the solid: its resolutions under a sphere, compared with the membrane; under a plate, with linear tetrahedra.
 const SPHERE_CASES: [&str; 3] = [
     "resolution=standard",
     "resolution=quick",
     "model=membrane,ball_radius_mm=12.7,side_mm=80,nodes_per_side=17",
 ];
 const PLATE_CASES: [&str; 3] = ["resolution=standard", "resolution=quick", "resolution=linear-tetrahedra"];
-/// Their reference.
+/// Reference case of the solid.
 const SOLID_REFERENCE: &str = "resolution=fine";
-/// The detail that splits its calls, the springs, and the parts of their workspaces.
+/// Detail that splits the spring's calls, the springs, and the fractions of their workspaces.
 const SPRING_SPLIT: &str = "rod_share";
 const SPRINGS: [&str; 4] = ["preset=thesis-1", "preset=thesis-2", "preset=thesis-3", "preset=slender"];
 const PARTS: [f64; 2] = [0.5, 1.0];
 
-/// Radius of the device's range, mm: the thesis's, and the simulated flotor's.
+/// Radius of the device's range, mm: of the thesis's device and of the simulated flotor.
 const DEVICE_RANGE_MM: f64 = 12.0;
 /// Free length (mm) of a spring whose length unit is the device's: scenes scale a spring's motion by its free length over this.
 const UNSCALED_LENGTH_MM: f64 = 15.0;
@@ -117,7 +117,7 @@ pub(crate) fn run(arguments: &BenchArguments) -> Result<(), CommandError> {
     if arguments.tick { time_ticks(arguments) } else { compare_cases(arguments) }
 }
 
-/// A whole tick of the loop on one device.
+/// Cost of a whole tick of the loop on one device.
 #[derive(Serialize)]
 struct TickRow {
     device: BenchDevice,
@@ -125,13 +125,13 @@ struct TickRow {
     cost: TickCost,
 }
 
-/// What the whole tick costs, and what a process of its own adds to it.
+/// Cost of the whole tick, and the part of process isolation.
 #[derive(Serialize)]
 struct TickReport {
     ticks: Vec<TickRow>,
-    /// To another thread and back, through the system's futexes.
+    /// Round trip to another thread and back, through the system's futexes.
     round_trip: TickCost,
-    /// What a model in a process of its own adds to a tick, in round trips.
+    /// Additional cost of a tick with the model in its own process, in round trips.
     isolation_in_round_trips: f64,
 }
 
@@ -144,10 +144,10 @@ impl TickReport {
     }
 }
 
-/// How much slower what waits for another thread is, roughly: so many fewer batches take as long.
+/// Approximate slowdown of a loop that waits for another thread: it gets fewer batches by this factor.
 const SLOWER: usize = 20;
 
-/// `--tick`
+/// Runs `--tick`: times the whole tick.
 fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
     let batches = match arguments.size {
         Size::Short => 2_000,
@@ -257,7 +257,7 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     write_text(arguments.plot.as_deref(), || report.to_svg())
 }
 
-/// The workspace of a case: the one set, else the device's range, for a spring in units of its free length.
+/// Returns the workspace of a case: the one set, else the device's range, for a spring in units of its free length.
 fn workspace(arguments: &BenchArguments, plugin: &Plugin, case: &Case) -> Result<Workspace, CommandError> {
     let plugin = case.other.as_ref().unwrap_or(plugin);
     let radius_mm = match arguments.workspace_mm {
@@ -272,10 +272,10 @@ fn workspace(arguments: &BenchArguments, plugin: &Plugin, case: &Case) -> Result
     Ok(Workspace { radius_m: radius_mm / 1e3, rotation_rad: arguments.workspace_deg.to_radians() })
 }
 
-/// Among the settings of a case, the id of another model.
+/// Key of another model's id among the settings of a case.
 const OTHER_MODEL: &str = "model";
 
-/// A case from `KEY=VALUE,KEY=VALUE`, on top of the common settings; another model of it is searched for in the registry.
+/// Parses a case from `KEY=VALUE,KEY=VALUE`, on top of the common settings; looks up another model in the registry.
 fn case(registry: &Registry, plugin: &Plugin, sets: &[KeyValue], text: &str) -> Result<Case, CommandError> {
     let usage = |problem: String| CommandError::Usage(format!("case `{text}`: {problem}"));
     let own = text.split(',').filter(|part| !part.trim().is_empty()).map(str::parse::<KeyValue>);
@@ -284,13 +284,13 @@ fn case(registry: &Registry, plugin: &Plugin, sets: &[KeyValue], text: &str) -> 
     let named = at.map(|at| own.remove(at).parameter().value);
     let other = named.map(|id| registry.load(&id, PluginKind::Model)).transpose()?;
     let parameters = other.as_ref().unwrap_or(plugin).parameters();
-    // The common settings are of the common model.
+    // The common settings apply to the common model only.
     let common = if other.is_some() { &[] } else { sets };
     let settings = common.iter().chain(&own).map(|set| {
         let parameter = set.parameter();
         Setting::parse(parameters, &parameter.key, &parameter.value).map_err(|error| usage(error.to_string()))
     });
-    // A value says what it is of, but for a switch.
+    // A value is clear without its key, apart from a switch.
     let word = |set: &KeyValue| {
         let parameter = set.parameter();
         match parameter.value.as_str() {

@@ -1,4 +1,4 @@
-//! `flotor eval`: poses in, wrenches out, as CSV.
+//! `flotor eval`: wrenches at poses, as CSV.
 
 use crate::evaluate::{Answer, Details, EvaluateError, Evaluation, Travel};
 use crate::poses::Poses;
@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
     }
     let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
     let settings = settings(&plugin, "--set", &arguments.sets)?;
-    // A refused setting is told before a long file is read.
+    // Report a rejected setting before a long file is read.
     let first = while_preparing(&plugin.metadata().id, || plugin.create_model(&settings))?;
     let details = if arguments.details { first.details() } else { &[] };
     let Poses { ids, handles } = read_poses(&arguments.poses)?;
@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
     write_text(Some(&arguments.out), || csv_text(&ids, &answers, details))
 }
 
-/// Reads the poses, from a file or from standard input.
+/// Reads the poses from a file or from standard input.
 fn read_poses(path: &Path) -> Result<Poses, CommandError> {
     let problem = |cause| {
         CommandError::Usage(format!("{}: {}", path.display(), format_args!("cannot read the poses: {cause}")))
@@ -91,7 +91,7 @@ fn read_poses(path: &Path) -> Result<Poses, CommandError> {
     Poses::parse(&path.display().to_string(), bytes).map_err(|error| CommandError::Usage(error.to_string()))
 }
 
-/// Longest file of poses, bytes: twenty million poses.
+/// Maximum size of a file of poses, bytes: twenty million poses.
 const MOST_BYTES: u64 = 2 << 30;
 
 fn read(path: &Path) -> std::io::Result<Vec<u8>> {
@@ -119,16 +119,16 @@ fn csv_text(ids: &[String], answers: &[Answer], details: &[Detail]) -> String {
     to_csv(head, ids.iter().zip(answers).map(row))
 }
 
-/// A detail as the text of its column.
+/// Formats a detail for its column.
 fn written(detail: &Detail, value: Option<f64>) -> String {
     let Some(value) = value else { return String::new() };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    // saturates: then there is no such word
+    // `as` saturates: an invalid value has no word
     let word = detail.words().get(value as usize);
     word.map_or_else(|| shortest(value), |word| word.as_str().to_owned())
 }
 
-/// The shortest text that reads back as the same number.
+/// Formats a number as the shortest text that parses to the same bits.
 fn shortest(number: f64) -> String {
     format!("{number:?}")
 }

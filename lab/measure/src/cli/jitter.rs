@@ -1,4 +1,4 @@
-//! `flotor jitter`: lateness of the servo next to that of a bare loop.
+//! `flotor jitter`: lateness of the servo compared with that of a bare loop.
 
 use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
 use clap::Args;
@@ -39,7 +39,7 @@ pub(crate) struct JitterArguments {
 }
 
 pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
-    // Before there are threads of plugins, which would take the signals.
+    // Handle signals before plugins start threads, which would receive them.
     let stop = stop_run_on_signals()?;
     stop_waits_with(&stop);
     let mut scene = Scene::demo().map_err(RunError::Scene)?;
@@ -86,7 +86,7 @@ fn to_text(report: &JitterReport) -> String {
     lines.join("\n")
 }
 
-/// Bars of a quarter octave, µs, of bins of ns; what is shorter than 10 ns takes no time.
+/// Groups bins of ns into bars of a quarter octave, µs; times below 10 ns are in the first bar.
 fn of_time(bins: &[(u64, u64)]) -> Vec<Bin> {
     Bin::quarter_octaves(0.01, bins.iter().map(|(ns, count)| (*ns as f64 * 1.0e-3, *count)))
 }

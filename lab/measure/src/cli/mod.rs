@@ -1,4 +1,4 @@
-//! The commands that measure plugins, loops and recordings: the program `flotor-lab`, which `flotor` starts.
+//! Commands that measure plugins, loops and recordings: command line of the program `flotor-lab`, which `flotor` starts.
 
 mod bench;
 mod eval;
@@ -34,7 +34,7 @@ enum Command {
     Stress(stress::StressArguments),
 }
 
-/// The commands with their arguments. Not real-time.
+/// Returns the commands with their arguments. Not real-time.
 #[must_use]
 pub fn command() -> clap::Command {
     Arguments::command()
@@ -50,7 +50,7 @@ pub fn main() -> ExitCode {
         Command::Jitter(arguments) => supervised(|| jitter::run(&arguments)),
         Command::Stability(arguments) => supervised(|| stability::run(&arguments)),
         Command::Bench(arguments) => supervised(|| bench::run(&arguments)),
-        // Judges: each starts processes of its own for the code of plugins.
+        // These start their own processes for the code of plugins.
         Command::Validate(arguments) => exit_code_of(validate::run(&arguments)),
         Command::Stress(arguments) => exit_code_of(stress::run(&arguments)),
     }
@@ -66,7 +66,7 @@ impl From<ReplayError> for CommandError {
     }
 }
 
-/// Progress of a measurement on a terminal; nothing in a pipe.
+/// Progress bar of a measurement on a terminal; nothing in a pipe.
 struct ProgressLine(indicatif::ProgressBar);
 
 impl ProgressLine {

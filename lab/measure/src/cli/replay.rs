@@ -1,4 +1,4 @@
-//! `flotor replay`: the models of a recording re-evaluated, unchanged or changed.
+//! `flotor replay`: re-evaluation of the models of a recording, unchanged or changed.
 
 use super::replay_picture::ReplayPicture;
 use crate::replay::{Compared, Coverage, Difference, DivergenceCause, Replay};
@@ -40,12 +40,12 @@ pub(crate) struct ReplayArguments {
 }
 
 impl ReplayArguments {
-    /// True if the user requested a change of the wrench.
+    /// Returns true if the user requested a change of the wrench.
     fn changes_anything(&self) -> bool {
         !(self.sets.is_empty() && self.models.is_empty())
     }
 
-    /// The recording and what is changed, as on the command line.
+    /// Describes the recording and the changes, as on the command line.
     fn text(&self) -> String {
         let file = self.recording.file_name().unwrap_or_default().to_string_lossy();
         let sets = self.sets.iter().map(|set| format!("--set {set}"));
@@ -62,7 +62,7 @@ impl ReplayArguments {
 #[derive(Serialize)]
 struct Report {
     bit_exact: bool,
-    /// Whether the recording covers the whole run.
+    /// True if the recording covers the whole run.
     complete: bool,
     #[serde(skip)]
     ending: Ending,
@@ -71,7 +71,7 @@ struct Report {
     #[serde(flatten)]
     difference: Difference,
     why_apart: Option<DivergenceCause>,
-    /// What is wrong with recorded samples, by device.
+    /// Implausible recorded samples, by device.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     implausible: Vec<String>,
     recorded_s: f64,
@@ -124,7 +124,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
 }
 
 impl Report {
-    /// The result in a few words that claim no more than was compared.
+    /// Returns the verdict, restricted to the compared ticks.
     fn verdict(&self) -> String {
         match (self.difference.ticks, self.bit_exact, self.coverage.missing_ticks) {
             (0, ..) => "no tick to compare".to_owned(),
@@ -136,7 +136,7 @@ impl Report {
         }
     }
 
-    /// Where the wrench is the same although it differs from one tick to another.
+    /// Describes the ticks around the differing ones, where the wrench is equal.
     fn same_around(&self, first: u64, last: u64) -> String {
         let Coverage { begins_at_tick, ends_at_tick, .. } = self.coverage;
         let before = begins_at_tick.filter(|begin| *begin < first).map(|_| format!("before {first}"));
@@ -145,7 +145,7 @@ impl Report {
         if parts.is_empty() { String::new() } else { format!("; bit for bit {}", parts.join(" and ")) }
     }
 
-    /// What of the run is not in the recording.
+    /// Describes the parts of the run that are missing in the recording.
     fn gaps(&self) -> Vec<String> {
         let Coverage { begins_at_tick, missing_ticks, first_missing_tick, .. } = self.coverage;
         let late = begins_at_tick.filter(|first| *first > 0);
@@ -176,7 +176,7 @@ fn to_text(arguments: &ReplayArguments, report: &Report) -> String {
             row("energy", format!("max {max_j:.3e} J"));
         }
     }
-    // If nothing was changed, the error gives the cause.
+    // Without changes the error contains the cause.
     if let (Some(why), true) = (&report.why_apart, arguments.changes_anything()) {
         row("note", format!("the outputs differ for another reason as well: {why}"));
     }

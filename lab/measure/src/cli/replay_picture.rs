@@ -1,4 +1,4 @@
-//! Recorded and replayed outputs as a picture: force along each axis, and the differences of force and torque.
+//! Picture of a replay: recorded and replayed force along each axis, and the differences of force and torque.
 
 use flotor_core::ModelOutputs;
 use flotor_core::trace::TickRecord;
@@ -8,7 +8,7 @@ use flotor_plot::{Axis, Figure, Panel, Quantity, Series, Trace, VectorTrace};
 /// Names of the components of a vector.
 const COMPONENTS: [&str; 3] = ["x", "y", "z"];
 
-/// The traces of a replay, reduced while they arrive.
+/// Traces of a replay, reduced on arrival.
 pub(super) struct ReplayPicture {
     recorded_n: [Trace; 3],
     replayed_n: [Trace; 3],
@@ -35,13 +35,13 @@ impl ReplayPicture {
         }
         let force_n = replayed.force() - recorded.force();
         self.force_difference.add(time_s, force_n.to_array());
-        // NaN, which leaves a gap, where the recording holds no torque.
+        // NaN, which leaves a gap, where the recording contains no torque.
         let torques = replayed.torque().zip(recorded.torque());
         let torque_nm = torques.map_or(DVec3::NAN, |(replayed, recorded)| replayed - recorded);
         self.torque_difference.add(time_s, torque_nm.to_array());
     }
 
-    /// Draws the traces. `subtitle` says which recording, and what was changed.
+    /// Draws the traces as SVG. `subtitle` names the recording and the changes.
     pub(super) fn into_svg(self, subtitle: &str) -> String {
         let figure = Figure::new("Recorded and replayed", Axis::linear("Time", "s"))
             .subtitle(format!("{subtitle}; difference: replayed − recorded"))
@@ -58,7 +58,7 @@ impl ReplayPicture {
     }
 }
 
-/// The recorded force along an axis, grey, under the replayed one in the colour of the axis.
+/// Draws the recorded force along an axis, grey, under the replayed one in the colour of the axis.
 fn force_panel(axis: usize, recorded: Trace, replayed: Trace) -> Result<Panel, String> {
     const GREY: usize = 7;
     let component = COMPONENTS[axis];

@@ -1,4 +1,4 @@
-//! `flotor stability`: the stiffest spring that stays stable on the simulated device, compared with theory.
+//! `flotor stability`: largest stable stiffness on the simulated device, compared with theory.
 
 use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
 use crate::stability::{Case, Grip, LoopError, Row, default_cases, is_search_end, measure, worst_deviation};
@@ -54,10 +54,10 @@ pub(crate) struct StabilityArguments {
     plot: Option<PathBuf>,
 }
 
-/// The device whose dynamics are simulated.
+/// Simulated device.
 const DEVICE: &str = "simulated";
 
-/// The JSON output.
+/// JSON output of `stability`.
 #[derive(Serialize)]
 struct Report<'a> {
     device: &'a str,
@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
     let worst_deviation = worst_deviation(&rows);
     let version = &plugin.metadata().version;
     let report = Report { device: DEVICE, version, rows: &rows, worst_deviation };
-    // A table for machines on standard output is all that is there.
+    // CSV on standard output replaces the text result.
     let csv = arguments.csv.as_deref();
     if csv.is_none_or(|path| path.as_os_str() != "-") {
         print_result(arguments.json.file(), &report, || to_text(&rows, worst_deviation))?;
@@ -91,7 +91,7 @@ pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
     write_text(arguments.plot.as_deref(), || picture)
 }
 
-/// The product of all lists given, or the default grid.
+/// Returns the product of all lists given, or the default grid.
 fn cases(arguments: &StabilityArguments) -> Vec<Case> {
     let StabilityArguments { rate, delay, damping, virtual_damping, quantum_um, hand: grip, .. } = arguments;
     let quantum_m = quantum_um * 1.0e-6;
@@ -130,7 +130,7 @@ fn refused(error: LoopError) -> CommandError {
     }
 }
 
-/// A limit, or that it is above the end of the search.
+/// Formats a limit, or the fact that it is above the end of the search.
 fn limit_text(limit_n_per_m: f64) -> String {
     let above = if is_search_end(limit_n_per_m) { "above " } else { "" };
     format!("{above}{limit_n_per_m:.1}")
@@ -154,7 +154,7 @@ fn to_text(rows: &[Row], worst_deviation: Option<f64>) -> String {
     [vec![title], table(head, rows.iter().map(line)), vec![foot]].concat().join("\n")
 }
 
-/// A panel for each combination of period and drag, a line and points for each delay in it.
+/// Draws a panel for each combination of period and drag, with a line and points for each delay.
 fn picture(plugin: &Plugin, cases: &[Case], rows: &[Row]) -> Result<String, CommandError> {
     let mut figure = Figure::new("Largest stable stiffness", Axis::linear("Virtual damping", "N s/m"))
         .subtitle("points: simulated flotor; lines: exact limit of the sampled loop, and Gil's rule")
@@ -189,7 +189,7 @@ fn stiffness_panel(first: &Case, plant: Plant, within: &[(&Case, &Row)]) -> Pane
             let rendering =
                 move |virtual_damping_ns_per_m| Rendering { period_s, delay_ticks, virtual_damping_ns_per_m };
             (0..=CURVE_POINTS).map(move |index| {
-                // Closer where the curves are steep, at little damping.
+                // Denser where the curves are steep, at little damping.
                 let share = f64::from(index) / f64::from(CURVE_POINTS);
                 let damping = most * share * share;
                 (damping, limit(&plant, &rendering(damping)))

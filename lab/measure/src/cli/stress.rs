@@ -1,4 +1,4 @@
-//! `flotor stress`: the numerical stability score of a force model.
+//! `flotor stress`: numerical stability score of a force model.
 
 use super::ProgressLine;
 use crate::Size;

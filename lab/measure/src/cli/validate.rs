@@ -1,4 +1,4 @@
-//! `flotor validate`: a plugin file against the rules of the contract.
+//! `flotor validate`: check of a plugin file against the rules of the contract.
 
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, duration_s};
@@ -45,13 +45,13 @@ fn rule(id: &str) -> Result<Check, String> {
 
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if let Some(rule) = arguments.rule {
-        ignore_no_signal(); // a plugin that sends one is found, also in the background of a shell
+        ignore_no_signal(); // detects a plugin that sends a signal, also in the background of a shell
         if arguments.deliver {
             let delivered = deliver(&arguments.plugin, &arguments.sets, rule, step_limit());
             return delivered.map_err(|error| CommandError::Failed(error.to_string()));
         }
         let verdict = Verdict::of(check(&arguments.plugin, &arguments.sets, rule));
-        // On a line of its own, whatever the plugin has printed before.
+        // On its own line, after any output of the plugin.
         say!(
             "\n{}",
             serde_json::to_string(&verdict).map_err(|error| CommandError::Failed(error.to_string()))?

@@ -1,4 +1,4 @@
-//! What differs between systems in a measurement: how a thread sleeps on a word that two processes may share.
+//! System interface of the measurements: waiting on a word that two processes may share.
 
 #[cfg(not(windows))]
 mod linux;

@@ -1,11 +1,11 @@
-//! Windows: no model has a process of its own yet, so nobody sleeps: a thread gives its turn away.
+//! Windows: models never run in their own process, so waiting only yields the processor.
 
 use std::sync::atomic::AtomicU32;
 
-/// Wakes who sleeps on a word: nobody does.
+/// Does nothing: no thread waits.
 pub(crate) fn wake(_: &AtomicU32) {}
 
-/// Gives the turn away.
+/// Yields the processor.
 pub(crate) fn wait(_: &AtomicU32, _: u32) {
     std::thread::yield_now();
 }

@@ -1,4 +1,4 @@
-//! The part of a run that a recording holds, and why a replay may differ although nothing was changed.
+//! Coverage of a run by a recording, and causes of a divergence without changes.
 
 use flotor_core::Clock;
 use flotor_core::trace::{Events, TickRecord};
@@ -6,21 +6,21 @@ use flotor_record::RunDescription;
 use flotor_servo::Port;
 use serde::Serialize;
 
-/// The ticks of a run that can be compared. One that lost the record of a device cannot.
+/// Ticks of a run that can be compared. A tick without the record of a device cannot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Coverage {
-    /// The first of them: above 0 if the recording began after the start of the run. `None` if there is no tick.
+    /// First comparable tick: above 0 if the recording began after the start of the run. `None` if there is no tick.
     pub begins_at_tick: Option<u64>,
-    /// The last of them.
+    /// Last comparable tick.
     pub ends_at_tick: Option<u64>,
-    /// Ticks after the first that are missing.
+    /// Number of missing ticks after the first.
     pub missing_ticks: u64,
-    /// The first of these.
+    /// First missing tick.
     pub first_missing_tick: Option<u64>,
 }
 
 impl Coverage {
-    /// Adds a complete tick; returns how many are missing just before it.
+    /// Adds a complete tick; returns the number of missing ticks just before.
     fn add(&mut self, tick: u64) -> u64 {
         let missing = self.ends_at_tick.map_or(0, |last| tick.saturating_sub(last).saturating_sub(1));
         self.miss(missing);
@@ -29,7 +29,7 @@ impl Coverage {
         missing
     }
 
-    /// The recording ends in the middle of this tick.
+    /// Ends the coverage in the middle of a tick.
     pub(super) fn break_off(&mut self, tick: u64) {
         self.miss(self.ends_at_tick.map_or(1, |last| tick.saturating_sub(last)));
     }
@@ -42,20 +42,20 @@ impl Coverage {
         }
     }
 
-    /// True if no tick is missing between the run's first and the last that is here.
+    /// Returns true if no tick is missing from the run's first to the last recorded one.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.missing_ticks == 0 && !self.is_joined_late()
     }
 
-    /// True if the recording began after the start of the run.
+    /// Returns true if the recording began after the start of the run.
     #[must_use]
     pub fn is_joined_late(&self) -> bool {
         self.begins_at_tick.is_some_and(|first| first > 0)
     }
 }
 
-/// Why outputs of the models differ in a replay from the recorded ones.
+/// Cause of a difference between replayed and recorded outputs of the models.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
 #[serde(tag = "cause", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -65,7 +65,7 @@ pub enum DivergenceCause {
         "`{model}` ran asynchronously in real time, and the recording lacks the arrival times of its results"
     )]
     FieldOnRealClock {
-        /// Its name.
+        /// Name of the model.
         model: String,
     },
     /// A model was disabled in the run, because of its time budget or its process.
@@ -73,26 +73,26 @@ pub enum DivergenceCause {
         "in tick {tick} of the run a model was disabled (time budget or process failure), and in the replay it is not"
     )]
     ModelOut {
-        /// The first tick of the run in which that made a difference.
+        /// First tick of the run in which the model's absence made a difference.
         tick: u64,
     },
-    /// A model was late, and the loop used its answer before.
+    /// A model was late, and the loop used its previous answer.
     #[error(
         "in tick {tick} of the run the answer of a model was late and the loop used the one before; in the replay no answer is \
          late"
     )]
     ModelLate {
-        /// The first tick of the run in which that made a difference.
+        /// First tick of the run in which the delay made a difference.
         tick: u64,
     },
-    /// Ticks are missing, and up to them the wrench is the same bit for bit.
+    /// Ticks are missing; before them the wrench is equal bit for bit.
     #[error(
         "{ticks} ticks are missing after tick {after_tick}, so the states of models and couplings are unknown"
     )]
     Gap {
-        /// The last tick before them.
+        /// Last tick before the missing ones.
         after_tick: u64,
-        /// How many.
+        /// Number of missing ticks.
         ticks: u64,
     },
     /// The recording began after the start of the run.
@@ -101,7 +101,7 @@ pub enum DivergenceCause {
          couplings"
     )]
     JoinedLate {
-        /// Its first tick.
+        /// First recorded tick.
         first_tick: u64,
     },
     /// The recording shows no cause.
@@ -113,13 +113,13 @@ pub enum DivergenceCause {
 #[derive(Default)]
 pub(super) struct Evidence {
     pub(super) coverage: Coverage,
-    /// A model with fields of unknown times.
+    /// Model with a field of unknown arrival times.
     field: Option<String>,
-    /// The last gap: the tick before it, and its ticks.
+    /// Last gap: tick before it, and number of missing ticks.
     gap: Option<(u64, u64)>,
-    /// The first tick in which a model was disabled in the run only.
+    /// First tick in which a model was disabled in the run only.
     out_at: Option<u64>,
-    /// Of the first tick that differs.
+    /// Cause of the first differing tick.
     cause: Option<DivergenceCause>,
 }
 
@@ -130,7 +130,7 @@ impl Evidence {
         Self { field: beside.map(|plugin| plugin.name.clone()), ..Self::default() }
     }
 
-    /// Looks at a tick, before it is compared: one record and one port for each device.
+    /// Records the evidence of a tick before its comparison: one record and one port for each device.
     pub(super) fn look(&mut self, tick: u64, records: &[TickRecord], ports: &[Port]) {
         let last = self.coverage.ends_at_tick;
         let missing = self.coverage.add(tick);
@@ -142,8 +142,8 @@ impl Evidence {
         }
     }
 
-    /// The last observed tick differs. Its own events take precedence over earlier ones: up to it everything was the
-    /// same.
+    /// Records that the last tick differs. Its own events take precedence over earlier ones: all earlier ticks were
+    /// equal.
     pub(super) fn differs(&mut self, tick: u64, records: &[TickRecord], ports: &[Port]) {
         if self.cause.is_some() {
             return;
@@ -165,12 +165,12 @@ impl Evidence {
         self.cause = Some(cause);
     }
 
-    /// Returns why the outputs differ although nothing was changed, if they do.
+    /// Returns the cause of a difference in an unchanged replay; `None` if no tick differs.
     pub(super) fn cause(&self) -> Option<DivergenceCause> {
         self.cause.clone()
     }
 
-    /// A cause other than the change, as far as the recording shows it.
+    /// Returns a cause besides the change, as far as the recording shows one.
     pub(super) fn other_cause(&self) -> Option<DivergenceCause> {
         let field =
             self.field.as_ref().map(|model| DivergenceCause::FieldOnRealClock { model: model.clone() });
@@ -180,7 +180,7 @@ impl Evidence {
     }
 }
 
-/// True if an event happened in a tick of the run and not in the replay: events of the model itself happen again.
+/// Returns true if an event occurred in a tick of the run and not in the replay: events of the model itself recur.
 fn happened_then(event: Events, records: &[TickRecord], ports: &[Port]) -> bool {
     let then_only = |(record, port): (&TickRecord, &Port)| {
         record.events.intersects(event) && !port.events.intersects(event)

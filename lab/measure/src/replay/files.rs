@@ -1,14 +1,14 @@
-//! The files that parameters of a recorded run named: found by their content, or an error.
+//! Lookup of files named by parameters of a recorded run, by their content.
 
 use flotor_record::NamedFile;
 use flotor_session::scene::{Location, ParameterText, SceneError};
 use std::path::{Path, PathBuf};
 
-/// A setting of the model `model`; if it named a file, with one that has the same content: where it was in
-/// the run, or beside the recording, for recordings travel.
+/// Returns a setting of `model`, a file name replaced by that of a file of equal content: at its place in the run, or
+/// beside the recording, which may have been moved.
 ///
 /// # Errors
-/// No file has that content. `parameters` are those of the model's description.
+/// If no file has that content. `parameters` are those of the model's description.
 pub(super) fn as_recorded(
     set: &ParameterText,
     model: &str,

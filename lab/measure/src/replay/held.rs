@@ -1,29 +1,29 @@
-//! Changes for a replay, which override those of the run.
+//! User's changes for a replay, which override those of the run.
 
 use flotor_session::scene::{KeyValue, ModelUse, PluginKeyValue, is_named};
 
-/// Changes of the models for a replay: they stay, whatever changed in the run.
+/// Changes of models that last for a whole replay, in spite of changes recorded in the run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Held {
-    /// Names of models and parameters.
+    /// Pairs of model and parameter with a changed value.
     parameters: Vec<(String, String)>,
-    /// Names of models that were given a plugin.
+    /// Names of models with another plugin.
     plugins: Vec<String>,
 }
 
 impl Held {
-    /// Puts `others` in place of models of the recording, then sets parameters of what is there. A model that
-    /// is on several devices is meant on all of them, or by its full name on one. Not real-time.
+    /// Replaces models of the recording by `others`, then sets parameters. A model on several devices is changed on all
+    /// of them, or by its full name on one. Not real-time.
     ///
     /// # Errors
-    /// In words: the recording has no such model.
+    /// A message if the recording has no such model.
     pub(super) fn apply(
         models: &mut [ModelUse],
         others: &[KeyValue],
         sets: &[PluginKeyValue],
     ) -> Result<Self, String> {
         let plugins = others.iter().map(|other| exchange(other, models)).collect::<Result<Vec<_>, _>>()?;
-        // Counted only now: a model that was exchanged has lost the settings of the run.
+        // Count the settings only now: a replaced model has lost those of the run.
         let recorded: Vec<usize> = models.iter().map(|model| model.plugin.parameters.len()).collect();
         sets.iter().try_for_each(|set| set.apply_to_models(models))?;
         let mut parameters = Vec::new();
@@ -34,17 +34,17 @@ impl Held {
         Ok(Self { parameters, plugins: plugins.concat() })
     }
 
-    /// True if nothing was changed.
+    /// Returns true if nothing was changed.
     pub(super) fn is_nothing(&self) -> bool {
         self.parameters.is_empty() && self.plugins.is_empty()
     }
 
-    /// True if the parameter keeps its value.
+    /// Returns true if the parameter was changed and so is fixed.
     pub(super) fn keeps_parameter(&self, model: &str, parameter: &str) -> bool {
         self.parameters.iter().any(|(name, key)| name == model && key == parameter)
     }
 
-    /// True if the model keeps its plugin.
+    /// Returns true if the model's plugin was changed and so is fixed.
     pub(super) fn keeps_plugin(&self, model: &str) -> bool {
         self.plugins.iter().any(|name| name == model)
     }

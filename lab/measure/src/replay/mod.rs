@@ -1,7 +1,7 @@
 //! Replay of a recorded run without its device: the models are re-evaluated at the recorded poses.
 //!
-//! Without a change the wrench equals the recorded one bit for bit; with another parameter the difference shows the
-//! effect of the change on the same hand movement.
+//! Without a change the wrench equals the recorded one bit for bit; with another parameter the difference is the effect
+//! of the change on the same hand movement.
 
 mod divergence;
 mod files;
@@ -30,7 +30,7 @@ use flotor_session::{PluginReport, RunError, prepare_model};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Why a replay failed.
+/// Failure of a replay.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
@@ -40,16 +40,16 @@ pub enum ReplayError {
     /// A model cannot be created.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The messages of another host are not in the recording.
+    /// The coupling's messages from another host are not in the recording.
     #[error(
         "the coupling `{coupling}` has its other end on another host, whose messages are not in the recording: \
          only runs whose couplings have both ends on one host can be replayed"
     )]
     Apart {
-        /// Its name.
+        /// Name of the coupling.
         coupling: String,
     },
-    /// The forces of a model came from a program, which the recording does not have.
+    /// The forces of a model came from a program, which is not in the recording.
     #[error(
         "a program commanded `{model}`, and the program is not in the recording; to compare the forces of a model on the same motion, \
          put the model in its place: `--model {model}=spring`"
@@ -63,35 +63,35 @@ pub enum ReplayError {
     Change(String),
 }
 
-/// Of couplings with both ends on this host.
+/// Timeouts of couplings with both ends on this host, which never wait.
 const NOBODY_TO_WAIT_FOR: Patience = Patience { silence_ns: 0, fade_ns: 0 };
 
 fn is_remote(coupling: &CouplingDescription) -> bool {
     matches!(coupling.ends, CouplingEnds::Remote(_))
 }
 
-/// Difference of the outputs of the models in a replay from those that the recording holds.
+/// Difference between replayed and recorded outputs of the models.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Difference {
-    /// Ticks compared.
+    /// Number of ticks compared.
     pub ticks: u64,
-    /// Ticks in which some bit of an output differs.
+    /// Number of ticks in which some bit of an output differs.
     pub differing_ticks: u64,
-    /// The first of them: before it, all is the same.
+    /// First differing tick.
     pub first_tick: Option<u64>,
-    /// The last of them: after it, all is the same.
+    /// Last differing tick.
     pub last_tick: Option<u64>,
     /// Largest difference of force, N.
     pub max_force_n: f64,
-    /// Largest difference of torque, N·m; absent where the recording holds no torque.
+    /// Largest difference of torque, N·m; absent where the recording contains no torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_torque_nm: Option<f64>,
     /// Root mean square of the difference of force, N.
     pub rms_force_n: f64,
-    /// Root mean square of the difference of torque, N·m; absent where the recording holds no torque.
+    /// Root mean square of the difference of torque, N·m; absent where the recording contains no torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_torque_nm: Option<f64>,
-    /// Largest difference of stored energy, J; absent where the recording holds no energy.
+    /// Largest difference of stored energy, J; absent where the recording contains no energy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_energy_j: Option<f64>,
 }
@@ -99,21 +99,21 @@ pub struct Difference {
 /// Result of a replay.
 #[derive(Clone, Debug)]
 pub struct Compared {
-    /// How the outputs differ.
+    /// Difference of the outputs.
     pub difference: Difference,
-    /// The part of the run that the recording holds.
+    /// Part of the run that the recording covers.
     pub coverage: Coverage,
-    /// Why it differs; if something was changed, a further cause, as far as the recording shows it.
+    /// Cause of the difference; after a change, a further cause, as far as the recording shows one.
     pub why: Option<DivergenceCause>,
-    /// Whether the recording has the run's end.
+    /// End of the recording: complete or cut off.
     pub ending: Ending,
-    /// Of each device that has some, by name: recorded samples that cannot be.
+    /// Implausible recorded samples by device name, of devices with any.
     pub implausible: Vec<(String, ImplausibleSamples)>,
     /// Health of each model in this replay and its last message, in the scene's order.
     pub health: Vec<(ModelHealth, String)>,
 }
 
-/// The models of a recording, ready for re-evaluation.
+/// Models of a recording, ready for re-evaluation.
 pub struct Replay<'r> {
     registry: &'r Registry,
     config: LoopConfig,
@@ -127,11 +127,11 @@ pub struct Replay<'r> {
 }
 
 impl<'r> Replay<'r> {
-    /// Opens a recording and creates its models as they were set, with other models and settings on top. Not real-time.
+    /// Opens a recording and creates its models as in the run, with other models and settings on top. Not real-time.
     ///
     /// # Errors
-    /// [`ReplayError`]: the recording cannot be read, a model to be changed is not in it, a plugin is missing or refuses the settings, a file
-    /// that a setting names is not that of the run.
+    /// [`ReplayError`] if the recording cannot be read, a model to be changed is not in the recording, a plugin is
+    /// missing or rejects the settings, or a file named by a setting differs from that of the run.
     pub fn open(
         path: &Path,
         registry: &'r Registry,
@@ -167,24 +167,24 @@ impl<'r> Replay<'r> {
         Ok(Self { registry, config, recording, uses, devices, forces, plugins, held })
     }
 
-    /// How the run was set up.
+    /// Returns the description of the run.
     #[must_use]
     pub fn run(&self) -> &RunDescription {
         self.recording.run()
     }
 
-    /// The models with every parameter now in force.
+    /// Returns the models with the current value of every parameter.
     #[must_use]
     pub fn plugins(&self) -> &[PluginReport] {
         &self.plugins
     }
 
-    /// Evaluates the models at every recorded pose. `look` gets the recorded tick and what the models
-    /// give now, as far as the recording holds it.
+    /// Evaluates the models at every recorded pose. `look` is called with each recorded tick and the models' outputs
+    /// now, limited to the recorded ones.
     ///
     /// # Errors
-    /// [`ReplayError`] at a damaged place, or if a plugin that was put in during the run is refused; what was compared
-    /// before is lost with it.
+    /// [`ReplayError`] at damaged data, or if a plugin swapped in during the run is rejected; the comparison up to
+    /// there is lost.
     pub fn compare(
         mut self,
         mut look: impl FnMut(&TickRecord, &ModelOutputs),
@@ -198,13 +198,13 @@ impl<'r> Replay<'r> {
         let mut records: Vec<TickRecord> = Vec::with_capacity(self.devices);
         while let Some(record) = self.recording.next() {
             let record = record?;
-            // A tick that lost a record on its way into the recording cannot be compared.
+            // Skip a tick that lost a record before the recording: it cannot be compared.
             if records.first().is_some_and(|first| first.tick != record.tick) {
                 records.clear();
             }
             records.push(record);
             let [.., record] = records.as_slice() else { continue };
-            // The changes before a tick come with its first record.
+            // The changes before a tick precede its first record.
             for change in self.recording.take_changes() {
                 self.repeat(&change)?;
             }
@@ -224,7 +224,7 @@ impl<'r> Replay<'r> {
             }
             let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
             while self.forces.take_faded(&tick).is_some() {}
-            // All that the recording holds of the tick, and no more.
+            // Compute all recorded outputs of the tick, and no more.
             let computed = |all: Demand, record: &TickRecord| all.with(record.model.computed());
             let observed = records.iter().fold(Demand::FORCE, computed);
             self.forces.step(&tick, &mut ports, observed, &heart);
@@ -238,7 +238,7 @@ impl<'r> Replay<'r> {
                 let outputs = replayed(port, &record);
                 difference.add(&record, &outputs);
                 look(&record, &outputs);
-                // The pose that was really held then.
+                // Use the wrench that was commanded in the run.
                 port.commanded = record.commanded;
             }
         }
@@ -256,8 +256,8 @@ impl<'r> Replay<'r> {
 }
 
 impl<'r> Replay<'r> {
-    /// Changes a parameter as it changed in the run. Not if it is held at another value, and not of a model that
-    /// has no such parameter: what that does to the wrench is the answer.
+    /// Repeats a parameter change of the run. Skips it if the user fixed another value, or if the model has no such
+    /// parameter: the effect on the wrench is the result.
     fn repeat(&mut self, change: &Change) -> Result<(), ReplayError> {
         let names = |plugin: &PluginReport| plugin.name == change.plugin;
         let Some(model) = self.plugins.iter().position(names) else { return Ok(()) }; // a device
@@ -279,7 +279,7 @@ impl<'r> Replay<'r> {
         Ok(())
     }
 
-    /// Swaps a model as in the run; not if the user replaced the model for this replay.
+    /// Swaps a model as in the run, unless the user replaced the model for this replay.
     fn replace(&mut self, model: usize, change: &Change, tick: &Tick) -> Result<(), ReplayError> {
         let (Some(used), Some(report)) = (self.uses.get(model), self.plugins.get_mut(model)) else {
             return Ok(());
@@ -290,8 +290,8 @@ impl<'r> Replay<'r> {
         let settings: Vec<(&str, &str)> =
             change.settings.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
         let mut other = used.replaced_by(Some(&change.parameter), &settings);
-        // Settings of the plugin before may not fit this one. A plugin that cannot be loaded has no schema; the
-        // error comes below.
+        // Settings of the previous plugin may not fit this one. A plugin that cannot be loaded has no schema; the error
+        // follows below.
         let plugin = self.registry.load(&other.plugin.plugin, PluginKind::Model);
         let schema = plugin.map_or(&[][..], |plugin| plugin.parameters());
         let is_known = |key: &str| schema.iter().any(|parameter| parameter.id() == key);
@@ -309,7 +309,7 @@ impl<'r> Replay<'r> {
 }
 
 impl Difference {
-    /// Adds one tick; the root mean squares hold sums until [`Self::finish`].
+    /// Adds one tick; the root mean squares contain sums until [`Self::finish`].
     fn add(&mut self, record: &TickRecord, outputs: &ModelOutputs) {
         self.ticks += 1;
         if bits(outputs) != bits(&record.model) {
@@ -317,7 +317,7 @@ impl Difference {
             self.first_tick.get_or_insert(record.tick);
             self.last_tick = Some(record.tick);
         }
-        // Two outputs of which one is not finite have no distance.
+        // Outputs have no distance if one of them is not finite.
         let finite = |distance: f64| if distance.is_finite() { distance } else { 0.0 };
         let force_n = (outputs.force() - record.model.force()).length();
         self.max_force_n = self.max_force_n.max(force_n);
@@ -338,19 +338,19 @@ impl Difference {
         self.rms_torque_nm = self.rms_torque_nm.map(|sum| (sum / ticks).sqrt());
     }
 
-    /// True if every bit of every tick is the same.
+    /// Returns true if every bit of every tick is equal.
     #[must_use]
     pub fn is_bit_exact(&self) -> bool {
         self.differing_ticks == 0
     }
 }
 
-/// The check of the samples of a device of which nothing is known but that a hand holds it.
+/// Returns the plausibility check of a device of unknown capabilities, held by a hand.
 fn any_device(period_ns: u64) -> PlausibilityCheck {
     PlausibilityCheck::new(&Capabilities { sensed: Axes::ALL, ..Capabilities::UNDRIVEN }, period_ns)
 }
 
-/// Looks at what was a new sample in the run: where there was none, the last pose stands in the record.
+/// Checks a sample if it was new in the run: otherwise the record contains the last pose.
 fn look_at_sample(check: &mut PlausibilityCheck, record: &TickRecord) {
     let mut without = Events::STALE_SAMPLE;
     for event in [Events::NOT_FINITE, Events::IMPLAUSIBLE_SAMPLE, Events::DEVICE_FAULT] {
@@ -369,19 +369,19 @@ fn look_at_sample(check: &mut PlausibilityCheck, record: &TickRecord) {
     let _ = check.check(&tick, &state);
 }
 
-/// Outputs of the models now, as far as the record holds them.
+/// Returns the models' outputs now, limited to the recorded ones.
 fn replayed(port: &Port, record: &TickRecord) -> ModelOutputs {
     port.outputs().limited_to(record.model.computed())
 }
 
-/// The outputs that are there, to the bit; every NaN is the same.
+/// Returns the bits of the available outputs; every NaN is equal.
 fn bits(outputs: &ModelOutputs) -> ([u64; 3], Option<[u64; 3]>, Option<u64>) {
     let bits = |number: f64| if number.is_nan() { f64::NAN.to_bits() } else { number.to_bits() };
     let torque = outputs.torque().map(|torque| torque.to_array().map(bits));
     (outputs.force().to_array().map(bits), torque, outputs.energy_j().map(bits))
 }
 
-/// Finds the files that settings of the run named. Settings of this replay are taken as they are.
+/// Replaces files of the run's settings by files of equal content. Settings of this replay are unchanged.
 fn use_recorded_files(
     uses: &mut [ModelUse],
     held: &Held,
@@ -398,7 +398,7 @@ fn use_recorded_files(
     Ok(())
 }
 
-/// The models of a recorded run as a scene would name them.
+/// Returns the models of a recorded run as in a scene.
 fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
     let location = Location { file: PathBuf::from(path), line: 0 };
     let model = |plugin: &flotor_record::PluginDescription| match plugin.role {
@@ -422,7 +422,7 @@ fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
             mapping,
             places_m: plugin.places_m.clone(),
             blend: plugin.blend,
-            isolation: Isolation::None, // no hand is on the device
+            isolation: Isolation::None, // no device, so no hand to protect
             field: plugin.field,
             budget_s: None,
             latency_s: run.devices().nth(usize::from(plugin.device)).map_or(0.0, |device| device.latency_s),

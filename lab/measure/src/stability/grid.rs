@@ -1,4 +1,4 @@
-//! The cases that are measured, side by side on all processors, and what is reported of each.
+//! Grid of cases, measured in parallel, with their results.
 
 use super::search::is_search_end;
 use super::simulated_loop::{Grip, LoopError, LoopSetup};
@@ -7,15 +7,15 @@ use flotor_hal::abi::loader::Plugin;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// One point of the grid.
+/// Point of the grid.
 pub type Case = LoopSetup;
 
-/// A case with its measured limit and what theory says.
+/// Case with its measured and theoretical limits.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Row {
     /// Time between two samples, s.
     pub period_s: f64,
-    /// Whole periods a force waits.
+    /// Delay of a force, whole periods.
     pub delay_ticks: u32,
     /// Drag of the device, N s/m.
     pub plant_damping_ns_per_m: f64,
@@ -23,23 +23,23 @@ pub struct Row {
     pub virtual_damping_ns_per_m: f64,
     /// Step of the position sensor, m.
     pub quantum_m: f64,
-    /// How the device is held.
+    /// Grip of the hand on the device.
     pub hand: Grip,
     /// Largest stable stiffness of the simulated loop, N/m; 0 if there is none.
     pub k_max_n_per_m: f64,
-    /// Of the exact sampled-data system with an ideal sensor, N/m.
+    /// Limit of the exact sampled-data system with an ideal sensor, N/m.
     pub exact_n_per_m: f64,
-    /// Whether the search ended at one of these two: then that limit is above it.
+    /// True if one of these two searches ended at its upper end: then that limit is above it.
     pub search_ended: bool,
-    /// By Gil's rule, N/m.
+    /// Limit by Gil's rule, N/m.
     pub gil_n_per_m: f64,
     /// Largest stiffness that is passive in any hand (Colgate and Schenkel), N/m.
     pub passive_n_per_m: f64,
 }
 
 impl Row {
-    /// Returns the deviation of the measured from the exact limit, as a share of it: infinite where only the measured loop is
-    /// stable, 0 where neither is. `None` where one of them is above the search, or no number: nothing to compare.
+    /// Returns the relative deviation of the measured from the exact limit: infinite where only the measured loop is
+    /// stable, 0 where neither is. `None` where a limit is above the search or NaN.
     #[must_use]
     pub fn deviation(&self) -> Option<f64> {
         let Self { k_max_n_per_m: measured, exact_n_per_m: exact, search_ended, .. } = *self;
@@ -48,15 +48,15 @@ impl Row {
     }
 }
 
-/// Returns the largest magnitude of the deviations of all rows that have one; `None` where none has. Not real-time.
+/// Returns the largest magnitude of the deviations of all rows; `None` without any. Not real-time.
 #[must_use]
 pub fn worst_deviation(rows: &[Row]) -> Option<f64> {
     rows.iter().filter_map(Row::deviation).map(f64::abs).max_by(f64::total_cmp)
 }
 
-/// The default grid: virtual damping from none to beyond its best at three delays, and single cases with more
-/// drag and a faster servo. Its drag of 0.5 N s/m is a quarter of what the simulated flotor has by default: that is an
-/// estimate, and a device that nobody has measured may have less.
+/// Returns the default grid: virtual damping from none to beyond its optimum at three delays, and single cases with
+/// more drag and a faster servo. Its drag of 0.5 N s/m is a quarter of the simulated flotor's default, which is an
+/// estimate: an unmeasured device may have less.
 #[must_use]
 pub fn default_cases() -> Vec<Case> {
     const VIRTUAL_DAMPING_NS_PER_M: [f64; 13] =
@@ -75,11 +75,11 @@ pub fn default_cases() -> Vec<Case> {
     sweep.chain(single).collect()
 }
 
-/// Measures every case on the device of `plugin`, as many at a time as there are processors; `done` is told
-/// after each. The rows come in the order of the cases, whatever the processors did. Not real-time.
+/// Measures every case on the device of `plugin`, in parallel on all processors; `done` is called after each. The rows
+/// are in the order of the cases, independent of the schedule. Not real-time.
 ///
 /// # Errors
-/// [`LoopError`] of the first case that has one.
+/// The first [`LoopError`] of a case.
 pub fn measure(plugin: &Plugin, cases: &[Case], done: impl Fn() + Sync) -> Result<Vec<Row>, LoopError> {
     let rows: Vec<Result<Row, LoopError>> = cases
         .par_iter()

@@ -1,4 +1,4 @@
-//! The stiffest virtual spring that stays stable on a device: measured on the simulated flotor, compared with theory.
+//! Largest stable stiffness of a virtual spring on a device: measured on the simulated flotor, compared with theory.
 //!
 //! A servo renders a spring by sampling the handle's position `x` once a period `T` and a zero-order hold
 //! of the force until the next sample,
@@ -7,14 +7,13 @@
 //! u = K x[k] + B (x[k] - x[k-1]) / T
 //! ```
 //!
-//! (the "virtual wall" of the haptics literature, here felt on both sides). Sampling and holding delay the
-//! force by half a period and more, so the spring returns a little more energy than was put into it; if drag
-//! cannot take that out, the handle starts to buzz by itself. The largest `K` without that is what a device
-//! can render.
+//! (the "virtual wall" of the haptics literature, here acting on both sides). Sampling and holding delay the force by
+//! half a period and more, so the spring returns slightly more energy than it received; if drag cannot dissipate that,
+//! the handle starts to buzz by itself. The largest `K` without that is the limit of the device.
 //!
-//! - [`simulated_loop`]: the loop itself around a loaded device plugin; what counts as stable.
-//! - [`theory`]: the same limit without simulating: exact, by passivity, by Gil's rule.
-//! - [`grid`]: the cases, measured side by side on all processors.
+//! - [`simulated_loop`]: loop around a loaded device plugin, and criterion of stability.
+//! - [`theory`]: limits without simulation: exact, by passivity, by Gil's rule.
+//! - [`grid`]: cases, measured in parallel on all processors.
 //!
 //! Not real-time throughout.
 

@@ -1,25 +1,25 @@
-//! The largest stable stiffness, by doubling and bisection.
+//! Search for the largest stable stiffness, by doubling and bisection.
 
-/// Where the search starts, N/m: softer than anything worth rendering. What is unstable even here has no limit.
+/// Start of the search, N/m: softer than any useful stiffness. A loop that is unstable even here has no limit.
 const SOFTEST_N_PER_M: f64 = 1.0;
-/// Where it ends, N/m: forty times the stiffest wall any haptic device is sold with, and a power of two, which doubling meets.
+/// End of the search, N/m: forty times the stiffest wall of any commercial haptic device, and a power of two, which doubling meets.
 const STIFFEST_N_PER_M: f64 = 1_048_576.0;
 
-/// Returns true if the search for a limit ended before it was found: the loop is stable at this stiffness, N/m, and above. Not
+/// Returns true if the search ended without a limit: the loop is stable at this stiffness, N/m, and above. Not
 /// real-time.
 #[must_use]
 pub fn is_search_end(limit_n_per_m: f64) -> bool {
     limit_n_per_m >= STIFFEST_N_PER_M
 }
 
-/// The stiffness in N/m up to which `is_stable` holds, within a share of `tolerance`; 0 if it never does, and the
-/// [end of the search](is_search_end) if it always does.
+/// Searches for the stiffness, N/m, up to which `is_stable` is true, within a relative `tolerance`; returns 0 if it
+/// never is, and the [end of the search](is_search_end) if it always is.
 ///
 /// Assumes that one interval of stiffness from the softest on is stable, as it is for a spring on a sampled
 /// mass. Not real-time.
 ///
 /// # Errors
-/// Those of `is_stable`.
+/// Errors of `is_stable`.
 pub(super) fn largest_stable<E>(
     tolerance: f64,
     mut is_stable: impl FnMut(f64) -> Result<bool, E>,

@@ -1,14 +1,14 @@
-//! A virtual spring in closed loop with a loaded device, and whether it stays quiet.
+//! Closed loop of a virtual spring and a loaded device, with a test of stability.
 //!
-//! The device is the plugin `simulated`, opened like in any scene; its centre of mass is put at the origin, so
-//! that a push along z stays a translation and the plant is the linear one of [`theory`](super::theory). The
-//! spring is here: it samples the height, computes its force, lets it wait in a delay line and writes it.
+//! The device is the plugin `simulated`, opened as in any scene. Its centre of mass is at the origin, so that a push
+//! along z remains a translation and the plant is the linear one of [`theory`](super::theory). The spring is
+//! implemented here: it samples the height, computes its force, delays it in a delay line and writes it.
 //!
-//! **Stable** means that the envelope of the height shrinks. It is measured as the mean square over two
-//! windows, one after the other, weighted by a Hann window: for an oscillation `e^(s t) sin(w t)` the ratio of
-//! the two is `e^(2 s W)` but for a ripple that falls with the cube of the number of periods in a window `W`.
-//! The loop starts from a displacement so small that no limit of force or range is met; a real device would
-//! meet them, and buzz at that amplitude instead of diverging.
+//! **Stable** means that the envelope of the height shrinks. The measure is the mean square over two successive
+//! windows, weighted by a Hann window: for an oscillation `e^(s t) sin(w t)` their ratio is `e^(2 s W)` but for a
+//! ripple that falls with the cube of the number of periods in a window `W`. The loop starts from a displacement so
+//! small that no limit of force or range is reached; a real device would reach them, and buzz at that amplitude instead
+//! of diverging.
 
 use super::search::largest_stable;
 use super::theory::Plant;
@@ -17,7 +17,7 @@ use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Refusal, Tick, Wr
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-/// How the device is held while its limit is measured.
+/// Grip of the hand on the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Grip {
@@ -30,30 +30,30 @@ pub enum Grip {
     Firm,
 }
 
-/// Why a loop could not be measured.
+/// Failure of a measurement of a loop.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoopError {
-    /// The plugin was refused or refuses.
+    /// The plugin cannot be loaded, or rejects a call.
     #[error(transparent)]
     Plugin(#[from] LoadError),
-    /// The plugin does not understand what the loop asks of a simulated flotor.
+    /// The plugin lacks a parameter of the simulated flotor.
     #[error("the plugin is no simulated flotor: {0}")]
     Setting(#[from] SettingError),
-    /// The device refuses to run.
+    /// The device rejects activation.
     #[error("the device cannot be activated: {0}")]
     Refused(Refusal),
-    /// The device faulted for a reason that is not the loop's.
+    /// The device faulted for a reason outside the loop.
     #[error("the device faulted: {}", .0.advice())]
     Fault(Fault),
 }
 
-/// A loop but for its stiffness.
+/// Configuration of a loop without its stiffness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoopSetup {
     /// Time between two samples, ns.
     pub period_ns: u64,
-    /// Whole periods a force waits before it is written.
+    /// Delay of a force before it is written, whole periods.
     pub delay_ticks: u32,
     /// Drag of the device, N s/m.
     pub plant_damping_ns_per_m: f64,
@@ -61,34 +61,34 @@ pub struct LoopSetup {
     pub virtual_damping_ns_per_m: f64,
     /// Step of the position sensor, m; 0 for an ideal one.
     pub quantum_m: f64,
-    /// How it is held.
+    /// Grip of the hand on the device.
     pub grip: Grip,
 }
 
-/// How closely the limit is searched, as a share of it.
+/// Relative tolerance of the search for the limit.
 const TOLERANCE: f64 = 1.0e-4;
-/// Time for the fast modes to die away, s.
+/// Time for the fast modes to decay, s.
 const SETTLE_S: f64 = 4.0;
 /// Length of each of the two windows, s.
 const WINDOW_S: f64 = 8.0;
-/// First displacement with an ideal sensor, m: at 1e6 N/m a millinewton.
+/// Initial displacement with an ideal sensor, m: at 1e6 N/m a millinewton.
 const IDEAL_START_M: f64 = 1.0e-9;
-/// First displacement with a real one, in its steps: above the limit cycles a quantised loop lives in, and small
-/// enough that a stiff spring does not meet the limits of the coils (10 µm, 60 kN/m: 12 N).
+/// Initial displacement with a quantised sensor, in its steps: above the limit cycles of a quantised loop, and small
+/// enough that a stiff spring stays within the limits of the coils (10 µm, 60 kN/m: 12 N).
 const QUANTISED_START_STEPS: f64 = 20.0;
-/// Limit cycles below this many steps of the sensor are not called unstable.
+/// Amplitude of limit cycles, in steps of the sensor, below which a loop counts as stable.
 const LIMIT_CYCLE_STEPS: f64 = 10.0;
-/// Beyond this many times the first displacement nobody needs to wait for the end: a release overshoots less.
+/// Growth over the initial displacement that ends a simulation early: the overshoot of a release is smaller.
 const GROWN: f64 = 5.0;
-/// Mean square below this many times the first displacement squared: gone.
+/// Mean square, relative to the initial displacement squared, below which a motion has vanished.
 const VANISHED: f64 = 1.0e-12;
 
 impl LoopSetup {
-    /// The largest stiffness at which the loop around `plugin` is stable, N/m; 0 if it is at none. Not
+    /// Returns the largest stiffness at which the loop around `plugin` is stable, N/m; 0 if there is none. Not
     /// real-time.
     ///
     /// # Errors
-    /// [`LoopError`], if the plugin is no simulated flotor or refuses.
+    /// [`LoopError`] if the plugin is not a simulated flotor or rejects a call.
     pub fn limit_n_per_m(&self, plugin: &Plugin) -> Result<f64, LoopError> {
         largest_stable(TOLERANCE, |stiffness_n_per_m| {
             let device = self.open(plugin)?;
@@ -98,11 +98,11 @@ impl LoopSetup {
         })
     }
 
-    /// Mass, damping and stiffness of device and hand together, as the plugin says they are in force. Not
+    /// Returns mass, damping and stiffness of device and hand together, from the plugin's current parameters. Not
     /// real-time.
     ///
     /// # Errors
-    /// [`LoopError`], as above.
+    /// [`LoopError`] if the plugin is not a simulated flotor or rejects a call.
     pub fn plant(&self, plugin: &Plugin) -> Result<Plant, LoopError> {
         let mut device = self.open(plugin)?;
         let mut value = |id: &str| {
@@ -146,7 +146,7 @@ impl LoopSetup {
         if self.quantum_m > 0.0 { QUANTISED_START_STEPS * self.quantum_m } else { IDEAL_START_M }
     }
 
-    /// Runs the loop from a small displacement and judges its envelope.
+    /// Runs the loop from a small displacement and tests whether its envelope shrinks.
     fn is_stable(&self, mut device: ActiveDevice, stiffness_n_per_m: f64) -> Result<bool, LoopError> {
         let start_m = self.start_m();
         let period_s = seconds(self.period_ns);
@@ -185,7 +185,7 @@ impl LoopSetup {
     }
 }
 
-/// The rendered spring and damper, with sensor and delay line.
+/// Rendered spring and damper, with sensor and delay line.
 struct Spring {
     stiffness_n_per_m: f64,
     damping_n_per_m: f64,
@@ -205,7 +205,7 @@ impl Spring {
         }
     }
 
-    /// The force to write now, N, after a sample at `height_m`.
+    /// Returns the force to write now, N, after a sample at `height_m`.
     fn force_n(&mut self, height_m: f64) -> f64 {
         let sensed_m = match self.quantum_m {
             quantum_m if quantum_m > 0.0 => (height_m / quantum_m).round() * quantum_m,
@@ -217,7 +217,7 @@ impl Spring {
     }
 }
 
-/// Mean square over a stretch of samples, weighted by a Hann window.
+/// Mean square of a range of samples, weighted by a Hann window.
 struct Window {
     step: f64,
     phase: f64,

@@ -1,9 +1,9 @@
-//! What theory says about the largest stable stiffness.
+//! Theoretical limits of the stable stiffness.
 //!
-//! Three answers to one question, from exact to handy:
-//! - [`exact_limit_n_per_m`]: the sampled-data system itself. Mass and damper under a held force are discretised
-//!   without error (zero-order hold), spring, damper and delay are added in `z`, and the characteristic
-//!   polynomial must have all roots inside the unit circle. Stability of this device and nothing else.
+//! Three limits, from exact to simple:
+//! - [`exact_limit_n_per_m`]: the sampled-data system itself. Mass and damper under a zero-order hold are discretised
+//! without error, spring, damper and delay are added in `z`, and the characteristic polynomial must have all roots
+//! inside the unit circle. Valid for the stability of this device alone.
 //! - [`passive_limit_n_per_m`]: Colgate and Schenkel (1997, J. Robotic Systems 14:37): the device stays stable
 //!   in *any* passive hand if its own damping exceeds what sampling feeds back at every frequency.
 //! - [`gil_limit_n_per_m`]: Gil, Sanchez, Hulin, Preusche and Hirzinger (2009, J. Comput. Inf. Sci. Eng.
@@ -15,21 +15,21 @@ pub use flotor_judge::plant::Plant;
 use std::convert::Infallible;
 use std::f64::consts::PI;
 
-/// How the spring is rendered.
+/// Rendering of a spring by a sampled loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rendering {
     /// Time between two samples, s.
     pub period_s: f64,
-    /// Whole periods between a sample and the force that answers it, beyond the hold.
+    /// Whole periods between a sample and its force, beyond the hold.
     pub delay_ticks: u32,
     /// Virtual damping by backward difference, N s/m.
     pub virtual_damping_ns_per_m: f64,
 }
 
-/// How closely the exact limit is searched, as a share of it.
+/// Relative tolerance of the search for the exact limit.
 const EXACT_TOLERANCE: f64 = 1.0e-9;
 
-/// Largest stiffness at which the sampled loop is stable, N/m; 0 if it is at none. Not real-time.
+/// Returns the largest stiffness at which the sampled loop is stable, N/m; 0 if there is none. Not real-time.
 #[must_use]
 pub fn exact_limit_n_per_m(plant: &Plant, rendering: &Rendering) -> f64 {
     let held = HeldPlant::new(plant, rendering.period_s);
@@ -39,13 +39,13 @@ pub fn exact_limit_n_per_m(plant: &Plant, rendering: &Rendering) -> f64 {
     limit
 }
 
-/// Largest stiffness a device of `damping_ns_per_m` renders passively, N/m; 0 if it does at none. Not real-time.
+/// Returns the largest stiffness that a device of `damping_ns_per_m` renders passively, N/m; 0 if there is none. Not real-time.
 ///
 /// Colgate and Schenkel's condition `b > T/2 / (1 - cos wT) Re[(1 - e^-jwT) H(e^jwT)]` at every frequency up to
 /// Nyquist's. Without delay it is `b > K T/2 + |B|`; with it, at low frequency, `b > K (T/2 + delay)`.
 #[must_use]
 pub fn passive_limit_n_per_m(damping_ns_per_m: f64, rendering: &Rendering) -> f64 {
-    /// Frequencies looked at: the bounds vary smoothly, over a few periods for a few ticks of delay.
+    /// Number of evaluated frequencies: the bounds vary smoothly, over a few periods for a few ticks of delay.
     const FREQUENCIES: u32 = 4096;
     let Rendering { period_s, delay_ticks, virtual_damping_ns_per_m } = *rendering;
     let delay = f64::from(delay_ticks);
@@ -58,7 +58,7 @@ pub fn passive_limit_n_per_m(damping_ns_per_m: f64, rendering: &Rendering) -> f6
         let of_spring = period_s * (cosine(0.0) - cosine(1.0)) / scale;
         let of_damper = (cosine(0.0) - 2.0 * cosine(1.0) + cosine(2.0)) / scale;
         let left = damping_ns_per_m - virtual_damping_ns_per_m * of_damper;
-        // K of_spring <= left: from above where sampling feeds energy back, from below where it takes it out.
+        // K of_spring <= left: an upper bound where sampling generates energy, a lower bound where it dissipates energy.
         if of_spring > 0.0 {
             most = most.min(left / of_spring);
         } else if left < 0.0 {
@@ -68,7 +68,7 @@ pub fn passive_limit_n_per_m(damping_ns_per_m: f64, rendering: &Rendering) -> f6
     if most >= least && most.is_finite() { most } else { 0.0 }
 }
 
-/// Gil's rule `K < (b + B) / (T/2 + delay)`, N/m, with all damping of device and hand in `b`. Not real-time.
+/// Evaluates Gil's rule `K < (b + B) / (T/2 + delay)`, N/m, with all damping of device and hand in `b`. Not real-time.
 #[must_use]
 pub fn gil_limit_n_per_m(plant: &Plant, rendering: &Rendering) -> f64 {
     let Rendering { period_s, delay_ticks, virtual_damping_ns_per_m } = *rendering;
@@ -76,7 +76,7 @@ pub fn gil_limit_n_per_m(plant: &Plant, rendering: &Rendering) -> f64 {
     sampled.stability_limit(plant.damping_ns_per_m, Damper::BothWays(virtual_damping_ns_per_m))
 }
 
-/// Force to position of a plant whose force is held for a period: `(b1 z + b0) / (z^2 + a1 z + a0)`.
+/// Transfer function from force to position of a plant under a zero-order hold: `(b1 z + b0) / (z^2 + a1 z + a0)`.
 struct HeldPlant {
     a0: f64,
     a1: f64,
@@ -91,8 +91,8 @@ impl HeldPlant {
     }
 }
 
-/// Characteristic polynomial of the loop, lowest power first:
-/// `(z^2 + a1 z + a0) z^(d+1) + (b1 z + b0) ((K + B/T) z - B/T)`.
+/// Returns the characteristic polynomial of the loop, lowest power first: `(z^2 + a1 z + a0) z^(d+1) + (b1 z + b0) ((K
+/// + B/T) z - B/T)`.
 fn characteristic(plant: &HeldPlant, rendering: &Rendering, stiffness_n_per_m: f64) -> Vec<f64> {
     let HeldPlant { a0, a1, b0, b1 } = *plant;
     let damper = rendering.virtual_damping_ns_per_m / rendering.period_s;
@@ -103,7 +103,7 @@ fn characteristic(plant: &HeldPlant, rendering: &Rendering, stiffness_n_per_m: f
     open_loop.zip(fed_back).map(|(open, back)| open + back).collect()
 }
 
-/// True if all roots of a real polynomial, lowest power first, lie strictly inside the unit circle: the
+/// Returns true if all roots of a real polynomial, lowest power first, lie strictly inside the unit circle: the
 /// Schur-Cohn recursion (Jury 1964), which lowers the degree one by one without computing a root.
 fn is_schur_stable(mut polynomial: Vec<f64>) -> bool {
     while let (Some(&last), Some(&first), true) =

@@ -1,4 +1,4 @@
-//! What differs between systems for a test of scenes: who may read a result.
+//! System interface of the scene tests: read permission of results.
 
 #[cfg(not(windows))]
 mod unix;

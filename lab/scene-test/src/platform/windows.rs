@@ -1,9 +1,9 @@
-//! Windows: a file has the rights of its folder.
+//! Windows: a file inherits the permissions of its folder.
 
 use std::fs::File;
 use std::io;
 
-/// A scratch file too is for those who may read its folder.
+/// Does nothing: a temporary file has the permissions of its folder too.
 #[allow(clippy::unnecessary_wraps)] // as on other systems
 pub(crate) fn readable_by_all(_: &File) -> io::Result<()> {
     Ok(())

@@ -1,12 +1,11 @@
-//! Whether a step computes and does nothing else.
+//! Check that a step only computes.
 //!
-//! The kernel can lock a thread in (seccomp, strict mode): whatever it asks of the system but to read and to
-//! write ends that thread. A thread that has been locked in walks a model along a path; one that comes
-//! through has opened no file, started no thread, and waited for no other thread.
+//! The kernel can sandbox a thread (seccomp, strict mode): any system call other than read and write ends that thread.
+//! A sandboxed thread steps a model along a path; if it completes, the model has opened no file, started no thread, and
+//! waited for no other thread.
 //!
-//! An allocation is such a call as well, if the C library is told to serve each from the system, which
-//! [`C_LIBRARY`] does: of a pair of `malloc` and `free` nothing else is left to see. Reading and writing are
-//! counted by the kernel.
+//! An allocation is a system call too if the C library serves each one from the system, as [`C_LIBRARY`] sets;
+//! otherwise a pair of `malloc` and `free` would leave no trace. The kernel counts reads and writes.
 
 use crate::validate::Seen;
 use crate::validate::path::walk;
@@ -22,18 +21,18 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
-/// Environment variable of the GNU C library, and what makes each allocation a system call: mappings from the
-/// first byte on, in one arena; no more of them than the kernel allows a process.
+/// Environment variable of the GNU C library that makes each allocation a system call: mappings from the first byte on,
+/// in one arena, and no more of them than the kernel allows a process.
 const C_LIBRARY: (&str, &str) =
     ("GLIBC_TUNABLES", "glibc.malloc.mmap_threshold=0:glibc.malloc.mmap_max=30000:glibc.malloc.arena_max=1");
 
-/// How the process ends in which a step called the system.
+/// Signal that ends the process after a system call in a step.
 const CAUGHT: Signal = Signal::SYS;
 
-/// Steps; the first is locked in, too: a loop has no other.
+/// Number of steps; the first is sandboxed too, because a loop treats all steps alike.
 const STEPS: usize = 1000;
 
-/// How often the thread is looked at.
+/// Poll interval of the thread's progress.
 const LOOK: Duration = Duration::from_millis(2);
 
 const WAITING: u8 = 0;
@@ -42,19 +41,18 @@ const NOT_ALLOWED: u8 = 2;
 const DONE: u8 = 3;
 const FAILED: u8 = 4;
 
-/// Prepares the process of the check.
+/// Prepares the process of the check: sets the allocator's environment variable.
 pub(crate) fn prepare(command: &mut Command) {
     let (variable, value) = C_LIBRARY;
     command.env(variable, value);
 }
 
-/// Whether a process ended because a step called the system, by the signal that ended it.
+/// Returns true if a process was ended because a step made a system call, by its signal.
 pub(crate) fn has_caught(signal: i32) -> bool {
     signal == CAUGHT.as_raw()
 }
 
-/// Walks the model in a thread that is locked in. **Ends this process** by [`CAUGHT`] if a step called the
-/// system.
+/// Steps the model in a sandboxed thread. **Ends this process** by [`CAUGHT`] if a step made a system call.
 pub(crate) fn system_calls(model: Model) -> Result<(), Seen> {
     let stage = Arc::new(AtomicU8::new(WAITING));
     let (ready, told) = channel();
@@ -70,7 +68,7 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Seen> {
     let before = transfers(&folder);
     stage.store(LOCKED, Ordering::Release);
     loop {
-        // First whether it is there, then what it said last.
+        // Read the folder first, then the stage: the thread stores its stage before it ends.
         let is_there = folder.exists();
         match stage.load(Ordering::Acquire) {
             DONE => break,
@@ -90,7 +88,7 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Seen> {
     }
 }
 
-/// What the thread does: never ends once it is locked in.
+/// Runs the thread of the check; once sandboxed it never ends.
 fn walk_locked_in(mut model: Model, ready: &Sender<i32>, stage: &AtomicU8) {
     let inputs: Vec<Input> = walk(STEPS as u64).collect();
     let _ = ready.send(gettid().as_raw_nonzero().get());
@@ -107,20 +105,20 @@ fn walk_locked_in(mut model: Model, ready: &Sender<i32>, stage: &AtomicU8) {
         is_answered &= model.step(input, &mut output) == CallStatus::Ok;
     }
     stage.store(if is_answered { DONE } else { FAILED }, Ordering::Release);
-    // To go home is a system call, too: it ends with the process.
+    // Ending the thread is a system call too: spin until the process ends.
     loop {
         std::hint::spin_loop();
     }
 }
 
-/// The thread is gone, and may have held the lock of the allocator: nothing may be allocated any more, so
-/// nothing can be said either. The signal says it.
+/// Ends this process by [`CAUGHT`]. The dead thread may hold the lock of the allocator: no allocation and so no message
+/// is possible; the signal is the message.
 fn end_here() -> ! {
     let _ = kill_process(getpid(), CAUGHT);
     std::process::abort()
 }
 
-/// How often a thread has read and written; `None` where the kernel does not count.
+/// Returns the number of reads and writes of a thread; `None` where the kernel does not count.
 fn transfers(folder: &Path) -> Option<u64> {
     let text = std::fs::read_to_string(folder.join("io")).ok()?;
     let count =

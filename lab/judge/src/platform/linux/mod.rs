@@ -1,4 +1,4 @@
-//! Linux: anonymous files, signals, the clock of a thread's processor, seccomp.
+//! Linux: anonymous files, signals, processor time of threads, seccomp.
 
 pub(crate) mod locked;
 pub(crate) mod state;
@@ -17,45 +17,45 @@ use std::time::Duration;
 /// Unit of processor times under /proc: `USER_HZ` is 100 on every Linux.
 const CLOCK_TICK: Duration = Duration::from_millis(10);
 
-/// A file without a name in any folder.
+/// Creates a file without a name in any folder.
 pub(crate) fn anonymous_file(name: &str) -> io::Result<File> {
     Ok(File::from(memfd_create(name, MemfdFlags::CLOEXEC)?))
 }
 
-/// Standard input, as the file that it is.
+/// Returns standard input as a file.
 pub(crate) fn standard_input() -> io::Result<File> {
     Ok(File::from(io::stdin().as_fd().try_clone_to_owned()?))
 }
 
-/// The signal that ended a process, if one did.
+/// Returns the signal that ended a process, if any.
 pub(crate) fn ending_signal(end: ExitStatus) -> Option<i32> {
     end.signal()
 }
 
-/// Ends this process at once, by a signal that nobody can take.
+/// Ends this process at once, by a signal that cannot be caught.
 pub(crate) fn end_at_once() {
     kill_process(getpid(), Signal::KILL).ok();
 }
 
-/// Time this thread had a processor: what others do on it does not count.
+/// Returns the processor time of this thread; time of other threads does not count.
 pub(crate) fn processor_time() -> Duration {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     Duration::try_from(now).unwrap_or_default()
 }
 
-/// What a process did so far, and whether it would do more now.
+/// Returns the processor time of a process, and whether it is waiting to run.
 pub(crate) fn used(process: u32) -> Used {
     let fields_of = |path: String| -> Vec<String> {
         let text = std::fs::read_to_string(path).unwrap_or_default();
         text.rsplit(')').next().unwrap_or_default().split_whitespace().map(str::to_owned).collect()
     };
-    // Fields 14 and 15 of proc(5), user and system; the state, field 3, comes first after the name.
+    // Fields 14 and 15 of proc(5), user and system time; after the name comes the state, field 3.
     let fields = fields_of(format!("/proc/{process}/stat"));
     let ticks = |field: usize| fields.get(field - 3).and_then(|text| text.parse::<u32>().ok()).unwrap_or(0);
     let mut threads = std::fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
     let wants = threads.any(|thread| {
         let state = fields_of(thread.path().join("stat").display().to_string());
-        // Runs or would run; waits for a disk, or for a page.
+        // Running or runnable; waiting for a disk or a page.
         state.first().is_some_and(|state| matches!(state.as_str(), "R" | "D"))
     });
     Used { ran: CLOCK_TICK * ticks(14).saturating_add(ticks(15)), wants }

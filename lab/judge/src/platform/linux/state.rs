@@ -1,4 +1,4 @@
-//! What the kernel tells of this process and thread, by the files under `/proc`.
+//! State of this process and thread, from the files under `/proc`.
 
 use crate::validate::Seen;
 use crate::validate::untouched::{May, Part};
@@ -7,12 +7,12 @@ use rustix::process::{WaitOptions, waitpid};
 use std::fs;
 use std::path::Path;
 
-/// That nothing is known.
+/// Returns the finding that `/proc` is missing.
 fn no_files() -> Seen {
     Seen::Missing("the system has no /proc, which the test needs".to_owned())
 }
 
-/// The parts of the state of this process and thread that only the kernel tells, or why it does not.
+/// Returns the parts of the state of this process and thread that only the kernel knows, or the reason of a failure.
 pub(crate) fn of_the_system() -> Result<Vec<Part>, Seen> {
     let whole = |path: &str| fs::read_to_string(path).unwrap_or_default();
     let (process, thread) = (whole("/proc/self/status"), whole("/proc/thread-self/status"));
@@ -37,15 +37,15 @@ pub(crate) fn of_the_system() -> Result<Vec<Part>, Seen> {
     ])
 }
 
-/// Threads of this process, or why they are not known.
+/// Returns the number of threads of this process, or the reason of a failure.
 pub(crate) fn threads() -> Result<usize, Seen> {
     fs::read_dir("/proc/self/task").map(Iterator::count).map_err(|_| no_files())
 }
 
-/// Whether this process has loaded a library of that name, started with it before all others.
+/// Checks that this process has loaded a library of that name, preloaded before all others.
 ///
 /// # Errors
-/// It has not.
+/// [`Seen::Missing`] if the library is not loaded.
 pub(crate) fn is_loaded_first(library: &str) -> Result<(), Seen> {
     let mapped = fs::read_to_string("/proc/self/maps").unwrap_or_default();
     match mapped.contains(library) {
@@ -54,7 +54,7 @@ pub(crate) fn is_loaded_first(library: &str) -> Result<(), Seen> {
     }
 }
 
-/// Whether this process has started others.
+/// Returns whether this process has child processes, as text.
 fn children() -> &'static str {
     match waitpid(None, WaitOptions::NOHANG) {
         Err(Errno::CHILD) => "none",
@@ -62,7 +62,7 @@ fn children() -> &'static str {
     }
 }
 
-/// A set of signals by their numbers, without 32 and 33: the C library uses those for its threads.
+/// Formats a set of signals by their numbers, without 32 and 33: the C library uses those for its threads.
 fn signals(status: &str, name: &str) -> String {
     let set = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix(name)?.trim(), 16).ok());
     let set = set.unwrap_or_default();
@@ -71,7 +71,7 @@ fn signals(status: &str, name: &str) -> String {
     format!("{name} {}", if numbers.is_empty() { "none".to_owned() } else { numbers.join(" ") })
 }
 
-/// Priority, nice value, real-time priority and policy, by their fields in proc(5).
+/// Returns nice value, real-time priority and policy, by their fields in proc(5).
 fn scheduling() -> Vec<String> {
     let text = fs::read_to_string("/proc/thread-self/stat").unwrap_or_default();
     let fields: Vec<&str> = text.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
@@ -79,7 +79,7 @@ fn scheduling() -> Vec<String> {
     [("nice", 19), ("real-time priority", 40), ("policy", 41)].map(of).to_vec()
 }
 
-/// Open files as the system names them; the folder that is being read is among them, under another name each time.
+/// Returns the open files, without the folder being read, whose name differs each time.
 fn files() -> Vec<String> {
     let entries = fs::read_dir("/proc/self/fd").into_iter().flatten().flatten();
     let named = entries.filter_map(|entry| Some((entry.file_name(), fs::read_link(entry.path()).ok()?)));
