@@ -1,4 +1,4 @@
-//! Results under codes: whether anything differs can be seen, but not what is which.
+//! Blinded results: show differences under codes without revealing the conditions.
 
 use super::{Analysis, ResponseRow};
 use flotor_statistics::anova::Effect;
@@ -6,55 +6,55 @@ use flotor_statistics::describe::mean;
 use flotor_study::blinding::Codes;
 use serde::Serialize;
 
-/// A response under a coded condition: a row of the table for other programs.
+/// Response under a coded condition: a row of the exported table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BlindedRow {
-    /// Who: `sub-01`.
+    /// Subject: `sub-01`.
     pub subject: String,
-    /// Code of the modality they started with.
+    /// Code of the subject's first modality.
     pub first_modality: &'static str,
     /// Code of the modality.
     pub modality: &'static str,
-    /// Code of the base, or of the stimulus rated.
+    /// Code of the base or rated stimulus.
     pub level: usize,
     /// Threshold as a share of the base, or scaled rating.
     pub response: f64,
 }
 
-/// The mean under one coded condition.
+/// Mean under one coded condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BlindedCell {
-    /// Modality and level: `A2`.
+    /// Code of modality and level: `A2`.
     pub condition: String,
-    /// Mean over subjects: of thresholds as shares of the base, or of scaled ratings.
+    /// Mean over subjects, of thresholds as shares of the base or of scaled ratings.
     pub mean: f64,
 }
 
-/// An analysis under codes.
+/// Analysis under codes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BlindedAnalysis {
-    /// "jnd" or "magnitude".
+    /// Task label: "jnd" or "magnitude".
     pub task: &'static str,
-    /// Sittings analysed.
+    /// Number of analysed sittings.
     pub subjects: usize,
-    /// Effects; their names tell what was varied, not which way it went.
+    /// Effects of the analysis of variance; their names show the factors, not the direction.
     pub anova: Vec<Effect>,
     /// Means by condition, in the order of the codes.
     pub cells: Vec<BlindedCell>,
-    /// What they are computed from.
+    /// Responses from which the effects are computed.
     #[serde(skip)]
     pub responses: Vec<BlindedRow>,
 }
 
 impl BlindedAnalysis {
-    /// Puts codes over a result.
+    /// Replaces the conditions of a result by codes.
     #[must_use]
     pub fn of(analysis: &Analysis, codes: &Codes) -> Self {
         let (task, subjects, anova) = match analysis {
             Analysis::Jnd(jnd) => (jnd.task, jnd.subjects, jnd.anova.clone()),
             Analysis::Magnitude(magnitude) => (magnitude.task, magnitude.subjects, magnitude.anova.clone()),
         };
-        // A threshold in the unit of the stimulus would give its base away.
+        // A threshold in the unit of the stimulus would reveal its base.
         let unit = |row: &ResponseRow| if task == "jnd" { row.stimulus } else { 1.0 };
         let blinded = |row: &ResponseRow| BlindedRow {
             subject: row.subject.clone(),
@@ -78,7 +78,7 @@ impl BlindedAnalysis {
         Self { task, subjects, anova, cells, responses }
     }
 
-    /// The page for people.
+    /// Formats the analysis as a text page.
     #[must_use]
     pub fn to_text(&self) -> String {
         super::text::blinded(self)

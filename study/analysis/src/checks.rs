@@ -1,4 +1,4 @@
-//! How a subject did in the trials that check them: catch trials and trials presented once more.
+//! Results of the check trials of a subject: catch trials, obvious pairs and repeated trials.
 
 use super::SubjectRecord;
 use flotor_statistics::describe::mean;
@@ -7,29 +7,29 @@ use flotor_study::sitting::Verdict;
 use flotor_study::trial::{Phase, Position, Presented, Response};
 use serde::Serialize;
 
-/// What came of the checks of one subject.
+/// Check results of one subject.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubjectChecks {
-    /// Who: `sub-01`.
+    /// Subject: `sub-01`.
     pub subject: String,
-    /// Catch trials: pairs without any difference.
+    /// Number of catch trials: pairs of equal stimuli.
     pub catch_trials: usize,
-    /// Of those, answers that named one of the two.
+    /// Number of catch trials in which a stimulus was named.
     pub false_alarms: usize,
-    /// Pairs with an obvious difference.
+    /// Number of pairs with an obvious difference.
     pub obvious_pairs: usize,
-    /// Of those, answers that did not name the larger one.
+    /// Number of obvious pairs whose larger stimulus was not named.
     pub missed_obvious: usize,
-    /// Trials presented once more.
+    /// Number of trials presented once more.
     pub repeat_checks: usize,
-    /// Share of them with the same answer as the first time; none for ratings.
+    /// Share of repeated trials with the same answer as before; `None` for ratings.
     pub agreement: Option<f64>,
-    /// Deviation of a single rating between the two times, as a share of the subject's mean rating; none for pairs.
+    /// Deviation of a single rating between the two presentations, as a share of the subject's mean rating; `None` for pairs.
     pub retest_deviation: Option<f64>,
 }
 
 impl SubjectChecks {
-    /// Of a subject's data so far.
+    /// Evaluates the checks in a subject's data so far.
     #[must_use]
     pub fn of(record: &SubjectRecord) -> Self {
         let of_phase = |phase| {
@@ -66,19 +66,19 @@ impl SubjectChecks {
         }
     }
 
-    /// Share of the catch trials in which one was named.
+    /// Returns the share of catch trials with a false alarm; `None` without catch trials.
     #[must_use]
     pub fn false_alarm_share(&self) -> Option<f64> {
         (self.catch_trials > 0).then(|| self.false_alarms as f64 / self.catch_trials as f64)
     }
 
-    /// Share of the obvious pairs whose larger stimulus was not named.
+    /// Returns the share of obvious pairs missed; `None` without obvious pairs.
     #[must_use]
     pub fn missed_obvious_share(&self) -> Option<f64> {
         (self.obvious_pairs > 0).then(|| self.missed_obvious as f64 / self.obvious_pairs as f64)
     }
 
-    /// One line for people; empty if there were no checks.
+    /// Formats the results as one line; empty without checks.
     #[must_use]
     pub fn to_text(&self) -> String {
         let catch = (self.catch_trials > 0).then(|| {
@@ -110,7 +110,7 @@ fn names_the_larger(event: &TrialEvent) -> bool {
     matches!(event.trial.presented, Presented::Pair(pair) if pair.larger_at == named)
 }
 
-/// The answer when a trial was presented before: the last time it counted, in the same track or replication.
+/// Returns the earlier answer to a repeated trial: the last counted one in the same track or replication.
 fn first_time(record: &SubjectRecord, place: usize, check: &TrialEvent) -> Option<Response> {
     let same = |event: &&TrialEvent| {
         let (one, other) = (&event.trial, &check.trial);

@@ -1,4 +1,4 @@
-//! Application of the rules of exclusion to complete sittings.
+//! Applies the exclusion rules to complete sittings.
 
 use crate::large::wrong_at_large;
 use crate::{Estimator, SubjectChecks, SubjectRecord};
@@ -9,25 +9,25 @@ use flotor_study::trial::{Modality, Presented, Response, Trial};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// What the rules leave, and what they took.
+/// Result of applying the rules.
 #[derive(Clone, Debug, Default)]
 pub struct Applied {
-    /// What is left to analyse.
+    /// Remaining data for the analysis.
     pub kept: Vec<SubjectRecord>,
-    /// What was excluded.
+    /// Excluded data with the reasons.
     pub excluded: Vec<Exclusion>,
     /// Rules that could not be applied.
     pub not_applied: Vec<NotApplied>,
 }
 
-/// A rule that could not be applied to some subjects.
+/// Rule that could not be applied to some subjects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NotApplied {
-    /// As the study file has it.
+    /// Name of the rule in the study file.
     pub rule: &'static str,
-    /// What is not known.
+    /// Missing information.
     pub why: &'static str,
-    /// Of whom.
+    /// Subjects concerned.
     pub subjects: Vec<SubjectNumber>,
 }
 
@@ -38,7 +38,7 @@ impl std::fmt::Display for NotApplied {
     }
 }
 
-/// Applies the rules to complete sittings; `rate_hz` is the rate of the servo, if there was one.
+/// Applies the rules to complete sittings; `rate_hz` is the servo rate, `None` without a scene.
 #[must_use]
 pub fn apply(
     rules: &ExclusionRules,
@@ -61,7 +61,7 @@ pub fn apply(
         let kept = without(&record, &new);
         applied.excluded.extend(new);
         match emptied(protocol, estimator, &kept) {
-            // Nothing to compare with would be left: the whole sitting goes.
+            // A condition would be empty: exclude the whole sitting.
             Some(found) => applied.excluded.push(Exclusion {
                 subject: record.subject,
                 scope: Scope::Sitting,
@@ -74,7 +74,7 @@ pub fn apply(
     applied
 }
 
-/// Applies the rules about trials, and returns the numbers of the excluded trials.
+/// Applies the trial rules and returns the numbers of the excluded trials.
 fn excluded_trials(
     rules: &ExclusionRules,
     record: &SubjectRecord,
@@ -118,7 +118,7 @@ fn outside_rule(
     if exploration.kinematics.is_empty() {
         applied.cannot("least_movement_mm", "no movement was stored", subject);
     }
-    // Who felt a trial again has entries for each stimulus several times: their ways are added up.
+    // A repeated presentation adds further entries for each stimulus: sum their path lengths.
     let (felt, stimuli) = (&exploration.kinematics, event.trial.presented.values().len().max(1));
     let way_mm = |stimulus: usize| {
         let here = felt.iter().skip(stimulus).step_by(stimuli);
@@ -177,7 +177,7 @@ impl Applied {
         }
     }
 
-    /// Returns what the rules that excluded something depend on beside the subject.
+    /// Returns the warnings for rules that excluded something and depend on more than the subject.
     pub fn cautions(&self) -> impl Iterator<Item = &'static str> {
         let mut rules: Vec<&str> = self.excluded.iter().map(|exclusion| exclusion.rule).collect();
         rules.sort_unstable();
@@ -185,7 +185,7 @@ impl Applied {
         rules.into_iter().filter_map(ExclusionRules::caution)
     }
 
-    /// What was excluded by which rule, for people.
+    /// Formats the exclusions with their rules.
     #[must_use]
     pub fn to_text(&self, rules: &ExclusionRules) -> String {
         let mut lines = vec![
@@ -210,7 +210,7 @@ impl Applied {
     }
 }
 
-/// Share of the ticks missed while stimuli were felt.
+/// Returns the share of ticks missed while stimuli were felt.
 fn missed_share(counted: &[&TrialEvent], rate_hz: Option<f64>) -> Option<f64> {
     let felt = counted.iter().filter(|event| !event.exploration.kinematics.is_empty());
     let time_s =
@@ -229,13 +229,13 @@ fn without(record: &SubjectRecord, excluded: &[Exclusion]) -> SubjectRecord {
     kept
 }
 
-/// Finds a condition with nothing to compute a result from, because the rules left nothing or no track came to a threshold.
+/// Finds a condition without a result, because rules excluded all of it or no track reached a threshold.
 fn emptied(protocol: &Protocol, estimator: Estimator, kept: &SubjectRecord) -> Option<String> {
     let level = |event: &TrialEvent| match event.trial.presented {
         Presented::Pair(pair) => pair.base,
         Presented::One { value } => value,
     };
-    // A track without a threshold has answers, and no result.
+    // A track without a threshold has answers, but no result.
     let by_tracks = matches!((protocol, estimator), (Protocol::Jnd(_), Estimator::Procedure));
     let has_result = |(modality, at): (Modality, f64)| {
         if by_tracks {

@@ -1,4 +1,4 @@
-//! Thresholds: Weber fractions, their difference between modalities, effects of base, modality and order.
+//! Analysis of thresholds: Weber fractions, their difference between modalities, effects of base, modality and order.
 
 use super::kinematics::{KinematicMeasure, measures};
 use super::published::Beside;
@@ -17,7 +17,7 @@ use flotor_study::sitting::Verdict;
 use flotor_study::trial::{Modality, Presented};
 use serde::Serialize;
 
-/// A number for each modality.
+/// Values for the two modalities.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WeberFractions<T> {
     /// Vision and haptics.
@@ -36,60 +36,60 @@ impl<T> WeberFractions<T> {
     }
 }
 
-/// Mean threshold under one condition: a bar of figure 18.
+/// Mean threshold in one condition: a bar of figure 18.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ThresholdCell {
-    /// Modality.
+    /// Modality of the condition.
     pub modality: Modality,
-    /// Base.
+    /// Base, in the unit of the stimulus.
     pub base: f64,
-    /// Threshold in the unit of the stimulus, over subjects.
+    /// Mean threshold over subjects, in the unit of the stimulus.
     pub threshold: MeanInterval,
 }
 
-/// The result of a difference experiment. The names of the fields are a contract: scripts rely on them.
+/// Result of a difference experiment. The field names are a stable interface for scripts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JndAnalysis {
-    /// "jnd".
+    /// Task label: "jnd".
     pub task: &'static str,
-    /// Sittings analysed.
+    /// Number of analysed sittings.
     pub subjects: usize,
-    /// How thresholds were found.
+    /// Estimator of the thresholds.
     pub estimator: Estimator,
     /// Mean threshold as a share of the base.
     pub weber: WeberFractions<f64>,
-    /// The same with its variation and 95 % confidence interval.
+    /// Mean threshold as a share of the base, with its variation and 95 % confidence interval.
     pub weber_detail: WeberFractions<MeanInterval>,
     /// Paired t-test between the modalities, positive if haptics alone is worse.
     pub t: Outcome<TTest>,
-    /// Thresholds in the unit of the stimulus: order x modality x base.
+    /// Effects on thresholds in the unit of the stimulus: order x modality x base.
     pub anova: Vec<Effect>,
-    /// Thresholds as a share of the base, within each modality: is the Weber fraction constant over bases?
+    /// Effect of the base on thresholds as shares of the base, within each modality; `None` for a single base.
     pub constancy: WeberFractions<Option<Effect>>,
     /// R² of the linear trend of thresholds over bases (all modalities); NaN (`null` in JSON) without three bases, or with equal means.
     pub linear_r2: f64,
     /// Thresholds by condition.
     pub thresholds: Vec<ThresholdCell>,
-    /// Pairs presented for real, per subject.
+    /// Mean number of presented pairs per subject.
     pub pairs_per_subject: f64,
-    /// Tracks that never came to a threshold; they are left out.
+    /// Number of tracks without a threshold, which are not analysed.
     pub unfinished_tracks: usize,
-    /// Thresholds of the modalities at each base, and Weber fractions of the bases: which differ.
+    /// Pairwise comparisons of the modalities at each base, and of the Weber fractions of the bases.
     pub post_hoc: Vec<PostHoc>,
-    /// How people moved; empty without kinematics.
+    /// Movement measures; empty without kinematics.
     pub kinematics: Vec<KinematicMeasure>,
-    /// What of the thesis may stand beside it.
+    /// Comparability with the thesis.
     #[serde(skip)]
     pub beside: Beside,
-    /// What the effects are computed from.
+    /// Responses from which the effects are computed.
     #[serde(skip)]
     pub responses: Vec<ResponseRow>,
 }
 
-/// Analyses thresholds.
+/// Analyses the thresholds of a study.
 ///
 /// # Errors
-/// [`AnalysisError`], if a subject has no threshold in some condition.
+/// [`AnalysisError`] if a subject has no threshold in some condition.
 pub fn analyse_jnd(
     protocol: &JndProtocol,
     subjects: &[SubjectRecord],
@@ -138,7 +138,7 @@ pub fn analyse_jnd(
     })
 }
 
-/// A subject's thresholds as shares of the base, averaged over replications.
+/// Thresholds of a subject as shares of the base, averaged over replications.
 struct Fractions {
     vh: Vec<f64>,
     h: Vec<f64>,
@@ -174,7 +174,7 @@ impl Fractions {
         mean(self.modality(modality))
     }
 
-    /// In the unit of the stimulus, modality by base.
+    /// Returns the thresholds in the unit of the stimulus, modality by base.
     fn thresholds(&self, protocol: &JndProtocol) -> Vec<f64> {
         let each =
             |modality| self.modality(modality).iter().zip(&protocol.bases).map(|(share, base)| share * base);
@@ -182,14 +182,14 @@ impl Fractions {
     }
 }
 
-/// Mean over the replications whose track came to a threshold.
+/// Returns the mean threshold over the replications with a threshold.
 fn mean_of_tracks(record: &SubjectRecord, modality: Modality, base: f64) -> Option<f64> {
     let tracks = record.tracks.iter().filter(|track| track.modality == modality && track.base == base);
     let thresholds: Vec<f64> = tracks.filter_map(|track| track.threshold).collect();
     (!thresholds.is_empty()).then(|| mean(&thresholds))
 }
 
-/// The most likely threshold in the light of all answers at a base.
+/// Returns the most likely threshold given all answers at a base.
 fn map_of_trials(
     protocol: &JndProtocol,
     record: &SubjectRecord,
@@ -208,7 +208,7 @@ fn map_of_trials(
     (!observed.is_empty()).then(|| most_likely(&observed, &Prior::default(), target).threshold)
 }
 
-/// Does the Weber fraction change with the base? Nothing to ask of a single base.
+/// Tests the constancy of the Weber fraction over bases; `None` for a single base.
 fn constancy(
     protocol: &JndProtocol,
     fractions: &[Fractions],

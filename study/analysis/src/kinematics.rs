@@ -1,7 +1,7 @@
-//! How people moved: mean speed, acceleration and force along the vertical, over stimulus and modality.
+//! Analysis of movements: mean speed, acceleration and force along the vertical, over stimulus and modality.
 //!
-//! Of a pair, the base alone counts. An adaptive procedure presents larger comparisons where thresholds are larger, and a larger
-//! stimulus is moved otherwise by the same hand: the comparisons would give each modality an effect that is its threshold's.
+//! Of a pair, only the base is analysed. An adaptive procedure presents larger comparisons where thresholds are larger, and the
+//! same hand moves a larger stimulus differently: the comparisons would add an effect of the threshold to each modality.
 
 use super::{AnalysisError, AnalysisOptions, CONFIDENCE, SubjectRecord, conditions, within_factors};
 use flotor_statistics::anova::{Design, Effect, analyse};
@@ -11,7 +11,7 @@ use flotor_study::log::TrialEvent;
 use flotor_study::trial::{Position, Presented};
 use serde::Serialize;
 
-/// A measure of movement: its name, and the number it is.
+/// Name and accessor of a movement measure.
 type Measure = (&'static str, fn(&StimulusKinematics) -> f64);
 
 /// The measures of CMU-RI-TR-07-21, section 4.3.
@@ -21,23 +21,23 @@ const MEASURES: [Measure; 3] = [
     ("mean force", |one| one.mean_force_n),
 ];
 
-/// One measure: means and effects.
+/// Analysis of one movement measure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KinematicMeasure {
-    /// What was measured, in SI units.
+    /// Name of the measure, in SI units.
     pub measure: &'static str,
-    /// Modality x stimulus.
+    /// Effects of modality x stimulus.
     pub anova: Vec<Effect>,
     /// Mean over subjects and modalities at each level of the stimulus, in order.
     pub means: Vec<f64>,
     /// Standard error of each mean over subjects.
     pub standard_errors: Vec<f64>,
-    /// Exponent of the stimulus to which the measure is proportional, over subjects: 1 where it is directly, -1 where it is inversely
-    /// proportional; none of a single level.
+    /// Mean over subjects of the exponent of a power law of the stimulus: 1 for direct, -1 for inverse proportionality; `None` for
+    /// a single level.
     pub exponent: Option<MeanInterval>,
 }
 
-/// Analyses movements over the levels of the stimulus (bases, or stimuli rated). Nothing where some were not measured.
+/// Analyses movements over the levels of the stimulus (bases, or rated stimuli). Empty if a measurement is missing.
 pub(super) fn measures(
     levels: &[f64],
     subjects: &[SubjectRecord],
@@ -64,7 +64,7 @@ pub(super) fn measures(
     Ok(found)
 }
 
-/// Standard error over subjects of the mean of both modalities at a level; NaN for one subject.
+/// Returns the standard error over subjects of the mean of both modalities at a level; NaN for one subject.
 fn standard_error(rows: &[Vec<f64>], level: usize, levels: usize) -> f64 {
     let of_subject =
         |row: &Vec<f64>| mean(&row.iter().skip(level).step_by(levels).copied().collect::<Vec<_>>());
@@ -72,8 +72,8 @@ fn standard_error(rows: &[Vec<f64>], level: usize, levels: usize) -> f64 {
     deviation(&means) / (means.len() as f64).sqrt()
 }
 
-/// Slope of the logarithm of a subject's measure, both modalities together, over the logarithm of the stimulus, by least squares; none
-/// of a single level, or where a mean is not above 0.
+/// Returns the least-squares slope of a subject's log measure, averaged over modalities, over the log stimulus; `None` for a single
+/// level, or if a mean is not above 0.
 fn exponent(levels: &[f64], row: &[f64]) -> Option<f64> {
     let (vh, h) = row.split_at_checked(levels.len())?;
     let x: Vec<f64> = levels.iter().map(|level| libm::log(*level)).collect();
@@ -85,7 +85,7 @@ fn exponent(levels: &[f64], row: &[f64]) -> Option<f64> {
     slope.is_finite().then_some(slope)
 }
 
-/// Means of one subject, modality by level; none if one of them was never measured.
+/// Returns the means of one subject, modality by level; `None` if a condition was never measured.
 fn cells(levels: &[f64], record: &SubjectRecord, value: fn(&StimulusKinematics) -> f64) -> Option<Vec<f64>> {
     let cell = |(modality, level)| {
         let here = record.counted().filter(|event| event.trial.modality == modality);
@@ -96,7 +96,7 @@ fn cells(levels: &[f64], record: &SubjectRecord, value: fn(&StimulusKinematics) 
     conditions(levels).map(cell).collect()
 }
 
-/// Movements with the stimulus of this level, each time it was felt: with a stimulus that was rated, or with the base of a pair.
+/// Returns the movements with the rated stimulus, or with the base of a pair, at this level, repetitions included.
 fn with_level(event: &TrialEvent, level: f64) -> impl Iterator<Item = &StimulusKinematics> {
     let (of_trial, place, stimuli) = match event.trial.presented {
         Presented::One { value } => (value, 0, 1),

@@ -1,4 +1,4 @@
-//! Wrong answers to differences that nobody misses: a question misread, keys the wrong way round, no attention.
+//! Wrong answers to obvious differences, which indicate a misread question, swapped keys, or inattention.
 
 use crate::SubjectRecord;
 use flotor_study::protocol::JndProtocol;
@@ -8,21 +8,21 @@ use flotor_study::trial::{Judgement, Presented};
 /// Answers to large differences.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct AtLarge {
-    /// Answers.
+    /// Number of answers.
     pub(crate) answers: usize,
-    /// Those of them that are wrong.
+    /// Number of wrong answers.
     pub(crate) wrong: usize,
 }
 
 impl AtLarge {
-    /// Share of wrong answers.
+    /// Returns the share of wrong answers; `None` without answers.
     pub(crate) fn share(self) -> Option<f64> {
         (self.answers > 0).then(|| self.wrong as f64 / self.answers as f64)
     }
 }
 
-/// Counts the answers to differences of [`JndProtocol::LARGE_DELTA`] and more. No fit decides what is large: the fit of somebody who is
-/// always wrong has a threshold above every difference.
+/// Counts the answers to differences of [`JndProtocol::LARGE_DELTA`] or more. The limit is fixed rather than fitted: the fitted
+/// threshold of a subject who is always wrong exceeds every difference.
 pub(crate) fn wrong_at_large(record: &SubjectRecord) -> AtLarge {
     let mut found = AtLarge::default();
     for event in record.counted() {

@@ -1,4 +1,4 @@
-//! From sittings to results: thresholds, Weber fractions, trends, effects, next to what was published.
+//! Analysis of studies: thresholds, Weber fractions, trends and effects, compared with published results.
 
 mod blinded;
 mod checks;
@@ -32,39 +32,39 @@ use flotor_study::sitting::{TrackResult, Verdict};
 use flotor_study::trial::{Modality, Phase};
 use serde::Serialize;
 
-/// A script in Python that repeats the tables from [`flotor_study::dataset::trials_csv`].
+/// Python script that reproduces the tables from [`flotor_study::dataset::trials_csv`].
 pub const SCRIPT_PYTHON: &str = include_str!("scripts/analysis.py");
-/// The same in R, for a table of another name.
+/// R script that reproduces the tables, with a placeholder for the table's name.
 const SCRIPT_R: &str = include_str!("scripts/analysis.R");
 
-/// Confidence of every interval.
+/// Confidence level of every interval.
 const CONFIDENCE: f64 = 0.95;
 
-/// Name of the table in [`SCRIPT_R`], as the script writes it.
+/// Placeholder of the table's name in [`SCRIPT_R`].
 const TABLE_IN_R: &str = "\"trials.csv\"";
 
-/// Returns the script in R that repeats the tables from [`flotor_study::dataset::trials_csv`], for the table of this name beside it.
+/// Returns the R script that reproduces the tables from [`flotor_study::dataset::trials_csv`], for a table of this name in the same folder.
 #[must_use]
 pub fn script_in_r(table_name: &str) -> String {
     let escaped = table_name.replace('\\', "\\\\").replace('"', "\\\"");
     SCRIPT_R.replace(TABLE_IN_R, &format!("\"{escaped}\""))
 }
 
-/// One subject's data.
+/// Data of one subject.
 #[derive(Clone, Debug)]
 pub struct SubjectRecord {
-    /// Who.
+    /// Number of the subject.
     pub subject: SubjectNumber,
-    /// The modality they started with.
+    /// First modality of the subject.
     pub first_modality: Modality,
-    /// Presentations with their answers.
+    /// Presentations with their answers, in order.
     pub trials: Vec<TrialEvent>,
-    /// Thresholds.
+    /// Results of the completed tracks.
     pub tracks: Vec<TrackResult>,
 }
 
 impl SubjectRecord {
-    /// The data of a log.
+    /// Copies the data of a log.
     #[must_use]
     pub fn of_log(log: &SittingLog) -> Self {
         let subject = log.begin.subject;
@@ -76,7 +76,7 @@ impl SubjectRecord {
         }
     }
 
-    /// The answers that count.
+    /// Returns the counted answers: main trials that are not repeated.
     pub fn counted(&self) -> impl Iterator<Item = &TrialEvent> {
         let counts =
             |event: &&TrialEvent| event.trial.phase == Phase::Main && event.verdict != Verdict::Repeated;
@@ -84,62 +84,62 @@ impl SubjectRecord {
     }
 }
 
-/// How thresholds are found.
+/// Estimator of thresholds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// That of the procedure: the mean of the last differences, or the posterior of QUEST+
+    /// Estimate of the procedure: mean of the last differences, or posterior of QUEST+
     #[default]
     Procedure,
-    /// The most likely observer, from all trials at a base
+    /// Most likely observer, from all trials at a base
     Map,
 }
 
-/// How an analysis is done.
+/// Options of an analysis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AnalysisOptions {
-    /// Sums of squares.
+    /// Type of the sums of squares.
     pub sums_of_squares: SumOfSquares,
-    /// How ratings are made comparable.
+    /// Normalisation of ratings across subjects.
     pub rating_scale: flotor_study::protocol::RatingScale,
-    /// How thresholds are found.
+    /// Estimator of thresholds.
     pub estimator: Estimator,
 }
 
-/// Why there is no result.
+/// Reason for a missing result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
     /// Too few complete sittings.
     #[error("complete sittings that are left to analyse: {complete}; an analysis needs 2 or more")]
     TooFewSubjects {
-        /// How many there are, without those that rules excluded.
+        /// Number of complete sittings that no rule excluded.
         complete: usize,
     },
-    /// A subject without a threshold in some condition.
+    /// A subject has no threshold in some condition.
     #[error("{subject}: no track at base {base} in modality {modality} reached a threshold")]
     NoThreshold {
-        /// Who.
+        /// Number of the subject.
         subject: SubjectNumber,
-        /// Modality.
+        /// Label of the modality.
         modality: &'static str,
-        /// Base.
+        /// Base, in the unit of the stimulus.
         base: f64,
     },
-    /// Ratings that cannot be scaled as asked for.
+    /// Ratings cannot be normalised as requested.
     #[error("{subject}: {problem}")]
     Ratings {
-        /// Who.
+        /// Number of the subject.
         subject: SubjectNumber,
-        /// Why.
+        /// Description of the problem.
         problem: &'static str,
     },
-    /// The statistics.
+    /// Error of a statistic.
     #[error(transparent)]
     Statistics(#[from] StatisticsError),
 }
 
-/// The result of a study.
+/// Result of a study.
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Analysis {
@@ -153,7 +153,7 @@ impl Analysis {
     /// Analyses the complete sittings of a study.
     ///
     /// # Errors
-    /// [`AnalysisError`].
+    /// [`AnalysisError`] for too few subjects, missing thresholds, or ratings that cannot be normalised.
     pub fn of(
         protocol: &Protocol,
         subjects: &[SubjectRecord],
@@ -170,7 +170,7 @@ impl Analysis {
         })
     }
 
-    /// Every subject's response under every condition, which the effects are computed from.
+    /// Returns each subject's response in each condition, from which the effects are computed.
     #[must_use]
     pub fn responses(&self) -> &[ResponseRow] {
         match self {
@@ -179,7 +179,7 @@ impl Analysis {
         }
     }
 
-    /// The page for people.
+    /// Formats the result as a text page.
     #[must_use]
     pub fn to_text(&self) -> String {
         match self {
@@ -189,25 +189,25 @@ impl Analysis {
     }
 }
 
-/// Returns a t-test as papers print it: `t(15) = 3.30, p = 0.005`.
+/// Formats a t-test as in publications: `t(15) = 3.30, p = 0.005`.
 #[must_use]
 pub fn t_text(t: &TTest) -> String {
     text::t_text(t, t.p)
 }
 
-/// Returns the interval of an effect size: `0.24 to 1.39`.
+/// Formats the interval of an effect size: `0.24 to 1.39`.
 #[must_use]
 pub fn size_interval_text(size: &EffectSize) -> String {
     text::size_interval_text(size)
 }
 
-/// An effect in words, as papers print it: `F(2, 30) = 1.46, p = 0.250 (HF p = 0.251)`.
+/// Formats an effect as in publications: `F(2, 30) = 1.46, p = 0.250 (HF p = 0.251)`.
 #[must_use]
 pub fn effect_text(effect: &Effect) -> String {
     text::effect_text(effect)
 }
 
-/// Returns why effects have no order of modalities, if they have none.
+/// Returns a note if the model has no effect of the order of modalities.
 #[must_use]
 pub fn order_note(effects: &[Effect]) -> Option<&'static str> {
     effects.iter().all(|effect| effect.effect != "order").then_some(
@@ -215,34 +215,34 @@ pub fn order_note(effects: &[Effect]) -> Option<&'static str> {
     )
 }
 
-/// An exponent with its interval, as text.
+/// Formats an exponent with its interval.
 #[must_use]
 pub fn exponent_text(exponent: &MeanInterval) -> String {
     text::exponent_text(exponent)
 }
 
-/// A probability in words.
+/// Formats a p-value: `p = 0.250`, or `p < 0.001`.
 #[must_use]
 pub fn p_text(p: f64) -> String {
     text::p_text(p)
 }
 
-/// One subject's response under one condition: a row of the table for other programs.
+/// Response of one subject in one condition: a row of the exported table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResponseRow {
-    /// Who: `sub-01`.
+    /// Subject: `sub-01`.
     pub subject: String,
-    /// Modality they started with.
+    /// First modality of the subject.
     pub first_modality: Modality,
-    /// Modality.
+    /// Modality of the condition.
     pub modality: Modality,
-    /// Base, or stimulus rated.
+    /// Base or rated stimulus, in the unit of the stimulus.
     pub stimulus: f64,
     /// Threshold in the unit of the stimulus, or scaled rating.
     pub response: f64,
 }
 
-/// Rows of `responses[subject][modality by level]`.
+/// Converts `responses[subject][modality by level]` to rows.
 fn response_rows(subjects: &[SubjectRecord], levels: &[f64], responses: &[Vec<f64>]) -> Vec<ResponseRow> {
     let of = |(record, row): (&SubjectRecord, &Vec<f64>)| {
         let row = conditions(levels).zip(row).map(|((modality, stimulus), response)| ResponseRow {
@@ -257,19 +257,19 @@ fn response_rows(subjects: &[SubjectRecord], levels: &[f64], responses: &[Vec<f6
     subjects.iter().zip(responses).flat_map(of).collect()
 }
 
-/// The factors within a subject: modality, and the level of the stimulus where there are several.
+/// Returns the factors within a subject: modality, and the level of the stimulus if there are several.
 fn within_factors(name: &str, levels: &[f64]) -> Vec<WithinFactor> {
     let factor = |name: &str, levels| WithinFactor { name: name.to_owned(), levels };
     let by_level = (levels.len() > 1).then(|| factor(name, levels.len()));
     [factor("modality", Modality::ALL.len())].into_iter().chain(by_level).collect()
 }
 
-/// Modality by level, in the order of the cells of a subject's row.
+/// Returns modality by level, in the order of the cells of a subject's row.
 fn conditions(levels: &[f64]) -> impl Iterator<Item = (Modality, f64)> {
     Modality::ALL.into_iter().flat_map(|modality| levels.iter().map(move |level| (modality, *level)))
 }
 
-/// Mean over subjects under each condition, of `responses[subject][modality by level]`.
+/// Returns the mean over subjects in each condition, of `responses[subject][modality by level]`.
 fn mean_responses(
     levels: &[f64],
     responses: &[Vec<f64>],
@@ -281,8 +281,7 @@ fn mean_responses(
     conditions(levels).enumerate().map(cell).collect()
 }
 
-/// The factor "which modality came first", unless all subjects started with the same, or so few are in a group that
-/// nothing would be left to compare it with.
+/// Returns the factor of the first modality; empty if all subjects started with the same one, or there are too few subjects to test it.
 fn order_factor(subjects: &[SubjectRecord]) -> Vec<BetweenFactor> {
     let groups: Vec<usize> = subjects.iter().map(|subject| subject.first_modality as usize).collect();
     let both = groups.contains(&0) && groups.contains(&1);

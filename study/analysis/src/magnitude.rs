@@ -1,4 +1,4 @@
-//! Ratings: made comparable, their trend over the stimuli, effects of stimulus, modality and order.
+//! Analysis of ratings: normalisation, trend over the stimuli, effects of stimulus, modality and order.
 
 use super::kinematics::{KinematicMeasure, measures};
 use super::published::Beside;
@@ -17,51 +17,51 @@ use serde::Serialize;
 /// Mean rating of a stimulus: a point of figure 17.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RatingCell {
-    /// Modality.
+    /// Modality of the condition.
     pub modality: Modality,
-    /// Stimulus.
+    /// Stimulus, in its unit.
     pub stimulus: f64,
-    /// Scaled rating, over subjects.
+    /// Mean normalised rating over subjects.
     pub rating: MeanInterval,
 }
 
-/// The result of a magnitude experiment. The names of the fields are a contract: scripts rely on them.
+/// Result of a magnitude experiment. The field names are a stable interface for scripts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MagnitudeAnalysis {
-    /// "magnitude".
+    /// Task label: "magnitude".
     pub task: &'static str,
-    /// Sittings analysed.
+    /// Number of analysed sittings.
     pub subjects: usize,
-    /// How ratings were made comparable.
+    /// Normalisation of the ratings across subjects.
     pub rating_scale: RatingScale,
     /// R² of the linear trend of the mean ratings over the stimuli; NaN (`null` in JSON) without a trend.
     pub linear_r2: f64,
-    /// The trend, all modalities together.
+    /// Linear trend of the mean ratings, averaged over modalities.
     pub trend: Outcome<LinearTrend>,
-    /// Scaled ratings: order x modality x stimulus.
+    /// Effects on normalised ratings: order x modality x stimulus.
     pub anova: Vec<Effect>,
     /// Ratings by condition.
     pub ratings: Vec<RatingCell>,
-    /// Ratings that count, per subject.
+    /// Mean number of counted ratings per subject.
     pub trials_per_subject: f64,
-    /// Presentations repeated because the handle left its range.
+    /// Number of presentations repeated because the handle left its range.
     pub repeated: usize,
-    /// Ratings of the modalities at each stimulus: which differ.
+    /// Pairwise comparisons of the modalities at each stimulus.
     pub post_hoc: Vec<PostHoc>,
-    /// How people moved; empty without kinematics.
+    /// Movement measures; empty without kinematics.
     pub kinematics: Vec<KinematicMeasure>,
-    /// What of the thesis may stand beside it.
+    /// Comparability with the thesis.
     #[serde(skip)]
     pub beside: Beside,
-    /// What the effects are computed from.
+    /// Responses from which the effects are computed.
     #[serde(skip)]
     pub responses: Vec<ResponseRow>,
 }
 
-/// Analyses ratings.
+/// Analyses the ratings of a study.
 ///
 /// # Errors
-/// [`AnalysisError`], if ratings cannot be scaled as asked for.
+/// [`AnalysisError`] if ratings cannot be normalised as requested.
 pub fn analyse_magnitude(
     protocol: &MagnitudeProtocol,
     subjects: &[SubjectRecord],
@@ -99,7 +99,7 @@ pub fn analyse_magnitude(
     })
 }
 
-/// A subject's mean scaled rating of each stimulus in each modality.
+/// Returns a subject's mean normalised ratings, modality by stimulus.
 fn scaled(
     protocol: &MagnitudeProtocol,
     record: &SubjectRecord,

@@ -1,4 +1,4 @@
-//! Which conditions differ: paired t-tests, corrected for how many there are, with the size of each difference.
+//! Post-hoc comparisons of conditions: paired t-tests with a correction for multiple tests, and effect sizes.
 
 use flotor_statistics::effect_size::{EffectSize, of_pairs};
 use flotor_statistics::multiple::holm;
@@ -6,29 +6,29 @@ use flotor_statistics::t_test::{TTest, paired};
 use flotor_statistics::{Outcome, StatisticsError};
 use serde::Serialize;
 
-/// A comparison of two conditions over subjects.
+/// Comparison of two conditions over subjects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PostHoc {
-    /// The conditions: `h - vh, base 26`.
+    /// Compared conditions: `h - vh, base 26`.
     pub comparison: String,
     /// Test of the difference.
     #[serde(flatten)]
     pub test: Outcome<PairTest>,
 }
 
-/// Test of a difference between two conditions.
+/// Test of the difference between two conditions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PairTest {
     /// Paired t-test of the difference.
     pub t: TTest,
-    /// Its p-value after Holm's correction for all comparisons of the same kind.
+    /// p-value after Holm's correction for all comparisons of the same kind.
     pub p_holm: f64,
-    /// Cohen's d of the pairs, with its 95 % interval.
+    /// Cohen's d of the pairs with its 95 % interval.
     pub d: EffectSize,
 }
 
-/// Compares conditions of one kind, each the responses under its two conditions, subject by subject. A difference that does not vary
-/// between subjects cannot be tested; it counts in the family with a p of 1, so that a tie makes no other comparison more likely.
+/// Compares pairs of conditions, each given by its name and the responses in both conditions by subject. A difference that does not vary
+/// between subjects cannot be tested; it counts in the family with a p of 1, so that a tie does not lower the p of another comparison.
 pub(super) fn compare(pairs: impl IntoIterator<Item = (String, Vec<f64>, Vec<f64>)>) -> Vec<PostHoc> {
     let tested = pairs.into_iter().map(|(comparison, first, second)| (comparison, paired(&first, &second)));
     let tested: Vec<(String, Result<TTest, StatisticsError>)> = tested.collect();
@@ -40,7 +40,7 @@ pub(super) fn compare(pairs: impl IntoIterator<Item = (String, Vec<f64>, Vec<f64
     tested.into_iter().zip(holm(&p)).map(of).collect()
 }
 
-/// The modalities at each level, of `responses[subject][modality by level]`.
+/// Compares the modalities at each level, from `responses[subject][modality by level]`.
 pub(super) fn modalities(name: &str, levels: &[f64], responses: &[Vec<f64>]) -> Vec<PostHoc> {
     let column = |index: usize| responses.iter().filter_map(|row| row.get(index).copied()).collect();
     compare(levels.iter().enumerate().map(|(index, level)| {
@@ -52,7 +52,7 @@ pub(super) fn modalities(name: &str, levels: &[f64], responses: &[Vec<f64>]) -> 
     }))
 }
 
-/// Each pair of levels, of `responses[subject][level]`.
+/// Compares each pair of levels, from `responses[subject][level]`.
 pub(super) fn levels(name: &str, levels: &[f64], responses: &[Vec<f64>]) -> Vec<PostHoc> {
     let column =
         |index: usize| responses.iter().filter_map(|row| row.get(index).copied()).collect::<Vec<_>>();

@@ -1,8 +1,7 @@
-//! How many subjects a difference experiment needs: whole studies of simulated observers, without apparatus, and how often the
-//! difference between the modalities is found.
+//! Power of a difference experiment: simulates whole studies without apparatus and counts significant differences between the modalities.
 //!
-//! The test is the paired t-test of `flotor analyse`. With equal observers in both modalities the same share is the rate of
-//! false alarms, which must be the level of the test.
+//! The test is the paired t-test of `flotor analyse`. With equal observers in both modalities the share is the rate of false
+//! alarms, which must equal the level of the test.
 
 use crate::{AnalysisError, AnalysisOptions, SubjectRecord, analyse_jnd};
 use flotor_study::log::TrialEvent;
@@ -12,25 +11,25 @@ use flotor_study::sitting::Sitting;
 use flotor_study::trial::Exploration;
 use serde::Serialize;
 
-/// Level of the test.
+/// Significance level of the test.
 pub const LEVEL: f64 = 0.05;
 
-/// The power of a study with so many subjects.
+/// Power of a study with a given number of subjects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Power {
-    /// Subjects of a study.
+    /// Number of subjects per study.
     pub subjects: u16,
-    /// Studies that were simulated.
+    /// Number of simulated studies.
     pub studies: u32,
-    /// Share of them that found a difference between the modalities, p below 0.05.
+    /// Share of studies with a significant difference between the modalities (p below 0.05).
     pub power: f64,
-    /// Its standard error.
+    /// Standard error of the power.
     pub standard_error: f64,
     /// Mean Weber fractions over all studies: vision and haptics, haptics alone.
     pub weber: [f64; 2],
 }
 
-/// Observers whose threshold without vision is this many times that with vision.
+/// Returns a population whose threshold without vision is `ratio` times that with vision.
 #[must_use]
 pub fn population(ratio: f64, lapse: f64) -> Population {
     let usual = Population::default();
@@ -38,10 +37,10 @@ pub fn population(ratio: f64, lapse: f64) -> Population {
     Population { h, lapse, ..usual }
 }
 
-/// p of the paired t-test (1 where nothing varies), and the Weber fractions, of one simulated study.
+/// Simulates one study; returns the p of the paired t-test (1 without variation) and the mean Weber fractions.
 ///
 /// # Errors
-/// [`AnalysisError`]: a track that came to no threshold.
+/// [`AnalysisError`] if a track reached no threshold.
 pub fn study(
     protocol: &JndProtocol,
     population: &Population,
@@ -68,7 +67,7 @@ pub fn study(
     Ok((analysis.t.tested().map_or(1.0, |t| t.p), [analysis.weber.vh, analysis.weber.h]))
 }
 
-/// The power from the results of studies with so many subjects.
+/// Estimates the power from the results of studies with `subjects` subjects.
 #[must_use]
 pub fn power(subjects: u16, results: &[(f64, [f64; 2])]) -> Power {
     let n = results.len() as f64;

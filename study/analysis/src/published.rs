@@ -1,20 +1,20 @@
-//! What CMU-RI-TR-07-21 reports (section 4.3), to stand beside one's own results.
+//! Published results of CMU-RI-TR-07-21 (section 4.3), for comparison.
 
 use flotor_statistics::describe::MeanInterval;
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Stimulus};
 
-/// What of the thesis may stand beside a study: its numbers are of springs, at its bases and stimuli, and of nothing else.
+/// Comparability of a study with the thesis, whose results hold only for springs at its bases and stimuli.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Beside {
-    /// The study asks what the thesis asked.
+    /// The settings match the thesis.
     Thesis,
-    /// It asks something else.
+    /// The settings differ.
     #[default]
     Nothing,
 }
 
 impl Beside {
-    /// Beside a difference experiment: bases of 17, 26 and 35 N, larger comparisons, three of four correct.
+    /// Checks a difference experiment: springs with bases of 17, 26 and 35 N, larger comparisons, a target of 75 %.
     #[must_use]
     pub fn jnd(protocol: &JndProtocol) -> Self {
         let usual = JndProtocol::default();
@@ -25,7 +25,7 @@ impl Beside {
         if is_same { Self::Thesis } else { Self::Nothing }
     }
 
-    /// Beside an experiment with ratings: twelve stimuli of 12 to 48 N.
+    /// Checks a magnitude experiment: springs with twelve stimuli of 12 to 48 N.
     #[must_use]
     pub fn magnitude(protocol: &MagnitudeProtocol) -> Self {
         let is_same =
@@ -33,19 +33,19 @@ impl Beside {
         if is_same { Self::Thesis } else { Self::Nothing }
     }
 
-    /// What the thesis says, if it may stand there.
+    /// Returns a text of the thesis if comparable, else an empty one.
     #[must_use]
     pub fn text(self, text: &str) -> &str {
         if self == Self::Thesis { text } else { "" }
     }
 
-    /// The effects of the thesis, if they may stand there.
+    /// Returns effects of the thesis if comparable, else none.
     #[must_use]
     pub fn effects(self, effects: &[Published]) -> &[Published] {
         if self == Self::Thesis { effects } else { &[] }
     }
 
-    /// The Weber fractions of the thesis, if they may stand there.
+    /// Returns the Weber fractions of the thesis, if comparable.
     #[must_use]
     pub fn weber(self) -> Option<[f64; 2]> {
         (self == Self::Thesis).then_some(WEBER)
@@ -56,7 +56,7 @@ fn is_of_springs(stimulus: &Stimulus) -> bool {
     (stimulus.model.as_str(), stimulus.parameter.as_str()) == ("spring", "gamma_n")
 }
 
-/// A statistic of the thesis, and its effect.
+/// Name of an effect, and its statistic in the thesis.
 pub type Published = (&'static str, &'static str);
 
 /// Effects on thresholds (section 4.3.2).
@@ -71,16 +71,16 @@ pub const MAGNITUDE: [Published; 3] = [
     ("order", "F(1, 14) < 0.823, p = 0.198"),
     ("stimulus", "F(11, 154) = 13.57, p < 0.001"),
 ];
-/// Weber fractions, vision and haptics, and haptics alone.
+/// Weber fractions: vision and haptics, haptics alone.
 pub const WEBER: [f64; 2] = [0.142, 0.172];
-/// Weber fractions over bases, within each modality.
+/// Effects of the base on Weber fractions, within each modality.
 pub const CONSTANCY: [&str; 2] = ["F(2, 30) = 1.46, p = 0.25", "F(2, 30) = 0.80, p = 0.46"];
-/// Paired test between the modalities.
+/// Paired t-test between the modalities.
 pub const T: &str = "t(15) = 3.30, p = 0.005";
 /// R² of the linear trend of ratings.
 pub const LINEAR_R2: f64 = 0.983;
 
-/// Effects on how people moved, by task and measure; modality had none.
+/// Returns the published effects on movements, by task and measure; modality had none.
 #[must_use]
 pub fn movement(task: &str, measure: &str) -> &'static [Published] {
     match (task, measure) {
@@ -96,17 +96,17 @@ pub fn movement(task: &str, measure: &str) -> &'static [Published] {
     }
 }
 
-/// Direction in which a measure of movement changes with the stimulus.
+/// Direction of change of a movement measure with the stimulus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// With a larger stimulus it is larger.
+    /// Larger with a larger stimulus.
     Rises,
-    /// With a larger stimulus it is smaller.
+    /// Smaller with a larger stimulus.
     Falls,
 }
 
-/// The direction of section 5: "velocity and acceleration are directly proportional and force is inversely proportional to the
-/// rendered gamma".
+/// Returns the direction published in section 5: "velocity and acceleration are directly proportional and force is inversely
+/// proportional to the rendered gamma".
 #[must_use]
 pub fn direction(measure: &str) -> Option<Direction> {
     match measure {
@@ -117,7 +117,7 @@ pub fn direction(measure: &str) -> Option<Direction> {
 }
 
 impl Direction {
-    /// Returns true if the interval of an exponent lies on this side of 0.
+    /// Returns true if the interval of an exponent lies on the published side of 0.
     #[must_use]
     pub fn is_reproduced(self, exponent: &MeanInterval) -> bool {
         let [low, high] = exponent.interval;
@@ -127,7 +127,7 @@ impl Direction {
         }
     }
 
-    /// Returns the direction beside an exponent, as text.
+    /// Formats the direction, and its agreement with an exponent.
     #[must_use]
     pub fn beside(self, exponent: &MeanInterval) -> String {
         let way = match self {

@@ -1,5 +1,5 @@
-//! One subject by themselves, from the first trial on: the tracks as far as they came, psychometric functions, and whether the
-//! answers are those of somebody who felt what was presented.
+//! Report on one subject, from the first trial on: tracks, psychometric functions, and signs of answers that do not follow from the
+//! stimuli.
 
 use crate::large::wrong_at_large;
 use crate::{SubjectChecks, SubjectRecord, p_text};
@@ -11,42 +11,42 @@ use flotor_study::sitting::{TrackResult, Verdict};
 use flotor_study::trial::{Modality, Phase, Presented, Response};
 use serde::Serialize;
 
-/// Less time with a stimulus than this is suspicious, s.
+/// Exploration time below which a presentation is suspicious, s.
 const SHORT_S: f64 = 0.5;
-/// Level of a subject's tests of one kind together: worse than chance, and the fit of a psychometric function.
+/// Significance level of each kind of test of a subject: worse than chance, and misfit of the psychometric function.
 const LEVEL: f64 = 0.05;
 
-/// The psychometric function in one condition.
+/// Psychometric function in one condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubjectCondition {
-    /// Modality.
+    /// Modality of the condition.
     pub modality: Modality,
-    /// Base.
+    /// Base, in the unit of the stimulus.
     pub base: f64,
-    /// Threshold and lapse with intervals.
+    /// Psychometric function with threshold and lapse.
     pub function: Psychometric,
 }
 
-/// What can be said of one subject.
+/// Data quality of one subject.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubjectQuality {
-    /// Who: `sub-01`.
+    /// Subject: `sub-01`.
     pub subject: String,
-    /// Answers that count.
+    /// Number of counted answers.
     pub answers: usize,
-    /// Thresholds of the tracks that are over.
+    /// Results of completed tracks.
     pub tracks: Vec<TrackResult>,
-    /// Psychometric functions, of a difference experiment.
+    /// Psychometric functions of a difference experiment; empty for ratings.
     pub conditions: Vec<SubjectCondition>,
-    /// Quartiles of the time from the end of a presentation to the answer, s; none where it is not known.
+    /// Quartiles of the time from the end of a presentation to the answer, s; `None` if unknown.
     pub response_time_s: Option<[f64; 3]>,
-    /// Share of "I don't know".
+    /// Share of "I don't know"; `None` without comparisons.
     pub dont_know: Option<f64>,
-    /// Share of "the first" among the answers that name one.
+    /// Share of "the first" among the answers that name a stimulus.
     pub first: Option<f64>,
-    /// What came of catch trials and repeated ones.
+    /// Results of the check trials.
     pub checks: SubjectChecks,
-    /// What is suspicious, a sentence each.
+    /// Suspicious findings, one sentence each.
     pub flags: Vec<String>,
 }
 
@@ -55,7 +55,7 @@ impl SubjectCondition {
         format!("{} base {}", self.modality.word(), self.base)
     }
 
-    /// Says what makes the function doubtful, at a level for each of so many conditions.
+    /// Returns the findings against the function, at a level corrected for the number of conditions.
     fn suspicions(&self, level: f64) -> Vec<String> {
         let Psychometric { named, wrong, p_chance, fit, .. } = self.function;
         let chance = (p_chance < level).then(|| {
@@ -71,7 +71,7 @@ impl SubjectCondition {
 }
 
 impl SubjectQuality {
-    /// Of a subject's data so far.
+    /// Evaluates a subject's data so far.
     #[must_use]
     pub fn of(protocol: &Protocol, record: &SubjectRecord, incidents: &[Incident]) -> Self {
         let counted: Vec<_> = record.counted().collect();
@@ -127,12 +127,12 @@ impl SubjectQuality {
         let open = self.tracks.iter().filter(|track| track.not_bounded.is_some()).count();
         say(open, "tracks whose answers do not bound the threshold");
         say(incidents.len(), "interruptions and disturbances in the log");
-        // Bonferroni's correction: a subject without any fault has a flag in one of twenty, at most.
+        // Bonferroni's correction: at most 5 % of subjects without a fault get a flag.
         let level = LEVEL / self.conditions.len().max(1) as f64;
         flags.extend(self.conditions.iter().flat_map(|condition| condition.suspicions(level)));
         if let Some(first) = self.first
             && named >= 20.0
-            // Two deviations of a binomial share of a half.
+            // Two standard deviations of a binomial share of a half.
             && (first - 0.5).abs() > 1.0 / named.sqrt()
         {
             flags.push(format!("a preference: {:.0} % of the answers named the first", first * 100.0));
@@ -155,7 +155,7 @@ impl SubjectQuality {
         flags
     }
 
-    /// The page for people.
+    /// Formats the findings as a text page.
     #[must_use]
     pub fn to_text(&self) -> String {
         let percent = |share: f64| format!("{:.1} %", share * 100.0);
@@ -201,7 +201,8 @@ impl SubjectQuality {
     }
 }
 
-/// A track whose smallest difference is none comes there: such an answer is right or wrong by chance, and moves the track.
+/// Counts named answers to pairs of equal stimuli, which are right or wrong by chance and affect the track; they occur in a track
+/// with a floor of 0.
 fn without_difference(record: &SubjectRecord) -> usize {
     let is_judged = |event: &&flotor_study::log::TrialEvent| {
         let named = matches!(event.response, Response::First | Response::Second);

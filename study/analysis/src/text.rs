@@ -1,4 +1,4 @@
-//! Results for people, next to what CMU-RI-TR-07-21 reports.
+//! Text pages of results, compared with CMU-RI-TR-07-21.
 
 use super::blinded::BlindedAnalysis;
 use super::published::Beside;
@@ -88,7 +88,7 @@ pub(super) fn blinded(analysis: &BlindedAnalysis) -> String {
     page.end()
 }
 
-/// Lines in the making.
+/// Text page under construction.
 #[derive(Default)]
 struct Page {
     lines: Vec<String>,
@@ -108,7 +108,7 @@ impl Page {
         self.lines.push(String::new());
     }
 
-    /// Name, value here, and value in the thesis.
+    /// Adds a row: name, own value, and value of the thesis.
     fn row(&mut self, name: &str, here: &str, published: &str) {
         let published = self.beside.text(published);
         let line = format!("  {}{}{published}", column(name, 30), column(here, 46));
@@ -129,7 +129,7 @@ impl Page {
         }
     }
 
-    /// Adds the sizes of the effects.
+    /// Adds the effect sizes.
     fn sizes(&mut self, table: &[Effect]) {
         self.gap();
         self.row("Partial omega squared", "with its 95 % interval", "");
@@ -168,7 +168,7 @@ impl Page {
     }
 }
 
-/// Returns a text as wide as a column; a text that fills the column has two spaces behind it.
+/// Pads a text to the width of a column; a text that fills the column is followed by two spaces.
 fn column(text: &str, width: usize) -> String {
     let is_full = text.chars().count() + 2 > width;
     if is_full { format!("{text}  ") } else { format!("{text:<width$}") }

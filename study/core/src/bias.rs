@@ -1,4 +1,4 @@
-//! How far each way to a threshold is off, and how much it scatters: many tracks of observers whose threshold is known.
+//! Bias and scatter of each threshold estimator, from many simulated tracks of observers with known thresholds.
 
 use crate::estimate::{Observation, Prior, most_likely};
 use crate::observer::TernaryObserver;
@@ -8,23 +8,23 @@ use crate::trial::{Judgement, Response};
 use flotor_statistics::describe::{deviation, mean};
 use serde::Serialize;
 
-/// Way to a threshold.
+/// Estimator of a threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Weighted up-down, mean of the differences from the 4th to the 8th reversal.
     Thesis,
-    /// The same trials, most likely observer.
+    /// Weighted up-down, most likely observer.
     Map,
     /// Trials placed by QUEST+.
     QuestPlus,
 }
 
 impl Method {
-    /// In the order of the tables.
+    /// All methods in the order of the tables.
     pub const ALL: [Self; 3] = [Self::Thesis, Self::Map, Self::QuestPlus];
 
-    /// As in tables.
+    /// Returns the label used in tables.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -35,7 +35,7 @@ impl Method {
     }
 }
 
-/// One method at one observer.
+/// Accuracy of one method for one observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BiasRow {
     /// Criterion of the observer, in deviations of the noise.
@@ -44,9 +44,9 @@ pub struct BiasRow {
     pub threshold: f64,
     /// Tracks whose trials make one estimate.
     pub tracks: u32,
-    /// Method.
+    /// Estimator.
     pub method: Method,
-    /// Estimates made.
+    /// Number of estimates.
     pub runs: u32,
     /// Mean estimate over the true threshold, less one.
     pub bias: f64,
@@ -58,7 +58,7 @@ pub struct BiasRow {
     pub trials: f64,
 }
 
-/// An observer whose threshold is this, at a target of 75 %.
+/// Returns the observer with a given threshold at a target of 75 %.
 #[must_use]
 pub fn observer_of(threshold: f64, criterion: f64) -> TernaryObserver {
     let unit = TernaryObserver { sigma: 1.0, criterion, bias: 0.0, lapse: 0.0 };
@@ -70,7 +70,7 @@ pub fn observer_of(threshold: f64, criterion: f64) -> TernaryObserver {
 #[must_use]
 pub fn rows(observer: &TernaryObserver, tracks: u32, runs: u32, seed: u64) -> Vec<BiasRow> {
     let threshold = observer.threshold(0.75);
-    // Without a floor, as published simulations of the rule.
+    // Without a floor, as in published simulations of the rule.
     let up_down = WeightedUpDownRule { floor: 0.0, ..WeightedUpDownRule::default() };
     let up_down = Procedure::WeightedUpDown(up_down).start();
     let quest = Procedure::QuestPlus(QuestPlusRule::default()).start();
@@ -116,7 +116,7 @@ pub fn rows(observer: &TernaryObserver, tracks: u32, runs: u32, seed: u64) -> Ve
     Method::ALL.into_iter().zip(&estimates).map(row).collect()
 }
 
-/// One track with one observer: its threshold, and the answers.
+/// Runs one track with one observer; returns threshold and answers.
 fn walk(
     mut track: Track,
     observer: &TernaryObserver,

@@ -1,23 +1,22 @@
-//! Codes instead of conditions: whoever runs or analyses a study does not know the conditions until unblinding.
+//! Condition codes for blinded studies: experimenter and analyst do not know the conditions until unblinding.
 //!
-//! Which code stands for which condition follows from the seed; [`Codes`] made from the same protocol and seed tell it
-//! again.
+//! The assignment follows from protocol and seed; [`Codes`] built from the same pair are equal.
 
 use crate::protocol::Protocol;
 use crate::random::{Purpose, Stream};
 use crate::trial::{Modality, Presented};
 
-/// The codes of a study.
+/// Condition codes of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Codes {
-    /// Bases of a difference experiment, or stimuli rated; the number of a level's code is its place here plus one.
+    /// Bases of a difference experiment, or rated stimuli; the code of a level is its index plus one.
     levels: Vec<f64>,
-    /// The modality that is called A.
+    /// Modality with code A.
     a: Modality,
 }
 
 impl Codes {
-    /// The codes of a study.
+    /// Draws the codes from the seed.
     #[must_use]
     pub fn new(protocol: &Protocol, seed: u64) -> Self {
         let mut stream = Stream::new(seed, Purpose::Blinding, 0, 0);
@@ -27,19 +26,19 @@ impl Codes {
         Self { levels, a }
     }
 
-    /// The code of a modality: A or B.
+    /// Returns the code of a modality: A or B.
     #[must_use]
     pub fn modality(&self, modality: Modality) -> &'static str {
         if modality == self.a { "A" } else { "B" }
     }
 
-    /// The code of a base, or of a stimulus rated: 1, 2, ...; 0 for one of practice alone.
+    /// Returns the code of a base or rated stimulus: 1, 2, ...; 0 for a practice stimulus.
     #[must_use]
     pub fn level(&self, level: f64) -> usize {
         self.levels.iter().position(|known| *known == level).map_or(0, |index| index + 1)
     }
 
-    /// The code of a condition: `A2`.
+    /// Returns the code of a condition, such as `A2`.
     #[must_use]
     pub fn condition(&self, modality: Modality, presented: &Presented) -> String {
         let level = match presented {

@@ -1,4 +1,4 @@
-//! Simulated subjects, all of them, several at a time.
+//! Runs a study with many simulated subjects in parallel.
 
 use crate::conduct::{ConductError, OutsideError, Presenter, conduct};
 use crate::dataset::{Dataset, DatasetError, Earlier, Progress};
@@ -15,63 +15,63 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// A study with simulated subjects.
 #[derive(Clone, Debug)]
 pub struct Cohort {
-    /// The experiment.
+    /// Experiment with its settings.
     pub protocol: Protocol,
-    /// Seed.
+    /// Seed of order, presentation and simulated answers.
     pub seed: u64,
-    /// Who.
+    /// Numbers of the subjects.
     pub subjects: Vec<SubjectNumber>,
-    /// What kind of people.
+    /// Distribution of the simulated observers' parameters.
     pub population: Population,
-    /// What presents the stimuli, for the log.
+    /// Description of the apparatus, for the log.
     pub apparatus: serde_json::Value,
-    /// Files that decide what is presented, for the log.
+    /// Files that determine the stimuli, for the log.
     pub inputs: Vec<InputFile>,
     /// Version of the program, for the log.
     pub version: String,
-    /// The study file that is followed, for the log.
+    /// The study file in use, for the log.
     pub plan: Option<Plan>,
-    /// What to do about subjects who have begun before.
+    /// Policy for subjects with an existing log.
     pub earlier: Earlier,
 }
 
-/// Why a study was not carried out to its end.
+/// Error that ended a study early.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CohortError {
-    /// The data.
+    /// Error of the data set.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// A sitting.
+    /// Error of a sitting.
     #[error("{subject}: {cause}")]
     Sitting {
-        /// Whose.
+        /// Number of the subject.
         subject: SubjectNumber,
-        /// Why.
+        /// Error of the sitting.
         cause: ConductError,
     },
 }
 
-/// Starts the presenter of one subject; `None` if a request to stop came first.
+/// Factory of presenters, one per subject; returns `None` if a stop was requested first.
 pub type PresenterFactory<'a> =
     dyn Fn(SubjectNumber) -> Result<Option<Box<dyn Presenter + 'a>>, OutsideError> + Sync + 'a;
 
-/// One subject's turn.
+/// One subject's sitting, ready to run.
 struct Turn {
     subject: SubjectNumber,
-    /// What was presented before it broke off.
+    /// Trials presented before the interruption.
     earlier: Vec<Trial>,
     sitting: Sitting,
     log: LogWriter,
 }
 
 impl Cohort {
-    /// The middle of the stimuli, which simulated ratings are relative to.
+    /// Returns the mean stimulus, the reference of simulated ratings.
     fn middle(&self) -> f64 {
         flotor_statistics::describe::mean(self.protocol.levels())
     }
 
-    /// The subject of this number.
+    /// Returns the simulated subject with this number.
     #[must_use]
     pub fn subject(&self, subject: SubjectNumber) -> SimulatedSubject {
         SimulatedSubject::new(&self.population, self.seed, subject, self.middle())
@@ -93,13 +93,13 @@ impl Cohort {
         }
     }
 
-    /// Carries the study out, `jobs` subjects at a time, and makes the tables. `watch` is told of every trial that
-    /// is on disk; `stop` ends it after the trials under way.
+    /// Runs the study with `jobs` subjects at a time and writes the tables. `watch` is called for every trial on disk; `stop` ends
+    /// the study after the trials in progress.
     ///
-    /// Nothing is presented before all subjects were found to be free, or what they did to be in order.
+    /// Checks the logs of all subjects before the first presentation.
     ///
     /// # Errors
-    /// [`CohortError`]; the trials so far are in the logs.
+    /// [`CohortError`]; completed trials are in the logs.
     pub fn run(
         &self,
         dataset: &Dataset,
@@ -112,7 +112,7 @@ impl Cohort {
             |subject: &SubjectNumber| Ok((*subject, dataset.progress(&self.begin(*subject), self.earlier)?));
         let mut waiting = self.subjects.iter().map(progress).collect::<Result<Vec<_>, CohortError>>()?;
         waiting.retain(|(_, progress)| !matches!(progress, Progress::Complete));
-        waiting.reverse(); // taken from the end
+        waiting.reverse(); // popped from the end
         let waiting = Mutex::new(waiting);
         let work = || {
             while let Some((subject, progress)) = waiting.lock().ok().and_then(|mut queue| queue.pop()) {
@@ -125,7 +125,7 @@ impl Cohort {
             Ok(())
         };
         let results: Vec<Result<(), CohortError>> = std::thread::scope(|scope| {
-            // Where the system has too few threads, this one does the rest.
+            // If the system has too few threads, this thread runs the remaining subjects.
             let start = |_| std::thread::Builder::new().spawn_scoped(scope, work).ok();
             let threads: Vec<_> = (1..jobs.get()).filter_map(start).collect();
             let own = std::iter::once(work());
@@ -163,8 +163,8 @@ impl Cohort {
         let failed = |cause| CohortError::Sitting { subject, cause };
         let presenter = presenter(subject).map_err(|cause| failed(ConductError::Outside(cause)))?;
         let Some(mut presenter) = presenter else { return Ok(()) };
-        // An apparatus has a past: presented with the same trials it comes to where it was, and what follows is, to
-        // the bit, what would have followed.
+        // An apparatus has state: replaying the earlier trials restores it, so that the continuation is bit-identical to an
+        // uninterrupted sitting.
         for trial in &earlier {
             if stop.load(Ordering::Relaxed) {
                 return Ok(());

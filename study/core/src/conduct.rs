@@ -1,4 +1,4 @@
-//! A sitting carried out: stimuli presented, answers asked for, every trial on disk before the next.
+//! Conducts a sitting: presents stimuli, collects answers, and writes every trial to disk before the next.
 
 use crate::log::{Event, LogError, LogWriter, TrialEvent};
 use crate::observer::SimulatedSubject;
@@ -6,19 +6,19 @@ use crate::sitting::{AnswerError, Sitting};
 use crate::trial::{Exploration, Trial};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whatever went wrong in an apparatus or a terminal.
+/// Error of an apparatus or a front end.
 pub type OutsideError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Presents the stimuli of a trial, one after the other, and says what happened.
+/// Presents the stimuli of a trial one after the other and reports the exploration.
 pub trait Presenter {
-    /// Presents a trial; `None` if a request to stop ended the presentation: the trial counts as never presented. Not real-time.
+    /// Presents a trial; returns `None` if a stop request interrupted it: the trial counts as not presented. Not real-time.
     ///
     /// # Errors
-    /// What the apparatus said; the trial counts as never presented.
+    /// Errors of the apparatus; the trial counts as not presented.
     fn present(&mut self, trial: &Trial) -> Result<Option<Exploration>, OutsideError>;
 }
 
-/// Presents nothing: simulated observers who need no apparatus.
+/// Presenter without an apparatus, for simulated observers.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Nothing;
 
@@ -28,43 +28,42 @@ impl Presenter for Nothing {
     }
 }
 
-/// How a sitting ended.
+/// Outcome of a sitting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// Everything was presented.
+    /// All trials were presented.
     Complete,
-    /// It was stopped; the log can be resumed.
+    /// Stopped on request; the log can be resumed.
     Stopped,
 }
 
-/// Why a sitting broke off. What is in the log stays and can be resumed.
+/// Error that interrupted a sitting. The log stays valid and can be resumed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConductError {
-    /// The log.
+    /// Error of the log.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The apparatus, before the first trial.
+    /// Error of the apparatus before the first trial.
     #[error("{0}")]
     Outside(OutsideError),
-    /// The apparatus, in a trial.
+    /// Error of the apparatus during a trial.
     #[error("trial {trial}: {cause}")]
     Trial {
-        /// Its number in the sitting.
+        /// Trial number in the sitting.
         trial: u32,
-        /// What was said.
+        /// Error of the apparatus.
         cause: OutsideError,
     },
-    /// The subject gave an answer that is none.
+    /// The subject gave an invalid answer.
     #[error(transparent)]
     Answer(#[from] AnswerError),
 }
 
-/// Carries the sitting of a simulated subject on to its end, or to where it is stopped. `watch` is told of every trial once it
-/// is on disk.
+/// Runs the sitting of a simulated subject until it is complete or stopped. `watch` is called for every trial on disk.
 ///
 /// # Errors
-/// [`ConductError`]; the trials before are in the log.
+/// [`ConductError`]; earlier trials are in the log.
 pub fn conduct(
     sitting: &mut Sitting,
     log: &mut LogWriter,

@@ -1,9 +1,8 @@
-//! Rules of exclusion, decided before there are data, and their findings. `flotor-analysis` applies them.
+//! Exclusion rules, fixed before data collection, and their findings. `flotor-analysis` applies the rules.
 //!
-//! A rule is about a whole sitting (`most_...`, `least_agreement`), or about single trials (`response_time_s`,
-//! `least_movement_mm`). A trial of ratings is left out by itself. A trial of an adaptive track takes the track with it, because
-//! the differences after it follow from its answer; only an estimate from all answers (`--estimator map`) can do without
-//! that trial alone.
+//! A rule applies to a whole sitting (`most_...`, `least_agreement`) or to single trials (`response_time_s`, `least_movement_mm`).
+//! A rated trial is excluded alone. A trial of an adaptive track excludes its track, because the later differences depend on its
+//! answer; only an estimate from all answers (`--estimator map`) can do without that trial alone.
 
 mod check;
 
@@ -11,14 +10,14 @@ use crate::protocol::SubjectNumber;
 use crate::trial::{Phase, Trial};
 use serde::{Deserialize, Serialize};
 
-/// The rules of a study; what is not said excludes nothing.
+/// Exclusion rules of a study; an absent rule excludes nothing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExclusionRules {
-    /// Sitting: largest share of catch trials in which one of two equal stimuli was named.
+    /// Sitting: largest share of catch trials answered with one of the two equal stimuli.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_false_alarms: Option<f64>,
-    /// Sitting: largest share of obvious pairs whose larger stimulus was not named.
+    /// Sitting: largest share of obvious pairs answered without naming the larger stimulus.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_missed_obvious: Option<f64>,
     /// Sitting: largest share of wrong answers to differences of 40 % and more.
@@ -36,26 +35,26 @@ pub struct ExclusionRules {
     /// Sitting: largest share of missed ticks while stimuli were felt.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_missed_ticks: Option<f64>,
-    /// Trial: least way of the handle with each stimulus, up and down together and as often as it was felt, mm.
+    /// Trial: least path length of the handle with each stimulus, up and down together, over all repetitions, mm.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub least_movement_mm: Option<f64>,
     /// Trial: shortest and longest time to the answer, s.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub response_time_s: Option<[f64; 2]>,
-    /// Sitting: largest share of trials that the rules about trials exclude.
+    /// Sitting: largest share of trials excluded by trial rules.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_excluded_trials: Option<f64>,
 }
 
-/// No rule of the file: a subject has no result in some condition, because the rules about trials left nothing, or because no track
-/// came to a threshold.
+/// Reason for exclusion without a rule: a subject has no result in some condition, because trial rules excluded all of it or no
+/// track reached a threshold.
 pub const EMPTY_CONDITION: &str = "empty_condition";
 
-/// What is excluded.
+/// Extent of an exclusion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scope {
-    /// Everything of the subject.
+    /// All data of the subject.
     Sitting,
     /// One track, by its number.
     Track(u32),
@@ -63,21 +62,21 @@ pub enum Scope {
     Trial(u32),
 }
 
-/// Something that was excluded.
+/// Excluded data and the reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Exclusion {
-    /// Whose.
+    /// Number of the subject.
     pub subject: SubjectNumber,
-    /// What.
+    /// Extent of the exclusion.
     pub scope: Scope,
-    /// By which rule, as the study file has it, or [`EMPTY_CONDITION`].
+    /// Name of the rule in the study file, or [`EMPTY_CONDITION`].
     pub rule: &'static str,
-    /// What was found.
+    /// Finding that violates the rule.
     pub found: String,
 }
 
 impl Exclusion {
-    /// Whether a trial that would count is excluded by this.
+    /// Returns true if a main trial is excluded by this finding.
     #[must_use]
     pub fn covers(&self, subject: SubjectNumber, trial: &Trial) -> bool {
         let is_here = match self.scope {
@@ -90,7 +89,7 @@ impl Exclusion {
 }
 
 impl Exclusion {
-    /// One line for people.
+    /// Formats the exclusion as one line.
     #[must_use]
     pub fn to_text(&self, rules: &ExclusionRules) -> String {
         format!("excluded: {}, {} ({})", self.scope, rules.text_of(self.rule), self.found)
@@ -108,13 +107,13 @@ impl std::fmt::Display for Scope {
 }
 
 impl ExclusionRules {
-    /// Whether there are no rules.
+    /// Returns true without any rule.
     #[must_use]
     pub fn are_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Returns what a rule depends on beside the subject, if it depends on the condition.
+    /// Returns a warning for a rule that depends on the condition as well as on the subject.
     #[must_use]
     pub fn caution(rule: &str) -> Option<&'static str> {
         (rule == "least_movement_mm").then_some(
@@ -122,14 +121,14 @@ impl ExclusionRules {
         )
     }
 
-    /// The rule as the study file has it: `most_false_alarms = 0.5`.
+    /// Formats a rule as in the study file: `most_false_alarms = 0.5`.
     #[must_use]
     pub fn text_of(&self, rule: &str) -> String {
         let said = serde_json::to_value(self).unwrap_or_default();
         said.get(rule).map_or_else(|| rule.to_owned(), |value| format!("{rule} = {value}"))
     }
 
-    /// The rules by name.
+    /// Returns the names of the rules that are set.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let said = serde_json::to_value(self).unwrap_or_default();

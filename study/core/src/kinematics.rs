@@ -1,29 +1,29 @@
-//! How a stimulus was explored, from samples of handle and force along the vertical: what CMU-RI-TR-07-21 recorded at
-//! 1000 Hz and analysed (section 4.3), and the stiffness that was really there to feel.
+//! Movement measures of an exploration, from vertical samples of handle and force: the measures that CMU-RI-TR-07-21 recorded at
+//! 1000 Hz and analysed (section 4.3), and the stiffness actually presented.
 
 use serde::{Deserialize, Serialize};
 
-/// One sample of handle and force, device frame: z is up, the force is the one on the hand.
+/// One sample of handle and force, device frame: z is up, the force acts on the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Time since the sample before, s.
+    /// Time since the previous sample, s.
     pub dt_s: f64,
     /// Height of the handle above home, m.
     pub z_m: f64,
-    /// Its velocity, m/s.
+    /// Vertical velocity of the handle, m/s.
     pub velocity_m_per_s: f64,
     /// Force along z, N.
     pub force_z_n: f64,
     /// Magnitude of the whole force, N.
     pub force_n: f64,
-    /// Whether the handle was out of its range.
+    /// True if the handle was out of its range.
     pub out_of_range: bool,
 }
 
-/// How one stimulus was explored.
+/// Movement measures of one stimulus.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StimulusKinematics {
-    /// How long, s.
+    /// Duration of the exploration, s.
     pub duration_s: f64,
     /// Mean speed along the vertical, m/s.
     pub mean_speed_m_per_s: f64,
@@ -33,18 +33,17 @@ pub struct StimulusKinematics {
     pub mean_force_n: f64,
     /// Largest magnitude of the force on the hand, N.
     pub peak_force_n: f64,
-    /// Down and up movements.
+    /// Number of down and up movements.
     pub cycles: u32,
-    /// Stiffness of vertical force against vertical displacement as the hand felt it, N/m; none if it did not move.
+    /// Stiffness of vertical force against vertical displacement as felt by the hand, N/m; `None` if the handle did not move.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub felt_stiffness_n_per_m: Option<f64>,
 }
 
-/// A movement shorter than this is none, m: above tremor (Stiles and Randall 1967: tenths of a millimetre), below the
-/// millimetres people explore a spring with.
+/// Smallest counted movement, m: above tremor (Stiles and Randall 1967: tenths of a millimetre), below the millimetres of an exploration.
 const SMALLEST_MOVEMENT_M: f64 = 0.5e-3;
 
-/// Adds up samples as they come, in constant memory.
+/// Accumulator of movement measures, in constant memory.
 #[derive(Clone, Debug, Default)]
 pub struct KinematicsMeter {
     duration_s: f64,
@@ -59,7 +58,7 @@ pub struct KinematicsMeter {
 }
 
 impl KinematicsMeter {
-    /// Takes a sample in. Samples that are not finite say nothing and are left out.
+    /// Adds a sample; skips samples that are not finite.
     pub fn take(&mut self, sample: &Sample) {
         let Sample { dt_s, z_m, velocity_m_per_s, force_z_n, force_n, out_of_range } = *sample;
         self.out_of_range |= out_of_range;
@@ -77,13 +76,13 @@ impl KinematicsMeter {
         self.line.take(z_m, force_z_n);
     }
 
-    /// Whether the handle ever was out of its range.
+    /// Returns true if the handle was ever out of its range.
     #[must_use]
     pub fn out_of_range(&self) -> bool {
         self.out_of_range
     }
 
-    /// What the samples come to; none if they took no time.
+    /// Returns the measures; `None` if the samples span no time.
     #[must_use]
     pub fn finish(&self) -> Option<StimulusKinematics> {
         let duration_s = self.duration_s;
@@ -94,18 +93,18 @@ impl KinematicsMeter {
             mean_force_n: self.impulse_ns / duration_s,
             peak_force_n: self.peak_force_n,
             cycles: self.turns.count / 2,
-            // A spring pushes up where the handle is down.
+            // A spring pushes up when the handle is down.
             felt_stiffness_n_per_m: self.line.slope().map(|slope| -slope),
         })
     }
 }
 
-/// Counts changes of direction, with a dead band.
+/// Counter of direction changes, with a dead band.
 #[derive(Clone, Debug, Default)]
 struct Turns {
-    /// Farthest place in the present direction, m.
+    /// Extreme position in the current direction, m.
     extreme_m: Option<f64>,
-    /// 1 up, -1 down, 0 not known yet.
+    /// 1 up, -1 down, 0 unknown.
     direction: f64,
     count: u32,
 }
@@ -144,7 +143,7 @@ impl Line {
         self.zf += from_mean_m * (force_n - self.mean_force_n);
     }
 
-    /// None unless the handle moved by more than nothing.
+    /// Returns the slope; `None` unless the handle moved measurably.
     fn slope(&self) -> Option<f64> {
         let deviation_m = (self.zz / self.count.max(1.0)).sqrt();
         (deviation_m > 0.1 * SMALLEST_MOVEMENT_M).then(|| self.zf / self.zz)

@@ -1,4 +1,4 @@
-//! Perception experiments: presentations, answers, and the log of both. Knows trials, and no device.
+//! Perception experiments: presentations, answers, and their log. Device-independent.
 //!
 //! ```text
 //!                      +----------------- a person, a simulated observer
@@ -8,17 +8,16 @@
 //!                +------- Sitting::answer <-------------+--> log (one line per trial, on disk before the next)
 //! ```
 //!
-//! - [`protocol`]: the experiments and every choice in them.
-//! - [`sitting`]: one subject's way through an experiment, the same for people, simulated observers and replay.
-//! - [`procedure`]: which difference comes next, and the threshold in the end.
-//! - [`observer`]: simulated subjects; [`estimate`]: what they must be like, given their answers; [`bias`]: how well
-//!   that is found.
-//! - [`log`]: what happened, line by line, chained; [`dataset`]: where it lies and the tables made from it.
-//! - [`kinematics`]: how a stimulus was explored, from samples of handle and force.
-//! - [`screen`]: a person's way through a sitting, for any front end; [`blinding`]: codes in place of conditions.
-//! - [`conduct`]: a sitting with presenter, simulated subject and log put together.
-//! - [`cohort`]: many simulated subjects at once.
-//! - [`exclusion`]: rules of exclusion, decided beforehand.
+//! - [`protocol`]: experiments and their settings.
+//! - [`sitting`]: state machine of one subject's experiment, shared by people, simulated observers and replay.
+//! - [`procedure`]: adaptive choice of the next difference, and the resulting threshold.
+//! - [`observer`]: simulated subjects; [`estimate`]: estimation of observers from answers; [`bias`]: accuracy of the estimators.
+//! - [`log`]: hash-chained event log; [`dataset`]: data folder and tables.
+//! - [`kinematics`]: movement measures of an exploration, from samples of handle and force.
+//! - [`screen`]: screens of a person's sitting, for any front end; [`blinding`]: codes in place of conditions.
+//! - [`conduct`]: runs a sitting with presenter, simulated subject and log.
+//! - [`cohort`]: many simulated subjects in parallel.
+//! - [`exclusion`]: exclusion rules, fixed before data collection.
 //!
 //! `flotor-analysis` computes thresholds, tests and effects from the logs.
 //!

@@ -1,44 +1,44 @@
-//! Seeded randomness without a past: every draw has a stream of its own, named by who draws for what.
+//! Stateless seeded randomness: every draw has a separate stream, named by its purpose and subject.
 //!
-//! A sitting that is continued after a crash therefore needs no generator state: trial 57 of subject 3 draws the same
-//! numbers whenever it is asked, on every machine and in any order.
+//! A sitting resumed after a crash therefore needs no generator state: trial 57 of subject 3 draws the same numbers at any time, on
+//! every machine and in any order.
 
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// What is drawn.
+/// Purpose of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// Order of blocks, demos and stimuli.
     Schedule = 1,
-    /// Which of a pair comes first, which way it differs.
+    /// Order within a pair, and side of the comparison.
     Presentation = 2,
-    /// What kind of observer a simulated subject is.
+    /// Parameters of a simulated subject.
     Subject = 3,
-    /// The noise in a simulated answer.
+    /// Noise of a simulated answer.
     Answer = 4,
-    /// How a simulated subject's hand moves.
+    /// Movement of a simulated subject's hand.
     Hand = 5,
-    /// Which code stands for which condition.
+    /// Codes of the conditions.
     Blinding = 6,
-    /// Before which trials of a track or a replication a check is presented.
+    /// Places of the checks in a track or replication.
     CheckPlace = 7,
-    /// Which earlier trial a check repeats.
+    /// Choice of the trial that a check repeats.
     CheckTrial = 8,
-    /// Sets of answers that a fitted observer might give.
+    /// Simulated answers of a fitted observer.
     GoodnessOfFit = 9,
 }
 
-/// A stream of random numbers.
+/// Stream of random numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct Stream {
     generator: Pcg64Mcg,
 }
 
 impl Stream {
-    /// The stream for one purpose, subject and index (of a trial, for instance) of an experiment.
+    /// Creates the stream for a purpose, subject and index (of a trial, for instance) of an experiment.
     pub(crate) fn new(seed: u64, purpose: Purpose, subject: u16, index: u32) -> Self {
         let mut name = [0_u8; 15];
         let parts = [&seed.to_le_bytes()[..], &[purpose as u8], &subject.to_le_bytes(), &index.to_le_bytes()];
@@ -46,7 +46,7 @@ impl Stream {
         Self { generator: Pcg64Mcg::seed_from_u64(xxh3_64(&name)) }
     }
 
-    /// Evenly distributed over 0 (included) to 1 (excluded).
+    /// Draws a number uniformly distributed over [0, 1).
     pub(crate) fn uniform(&mut self) -> f64 {
         /// 2^-53: the 53 highest bits fill the mantissa.
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
@@ -54,20 +54,19 @@ impl Stream {
         bits * STEP
     }
 
-    /// Normal distribution of mean 0 and deviation 1 (Box and Muller 1958), by functions that give the same bits on
-    /// every machine.
+    /// Draws a standard normal number (Box and Muller 1958), bit-identical on every machine.
     pub(crate) fn normal(&mut self) -> f64 {
         // 1 - u is never zero, so the logarithm is finite.
         let radius = (-2.0 * libm::log(1.0 - self.uniform())).sqrt();
         radius * libm::cos(TAU * self.uniform())
     }
 
-    /// Heads or tails.
+    /// Draws a fair coin.
     pub(crate) fn coin(&mut self) -> bool {
         self.uniform() < 0.5
     }
 
-    /// Evenly one of `0..n`; 0 for `n` = 0.
+    /// Draws uniformly from `0..n`; returns 0 for `n` = 0.
     pub(crate) fn below(&mut self, n: usize) -> usize {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // n is the length of a list of trials
@@ -75,7 +74,7 @@ impl Stream {
         index.min(n.saturating_sub(1))
     }
 
-    /// Every order equally likely (Fisher and Yates).
+    /// Shuffles a list, every order equally likely (Fisher and Yates).
     pub(crate) fn shuffle<T>(&mut self, list: &mut [T]) {
         for last in (1..list.len()).rev() {
             let other = self.below(last + 1);

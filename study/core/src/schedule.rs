@@ -1,14 +1,14 @@
-//! Orders: which base, which stimulus, when. All from the subject's number and the seed.
+//! Orders of blocks, demonstrations, stimuli and checks, from the subject's number and the seed.
 
 use crate::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
 use crate::random::{Purpose, Stream};
 use crate::trial::{Modality, Phase};
 
-/// Order of the bases in each replication, as indices: the rows of Latin squares, no row twice before all were used.
+/// Returns the order of the bases in each replication, as indices: rows of Latin squares, none repeated before all were used.
 ///
-/// The rows of a cyclic Latin square (each base once at each place) in random order, with the bases permuted at random
-/// and the square mirrored at random; after its last row the mirrored square follows. For the three bases of the
-/// thesis these two squares hold all six orders, so four replications never repeat one.
+/// The rows of a cyclic Latin square (each base once at each place) come in random order, with the bases permuted and the square
+/// mirrored at random; after the last row the mirrored square follows. For the three bases of the thesis these two squares hold all
+/// six orders, so four replications never repeat one.
 pub(crate) fn base_orders(protocol: &JndProtocol, seed: u64, subject: SubjectNumber) -> Vec<Vec<usize>> {
     let count = protocol.bases.len();
     let mut stream = Stream::new(seed, Purpose::Schedule, subject.get(), 0);
@@ -32,12 +32,12 @@ pub(crate) fn base_orders(protocol: &JndProtocol, seed: u64, subject: SubjectNum
     orders
 }
 
-/// The modality of each replication: alternating.
+/// Returns the modality of a replication; modalities alternate.
 pub(crate) fn alternating(first: Modality, replication: usize) -> Modality {
     if replication.is_multiple_of(2) { first } else { first.other() }
 }
 
-/// The demo of a difference experiment: three pairs in each modality, in mixed order.
+/// Returns the demonstration of a difference experiment: three pairs in each modality, in mixed order.
 ///
 /// The pairs are neighbours among four springs: obviously different, close, nearly equal.
 pub(crate) fn jnd_demo(
@@ -56,7 +56,7 @@ pub(crate) fn jnd_demo(
     demo
 }
 
-/// The stimuli of one replication of a magnitude experiment, in random order.
+/// Returns the stimuli of one replication of a magnitude experiment, in random order.
 pub(crate) fn magnitude_order(
     protocol: &MagnitudeProtocol,
     seed: u64,
@@ -68,11 +68,11 @@ pub(crate) fn magnitude_order(
     values
 }
 
-/// The checks of a track, each with the number of trials of the track before it, in order: as many as there are, at
-/// random places after the first trial, all before a track can be over.
+/// Returns the checks of a track in order, each with the number of the track's trials before it, at random places after the first
+/// trial and before the earliest end of the track.
 ///
-/// A repeat check has another pair than the one it repeats before it, and a trial that counts between it and another repeat check,
-/// as far as the track has places for that.
+/// A repeat check follows another pair than the one it repeats, and a counted trial separates two repeat checks, as far as the
+/// track has places for that.
 pub(crate) fn track_checks(
     protocol: &JndProtocol,
     seed: u64,
@@ -82,7 +82,7 @@ pub(crate) fn track_checks(
     let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), track);
     let checks = protocol.checks;
     let obvious = checks.obvious.map_or(0, |pairs| pairs.count);
-    // Those of another kind are drawn last, so that they move no other.
+    // Obvious pairs are drawn last, so that they do not move the other checks.
     let kinds =
         [(Phase::Catch, checks.catch), (Phase::RepeatCheck, checks.repeats), (Phase::Obvious, obvious)];
     let kinds = kinds.into_iter().flat_map(|(kind, count)| std::iter::repeat_n(kind, count as usize));
@@ -98,14 +98,14 @@ pub(crate) fn track_checks(
     checks
 }
 
-/// Takes from what is left, in order, the one that was drawn, or the next one, or after the last the first; none is left at the end.
+/// Removes the drawn item from a sorted list, else the next larger, wrapping around; returns `None` if the list is empty.
 fn taken<T: PartialOrd>(left: &mut Vec<T>, drawn: &T) -> Option<T> {
     let next = left.iter().position(|one| one >= drawn).unwrap_or(0);
     (!left.is_empty()).then(|| left.remove(next))
 }
 
-/// One replication of a magnitude experiment with its checks: each presents one of its stimuli once more, with another one or
-/// several between the two, and none twice at one place unless there are more checks than places.
+/// Returns one replication of a magnitude experiment with its checks. Each check repeats a stimulus after at least one other, and
+/// checks share a place only if there are more checks than places.
 pub(crate) fn with_repeat_checks(
     protocol: &MagnitudeProtocol,
     seed: u64,
@@ -115,7 +115,7 @@ pub(crate) fn with_repeat_checks(
 ) -> Vec<(Phase, f64)> {
     let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), replication);
     let count = order.len();
-    // Which stimulus, and before which one: after at least one more of the others.
+    // Pairs of stimulus index and place of its check, with at least one other stimulus in between.
     let mut left: Vec<(usize, usize)> = (0..count.saturating_sub(2))
         .flat_map(|which| (which + 2..=count).map(move |place| (which, place)))
         .collect();
@@ -139,7 +139,7 @@ pub(crate) fn with_repeat_checks(
     all
 }
 
-/// The demo before a modality of a magnitude experiment: the extremes and others, in random order.
+/// Returns the demonstration before a modality of a magnitude experiment: the extremes and others, in random order.
 pub(crate) fn magnitude_demo(
     protocol: &MagnitudeProtocol,
     seed: u64,

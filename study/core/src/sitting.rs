@@ -1,7 +1,7 @@
-//! One subject's way through an experiment: the state machine behind people, simulated observers and replay alike.
+//! State machine of one subject's experiment, shared by people, simulated observers and replay.
 //!
-//! [`Sitting::next`] says what is to be presented, [`Sitting::answer`] takes in what came of it. Both depend on the
-//! protocol, the seed, the subject's number and the answers so far, and on nothing else.
+//! [`Sitting::next`] returns the next trial, [`Sitting::answer`] processes its answer. Both depend only on the protocol, the seed,
+//! the subject's number and the answers so far.
 
 use crate::estimate::NotBounded;
 use crate::procedure::Track;
@@ -12,84 +12,84 @@ use crate::trial::{Exploration, Judgement, Modality, Pair, Phase, Position, Pres
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// What became of an answer.
+/// Verdict on an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// The handle left its range: the trial comes again.
+    /// The handle left its range: the trial is repeated.
     Repeated,
-    /// Practice, or a rating: nothing to judge.
+    /// Accepted without judgement: practice, or a rating.
     Taken,
-    /// A comparison.
+    /// Judged comparison.
     Judged {
-        /// What it is worth.
+        /// Judgement of the answer.
         judgement: Judgement,
-        /// Whether it turned the direction of its track.
+        /// True for a reversal of the track.
         reversal: bool,
     },
 }
 
-/// An answer that does not fit the trial.
+/// Invalid answer to a trial.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnswerError {
     /// A rating for a pair, or a comparison for one stimulus.
     #[error("`{}` is not a valid answer in this trial", .0.word())]
     Kind(Response),
-    /// A rating that is no number.
+    /// A rating that is not finite.
     #[error("a rating must be a finite number")]
     NotFinite,
-    /// There is no trial.
+    /// All trials were presented already.
     #[error("the experiment is over")]
     Over,
 }
 
-/// The threshold a track found.
+/// Result of a track.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TrackResult {
-    /// Track, from 1.
+    /// Track number, from 1.
     pub track: u32,
-    /// Replication, from 1.
+    /// Replication number, from 1.
     pub replication: u32,
-    /// Modality.
+    /// Modality of the track.
     pub modality: Modality,
-    /// Base.
+    /// Base, in the stimulus's unit.
     pub base: f64,
-    /// Threshold as a share of the base; none if the track never got there.
+    /// Threshold as a share of the base; `None` if the track did not reach one.
     pub threshold: Option<f64>,
-    /// The ends of the threshold that the answers do not bound.
+    /// Ends of the threshold that the answers do not bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_bounded: Option<NotBounded>,
-    /// Trials it took.
+    /// Number of trials.
     pub trials: u32,
 }
 
-/// A block of a sitting that is yet to come.
+/// Remaining block of a sitting.
 #[derive(Clone, Debug)]
 enum Item {
     Show { phase: Phase, replication: u32, modality: Modality, presented: Presented },
     Adapt { replication: u32, modality: Modality, base: f64 },
 }
 
-/// A track under way.
+/// Track in progress.
 #[derive(Clone, Debug)]
 struct Running {
     track: Track,
     trials: u32,
-    /// Checks yet to come, each after so many trials.
+    /// Remaining checks, each with the number of trials before it.
     checks: VecDeque<(u32, Phase)>,
-    /// What was presented so far.
+    /// Pairs presented so far.
     pairs: Vec<Pair>,
 }
 
 impl Running {
-    /// The check that is due now, if one is.
+    /// Returns the check that is due now.
     fn check(&self) -> Option<Phase> {
         self.checks.front().filter(|(after, _)| *after <= self.trials).map(|(_, check)| *check)
     }
 }
 
-/// One subject in one experiment.
+/// Sitting of one subject.
 #[derive(Clone, Debug)]
 pub struct Sitting {
     protocol: Protocol,
@@ -104,7 +104,7 @@ pub struct Sitting {
 }
 
 impl Sitting {
-    /// At the first trial.
+    /// Creates the sitting at its first trial.
     #[must_use]
     pub fn new(protocol: &Protocol, seed: u64, subject: SubjectNumber) -> Self {
         let items = match protocol {
@@ -126,31 +126,31 @@ impl Sitting {
         sitting
     }
 
-    /// Who sits.
+    /// Returns the number of the subject.
     #[must_use]
     pub fn subject(&self) -> SubjectNumber {
         self.subject
     }
 
-    /// Presentations so far.
+    /// Returns the number of presentations so far.
     #[must_use]
     pub fn presented(&self) -> u32 {
         self.presented
     }
 
-    /// Whether everything was presented.
+    /// Returns true if all trials were presented.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.items.is_empty()
     }
 
-    /// Thresholds of the tracks that are over.
+    /// Returns the results of completed tracks.
     #[must_use]
     pub fn results(&self) -> &[TrackResult] {
         &self.results
     }
 
-    /// The trial to present now; the same however often it is asked.
+    /// Returns the trial to present now; does not change the state.
     #[must_use]
     pub fn next(&self) -> Option<Trial> {
         let item = self.items.front()?;
@@ -167,8 +167,8 @@ impl Sitting {
         Some(Trial { number, phase, replication, track, modality, presented, repeat: self.repeat })
     }
 
-    /// What somebody who goes on after a break may practise with first, in the modality of the next trial: no part of the sitting.
-    /// Nothing while practice is what comes next, or where there is none.
+    /// Returns practice trials for a resumed sitting, in the modality of its next trial; they are not part of the sitting. Empty if
+    /// practice comes next anyway, or the protocol has none.
     #[must_use]
     pub fn practice(&self) -> Vec<Trial> {
         let Some(Trial { modality, .. }) = self.next().filter(|next| next.phase != Phase::Practice) else {
@@ -190,10 +190,10 @@ impl Sitting {
         presented.into_iter().map(trial).collect()
     }
 
-    /// Takes in what came of the trial [`Sitting::next`] named.
+    /// Processes the answer to the trial of [`Sitting::next`].
     ///
     /// # Errors
-    /// An answer of the wrong kind, or none to be given; nothing has changed then.
+    /// If the answer is of the wrong kind or the sitting is over; the state is unchanged.
     pub fn answer(&mut self, response: Response, exploration: &Exploration) -> Result<Verdict, AnswerError> {
         let trial = self.next().ok_or(AnswerError::Over)?;
         check_kind(&trial, response)?;
@@ -253,16 +253,16 @@ impl Sitting {
         self.begin_track();
     }
 
-    /// What a track presents now: its next pair, or a check.
+    /// Returns the track's next pair or check.
     fn of_track(&self, base: f64, number: u32) -> (Phase, Pair) {
         let Some(running) = &self.running else { return (Phase::Main, self.pair(base, 0.0, number)) };
         match running.check() {
             Some(Phase::Catch) => (Phase::Catch, self.pair(base, 0.0, number)),
             Some(Phase::Obvious) => (Phase::Obvious, self.pair(base, self.obvious_delta(), number)),
             Some(Phase::RepeatCheck) => {
-                // Not the last one, where there are others: two equal pairs in a row would be noticed.
+                // Not the last pair, if possible: two equal pairs in a row would be noticed.
                 let earlier = running.pairs.len().saturating_sub(1).max(1);
-                // A check that comes again presents the same pair.
+                // A repeated check presents the same pair.
                 let name = number - self.repeat;
                 let which =
                     Stream::new(self.seed, Purpose::CheckTrial, self.subject.get(), name).below(earlier);
@@ -283,7 +283,7 @@ impl Sitting {
             return pair(base, base, Position::Second, true);
         };
         let mut stream = Stream::new(self.seed, Purpose::Presentation, self.subject.get(), number);
-        // Both are drawn in any case, so that one choice does not change what the other draws.
+        // Both are drawn in any case, so that one setting does not affect the other draw.
         let (second, above) = (stream.coin(), stream.coin());
         let comparison_at = match jnd.order {
             PresentationOrder::Random if second => Position::Second,

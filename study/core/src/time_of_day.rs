@@ -1,5 +1,5 @@
-//! When something happened, for people and for other devices' files: the time of day in UTC, to the millisecond. Only what a
-//! person does has one; simulated sittings are the same whenever they run.
+//! Time of day in UTC, to the millisecond, for people and for files of other devices. Only a person's events have times; simulated
+//! sittings do not depend on the time.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
@@ -8,53 +8,52 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 const MS_PER_DAY: u64 = 86_400_000;
 
-/// A moment, as milliseconds since 1970 in UTC; written `2026-11-25T18:34:09.123Z` (ISO 8601, as in BIDS).
+/// Time of day, in milliseconds since 1970 UTC; written `2026-11-25T18:34:09.123Z` (ISO 8601, as in BIDS).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TimeOfDay(u64);
 
 impl TimeOfDay {
-    /// This moment by the system's clock.
+    /// Returns the current time by the system's clock.
     #[must_use]
     pub fn now() -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self(u64::try_from(since.as_millis()).unwrap_or(u64::MAX))
     }
 
-    /// Time from an earlier moment, s; negative if that was later.
+    /// Returns the time since an earlier moment, s; negative if that was later.
     #[must_use]
     pub fn since_s(self, earlier: Self) -> f64 {
         (self.0 as f64 - earlier.0 as f64) * 1.0e-3
     }
 }
 
-/// A change of the system's time of day by less than this is its ordinary adjustment, ms.
+/// Smallest change of the system's time of day that counts as a jump, ms; less is ordinary adjustment.
 const LEAST_JUMP_MS: i64 = 1_000;
 
-/// The clock of a sitting: the time of day at its start, and from there on steady time. Whoever sets the system's time of day
-/// moves no time of the sitting.
+/// Clock of a sitting: the time of day at its start plus monotonic time, unaffected by changes of the system's time.
 #[derive(Clone, Copy, Debug)]
 pub struct SittingClock {
     began: TimeOfDay,
     started: Instant,
-    /// The system's time of day less this clock's when that was noted last, ms.
+    /// System time less this clock's time at the last noted jump, ms.
     noted_ms: i64,
 }
 
 impl SittingClock {
-    /// Starts at this moment.
+    /// Starts the clock at the current time.
     #[must_use]
     pub fn start() -> Self {
         Self { began: TimeOfDay::now(), started: Instant::now(), noted_ms: 0 }
     }
 
-    /// The time of day by this clock.
+    /// Returns the time of day by this clock.
     #[must_use]
     pub fn now(&self) -> TimeOfDay {
         let passed_ms = u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX);
         TimeOfDay(self.began.0.saturating_add(passed_ms))
     }
 
-    /// How far the system's time of day has jumped since this was called last, ms; none if it has kept pace.
+    /// Returns the jump of the system's time of day since the last call, ms; `None` without a jump.
     pub fn take_jump_ms(&mut self) -> Option<i64> {
         self.jump_to(TimeOfDay::now())
     }
@@ -79,7 +78,7 @@ impl fmt::Display for TimeOfDay {
     }
 }
 
-/// Year, month and day of a day counted from 1970-01-01 (Gregorian; years from March on, so that the leap day is the last).
+/// Converts days since 1970-01-01 to year, month and day (Gregorian; years start in March, so that the leap day is the last).
 fn date(days: u64) -> (u64, u64, u64) {
     let from_march = days + 719_468; // days from 0000-03-01 to 1970-01-01
     let (era, day) = (from_march / 146_097, from_march % 146_097);
@@ -91,7 +90,7 @@ fn date(days: u64) -> (u64, u64, u64) {
     (era * 400 + year + carry, month, day)
 }
 
-/// A text that is no time of day.
+/// Error of parsing a time of day.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("it is no time like 2026-11-25T18:34:09.123Z")]
 pub struct NoTime;
@@ -112,7 +111,7 @@ impl FromStr for TimeOfDay {
         let days = 365 * years + years / 4 - years / 100 + years / 400 + (153 * march + 2) / 5 + day;
         let days = days.checked_sub(719_469).ok_or(NoTime)?;
         let time = Self(days * MS_PER_DAY + hour * 3_600_000 + minute * 60_000 + second * 1000 + ms);
-        // What reads back as the same text is one, and nothing else.
+        // Accept only text in canonical form.
         if time.to_string() == text { Ok(time) } else { Err(NoTime) }
     }
 }

@@ -1,10 +1,10 @@
-//! What is presented and what is answered.
+//! Trials, answers and explorations.
 
 use crate::kinematics::StimulusKinematics;
 use crate::time_of_day::TimeOfDay;
 use serde::{Deserialize, Serialize};
 
-/// What a subject sees and feels.
+/// Sensory modality of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Modality {
@@ -15,10 +15,10 @@ pub enum Modality {
 }
 
 impl Modality {
-    /// Both, in the order of the tables.
+    /// Both modalities in the order of the tables.
     pub const ALL: [Self; 2] = [Self::Vh, Self::H];
 
-    /// The other one.
+    /// Returns the other modality.
     #[must_use]
     pub fn other(self) -> Self {
         match self {
@@ -27,7 +27,7 @@ impl Modality {
         }
     }
 
-    /// As in the tables.
+    /// Returns the label used in tables.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -37,25 +37,24 @@ impl Modality {
     }
 }
 
-/// Whether a trial counts.
+/// Role of a trial in the analysis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
-    /// Shown beforehand, never analysed.
+    /// Practice, never analysed.
     Practice,
-    /// Counts.
+    /// Counted trial.
     Main,
-    /// A check: a pair of equal stimuli, for a false alarm. Not analysed with those that count.
+    /// Check: a pair of equal stimuli, to detect false alarms. Not analysed with counted trials.
     Catch,
-    /// A check: a pair with an obvious difference, for a question misread and keys the wrong way round. Not analysed with those that
-    /// count.
+    /// Check: a pair with an obvious difference, to detect a misread question or swapped keys. Not analysed with counted trials.
     Obvious,
-    /// A check: what was presented once before, for how alike the two answers are. Not analysed with those that count.
+    /// Check: a repeated presentation, to measure the agreement of answers. Not analysed with counted trials.
     RepeatCheck,
 }
 
 impl Phase {
-    /// As in the tables.
+    /// Returns the label used in tables.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -67,14 +66,14 @@ impl Phase {
         }
     }
 
-    /// What the subject may know of it: a check looks like a trial that counts.
+    /// Returns the phase as shown to the subject: a check appears as a counted trial.
     #[must_use]
     pub fn shown(self) -> Self {
         if self == Self::Practice { Self::Practice } else { Self::Main }
     }
 }
 
-/// First or second of a pair.
+/// Position within a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Position {
@@ -84,23 +83,23 @@ pub enum Position {
     Second,
 }
 
-/// Two stimuli to compare: a base and one that differs from it.
+/// Two stimuli to compare: a base and a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pair {
-    /// The base, in the stimulus's unit.
+    /// Base, in the stimulus's unit.
     pub base: f64,
-    /// The other one.
+    /// Comparison, in the stimulus's unit.
     pub comparison: f64,
-    /// Their difference as a share of the base, never negative.
+    /// Difference as a share of the base, never negative.
     pub delta: f64,
-    /// When the comparison is presented.
+    /// Position of the comparison.
     pub comparison_at: Position,
-    /// Where the larger one is presented. For equal stimuli, where it would have been.
+    /// Position of the larger stimulus; for equal stimuli, its position had they differed.
     pub larger_at: Position,
 }
 
 impl Pair {
-    /// The values in the order they are presented.
+    /// Returns the values in the order of presentation.
     #[must_use]
     pub fn in_order(&self) -> [f64; 2] {
         match self.comparison_at {
@@ -110,21 +109,21 @@ impl Pair {
     }
 }
 
-/// What is presented in a trial.
+/// Stimuli of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Presented {
-    /// One stimulus to be rated.
+    /// One stimulus to rate.
     One {
-        /// In the stimulus's unit.
+        /// Value in the stimulus's unit.
         value: f64,
     },
-    /// Two to be compared.
+    /// Two stimuli to compare.
     Pair(Pair),
 }
 
 impl Presented {
-    /// The values in the order they are presented.
+    /// Returns the values in the order of presentation.
     #[must_use]
     pub fn values(&self) -> Vec<f64> {
         match self {
@@ -134,43 +133,43 @@ impl Presented {
     }
 }
 
-/// One presentation.
+/// Presentation of a stimulus or pair.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
-    /// Count of presentations in the sitting, from 1; 0: practice before a sitting goes on, which is no part of it.
+    /// Number of the presentation in the sitting, from 1; 0 for practice before a resumed sitting, which is not part of it.
     pub number: u32,
-    /// Whether it counts.
+    /// Role of the trial in the analysis.
     pub phase: Phase,
     /// Replication, from 1; 0 for practice.
     pub replication: u32,
-    /// Track of a staircase, from 1 over the whole sitting; 0 where there is none.
+    /// Adaptive track, from 1 over the whole sitting; 0 without a track.
     pub track: u32,
-    /// Modality.
+    /// Sensory modality.
     pub modality: Modality,
-    /// Stimuli.
+    /// Presented stimuli.
     pub presented: Presented,
-    /// How often this presentation had to be repeated before, because the handle left its range.
+    /// Number of earlier presentations of this trial in which the handle left its range.
     pub repeat: u32,
 }
 
-/// What a subject answers.
+/// Answer of a subject.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Response {
-    /// The first of a pair has more of it.
+    /// The first of a pair has more of the quality.
     First,
-    /// The second has.
+    /// The second of a pair has more of the quality.
     Second,
-    /// Cannot tell.
+    /// No noticeable difference ("I don't know").
     DontKnow,
-    /// A number of the subject's own scale.
+    /// A number on the subject's free scale.
     Rating(f64),
-    /// Felt in practice; no answer asked.
+    /// Practice without an answer.
     Seen,
 }
 
 impl Response {
-    /// In words, without a rating's number.
+    /// Returns the label used in tables, without a rating's number.
     #[must_use]
     pub fn word(&self) -> &'static str {
         match self {
@@ -183,33 +182,32 @@ impl Response {
     }
 }
 
-/// What an answer to a pair is worth.
+/// Judgement of the answer to a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Judgement {
-    /// The larger one was named.
+    /// The larger stimulus was named.
     Correct,
-    /// The smaller one was.
+    /// The smaller stimulus was named.
     Wrong,
-    /// Neither.
+    /// Neither stimulus was named.
     Unsure,
 }
 
-/// What happened while stimuli were presented.
+/// Measurements during a presentation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Exploration {
-    /// The handle left its range: the presentation is to be repeated.
+    /// True if the handle left its range: the presentation is to be repeated.
     pub boundary_hit: bool,
-    /// From the end of the presentation to the answer, s; unknown for simulated observers.
+    /// Time from the end of the presentation to the answer, s; `None` for simulated observers.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub response_time_s: Option<f64>,
-    /// One entry per stimulus in the order of presentation, where a device was there to measure; all of them once more for each time
-    /// the trial was felt again.
+    /// Movement measures of each stimulus in the order of presentation, again for each repetition on request; empty without a device.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub kinematics: Vec<StimulusKinematics>,
-    /// Ticks the servo missed.
+    /// Number of ticks the servo missed.
     pub missed_ticks: u64,
-    /// When the first stimulus could be felt; unknown for simulated observers.
+    /// Time when the first stimulus could be felt; `None` for simulated observers.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub onset: Option<TimeOfDay>,
 }

@@ -41,14 +41,14 @@ pub(crate) struct AnalyseArguments {
     /// Write every subject's response under every condition, for R or Python
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    /// Write one row for each trial of the complete sittings, and beside it a script in R and one in Python that repeat
-    /// the tables, as they are with the defaults of --estimator, --type and --ratings
+    /// Write one row for each trial of the complete sittings, and beside it scripts in R and Python that reproduce the tables with
+    /// the defaults of --estimator, --type and --ratings
     #[arg(long, value_name = "FILE.csv", conflicts_with = "blind")]
     trials: Option<PathBuf>,
-    /// Every subject by themselves, also those who have not finished: tracks, psychometric functions, what is suspicious
+    /// Report each subject separately, incomplete ones too: tracks, psychometric functions, suspicious answers
     #[arg(long, conflicts_with_all = ["html", "csv", "blind"])]
     each: bool,
-    /// Codes instead of modalities and stimuli, without the values of the thesis
+    /// Show codes instead of modalities and stimuli, without the values of the thesis
     #[arg(long, conflicts_with = "html")]
     blind: bool,
     #[command(flatten)]
@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
     let Some(first) = logs.first() else { return Ok(()) };
     let complete = logs.iter().filter(|log| log.complete).count();
-    // A pilot is analysed before there is anybody to compare it with.
+    // A pilot is analysed before a second subject is complete.
     if arguments.each || complete < 2 {
         let needs_all = [&arguments.html, &arguments.csv, &arguments.trials].into_iter().any(Option::is_some);
         if arguments.blind || needs_all {
@@ -111,7 +111,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         note(format_args!("{kept} sittings are left to analyse ({excluded} exclusions)"));
     }
     let analysis = Analysis::of(protocol, subjects, &options).map_err(|error| {
-        // What the rules took may be why; whoever must not know conditions does not see it.
+        // Exclusions may be the cause; in a blinded analysis they are not shown.
         if !applied.excluded.is_empty() && !arguments.blind {
             note(format_args!("what was excluded:\n{}", applied.to_text(&rules)));
         }
@@ -164,7 +164,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     write_text(Some(&path.with_extension("R")), || script_in_r(&table))
 }
 
-/// A result with its origin, and with what came of checks and exclusion rules where the study has them.
+/// Analysis with its provenance, checks and exclusions.
 #[derive(Serialize)]
 pub(crate) struct Report<'a> {
     pub(crate) observer: ObserverKind,
@@ -179,7 +179,7 @@ pub(crate) struct Report<'a> {
     pub(crate) provenance: &'a Provenance,
 }
 
-/// A result of one subject, or under codes, with the origin of its answers.
+/// Result of one subject, or a blinded result, with the origin of its answers.
 #[derive(Serialize)]
 struct WithObserver<'a, T> {
     observer: ObserverKind,
@@ -187,7 +187,7 @@ struct WithObserver<'a, T> {
     result: &'a T,
 }
 
-/// Returns a title with the restriction that the origin of the answers sets.
+/// Appends the restriction of the answers' origin to a title.
 fn titled(title: String, observer: ObserverKind) -> String {
     match observer.restriction() {
         Some(restriction) => format!("{title}: {restriction}"),
@@ -200,12 +200,12 @@ fn checks_text(checks: &[SubjectChecks]) -> String {
     format!("  Checks{}", checks.iter().map(line).collect::<String>())
 }
 
-/// Returns the state of a sitting that did not come to its end, as text.
+/// Describes an incomplete sitting.
 fn incomplete(log: &SittingLog) -> String {
     format!("{}: incomplete after {} trials", log.begin.subject, log.trials.len())
 }
 
-/// A subject's data with the origin of its answers and the state of the sitting.
+/// Results of one subject.
 #[derive(Serialize)]
 struct Each {
     observer: ObserverKind,
@@ -235,7 +235,7 @@ impl Each {
     }
 }
 
-/// Prints every subject by themselves.
+/// Prints the results of each subject.
 fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), CommandError> {
     let each: Vec<Each> = logs.iter().map(|log| Each::of(log, arguments.choices)).collect();
     let text = || {
@@ -247,7 +247,7 @@ fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), Co
     print_result(arguments.json.file(), &each, text)
 }
 
-/// Returns a line for each incident of a log, and one for all ticks that were missed.
+/// Returns one line per incident of a log, and one line for all missed ticks.
 fn incidents_text(log: &SittingLog) -> String {
     let (mut lines, mut missed) = (String::new(), Vec::new());
     for (trials, time, incident) in &log.incidents {
@@ -265,7 +265,7 @@ fn incidents_text(log: &SittingLog) -> String {
     lines
 }
 
-/// Results under codes.
+/// Prints blinded results.
 fn tell_blinded(
     arguments: &AnalyseArguments,
     analysis: &BlindedAnalysis,

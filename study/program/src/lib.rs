@@ -1,4 +1,4 @@
-//! The commands of experiments: the program `flotor-study`, which `flotor` starts.
+//! Program `flotor-study`: the study commands, started by `flotor`.
 
 mod analyse;
 mod page;
@@ -24,13 +24,13 @@ enum Command {
     Analyse(analyse::AnalyseArguments),
 }
 
-/// The commands with their arguments. Not real-time.
+/// Returns the clap command with all arguments. Not real-time.
 #[must_use]
 pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// Runs the command of this process.
+/// Runs the command given on the command line.
 #[must_use]
 pub fn main() -> ExitCode {
     flotor_session::tell_notices(|notice| flotor_command::note(notice));
@@ -40,7 +40,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// What cannot be done with the data of a study, with its exit code.
+/// Converts a data set error to a command error with its exit code.
 fn of_dataset(error: DatasetError) -> CommandError {
     match error {
         DatasetError::File { .. } => CommandError::Failed(error.to_string()),

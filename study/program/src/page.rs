@@ -1,5 +1,5 @@
-//! A study on one page: figures 17 or 18 of CMU-RI-TR-07-21 with this study's data, and every number next to the
-//! thesis's. One HTML file that needs no other.
+//! HTML report of a study: figures 17 or 18 of CMU-RI-TR-07-21 with the study's data, and all results beside the thesis's. A single
+//! self-contained file.
 
 mod figures;
 
@@ -22,10 +22,9 @@ use flotor_study::protocol::{Protocol, Stimulus};
 use flotor_study::trial::Modality;
 use std::fmt::Write;
 
-/// Returns the page of a result.
+/// Returns the HTML page of a result.
 ///
-/// `begin` is the first line of any log of the study, `applied` has the sittings that were analysed and what the rules of the study
-/// file excluded.
+/// `begin` is the first line of any log of the study, `applied` the analysed sittings and the exclusions.
 #[must_use]
 pub(crate) fn html(begin: &Begin, report: &Report<'_>, applied: &Applied) -> String {
     let stimulus = begin.protocol.stimulus();
@@ -58,7 +57,7 @@ pub(crate) fn html(begin: &Begin, report: &Report<'_>, applied: &Applied) -> Str
     )
 }
 
-/// What came of the checks of each subject; nothing where there are none.
+/// Adds the check results of each subject, if any.
 fn checks(page: &mut Page, checks: &[SubjectChecks]) {
     if checks.is_empty() {
         return;
@@ -69,7 +68,7 @@ fn checks(page: &mut Page, checks: &[SubjectChecks]) {
     });
 }
 
-/// What the rules of the study file took, and those that could not be applied; nothing where there are no rules.
+/// Adds the exclusions and the rules that could not be applied, if the study has rules.
 fn exclusions(page: &mut Page, rules: &ExclusionRules, applied: &Applied) {
     if rules.are_none() && applied.excluded.is_empty() {
         return;
@@ -182,7 +181,7 @@ fn jnd_page(
     }
 }
 
-/// The tracks of the first subject, and folded those of all others.
+/// Adds the tracks of the first subject, and those of all others in a folded section.
 fn tracks(page: &mut Page, subjects: &[SubjectRecord], stimulus: &Stimulus) {
     let Some((first, others)) = subjects.split_first() else { return };
     page.figure(figures::tracks(first, stimulus), "The adaptive tracks of the first subject.");
@@ -253,7 +252,7 @@ fn movements(
     }
 }
 
-/// Everything needed to compute the result again.
+/// Adds the protocol and the provenance.
 fn provenance(page: &mut Page, begin: &Begin, provenance: &Provenance) {
     page.heading("Protocol and provenance");
     page.table(&["", ""], |rows| {
@@ -272,7 +271,7 @@ fn provenance(page: &mut Page, begin: &Begin, provenance: &Provenance) {
     }
 }
 
-/// Reads on light and dark screens and on paper; tables as journals print them: three rules, no boxes.
+/// Style sheet for light and dark screens and for paper; tables with three rules, as in journals.
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:58rem;margin:2rem auto;padding:0 1rem;\
     color-scheme:light dark}h1{line-height:1.2}figure{margin:1.5rem 0}figcaption{font-size:.9rem;opacity:.8}\
     svg{max-width:100%;height:auto}table{border-collapse:collapse;margin:1rem 0;font-variant-numeric:tabular-nums;\
@@ -288,21 +287,21 @@ fn percent(value: &MeanInterval) -> String {
     format!("{:.1} %", value.mean * 100.0)
 }
 
-/// Returns a text with its first letter as a capital one.
+/// Capitalises the first letter.
 fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Returns a p-value for a column named p.
+/// Formats a p-value for a column named p.
 fn p_cell(p: f64) -> String {
     p_text(p).replace("p = ", "").replace("p ", "")
 }
 
-/// A page in the making.
+/// HTML page under construction.
 struct Page {
     text: String,
-    /// Text behind every figure.
+    /// Watermark of every figure.
     watermark: &'static str,
 }
 
@@ -325,7 +324,7 @@ impl Page {
         let _ = writeln!(self.text, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
     }
 
-    /// Adds what `fill` adds, hidden until a reader unfolds it.
+    /// Adds a section, initially collapsed, with the content of `fill`.
     fn folded(&mut self, summary: &str, fill: impl FnOnce(&mut Self)) {
         let _ = writeln!(self.text, "<details><summary>{}</summary>", escaped(summary));
         fill(self);
@@ -342,7 +341,7 @@ impl Page {
         self.text.push_str("</tbody></table>\n");
     }
 
-    /// Means and standard errors under each condition, the modalities side by side.
+    /// Adds a table of means and standard errors per condition, with the modalities side by side.
     fn means<'m>(&mut self, level: &str, cells: impl Iterator<Item = (Modality, f64, &'m MeanInterval)>) {
         let cells: Vec<_> = cells.collect();
         let of = |modality| cells.iter().filter(move |(of, ..)| *of == modality);
@@ -410,7 +409,7 @@ impl Page {
     }
 }
 
-/// Rows of a table in the making.
+/// Rows of a table under construction.
 struct Rows<'p>(&'p mut String);
 
 impl Rows<'_> {

@@ -68,7 +68,7 @@ enum Task {
     Magnitude(MagnitudeArguments),
     /// Just noticeable difference of a force, felt or exerted
     Force(ForceArguments),
-    /// What a study file says: begins, or goes on with what was broken off
+    /// Run a study file: begin, or resume an interrupted study
     Run(plan::RunArguments),
     /// Feel a spring while its dimensions and material change, without trials
     Explore(explore::ExploreArguments),
@@ -76,13 +76,13 @@ enum Task {
     Spring(spring::SpringArguments),
     /// Add a note of the experimenter to a subject's log
     Note(NoteArguments),
-    /// How many subjects a difference experiment needs, by simulated studies
+    /// Sample size of a difference experiment, by simulated studies
     Power(power::PowerArguments),
     /// Bias and error of each threshold estimator, on observers with a known threshold
     Bias(bias::BiasArguments),
 }
 
-/// `--observer`
+/// Values of `--observer`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 enum ObserverOption {
     /// Signal detection with known thresholds, a simulated hand, virtual time
@@ -92,10 +92,10 @@ enum ObserverOption {
     Human,
 }
 
-/// More threads than this help no machine.
+/// Upper limit of `--jobs`.
 const MOST_JOBS: NonZeroUsize = NonZeroUsize::MIN.saturating_add(1023);
 
-/// Options of every experiment.
+/// Options common to all experiments.
 #[derive(Args)]
 struct Common {
     /// Observer who answers
@@ -141,7 +141,7 @@ struct Common {
     /// Screen for questions and answers (human)
     #[arg(long, value_enum, default_value_t)]
     screen: front::ScreenOption,
-    /// Text that a person reads before the first trial, and goes on if they agree (human); its first line is a title
+    /// Consent text shown to the person before the first trial (human); its first line is a title
     #[arg(long, value_name = "FILE")]
     consent: Option<PathBuf>,
     /// Text with instructions, in the language of the person, before each sitting (human); its first line is a title
@@ -165,10 +165,10 @@ struct Common {
     /// Least time for which each stimulus must be felt (human)
     #[arg(long, default_value = "0.5s", value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
     least_time: f64,
-    /// Least way of the handle while a stimulus is felt, up and down together, mm (human)
+    /// Least path length of the handle while a stimulus is felt, up and down together, mm (human)
     #[arg(long, default_value_t = 2.0, value_parser = real, allow_hyphen_values = true, value_name = "MM")]
     least_movement_mm: f64,
-    /// How often a person may feel a trial again at most (human; default: no limit)
+    /// Maximum number of times a person may feel a trial again (human; default: no limit)
     #[arg(long, value_parser = count(0..=1000_u32), value_name = "N")]
     feel_again: Option<u32>,
     /// White noise on headphones (human)
@@ -186,7 +186,7 @@ struct Common {
     /// If the handle leaves its range: repeat the trial (at most three times) or keep its answer
     #[arg(long, value_enum, default_value_t)]
     boundary: BoundaryChoice,
-    /// The study file that it follows.
+    /// Study file in use.
     #[arg(skip)]
     plan: Option<Plan>,
     #[command(flatten)]
@@ -258,19 +258,19 @@ struct JndArguments {
     /// Largest difference, as a share of the base
     #[arg(long, default_value_t = 0.95, value_parser = real, value_name = "SHARE")]
     ceiling: f64,
-    /// On which side of the base the comparison lies
+    /// Side of the base on which the comparison lies
     #[arg(long, value_enum, default_value_t)]
     side: ComparisonSide,
-    /// Which of a pair comes first
+    /// Order of presentation within a pair
     #[arg(long, value_enum, default_value_t)]
     order: PresentationOrder,
     /// Catch trials in each track: pairs without any difference, which do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     catch_trials: u32,
-    /// Pairs presented once more in each track, which do not count: how alike are the answers?
+    /// Pairs presented once more in each track to check the consistency of answers; they do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     repeat_checks: u32,
-    /// Obvious pairs in each track, which do not count: is the larger one named?
+    /// Obvious pairs in each track to check attention; they do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     obvious_pairs: u32,
     /// Difference of the obvious pairs, as a share of the base
@@ -294,7 +294,7 @@ struct MagnitudeArguments {
     /// Replications in each modality
     #[arg(long, default_value_t = 3, value_parser = count(1..=1000_u32), value_name = "N")]
     replications: u32,
-    /// Stimuli presented once more in each replication, which do not count: how alike are the ratings?
+    /// Stimuli presented once more in each replication to check the consistency of ratings; they do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     repeat_checks: u32,
     /// Stimuli shown before each modality
@@ -312,7 +312,7 @@ struct MagnitudeArguments {
     flotor study force --observer human --way exerted --out people"
 )]
 struct ForceArguments {
-    /// Whether the force is felt or exerted
+    /// Kind of force: felt or exerted
     #[arg(long, value_enum, default_value_t)]
     way: ForceWay,
     #[command(flatten)]
@@ -325,9 +325,9 @@ struct Subject {
     bases: [f64; 3],
 }
 
-/// Springs, as in the thesis.
+/// Springs, with the bases of the thesis.
 const STIFFNESS: Subject = Subject { stimulus: "spring.gamma_n", bases: [17.0, 26.0, 35.0] };
-/// Forces in the same proportions and in the range those springs are felt with.
+/// Forces in the proportions of the spring bases, within the range of forces felt with those springs.
 const FORCE: Subject = Subject { stimulus: "load.force_n", bases: [3.0, 6.0, 9.0] };
 
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
@@ -351,19 +351,19 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     }
 }
 
-/// One word of a table.
+/// Parses one word for a table.
 fn word(text: &str) -> Result<String, String> {
     let is_word = !text.is_empty() && text.len() <= 20 && text.chars().all(char::is_alphanumeric);
     if is_word { Ok(text.to_owned()) } else { Err("it is one word of at most 20 letters".to_owned()) }
 }
 
-/// Seconds, and not none.
+/// Parses a duration above 0, s.
 fn feel_s(text: &str) -> Result<f64, String> {
     duration_s(text).and_then(|s| if s > 0.0 { Ok(s) } else { Err("the range is above 0".to_owned()) })
 }
 
 impl Common {
-    /// What was said of the person, if anything was.
+    /// Returns the data on the person, if any were given.
     fn person(&self) -> Option<Person> {
         let Self { age, sex, handedness, .. } = self;
         let person = Person { age: *age, sex: sex.clone(), handedness: handedness.clone() };
@@ -382,7 +382,7 @@ impl Common {
         Ok(Stimulus { model: model.to_owned(), parameter: parameter.to_owned() })
     }
 
-    /// The scene with everything the command line says on top.
+    /// Loads the scene and applies the command-line settings.
     fn scene(&self, stimulus: &Stimulus, way: Option<ForceWay>) -> Result<Scene, CommandError> {
         let (scene, hand) = match &self.scene {
             Some(path) => (Scene::load(path), None),
@@ -456,13 +456,13 @@ impl MagnitudeArguments {
     }
 }
 
-/// Settings of an experiment, written as on the command line.
+/// Applies settings in command-line syntax to a scene.
 fn set(scene: &mut Scene, texts: &[&str]) -> Result<(), CommandError> {
     let apply = |text: &&str| text.parse::<PluginKeyValue>()?.apply(scene);
     texts.iter().try_for_each(apply).map_err(CommandError::Usage)
 }
 
-/// Checks everything, then carries the study out; of a force, `way` says how it is felt.
+/// Checks the configuration and runs the study; `way` is the kind of force in a force experiment.
 fn carry_out(common: &Common, protocol: Protocol, way: Option<ForceWay>) -> Result<(), CommandError> {
     protocol.check().map_err(|error| CommandError::Usage(error.to_string()))?;
     if let Some(plan) = &common.plan {
@@ -484,7 +484,7 @@ fn carry_out(common: &Common, protocol: Protocol, way: Option<ForceWay>) -> Resu
     }
 }
 
-/// Returns the people that simulated subjects are drawn from. Ratings need no Weber fraction.
+/// Returns the population of the simulated subjects. Ratings need no Weber fraction.
 fn people(common: &Common, protocol: &Protocol, way: Option<ForceWay>) -> Result<Population, CommandError> {
     match (common.weber, protocol) {
         (Some(thresholds), _) => Ok(Population::with_thresholds(thresholds)),
@@ -493,7 +493,7 @@ fn people(common: &Common, protocol: &Protocol, way: Option<ForceWay>) -> Result
     }
 }
 
-/// All simulated subjects, several at a time.
+/// Runs all simulated subjects, several in parallel.
 fn simulate(
     common: &Common,
     protocol: Protocol,
@@ -537,7 +537,7 @@ fn simulate(
     let first = Once::new();
     let watch = || {
         progress.inc(1);
-        // Off a terminal nothing else would say for half a minute that it works.
+        // Without a terminal there is no progress bar: print one note instead.
         first.call_once(|| {
             if progress.is_hidden() {
                 let root = dataset.root().display();
@@ -551,7 +551,7 @@ fn simulate(
     tell(&dataset)
 }
 
-/// A scene that does not fit the experiment: configuration, unless a plugin was refused.
+/// Converts an apparatus error: a configuration error, unless the run itself failed.
 fn unfit(error: ApparatusError) -> CommandError {
     match error {
         ApparatusError::Run(error) => error.into(),
@@ -599,8 +599,8 @@ fn refused(error: CohortError) -> CommandError {
     }
 }
 
-/// Returns the error of an apparatus, with the exit code of its cause. A note above the error of a run has the `message`, which names
-/// subject and trial.
+/// Converts an apparatus error to a command error with the exit code of its cause. For errors of a run, first prints `message` as a
+/// note, with subject and trial.
 fn outside(cause: OutsideError, message: String) -> CommandError {
     let error = match cause.downcast_ref::<RunEnded>() {
         Some(RunEnded(RunEnd::DeviceFault(fault))) => CommandError::DeviceFault(*fault),

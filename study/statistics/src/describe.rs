@@ -1,11 +1,11 @@
-//! A list of numbers in a few.
+//! Descriptive statistics of a list of numbers.
 
 use crate::distribution::student_two_sided_quantile;
 use crate::{StatisticsError, check, count};
 use serde::Serialize;
 
-/// Mean by the corrected two-pass rule: the mean of the differences from a first mean takes back what rounding left,
-/// also where the numbers are large and their differences small. NaN for an empty list.
+/// Returns the mean by the corrected two-pass rule: adding the mean difference from a first mean removes its rounding error, also
+/// for large numbers with small differences. NaN for an empty list.
 #[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     let n = count(values.len());
@@ -13,23 +13,23 @@ pub fn mean(values: &[f64]) -> f64 {
     first + values.iter().map(|value| value - first).sum::<f64>() / n
 }
 
-/// Sum of squared differences from the mean.
+/// Returns the sum of squared differences from the mean.
 #[must_use]
 pub fn sum_of_squares(values: &[f64]) -> f64 {
     let mean = mean(values);
     values.iter().map(|value| (value - mean) * (value - mean)).sum()
 }
 
-/// Standard deviation of a sample (n - 1); NaN for fewer than two values.
+/// Returns the standard deviation of a sample (n - 1); NaN for fewer than two values.
 #[must_use]
 pub fn deviation(values: &[f64]) -> f64 {
     (sum_of_squares(values) / (count(values.len()) - 1.0)).sqrt()
 }
 
-/// A mean and how well it is known.
+/// Mean with its precision.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MeanInterval {
-    /// Mean.
+    /// Mean of the values.
     pub mean: f64,
     /// Standard deviation of the values.
     pub sd: f64,
@@ -37,14 +37,14 @@ pub struct MeanInterval {
     pub se: f64,
     /// Lower and upper end of the confidence interval.
     pub interval: [f64; 2],
-    /// How many values.
+    /// Number of values.
     pub n: usize,
 }
 
-/// Mean with its confidence interval by Student's t.
+/// Computes the mean and its confidence interval by Student's t.
 ///
 /// # Errors
-/// Fewer than two values, or one that is not finite.
+/// If there are fewer than two values, or one is not finite.
 pub fn mean_interval(values: &[f64], confidence: f64) -> Result<MeanInterval, StatisticsError> {
     check("a confidence interval", values, 2)?;
     let (mean, sd) = (mean(values), deviation(values));
@@ -53,8 +53,8 @@ pub fn mean_interval(values: &[f64], confidence: f64) -> Result<MeanInterval, St
     Ok(MeanInterval { mean, sd, se, interval: [mean - half, mean + half], n: values.len() })
 }
 
-/// The value below which this share of a list lies, by linear interpolation (type 7 of Hyndman and Fan, as R and
-/// NumPy do). NaN for an empty list.
+/// Returns the quantile for a share of the list, by linear interpolation (type 7 of Hyndman and Fan, as in R and NumPy). NaN for an
+/// empty list.
 #[must_use]
 pub fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();

@@ -1,26 +1,26 @@
-//! Normal, Student's t and Fisher's F: tails, and the quantiles that intervals need.
+//! Distributions: normal, Student's t and Fisher's F, with tails and the quantiles for intervals.
 
 use crate::special::regularised_beta;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Steps of the search for a quantile. Bisection alone would need 60 for the last bit.
+/// Maximum number of steps of a quantile search; bisection alone needs 60.
 const QUANTILE_STEPS_MOST: u32 = 200;
 
-/// Density of the normal distribution of mean 0 and deviation 1.
+/// Returns the density of the standard normal distribution.
 #[must_use]
 pub fn normal_density(x: f64) -> f64 {
     libm::exp(-0.5 * x * x) / (2.0 * PI).sqrt()
 }
 
-/// Probability of a normal number below x.
+/// Returns the probability of a standard normal number below `x`.
 #[must_use]
 pub fn normal_below(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
 }
 
-/// The number below which a normal number lies with this probability; infinite at 0 and 1, NaN outside.
+/// Returns the standard normal quantile; infinite at probabilities 0 and 1, NaN outside.
 ///
-/// Acklam's rational approximation (relative error 1.2e-9), and two steps of Halley's method on top.
+/// Acklam's rational approximation (relative error 1.2e-9), refined by two steps of Halley's method.
 #[must_use]
 pub fn normal_quantile(probability: f64) -> f64 {
     if !(0.0..=1.0).contains(&probability) {
@@ -43,7 +43,7 @@ pub fn normal_quantile(probability: f64) -> f64 {
     x
 }
 
-/// Acklam's approximation of the normal quantile for probabilities up to a half.
+/// Returns Acklam's approximation of the normal quantile for probabilities up to a half.
 fn acklam_lower(probability: f64) -> f64 {
     const TAIL: f64 = 0.024_25;
     const CENTRE_NUMERATOR: [f64; 6] = [
@@ -88,7 +88,7 @@ fn acklam_lower(probability: f64) -> f64 {
     }
 }
 
-/// Probability that |t| is larger, for Student's t with `df` degrees of freedom: the two-sided p-value.
+/// Returns the two-sided p-value of Student's t with `df` degrees of freedom: the probability of a larger |t|.
 #[must_use]
 pub fn student_two_sided(t: f64, df: f64) -> f64 {
     if t.is_infinite() {
@@ -98,8 +98,8 @@ pub fn student_two_sided(t: f64, df: f64) -> f64 {
     regularised_beta(0.5 * df, 0.5, df / (df + square), square / (df + square))
 }
 
-/// The t that is exceeded in absolute value with this probability: for 0.05, the half-width of a 95 % interval in
-/// standard errors. NaN outside 0 to 1.
+/// Returns the two-sided quantile of Student's t: for probability 0.05, the half-width of a 95 % interval in standard errors. NaN
+/// outside 0 to 1.
 #[must_use]
 pub fn student_two_sided_quantile(probability: f64, df: f64) -> f64 {
     if !(0.0..=1.0).contains(&probability) || df.is_nan() || df <= 0.0 {
@@ -108,7 +108,7 @@ pub fn student_two_sided_quantile(probability: f64, df: f64) -> f64 {
     if probability == 0.0 {
         return f64::INFINITY;
     }
-    // The tail falls with t: double until the quantile is between, then halve.
+    // The tail falls with t: double until the quantile is bracketed, then bisect.
     let mut high = 1.0;
     while student_two_sided(high, df) > probability && high < f64::MAX / 4.0 {
         high *= 2.0;
@@ -128,7 +128,7 @@ pub fn student_two_sided_quantile(probability: f64, df: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Probability of so many successes or more among independent trials of this probability: the one-sided p-value.
+/// Returns the probability of at least this many successes in independent trials: the one-sided p-value.
 #[must_use]
 pub fn binomial_at_least(successes: usize, trials: usize, probability: f64) -> f64 {
     if successes == 0 {
@@ -141,7 +141,7 @@ pub fn binomial_at_least(successes: usize, trials: usize, probability: f64) -> f
     regularised_beta(k, n - k + 1.0, probability, 1.0 - probability)
 }
 
-/// Probability of a larger F with `df` and `error_df` degrees of freedom, which need not be whole: the p-value.
+/// Returns the p-value of an F with `df` and `error_df` degrees of freedom, not necessarily integers.
 #[must_use]
 pub fn fisher_above(f: f64, df: f64, error_df: f64) -> f64 {
     if f.is_infinite() {

@@ -8,25 +8,25 @@ use serde::Serialize;
 /// An effect size with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EffectSize {
-    /// The estimate.
+    /// Point estimate.
     pub value: f64,
-    /// Lower and upper end. An end beyond a noncentrality of 1000 (t) or 10^6 (F) is infinite for Cohen's d and 1 for a share; the
-    /// other end is then at least as wide as the true one.
+    /// Lower and upper end. An end with a noncentrality beyond 1000 (t) or 10^6 (F) is infinite for Cohen's d and 1 for a share;
+    /// the opposite end is then conservative.
     pub interval: [f64; 2],
 }
 
-/// Largest noncentrality of a t that is searched.
+/// Largest noncentrality of t in the search.
 const MOST_OF_T: f64 = 1.0e3;
-/// Largest noncentrality of an F that is searched.
+/// Largest noncentrality of F in the search.
 const MOST_OF_F: f64 = 1.0e6;
-/// Tail of each side of an interval.
+/// Probability outside each end of an interval.
 const TAIL: f64 = 0.025;
-/// Steps of a search for a root; ten to twenty are usual.
+/// Maximum number of steps of a root search; ten to twenty are usual.
 const STEPS_MOST: usize = 200;
-/// Relative width at which a root is found.
+/// Relative tolerance of a root.
 const WIDTH: f64 = 1.0e-13;
 
-/// Cohen's d of pairs: the mean difference in standard deviations of the differences.
+/// Returns Cohen's d of pairs: the mean difference in standard deviations of the differences.
 #[must_use]
 pub fn of_pairs(t: &TTest) -> EffectSize {
     let root_n = (t.df + 1.0).sqrt();
@@ -35,10 +35,10 @@ pub fn of_pairs(t: &TTest) -> EffectSize {
     EffectSize { value: t.value / root_n, interval: ends.map(|end| end / root_n) }
 }
 
-/// Partial omega squared of an F: the share of the population's variation that the effect explains.
+/// Returns partial omega squared of an F: the share of the population's variation explained by the effect.
 ///
-/// The mean of F is that of an effect with the noncentrality `df (F - 1)`, to which the interval is converted by the same
-/// formula. Eta squared is larger in the mean, and may lie outside this interval. An F below 1 gives 0.
+/// The value follows from the noncentrality `df (F - 1)`, whose mean F equals the observed one; the interval of the noncentrality
+/// is converted by the same formula. Eta squared is larger on average and may lie outside this interval. An F below 1 gives 0.
 #[must_use]
 pub fn partial_omega_squared(f: f64, df: f64, error_df: f64) -> EffectSize {
     let share = |noncentrality: f64| {
@@ -48,7 +48,7 @@ pub fn partial_omega_squared(f: f64, df: f64, error_df: f64) -> EffectSize {
     EffectSize { value: share((df * (f - 1.0)).max(0.0)), interval: [low.min(MOST_OF_F), high].map(share) }
 }
 
-/// The noncentrality at which a t is as small as this with a probability; infinite beyond the search.
+/// Returns the noncentrality for which a smaller t has probability `below`; infinite beyond the search.
 fn noncentrality_of_t(t: f64, df: f64, below: f64) -> f64 {
     // The distribution moves up with the noncentrality.
     let of = |delta: f64| noncentral_t_below(t, df, delta) - below;
@@ -71,7 +71,7 @@ fn noncentrality_of_t(t: f64, df: f64, below: f64) -> f64 {
     falling_root(of, low, high)
 }
 
-/// The noncentrality at which an F is as small as this with a probability; 0 if it is never that large, infinite beyond the search.
+/// Returns the noncentrality for which a smaller F has probability `below`; 0 if none reaches it, infinite beyond the search.
 fn noncentrality_of_f(f: f64, df: f64, error_df: f64, below: f64) -> f64 {
     let of = |lambda: f64| noncentral_f_below(f, df, error_df, lambda) - below;
     let (mut low, mut high) = (0.0, 1.0_f64.max(f * df).min(MOST_OF_F));
@@ -106,7 +106,7 @@ fn falling_root(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
         } else {
             (high, at_high) = (root, at);
         }
-        // The end that stays twice counts half.
+        // Illinois rule: halve the value at an end that did not move twice.
         match (last_raised_low == Some(raises_low), raises_low) {
             (true, true) => at_high *= 0.5,
             (true, false) => at_low *= 0.5,
@@ -117,9 +117,9 @@ fn falling_root(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     root
 }
 
-/// Sums `weight(j) I_x(a + j, b)` over the counts j whose Poisson weight matters: beyond, all together weigh less than 1e-17.
+/// Sums `weight(j) I_x(a + j, b)` over the counts j with significant Poisson weight; all others together weigh less than 1e-17.
 ///
-/// `first` gives the weight of the first count, `ratio(j)` is that of the weights of j + 1 and j.
+/// `first` returns the weight of the first count, `ratio(j)` the ratio of the weights of j + 1 and j.
 fn mixture(
     mean: f64,
     first: impl Fn(f64) -> f64,
@@ -133,7 +133,7 @@ fn mixture(
     let mut sum = 0.0;
     while j <= most {
         sum += weight * beta;
-        // A step that was too small for a double may grow again.
+        // A step that has underflowed may grow again.
         step = if step > f64::MIN_POSITIVE {
             step * x * (a + j - 1.0 + b) / (a + j)
         } else {
@@ -146,14 +146,14 @@ fn mixture(
     sum
 }
 
-/// Probability of a noncentral F below a value: central ones, weighted by Poisson.
+/// Returns the probability of a noncentral F below a value: Poisson mixture of central distributions.
 fn noncentral_f_below(f: f64, df: f64, error_df: f64, lambda: f64) -> f64 {
     let parts = (df * f / (df * f + error_df), error_df / (df * f + error_df));
     let half = 0.5 * lambda;
     mixture(half, |j| poisson(half, j), |j| half / (j + 1.0), (0.5 * df, 0.5 * error_df), parts)
 }
 
-/// Probability of a noncentral t below a value (Lenth 1989, AS 243, summed about the largest weights).
+/// Returns the probability of a noncentral t below a value (Lenth 1989, AS 243, summed about the largest weights).
 fn noncentral_t_below(t: f64, df: f64, delta: f64) -> f64 {
     if t < 0.0 {
         return 1.0 - noncentral_t_below(-t, df, -delta);
@@ -161,13 +161,13 @@ fn noncentral_t_below(t: f64, df: f64, delta: f64) -> f64 {
     let parts = (t * t / (t * t + df), df / (t * t + df));
     let half = 0.5 * delta * delta;
     let even = mixture(half, |j| poisson(half, j), |j| half / (j + 1.0), (0.5, 0.5 * df), parts);
-    // Gamma(j + 1) / Gamma(j + 3/2) turns a weight of the even part into one of the odd part.
+    // Gamma(j + 1) / Gamma(j + 3/2) converts a weight of the even part to one of the odd part.
     let odd = |j: f64| poisson(half, j) * libm::exp(libm::lgamma(j + 1.0) - libm::lgamma(j + 1.5));
     let odd = mixture(half, odd, |j| half / (j + 1.5), (1.0, 0.5 * df), parts);
     (normal_below(-delta) + 0.5 * (even + delta / std::f64::consts::SQRT_2 * odd)).clamp(0.0, 1.0)
 }
 
-/// Poisson probability of a count.
+/// Returns the Poisson probability of a count.
 fn poisson(mean: f64, count: f64) -> f64 {
     if mean == 0.0 {
         return if count == 0.0 { 1.0 } else { 0.0 };

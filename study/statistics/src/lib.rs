@@ -1,17 +1,17 @@
-//! Statistics of the perception experiments: numbers in, numbers out. Knows neither trials nor devices.
+//! Statistics for the perception experiments: pure numerics, independent of trials and devices.
 //!
 //! - [`describe`]: means, deviations, confidence intervals.
 //! - [`t_test`]: one sample, pairs, two groups (Welch, Student).
-//! - [`regression`]: a straight line.
+//! - [`regression`]: straight line by least squares.
 //! - [`anova`]: analysis of variance with factors between and within subjects, sums of squares of type II and III,
 //!   corrections for lack of sphericity.
-//! - [`trend`]: the linear part of an effect within subjects.
-//! - [`effect_size`], [`multiple`]: sizes of effects with intervals; corrections for several tests.
+//! - [`trend`]: linear trend of an effect within subjects.
+//! - [`effect_size`], [`multiple`]: effect sizes with intervals; corrections for multiple tests.
 //! - [`quadrature`]: integrals and quantiles of a density.
-//! - [`distribution`]: normal, Student's t, Fisher's F. A p-value is computed as the tail it is, never as one minus
-//!   the rest, so that it has its digits however small it is.
+//! - [`distribution`]: normal, Student's t, Fisher's F. A p-value is computed directly as a tail, never as one minus the rest, so
+//!   that small values keep their precision.
 //!
-//! A number that data do not give is an [`Outcome`] with its reason, and the others stay.
+//! A number that the data cannot give is an [`Outcome`] with its reason; other results are unaffected.
 //!
 //! Every result is compared with R or with the certified values of NIST to 1e-9, relative (`tests/`). Nothing here
 //! is real-time.
@@ -30,90 +30,90 @@ pub mod trend;
 
 use serde::Serialize;
 
-/// Why a number cannot be had.
+/// Reason why a statistic cannot be computed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StatisticsError {
-    /// There are fewer numbers than the result needs.
+    /// Too few values for the result.
     #[error("{what} needs at least {needed} {unit}, there are {found}")]
     TooFew {
-        /// The result.
+        /// Name of the result.
         what: &'static str,
-        /// What there is too little of.
+        /// Unit of the counts.
         unit: &'static str,
-        /// How many it takes.
+        /// Required number.
         needed: usize,
-        /// How many there are.
+        /// Available number.
         found: usize,
     },
     /// A number is NaN or infinite.
     #[error("{what}: value {index} is not finite")]
     NotFinite {
-        /// The result.
+        /// Name of the result.
         what: &'static str,
-        /// Which value, counted from 0.
+        /// Index of the value, from 0.
         index: usize,
     },
-    /// Lists that belong together differ in length.
+    /// Paired lists differ in length.
     #[error("{what}: {left} values on one side, {right} on the other")]
     Lengths {
-        /// The result.
+        /// Name of the result.
         what: &'static str,
         /// Length of the first list.
         left: usize,
-        /// Length of the second.
+        /// Length of the second list.
         right: usize,
     },
-    /// Without variation there is nothing to compare with.
+    /// The values do not vary, so there is no error to test against.
     #[error("{what}: the values do not vary")]
     Constant {
-        /// The result.
+        /// Name of the result.
         what: &'static str,
     },
-    /// Pairs that are equal in every subject.
+    /// The pairs are equal in every subject.
     #[error("no difference in any subject")]
     NoDifference,
-    /// Differences without variation between subjects.
+    /// The differences do not vary between subjects.
     #[error("the same difference in every subject")]
     SameDifference,
-    /// Means without variation.
+    /// The means are equal at all levels.
     #[error("equal means at all levels")]
     EqualMeans,
-    /// An effect in subjects that do not differ in it.
+    /// The effect does not vary between subjects.
     #[error("no variation between subjects to test it against")]
     NoError,
-    /// Responses from which scaling has removed an effect and its error.
+    /// Scaling of the responses has removed an effect and its error.
     #[error("scaling of the responses removes the effect")]
     NothingLeft,
-    /// A design of an analysis of variance that cannot be analysed.
+    /// The design of an analysis of variance is invalid.
     #[error("analysis of variance: {0}")]
     Design(String),
 }
 
-/// A statistic, or the reason why the data give none. One that cannot be computed takes no other away.
+/// Statistic, or the reason why it cannot be computed. A missing statistic does not affect others.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Outcome<T> {
-    /// The statistic.
+    /// Computed statistic.
     Tested(T),
-    /// None, for a reason.
+    /// No statistic.
     NotTestable {
-        /// The reason.
+        /// Reason for the missing statistic.
         #[serde(serialize_with = "as_text")]
         not_testable: StatisticsError,
     },
 }
 
 impl<T> Outcome<T> {
-    /// Returns the statistic, if there is one.
+    /// Returns the statistic, if computed.
     pub fn tested(&self) -> Option<&T> {
         self.result().ok()
     }
 
-    /// Returns the statistic or the reason.
+    /// Returns the statistic or the reason for its absence.
     ///
     /// # Errors
-    /// The reason why there is no statistic.
+    /// The reason for the missing statistic.
     pub fn result(&self) -> Result<&T, &StatisticsError> {
         match self {
             Self::Tested(tested) => Ok(tested),
@@ -121,12 +121,12 @@ impl<T> Outcome<T> {
         }
     }
 
-    /// Describes the outcome: the statistic in words of its own, or "not testable" with the reason.
+    /// Formats the statistic by `text`, or "not testable" with the reason.
     pub fn to_text(&self, text: impl FnOnce(&T) -> String) -> String {
         self.result().map_or_else(not_testable_text, text)
     }
 
-    /// Converts the statistic.
+    /// Converts the statistic by a function.
     pub fn map<U>(self, of: impl FnOnce(T) -> U) -> Outcome<U> {
         match self {
             Self::Tested(tested) => Outcome::Tested(of(tested)),
@@ -144,7 +144,7 @@ impl<T> From<Result<T, StatisticsError>> for Outcome<T> {
     }
 }
 
-/// Describes a statistic that could not be computed.
+/// Formats the reason for a missing statistic.
 #[must_use]
 pub fn not_testable_text(reason: &StatisticsError) -> String {
     format!("not testable: {reason}")
@@ -154,10 +154,10 @@ fn as_text<S: serde::Serializer>(reason: &StatisticsError, serializer: S) -> Res
     serializer.collect_str(reason)
 }
 
-/// Squares below this share of those of the responses are rounding errors, whose relative size is 1e-16.
+/// Share of the squared responses below which squares are rounding errors (relative size 1e-16).
 const ROUNDING: f64 = 1.0e-20;
 
-/// All of a list is finite, and there is enough of it.
+/// Checks that a list is finite and long enough.
 fn check(what: &'static str, values: &[f64], needed: usize) -> Result<(), StatisticsError> {
     if let Some(index) = values.iter().position(|value| !value.is_finite()) {
         return Err(StatisticsError::NotFinite { what, index });
@@ -168,7 +168,7 @@ fn check(what: &'static str, values: &[f64], needed: usize) -> Result<(), Statis
     Ok(())
 }
 
-/// A count as a number; counts here are far below 2^53.
+/// Converts a count to `f64`; counts are far below 2^53.
 fn count(n: usize) -> f64 {
     n as f64
 }

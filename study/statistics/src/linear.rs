@@ -1,6 +1,6 @@
-//! Least squares for small designs: what is left of several responses after a set of columns is fitted.
+//! Least squares for small designs: residuals of several responses after fitting a set of columns.
 
-/// A matrix, row by row.
+/// Matrix in row-major order.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Matrix {
     rows: usize,
@@ -22,7 +22,7 @@ impl Matrix {
         self.columns
     }
 
-    /// The value at a place; zero outside, so that no index can fail.
+    /// Returns the entry at a position; zero outside, so that no index can fail.
     pub(crate) fn at(&self, row: usize, column: usize) -> f64 {
         if column >= self.columns {
             return 0.0;
@@ -40,7 +40,7 @@ impl Matrix {
         })
     }
 
-    /// Every product of an entry of `self` with one of `other`, in blocks.
+    /// Returns the Kronecker product.
     pub(crate) fn kronecker(&self, other: &Self) -> Self {
         Self::from_fn(self.rows * other.rows, self.columns * other.columns, |row, column| {
             self.at(row / other.rows, column / other.columns)
@@ -48,7 +48,7 @@ impl Matrix {
         })
     }
 
-    /// Side by side.
+    /// Concatenates two matrices horizontally.
     pub(crate) fn beside(&self, other: &Self) -> Self {
         Self::from_fn(self.rows.max(other.rows), self.columns + other.columns, |row, column| {
             if column < self.columns { self.at(row, column) } else { other.at(row, column - self.columns) }
@@ -59,18 +59,18 @@ impl Matrix {
         (0..self.rows.min(self.columns)).map(|k| self.at(k, k)).sum()
     }
 
-    /// Trace of the square of a symmetric matrix: the sum of the squares of all its numbers, as of any other.
+    /// Returns the trace of the square of a symmetric matrix: the sum of all squared entries.
     pub(crate) fn trace_of_square(&self) -> f64 {
         self.values.iter().map(|value| value * value).sum()
     }
 }
 
-/// Columns made orthonormal, one after the other (Gram-Schmidt, twice: Kahan and Parlett's "twice is enough").
+/// Orthonormal basis of a matrix's columns (Gram-Schmidt, twice: Kahan and Parlett's "twice is enough").
 pub(crate) struct Basis {
     columns: Vec<Vec<f64>>,
 }
 
-/// Below this share of its length, what is left of a column is rounding: the column adds nothing.
+/// Relative length of a residual column below which the column is linearly dependent.
 const DEPENDENT: f64 = 1.0e-10;
 
 impl Basis {
@@ -87,7 +87,7 @@ impl Basis {
         basis
     }
 
-    /// How many columns are independent.
+    /// Returns the number of independent columns.
     pub(crate) fn rank(&self) -> usize {
         self.columns.len()
     }
@@ -100,7 +100,7 @@ impl Basis {
         values
     }
 
-    /// Sums of squares and products of what the basis leaves of each column of `responses`.
+    /// Returns sums of squares and products of the residuals of each column of `responses`.
     pub(crate) fn residual_products(&self, responses: &Matrix) -> Matrix {
         let left: Vec<Vec<f64>> = (0..responses.columns())
             .map(|column| self.residual(self.residual(responses.column(column))))
@@ -108,8 +108,7 @@ impl Basis {
         products(&left)
     }
 
-    /// Sums of squares and products of what this basis explains beyond a smaller one: its columns beyond those of
-    /// `smaller`, which must span a part of what it spans.
+    /// Returns sums of squares and products explained by this basis beyond `smaller`, which must span a subspace of this basis.
     pub(crate) fn products_beyond(&self, smaller: &Self, responses: &Matrix) -> Matrix {
         let mut extended = Self { columns: smaller.columns.clone() };
         let mut beyond = Vec::new();
@@ -124,7 +123,7 @@ impl Basis {
         }
         let shares: Vec<Vec<f64>> = (0..responses.columns())
             .map(|column| {
-                // Without what the smaller basis explains: a large mean would drown a small effect in rounding.
+                // Use residuals of the smaller basis: a large mean would swamp a small effect with rounding errors.
                 let response = smaller.residual(smaller.residual(responses.column(column)));
                 beyond.iter().map(|unit| dot(unit, &response)).collect()
             })

@@ -1,7 +1,7 @@
-//! Several tests of one question: the probability of any wrong yes stays what a single one has.
+//! Corrections for multiple tests: the family-wise error rate equals that of a single test.
 
-/// Holm's correction (1979): the smallest p is multiplied by the number of tests, the next by one less, and so on; none is
-/// smaller than one before it, and none above 1. In the order given; what is no probability stays as it is and is not counted.
+/// Returns p-values after Holm's correction (1979): the smallest p is multiplied by the number of tests, the next by one less, and so on,
+/// without decreasing and limited to 1. Keeps the order of the list; values that are not finite are not counted and returned unchanged.
 #[must_use]
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).filter(|index| p[*index].is_finite()).collect();

@@ -1,23 +1,23 @@
-//! Integrals and quantiles of a density of one variable, by Gauss and Legendre's rule.
+//! Integrals and quantiles of a univariate density, by Gauss-Legendre quadrature.
 
 use crate::count;
 use std::f64::consts::PI;
 
-/// Steps of Newton's method for a node; four are usual.
+/// Maximum number of Newton steps for a node; four are usual.
 const NEWTON_STEPS: usize = 20;
-/// Panels between which the integral of a density is known.
+/// Number of panels for the integral of a density.
 const PANELS: usize = 512;
 
-/// A node of a rule, and its weight.
+/// Node of a quadrature rule with its weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
-    /// Abscissa.
+    /// Abscissa of the node.
     pub at: f64,
-    /// Weight.
+    /// Weight of the node.
     pub weight: f64,
 }
 
-/// Returns the rule of so many nodes over an interval: exact for polynomials of a degree below twice their number.
+/// Returns the rule with a given number of nodes over an interval: exact for polynomials of degree below twice that number.
 #[must_use]
 pub fn gauss_legendre(nodes: usize, [low, high]: [f64; 2]) -> Vec<Node> {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
@@ -38,7 +38,7 @@ pub fn gauss_legendre(nodes: usize, [low, high]: [f64; 2]) -> Vec<Node> {
     (0..nodes).map(node).collect()
 }
 
-/// The Legendre polynomial of a degree and its derivative.
+/// Returns a Legendre polynomial and its derivative.
 fn legendre(degree: usize, x: f64) -> (f64, f64) {
     let (mut before, mut value) = (1.0, x);
     for n in 2..=degree {
@@ -48,7 +48,7 @@ fn legendre(degree: usize, x: f64) -> (f64, f64) {
     (value, count(degree) * (x * value - before) / (x * x - 1.0))
 }
 
-/// A density over an interval, known at the nodes of a rule and between them by the polynomial through these.
+/// Density over an interval, interpolated by the polynomial through its values at the nodes of a rule.
 #[derive(Clone, Debug)]
 pub struct Density {
     low: f64,
@@ -60,7 +60,7 @@ pub struct Density {
 }
 
 impl Density {
-    /// A density, up to a factor, from its values at the nodes of [`gauss_legendre`] over this interval.
+    /// Builds a density, up to a factor, from its values at the nodes of [`gauss_legendre`] over this interval.
     #[must_use]
     pub fn new(nodes: &[Node], [low, high]: [f64; 2], at_nodes: &[f64]) -> Self {
         let width = (high - low) / count(PANELS);
@@ -96,7 +96,7 @@ impl Density {
         Self { low, width, values, below }
     }
 
-    /// Returns the value below which this share of the density lies.
+    /// Returns the quantile for a share of the density.
     #[must_use]
     pub fn quantile(&self, share: f64) -> f64 {
         let total = self.below.last().copied().unwrap_or(f64::NAN);
@@ -105,7 +105,7 @@ impl Density {
         let at = |list: &[f64], index: usize| list.get(index).copied().unwrap_or(f64::NAN);
         let (start, end) = (at(&self.below, panel), at(&self.below, panel + 1));
         let [first, middle, last] = [0, 1, 2].map(|half| at(&self.values, 2 * panel + half));
-        // The integral of the parabola through the three values, which ends where Simpson's rule does.
+        // Integral of the parabola through the three values, consistent with Simpson's rule at the panel's end.
         let inside = |x: f64| {
             let (slope, bend) = (4.0 * middle - 3.0 * first - last, 2.0 * (first + last) - 4.0 * middle);
             self.width * x * (first + x * (0.5 * slope + x * bend / 3.0))

@@ -1,16 +1,16 @@
-//! A straight line through points.
+//! Linear regression of points.
 
 use crate::describe::{mean, sum_of_squares};
 use crate::distribution::{fisher_above, student_two_sided, student_two_sided_quantile};
 use crate::{StatisticsError, check, count};
 use serde::Serialize;
 
-/// A line fitted by least squares.
+/// Line fitted by least squares.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Line {
-    /// Height at zero.
+    /// Value at zero.
     pub intercept: f64,
-    /// Rise per unit.
+    /// Change of the value per unit of the abscissa.
     pub slope: f64,
     /// Standard error of the intercept.
     pub intercept_se: f64,
@@ -18,15 +18,15 @@ pub struct Line {
     pub slope_se: f64,
     /// 95 % confidence interval of the slope.
     pub slope_interval: [f64; 2],
-    /// Probability of such a slope if there is none.
+    /// p-value of the slope: probability of a larger |slope| if the true one is zero.
     pub slope_p: f64,
-    /// Share of the variation that the line explains.
+    /// Share of the variation explained by the line.
     pub r_squared: f64,
     /// Standard deviation of the residuals.
     pub residual_sd: f64,
-    /// F of the line against no slope.
+    /// F of the slope.
     pub f: f64,
-    /// Its p-value.
+    /// p-value of F.
     pub p: f64,
     /// Degrees of freedom of the residuals.
     pub error_df: f64,
@@ -35,7 +35,7 @@ pub struct Line {
 /// Fits a line to points.
 ///
 /// # Errors
-/// Fewer than three points, lists of different length, a value that is not finite, or abscissae that do not vary.
+/// If there are fewer than three points, the lists differ in length, a value is not finite, or the abscissae do not vary.
 pub fn line(x: &[f64], y: &[f64]) -> Result<Line, StatisticsError> {
     const WHAT: &str = "a line";
     check(WHAT, x, 3)?;
@@ -50,7 +50,7 @@ pub fn line(x: &[f64], y: &[f64]) -> Result<Line, StatisticsError> {
     }
     let xy: f64 = x.iter().zip(y).map(|(x, y)| (x - x_mean) * (y - y_mean)).sum();
     let slope = xy / xx;
-    // From the residuals themselves, not as a difference of sums, which cancels for a good fit.
+    // Sum the squared residuals directly: a difference of sums cancels for a good fit.
     let residual = |(x, y): (&f64, &f64)| (y - y_mean) - slope * (x - x_mean);
     let residual_squares: f64 = x.iter().zip(y).map(residual).map(|r| r * r).sum();
     let n = count(x.len());

@@ -1,17 +1,15 @@
-//! The incomplete beta function, from which the tails of t and F follow.
+//! Incomplete beta function, the basis of the tails of t and F.
 
-/// Terms after which the continued fraction is given up. It converges in about the square root of the larger
-/// argument; degrees of freedom of ten million still get there.
+/// Maximum number of terms of the continued fraction. Convergence takes about the square root of the larger argument, so this
+/// suffices for ten million degrees of freedom.
 const FRACTION_TERMS_MOST: u32 = 10_000;
-/// Keeps a vanishing denominator of the continued fraction from dividing by zero (Lentz's method).
+/// Lower limit of the denominators of the continued fraction (Lentz's method).
 const TINY: f64 = 1.0e-300;
 
-/// The regularised incomplete beta function I_x(a, b), with `y = 1 - x` given beside `x` because a caller can
-/// compute it without cancellation.
+/// Returns the regularised incomplete beta function I_x(a, b). The caller passes `y = 1 - x` as well, computed without cancellation.
 ///
-/// By the continued fraction of Abramowitz and Stegun 26.5.8, evaluated from the front (Lentz 1976), on that side
-/// of the mean where it converges; there the result is also the smaller of the two tails, so no tail is ever taken
-/// as a difference.
+/// Uses the continued fraction of Abramowitz and Stegun 26.5.8, evaluated from the front (Lentz 1976), on the side of the mean
+/// where it converges; there the result is also the smaller of the two tails, so no tail is computed as a difference.
 pub(crate) fn regularised_beta(a: f64, b: f64, x: f64, y: f64) -> f64 {
     if a.is_nan() || b.is_nan() || x.is_nan() {
         return f64::NAN;
@@ -34,9 +32,9 @@ fn lower_tail(a: f64, b: f64, x: f64, y: f64) -> f64 {
     front(a, b, x, y) * fraction(a, b, x) / a
 }
 
-/// x^a y^b / B(a, b).
+/// Returns x^a y^b / B(a, b).
 fn front(a: f64, b: f64, x: f64, y: f64) -> f64 {
-    // ln(1 - y) keeps the digits that ln x would lose next to 1.
+    // ln(1 - y) keeps the digits that ln x loses near 1.
     let ln_x = if y < 0.5 { libm::log1p(-y) } else { libm::log(x) };
     let ln_y = if x < 0.5 { libm::log1p(-x) } else { libm::log(y) };
     let ln_beta = libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);

@@ -1,22 +1,22 @@
-//! Student's t: one sample, pairs, two groups.
+//! Student's t-tests: one sample, pairs, two groups.
 
 use crate::describe::{deviation, mean, sum_of_squares};
 use crate::distribution::{student_two_sided, student_two_sided_quantile};
 use crate::{ROUNDING, StatisticsError, check, count};
 use serde::Serialize;
 
-/// Result of a t-test, two-sided.
+/// Result of a two-sided t-test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TTest {
-    /// Degrees of freedom; not whole for groups of unequal variance.
+    /// Degrees of freedom; not an integer for groups of unequal variance.
     pub df: f64,
-    /// t.
+    /// t statistic.
     pub value: f64,
     /// Probability of a larger |t| if there is no difference.
     pub p: f64,
-    /// The difference of the means.
+    /// Difference of the means.
     pub difference: f64,
-    /// Its 95 % confidence interval.
+    /// 95 % confidence interval of the difference.
     pub interval: [f64; 2],
 }
 
@@ -32,10 +32,10 @@ impl TTest {
     }
 }
 
-/// Do these values differ from `expected` in the mean?
+/// Tests the mean of a sample against `expected`.
 ///
 /// # Errors
-/// Fewer than two values, none that vary, or one that is not finite.
+/// If there are fewer than two values, none vary, or one is not finite.
 pub fn one_sample(values: &[f64], expected: f64) -> Result<TTest, StatisticsError> {
     const WHAT: &str = "a t-test";
     check(WHAT, values, 2)?;
@@ -43,11 +43,11 @@ pub fn one_sample(values: &[f64], expected: f64) -> Result<TTest, StatisticsErro
     TTest::new(WHAT, mean(values) - expected, deviation(values) / n.sqrt(), n - 1.0)
 }
 
-/// Do pairs differ in the mean? Positive where the first of a pair is larger.
+/// Tests the mean difference of pairs, positive where the first of a pair is larger.
 ///
 /// # Errors
-/// As [`one_sample`], or lists of different length; [`StatisticsError::NoDifference`] or [`StatisticsError::SameDifference`] where
-/// nothing but rounding errors varies.
+/// Errors of [`one_sample`], or lists of different length; [`StatisticsError::NoDifference`] or [`StatisticsError::SameDifference`]
+/// if only rounding errors vary.
 pub fn paired(first: &[f64], second: &[f64]) -> Result<TTest, StatisticsError> {
     if first.len() != second.len() {
         return Err(StatisticsError::Lengths {
@@ -66,19 +66,19 @@ pub fn paired(first: &[f64], second: &[f64]) -> Result<TTest, StatisticsError> {
     one_sample(&differences, 0.0)
 }
 
-/// How the spread of two groups is estimated.
+/// Assumption on the variances of two groups.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variances {
-    /// One variance for both groups (Student).
+    /// Common variance of both groups (Student).
     Pooled,
-    /// Each group its own (Welch 1947), with Satterthwaite's degrees of freedom.
+    /// Separate variances (Welch 1947), with Satterthwaite's degrees of freedom.
     Separate,
 }
 
-/// Do two groups differ in the mean? Positive where the first is larger.
+/// Tests the difference of two group means, positive where the first is larger.
 ///
 /// # Errors
-/// Fewer than two values in a group, none that vary, or one that is not finite.
+/// If a group has fewer than two values, none vary, or one is not finite.
 pub fn two_groups(first: &[f64], second: &[f64], variances: Variances) -> Result<TTest, StatisticsError> {
     const WHAT: &str = "a t-test of two groups";
     check(WHAT, first, 2)?;

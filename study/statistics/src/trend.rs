@@ -1,4 +1,4 @@
-//! The linear part of an effect within subjects.
+//! Linear trend of an effect within subjects.
 
 use crate::describe::{mean, sum_of_squares};
 use crate::distribution::fisher_above;
@@ -7,14 +7,14 @@ use crate::t_test::one_sample;
 use crate::{Outcome, ROUNDING, StatisticsError, count};
 use serde::Serialize;
 
-/// Line through the means of a within-subject factor over its levels.
+/// Least-squares line through the means at the levels of a within-subject factor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LinearTrend {
-    /// Rise of the mean response per unit of the factor.
+    /// Change of the mean response per unit of the factor.
     pub slope: f64,
-    /// Height of the line at zero.
+    /// Value of the line at zero.
     pub intercept: f64,
-    /// Share of the variation among the means that the line explains: the R² of the trend.
+    /// R² of the trend: the share of the variation among the means explained by the line.
     pub r_squared: f64,
     /// Test of the linear contrast.
     #[serde(flatten)]
@@ -34,10 +34,10 @@ pub struct ContrastTest {
     pub p: f64,
 }
 
-/// The trend of responses over the levels of a factor: `responses[subject][level]`.
+/// Fits the linear trend of `responses[subject][level]` over the levels of a factor.
 ///
 /// # Errors
-/// Fewer than three levels, rows of the wrong length, a value that is not finite, means that do not vary.
+/// If there are fewer than three levels, a row has the wrong length, a value is not finite, or the means do not vary.
 pub fn linear(levels: &[f64], responses: &[Vec<f64>]) -> Result<LinearTrend, StatisticsError> {
     const WHAT: &str = "a linear trend";
     for row in responses {

@@ -1,4 +1,4 @@
-//! A person's sitting: screens shown, stimuli felt, answers logged, each before the next trial begins.
+//! Runs the sitting of a person: shows screens, presents stimuli and logs each answer before the next trial begins.
 
 use super::real_time_rig::RealTimeRig;
 use crate::conduct::{Ending, OutsideError};
@@ -7,31 +7,31 @@ use crate::screen::{Attended, Felt, Input, May, Screen, Step};
 use crate::trial::Trial;
 use std::time::Instant;
 
-/// What a front end has heard of a person.
+/// Result of polling a front end.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Heard {
-    /// Nothing yet.
+    /// No input yet.
     Nothing,
-    /// What the person did.
+    /// Input of the person.
     Input(Input),
-    /// The window is closed, or standard input is: nobody can be asked any more.
+    /// The window or standard input is closed: no further input is possible.
     Closed,
 }
 
-/// The least that a stimulus must be felt before it counts: a key pressed by accident, or ahead, is no answer.
+/// Minimum exploration of a stimulus before an answer counts, against keys pressed by accident or too early.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Least {
-    /// Time, s.
+    /// Least time, s.
     pub time_s: f64,
-    /// Way of the handle, up and down together, m.
+    /// Least path length of the handle, up and down together, m.
     pub way_m: f64,
 }
 
 impl Least {
-    /// Half a second, and twice a millimetre. From then on the answer before it is no longer taken back.
+    /// Half a second and 2 mm. Past these limits the previous answer can no longer be withdrawn.
     pub const USUAL: Least = Least { time_s: 0.5, way_m: 2.0e-3 };
 
-    /// Why a stimulus was not felt long or far enough, if so.
+    /// Returns a hint if a stimulus was not felt long or far enough.
     fn is_missed(&self, time_s: f64, way_m: Option<f64>) -> Option<&'static str> {
         if time_s < self.time_s {
             Some("feel it a little longer")
@@ -43,39 +43,38 @@ impl Least {
     }
 }
 
-/// Where a person sees screens and answers: a terminal, a pipe to a window, a test.
+/// User interface of a person's sitting: a terminal, a pipe to a window, a test.
 pub trait FrontEnd {
     /// Shows a screen.
     ///
     /// # Errors
-    /// Nobody can be shown anything any more.
+    /// If the front end is gone.
     fn show(&mut self, screen: &Screen) -> Result<(), OutsideError>;
 
-    /// What the person has done since; waits for it no longer than a moment, so that the handle can be
-    /// watched meanwhile.
+    /// Returns the input since the last call; waits only briefly, so that the handle can be watched meanwhile.
     ///
     /// # Errors
-    /// Nobody can be asked any more.
+    /// If the front end is gone.
     fn poll(&mut self, screen: &Screen) -> Result<Heard, OutsideError>;
 
-    /// The handle has just been pushed out of its range: to be seen and heard at once.
+    /// Warns at once, visibly and audibly, that the handle was pushed out of its range.
     ///
     /// # Errors
-    /// Nobody can be told any more.
+    /// If the front end is gone.
     fn warn_out_of_range(&mut self) -> Result<(), OutsideError>;
 
-    /// An input that cannot be taken, and why.
+    /// Shows why an input was rejected.
     ///
     /// # Errors
-    /// Nobody can be told any more.
+    /// If the front end is gone.
     fn refuse(&mut self, why: &str) -> Result<(), OutsideError>;
 }
 
-/// Carries a sitting on to its end, or to where it is stopped; whatever stops or disturbs it is in the log. `watch` is told of
-/// every trial that is on disk.
+/// Runs a sitting until it is complete or stopped, and logs each interruption and disturbance. `watch` is called for every trial
+/// that is on disk.
 ///
 /// # Errors
-/// Apparatus, front end or log; what is in the log stays and can be resumed.
+/// Errors of apparatus, front end or log; the log stays valid and can be resumed.
 pub fn attend(
     attended: &mut Attended,
     log: &mut LogWriter,
@@ -86,7 +85,7 @@ pub fn attend(
 ) -> Result<Ending, OutsideError> {
     let result = sit(attended, log, rig, front, least, watch);
     if let Err(error) = &result {
-        // The reason comes first; that it could not be written is the lesser trouble.
+        // The first error is returned; a failure to log it matters less.
         let _ = log.write(&Event::Incident(rig.incident_of(error.as_ref())));
     }
     result
@@ -153,14 +152,14 @@ fn sit(
         };
         match step {
             Step::Answered(event) => {
-                // The answer before the movement: it is small, and cannot be had again.
+                // Log the answer before the movement: it is small, and cannot be measured again.
                 log.write(&Event::Trial(event.clone()))?;
                 close_recording(rig, log)?;
                 watch(&event);
             }
             Step::Withdrawn(trial) => {
                 log.write(&Event::Withdrawn { trial })?;
-                // What had just begun comes again after the answer; of the one to be answered nothing more is felt now.
+                // Abort the stimulus that has just begun: it is presented again after the answer.
                 if let Some(trial) = felt {
                     end(rig, &trial, log)?;
                     close_recording(rig, log)?;
@@ -178,12 +177,12 @@ fn sit(
     }
 }
 
-/// Whether an answer can be taken back while a stimulus is felt.
+/// Returns true if an answer can be withdrawn while a stimulus is felt.
 fn may_withdraw(screen: &Screen) -> bool {
     matches!(screen, Screen::Feel { trial, .. } if trial.may.contains(&May::Withdraw))
 }
 
-/// Ends a stimulus, and tells of the ticks that it missed.
+/// Ends a stimulus and logs its missed ticks.
 fn end(rig: &mut RealTimeRig<'_>, trial: &Trial, log: &mut LogWriter) -> Result<Felt, OutsideError> {
     let felt = rig.end()?;
     if felt.missed_ticks > 0 {
@@ -192,7 +191,7 @@ fn end(rig: &mut RealTimeRig<'_>, trial: &Trial, log: &mut LogWriter) -> Result<
     Ok(felt)
 }
 
-/// What disturbed a trial: an incident of the sitting, or a note where it is no part of that.
+/// Returns the event of a disturbance: an incident, or a note during practice, which is not part of the sitting.
 fn disturbance(trial: &Trial, incident: Incident) -> Event {
     match trial.number {
         0 => Event::Note { text: format!("practice before going on: {incident}") },
@@ -200,7 +199,7 @@ fn disturbance(trial: &Trial, incident: Incident) -> Event {
     }
 }
 
-/// Closes the recording of a trial; that it failed is noted, and the sitting goes on.
+/// Closes the recording of a trial; logs a failure and continues the sitting.
 fn close_recording(rig: &mut RealTimeRig<'_>, log: &mut LogWriter) -> Result<(), OutsideError> {
     if let Err(error) = rig.close_recording() {
         log.write(&Event::Incident(Incident::NotRecorded { reason: error.to_string() }))?;
@@ -208,7 +207,7 @@ fn close_recording(rig: &mut RealTimeRig<'_>, log: &mut LogWriter) -> Result<(),
     Ok(())
 }
 
-/// The next input, or what stops the sitting. Warns once for each time the handle leaves its range, and notes it.
+/// Returns the next input, or the incident that stops the sitting. Warns and logs once each time the handle leaves its range.
 fn wait_for_input(
     rig: &mut RealTimeRig<'_>,
     front: &mut dyn FrontEnd,
@@ -224,7 +223,7 @@ fn wait_for_input(
         match front.poll(screen)? {
             Heard::Nothing => {}
             Heard::Input(input) => return Ok(Ok(input)),
-            // The window is closed by an emergency stop, too: that is what has to be known.
+            // An emergency stop closes the window, too: report the stop.
             Heard::Closed => return Ok(Err(rig.stopped_by().unwrap_or(Incident::WindowClosed))),
         }
         let out = felt.filter(|_| rig.is_out_of_range());

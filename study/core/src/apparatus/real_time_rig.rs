@@ -1,4 +1,4 @@
-//! Presents stimuli to a person: the servo loop in real time, on threads of its own. Clients may show it and stop it; only the
+//! Presents stimuli to a person: the servo loop in real time, on its own threads. Clients may display and stop the run; only the
 //! experiment changes the stimuli.
 
 use super::watch::Shared;
@@ -20,10 +20,10 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Longer than the time in which the loop applies a change and its observers report it.
+/// Settling time, longer than the loop needs to apply a change and its observers to report it.
 const SETTLE: Duration = Duration::from_millis(20);
 
-/// The apparatus of one person, in real time. Dropped, it ends the run in order.
+/// Real-time apparatus of one person. Dropping it stops the run.
 pub struct RealTimeRig<'a> {
     apparatus: &'a Apparatus,
     kinematics: Kinematics,
@@ -35,11 +35,11 @@ pub struct RealTimeRig<'a> {
     /// Warnings of the run.
     warnings: Vec<String>,
     run: Option<JoinHandle<Result<Outcome, RunError>>>,
-    /// How the run ended, once that is known.
+    /// End of the run, once known.
     ended: Option<RunEnd>,
 }
 
-/// A client of a study may end it, and nothing else.
+/// Request handler that lets clients stop a study, and nothing else.
 struct OnlyStop {
     stop: StopSwitch,
     latch: Option<LatchGuard>,
@@ -48,7 +48,7 @@ struct OnlyStop {
 impl Serve for OnlyStop {
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         match ask {
-            Ask::Watch { .. } | Ask::LookAway => {} // the publication's own
+            Ask::Watch { .. } | Ask::LookAway => {} // handled by the publication
             Ask::Stop => self.stop.stop(),
             Ask::EmergencyStop => return emergency_stop(&self.stop, self.latch.as_ref()),
             Ask::MachineStop => machine_stop(&self.stop, self.latch.as_ref()),
@@ -62,10 +62,10 @@ impl Serve for OnlyStop {
 }
 
 impl<'a> RealTimeRig<'a> {
-    /// Starts the loop; no object is felt yet.
+    /// Starts the loop with the object faded out.
     ///
     /// # Errors
-    /// [`RunError`], or what the loop said to the first change.
+    /// [`RunError`], or the loop's rejection of the first change.
     pub fn start(
         apparatus: &'a Apparatus,
         kinematics: Kinematics,
@@ -105,33 +105,33 @@ impl<'a> RealTimeRig<'a> {
         })
     }
 
-    /// From now on keeps every tick of every trial, in a file for each.
+    /// Records every tick of every trial from now on, one file per trial.
     pub fn record_into(&mut self, files: TrialFiles) {
         self.shared.expect_recordings();
         self.files = Some(files);
     }
 
-    /// Returns the warnings of the run, on its stops and its devices, for people before the first trial.
+    /// Returns the warnings of the run about stops and devices, to be shown before the first trial.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// Why no window can watch the run, if so.
+    /// Returns the reason why no window can display the run, if so.
     #[must_use]
     pub fn unseen(&self) -> Option<&str> {
         self.unseen.as_deref()
     }
 
-    /// Gives the object its value and lets it be felt; why the movement is not recorded, if it should be and cannot.
+    /// Sets the stimulus and fades it in; returns the reason if the movement should be recorded and cannot.
     ///
     /// # Errors
-    /// The run has ended, or the model refused.
+    /// If the run has ended, or the model rejected the value.
     pub fn begin(&mut self, trial: &Trial, value: f64) -> Result<Option<String>, OutsideError> {
         self.check()?;
         self.set(value)?;
         {
-            // Exploration begins when there is something to feel, not when all of it is there.
+            // Exploration begins when the first force is felt, not at full weight.
             let mut watch = self.shared.lock();
             watch.missed_ticks = 0;
             watch.meter = Some(KinematicsMeter::default());
@@ -146,7 +146,7 @@ impl<'a> RealTimeRig<'a> {
         let is_of_sitting = trial.number > 0;
         if let (Some(files), false, true) = (&self.files, watch.recording.is_on(), is_of_sitting) {
             let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);
-            // What was recorded before a sitting broke off is kept.
+            // Keep the recording of a trial that was interrupted earlier.
             match Recorder::create(&files.next_of(trial), &run) {
                 Ok(recorder) => watch.recording = RunRecording::new(Some(recorder)),
                 Err(error) => return Ok(Some(error.to_string())),
@@ -155,7 +155,7 @@ impl<'a> RealTimeRig<'a> {
         Ok(None)
     }
 
-    /// Way of the handle since the stimulus can be felt, m; none before the first sample.
+    /// Returns the path length of the handle since the stimulus can be felt, m; `None` before the first sample.
     #[must_use]
     pub fn way_m(&self) -> Option<f64> {
         let watch = self.shared.lock();
@@ -163,10 +163,10 @@ impl<'a> RealTimeRig<'a> {
         Some(moved.mean_speed_m_per_s * moved.duration_s)
     }
 
-    /// Lets the object go; how it was felt.
+    /// Fades the object out and returns the measures of its exploration.
     ///
     /// # Errors
-    /// The run has ended.
+    /// If the run has ended.
     pub fn end(&mut self) -> Result<Felt, OutsideError> {
         let (meter, missed_ticks) = {
             let mut watch = self.shared.lock();
@@ -179,26 +179,26 @@ impl<'a> RealTimeRig<'a> {
         Ok(Felt { kinematics, boundary_hit: meter.out_of_range(), missed_ticks })
     }
 
-    /// Closes the recording of a trial that was answered.
+    /// Closes the recording of an answered trial.
     ///
     /// # Errors
-    /// The recording.
+    /// Errors of the recording.
     pub fn close_recording(&mut self) -> Result<(), OutsideError> {
         Ok(self.shared.lock().recording.finish(&[])?)
     }
 
-    /// Whether the handle is out of its range right now.
+    /// Returns true while the handle is out of its range.
     #[must_use]
     pub fn is_out_of_range(&self) -> bool {
         self.shared.lock().out_of_range
     }
 
-    /// Whether somebody asked the run to stop, or it ended by itself.
+    /// Returns true if a stop was requested or the run has ended.
     fn is_stopping(&self) -> bool {
         self.stop.is_stop_asked() || self.run.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// What stops the sitting, if anything does: an emergency stop, a request to end, or the end of the run.
+    /// Returns the incident that stops the sitting, if any: an emergency stop, a stop request, or the end of the run.
     pub fn stopped_by(&mut self) -> Option<Incident> {
         if let Some(source) = self.stop.emergency() {
             return Some(Incident::EmergencyStop { source: source.word().to_owned() });
@@ -209,7 +209,7 @@ impl<'a> RealTimeRig<'a> {
         self.check().err().map(|error| self.incident_of(error.as_ref()))
     }
 
-    /// An error that ended the sitting, as an incident.
+    /// Converts an error that ended the sitting to an incident.
     #[must_use]
     pub fn incident_of(&self, error: &(dyn std::error::Error + Send + Sync + 'static)) -> Incident {
         match error.downcast_ref::<RunEnded>().map(|ended| ended.0).or(self.ended) {
@@ -220,11 +220,11 @@ impl<'a> RealTimeRig<'a> {
         }
     }
 
-    /// Ends the run of a sitting that was broken off; an error if a fault or an emergency stop had ended it. After the last
-    /// trial it goes on, so that the handle is held while the person is thanked.
+    /// Ends the run of an interrupted sitting. After a complete sitting the run continues, so that the handle is held while the
+    /// person is thanked.
     ///
     /// # Errors
-    /// How it ended.
+    /// If a fault or an emergency stop ended the run.
     pub fn finish_after(&mut self, ending: Ending) -> Result<Ending, OutsideError> {
         if ending == Ending::Complete {
             return Ok(ending);
@@ -241,7 +241,7 @@ impl<'a> RealTimeRig<'a> {
     }
 
     fn set(&self, value: f64) -> Result<(), OutsideError> {
-        // A model that was replaced may still be fading.
+        // A replaced model may still be fading out.
         for _ in 0..100 {
             match self.apparatus.set(&self.controls, value) {
                 Err(ControlError::Busy) => std::thread::sleep(SETTLE),
@@ -255,8 +255,8 @@ impl<'a> RealTimeRig<'a> {
         std::thread::sleep(Duration::from_secs_f64(self.apparatus.fade_s()) + SETTLE);
     }
 
-    /// Waits until the loop has seen the object: on a machine with other things to do a fade's time may pass without a tick,
-    /// and what nobody could feel is no trial.
+    /// Waits until the loop has sampled the object: on a busy machine the time of a fade may pass without a tick, and a trial needs
+    /// a stimulus that could be felt.
     fn wait_until_seen(&self) {
         const MOST_LOOKS: u32 = 250;
         let is_seen = || {
@@ -271,7 +271,7 @@ impl<'a> RealTimeRig<'a> {
         }
     }
 
-    /// An error if the run has ended by itself.
+    /// Returns an error if the run has ended by itself.
     fn check(&mut self) -> Result<(), OutsideError> {
         match (&self.run, self.ended) {
             (Some(run), _) if !run.is_finished() => return Ok(()),

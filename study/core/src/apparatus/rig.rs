@@ -1,5 +1,5 @@
-//! Presents stimuli to a simulated observer: the servo loop on the virtual clock, with the simulated hand of that
-//! subject going up and down all the time.
+//! Presents stimuli to a simulated observer: the servo loop on the virtual clock, with the subject's simulated hand moving up and
+//! down all the time.
 //!
 //! ```text
 //! object's weight   1 ──╮        ╭── 1        between two stimuli the object fades out, changes while nobody feels
@@ -23,17 +23,17 @@ use flotor_session::summary::end_cause;
 use flotor_session::{ControlError, Observer, RunError, RunRecording, Steps};
 use std::path::PathBuf;
 
-/// The run ended before the experiment did.
+/// Run that ended before the experiment did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the run ended during a trial: {}", end_cause(.0))]
 pub struct RunEnded(pub RunEnd);
 
-/// The model did not take a stimulus although the check said it would.
+/// Stimulus that the model rejected although the check had accepted it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("the model refused {}.{} = {}", .0.plugin, .0.parameter, .0.value)]
 pub struct StimulusRefused(pub Change);
 
-/// Where recordings of trials go: a file for each.
+/// Paths of the trial recordings, one file per trial.
 #[derive(Clone, Debug)]
 pub struct TrialFiles {
     folder: PathBuf,
@@ -41,16 +41,16 @@ pub struct TrialFiles {
 }
 
 impl TrialFiles {
-    /// Files in a folder, which is made.
+    /// Creates the folder for the recordings.
     ///
     /// # Errors
-    /// What the system said.
+    /// If the folder cannot be created.
     pub fn make(folder: PathBuf, prefix: String) -> std::io::Result<Self> {
         std::fs::create_dir_all(&folder)?;
         Ok(Self { folder, prefix })
     }
 
-    /// A file for a trial that does not exist yet: of a trial that was broken off and comes again, the first stays.
+    /// Returns an unused path for a trial: the recording of an interrupted trial is not overwritten by its repetition.
     #[must_use]
     pub fn next_of(&self, trial: &Trial) -> PathBuf {
         let first = self.of(trial);
@@ -61,14 +61,14 @@ impl TrialFiles {
         paths.find(|path| !path.exists()).unwrap_or(first)
     }
 
-    /// The file of a trial.
+    /// Returns the path of a trial's first recording.
     #[must_use]
     pub fn of(&self, trial: &Trial) -> PathBuf {
         self.folder.join(format!("{}_trial-{:04}_motion.mcap", self.prefix, trial.number))
     }
 }
 
-/// The apparatus of one simulated subject, in virtual time.
+/// Virtual-time apparatus of one simulated subject.
 pub struct Rig<'a> {
     apparatus: &'a Apparatus,
     scene: Scene,
@@ -82,7 +82,7 @@ pub struct Rig<'a> {
 }
 
 impl<'a> Rig<'a> {
-    /// Everything loaded and active; the object is there. Every stimulus will be felt for `feel_s`; `stop` ends the run.
+    /// Loads and activates the scene with the object faded in. Each stimulus is felt for `feel_s`; `stop` ends the run.
     ///
     /// # Errors
     /// [`RunError`].
@@ -102,7 +102,7 @@ impl<'a> Rig<'a> {
         let ticks = |seconds: f64| (seconds * scene.rate_hz).ceil() as u64;
         Ok(Self {
             feel_ticks: ticks(feel_s),
-            // One more, for the tick a change waits for.
+            // One extra tick until a change is applied.
             fade_ticks: ticks(apparatus.fade_s()) + 1,
             apparatus,
             seed,
@@ -114,10 +114,10 @@ impl<'a> Rig<'a> {
         })
     }
 
-    /// The stimuli of a trial, each for its time, watched by somebody else too.
+    /// Presents the stimuli of a trial, each for its time, to a second observer as well.
     ///
     /// # Errors
-    /// What the apparatus said.
+    /// Errors of the apparatus.
     pub fn present_watched(
         &mut self,
         trial: &Trial,
@@ -148,7 +148,7 @@ impl<'a> Rig<'a> {
         let apparatus = self.apparatus;
         apparatus.show(self.steps.controls(), false)?;
         self.advance(self.fade_ticks, also)?;
-        // A model that was replaced is dropped after it has faded: only then another can be.
+        // A replaced model is dropped after its fade-out; only then can another replacement start.
         let mut busy = apparatus.set(self.steps.controls(), value);
         if let Err(ControlError::Busy) = busy {
             self.advance(self.fade_ticks, also)?;

@@ -1,5 +1,4 @@
-//! The apparatus of an experiment: a scene, and the parameter of a model in it that is varied. Everything that can be
-//! wrong with either is found before the first trial.
+//! Apparatus of an experiment: a scene and the varied parameter of one of its models, both checked before the first trial.
 
 use crate::log::InputFile;
 use crate::observer::HandManner;
@@ -18,56 +17,56 @@ use serde_json::{Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What is kept of how people moved.
+/// Recorded data on how people moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kinematics {
     /// Every tick of every trial (MCAP), and the measures
     Full,
     /// Measures of each stimulus
     Summary,
-    /// Nothing
+    /// No movement data
     None,
 }
 
-/// Why an experiment cannot be carried out on a scene.
+/// Error of setting up an experiment on a scene.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ApparatusError {
-    /// The scene, a plugin, or what the device cannot do.
+    /// Error of the scene, a plugin, or the device.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// No model of the scene has this name.
+    /// The scene has no model of this name.
     #[error(
         "stimulus {stimulus}: the scene has no model `{}`{} (it has {})",
         stimulus.model, nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")),
         models.join(", ")
     )]
     NoModel {
-        /// The requested name.
+        /// The stimulus as requested.
         stimulus: Stimulus,
-        /// The most similar name there is.
+        /// The most similar model name.
         nearest: Option<String>,
-        /// All names.
+        /// All model names.
         models: Vec<String>,
     },
-    /// The model has no such number.
+    /// The model has no real parameter of this id.
     #[error(
         "stimulus {stimulus}: `{}` has no number `{}`{} (it has {})",
         stimulus.model, stimulus.parameter,
         nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")), numbers.join(", ")
     )]
     NoParameter {
-        /// The requested name.
+        /// The stimulus as requested.
         stimulus: Stimulus,
-        /// The most similar id there is.
+        /// The most similar parameter id.
         nearest: Option<String>,
-        /// All numbers.
+        /// Ids of all real parameters.
         numbers: Vec<String>,
     },
-    /// A file of the scene cannot be read any more.
+    /// A file of the scene has become unreadable.
     #[error("{}: {cause}; the file was there a moment ago: start again", path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Message of the system.
         #[source]
@@ -76,53 +75,53 @@ pub enum ApparatusError {
     /// A stimulus outside the range of its parameter.
     #[error(transparent)]
     Range(#[from] ProtocolError),
-    /// The model refuses one of the stimuli.
+    /// The model rejects one of the stimuli.
     #[error("stimulus {stimulus} = {value}: {cause}")]
     Refused {
-        /// What is varied.
+        /// The varied parameter.
         stimulus: Stimulus,
-        /// The value.
+        /// Rejected value, in the parameter's unit.
         value: f64,
-        /// What the model said.
+        /// Error of the model.
         cause: Box<RunError>,
     },
-    /// The ceiling of the host could cut a stimulus off, and nobody would see it in the answers.
+    /// The force ceiling of the host could clip a stimulus, unnoticed in the answers.
     #[error(
         "{device}, and the host sends at most {} N and {} N·m: a stimulus above that would be felt as another. Set `[limits] force_n` and `torque_nm` to no more than that, or give `--allow-strong`",
         CEILING.force_n, CEILING.torque_nm
     )]
     HeldBack {
-        /// It.
+        /// Device stronger than the ceiling.
         device: StrongDevice,
     },
-    /// A simulated observer needs a hand to feel with.
+    /// The device has no simulated hand for a simulated observer.
     #[error(
         "the device `{device}` has no simulated hand for simulated observers (it lacks `{missing}`); use --observer human, a scene with the device `simulated`, or --apparatus none"
     )]
     NoHand {
-        /// The device.
+        /// Plugin name of the device.
         device: String,
-        /// The parameter it lacks.
+        /// Id of the missing parameter.
         missing: &'static str,
     },
 }
 
-/// How a stimulus gets into a running model.
+/// Means of changing the stimulus in a running model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Route {
-    /// The parameter is live.
+    /// By a live parameter.
     Parameter,
-    /// It is read when the model is made: a new model takes the place of the old.
+    /// By replacing the model, for a parameter that is read at creation.
     Swap,
 }
 
-/// A scene to judge, checked.
+/// Checked scene with its varied stimulus.
 pub struct Apparatus {
     scene: Scene,
     registry: Registry,
     stimulus: Stimulus,
     route: Route,
-    /// The model's part of the wrench while it is felt, and the time it takes to come and go, s.
+    /// Blend weight of the model while it is felt, and its fade time, s.
     weight: f64,
     fade_s: f64,
     plugins: Vec<PluginReport>,
@@ -130,13 +129,13 @@ pub struct Apparatus {
     notices: Vec<String>,
 }
 
-/// The scene runs as long as the experiment lasts.
+/// Duration of the scene, s: a year, longer than any experiment.
 const DURATION_S: f64 = 31_536_000.0;
 
-/// A parameter of the device, and what a hand has to say to it.
+/// A parameter of the device, and its value from a hand's manner.
 type HandParameter = (&'static str, fn(&HandManner) -> f64);
 
-/// What a hand is told, by parameter of the device.
+/// Settings of the simulated hand, by parameter id of the device.
 const HAND: [HandParameter; 5] = [
     ("hand_frequency_hz", |hand| hand.frequency_hz),
     ("hand_centre_mm", |hand| hand.centre_m * 1.0e3),
@@ -146,20 +145,20 @@ const HAND: [HandParameter; 5] = [
 ];
 
 impl Apparatus {
-    /// Checks an experiment against a scene: the model and its parameter exist, every stimulus is in range and taken,
-    /// and the device can do what the scene wants. Not real-time; nothing is energised.
+    /// Checks an experiment against a scene: model and parameter exist, the model accepts every stimulus, and the device supports
+    /// the scene. Not real-time; energises nothing.
     ///
     /// # Errors
-    /// [`ApparatusError`], the first thing that cannot be.
+    /// The first [`ApparatusError`] found.
     pub fn check(scene: Scene, protocol: &Protocol) -> Result<Self, ApparatusError> {
         Self::check_with(scene, protocol, Strength::UnderCeiling)
     }
 
-    /// The same on devices of a strength. Where more than the host's ceiling could be commanded and is not allowed, the
-    /// experiment is refused. Not real-time; nothing is energised.
+    /// Checks as [`Self::check`] does, for devices of a given strength. Rejects forces above the host's ceiling unless they are
+    /// allowed. Not real-time; energises nothing.
     ///
     /// # Errors
-    /// [`ApparatusError`], the first thing that cannot be.
+    /// The first [`ApparatusError`] found.
     pub fn check_with(
         mut scene: Scene,
         protocol: &Protocol,
@@ -198,18 +197,18 @@ impl Apparatus {
         Ok(apparatus)
     }
 
-    /// What a person should know of the limits before the first trial, a line each.
+    /// Returns the notices about force limits, one line each, to be shown before the first trial.
     #[must_use]
     pub fn notices(&self) -> &[String] {
         &self.notices
     }
 
-    /// How strong its devices may be.
+    /// Returns the permitted strength of the devices.
     pub(super) fn strength(&self) -> Strength {
         self.strength
     }
 
-    /// Whether the first device has a hand a simulated observer can feel with.
+    /// Checks that the first device has a simulated hand.
     ///
     /// # Errors
     /// [`ApparatusError::NoHand`].
@@ -224,7 +223,7 @@ impl Apparatus {
         })
     }
 
-    /// Everything that decides what is felt, for the log: scene, settings, plugins with their versions.
+    /// Returns the configuration that determines the stimuli, for the log: scene, settings, plugins with versions.
     #[must_use]
     pub fn description(&self) -> Value {
         let plugin = |plugin: &PluginReport| {
@@ -239,10 +238,10 @@ impl Apparatus {
         })
     }
 
-    /// Files that settings of the scene name, by their content. Not real-time: reads them.
+    /// Hashes the files named by settings of the scene. Not real-time: reads the files.
     ///
     /// # Errors
-    /// One of them cannot be read any more.
+    /// If a file cannot be read.
     pub fn input_files(&self) -> Result<Vec<InputFile>, ApparatusError> {
         let named = self.plugins.iter().flat_map(|plugin| {
             named_files(plugin).map(move |(parameter, path)| (format!("{}.{parameter}", plugin.name), path))
@@ -250,28 +249,28 @@ impl Apparatus {
         named.map(|(used_as, path)| input(used_as, &path)).collect()
     }
 
-    /// Files of the plugins, by their content: another build of one version is another stimulus. Not real-time: reads them.
+    /// Hashes the plugin files: another build of the same version may be another stimulus. Not real-time: reads the files.
     ///
     /// # Errors
-    /// One of them cannot be read any more.
+    /// If a file cannot be read.
     pub fn plugin_files(&self) -> Result<Vec<InputFile>, ApparatusError> {
         let in_files = self.plugins.iter().filter(|plugin| !plugin.metadata.path.as_os_str().is_empty());
         in_files.map(|plugin| input(plugin.name.clone(), &plugin.metadata.path)).collect()
     }
 
-    /// What a second of fully recorded movement takes on disk, bytes, about: 466 a tick were measured with one device.
+    /// Estimates the disk space of full recording, bytes per second (measured: 466 bytes per tick with one device).
     #[must_use]
     pub fn recording_bytes_per_s(&self) -> f64 {
         470.0 * self.scene.rate_hz * self.scene.devices.len() as f64
     }
 
-    /// What is varied.
+    /// Returns the varied parameter.
     #[must_use]
     pub fn stimulus(&self) -> &Stimulus {
         &self.stimulus
     }
 
-    /// Whether the stimuli change by new models rather than by live parameters.
+    /// Returns true if stimuli change by model replacement instead of live parameters.
     #[must_use]
     pub fn swaps_models(&self) -> bool {
         self.route == Route::Swap
@@ -285,11 +284,11 @@ impl Apparatus {
         &self.scene
     }
 
-    /// The scene with the hand of a simulated subject.
+    /// Returns the scene with the hand of a simulated subject.
     pub(super) fn scene_with_hand(&self, seed: u64, subject: SubjectNumber) -> Scene {
         let hand = HandManner::of(seed, subject);
         let mut scene = self.scene.clone();
-        // In front: what a scene or a person has set stays.
+        // Inserted in front, so that settings of the scene or a person take precedence.
         let parameters = HAND.iter().map(|(id, value)| text(id, value(&hand)));
         if let Some(device) = scene.devices.first_mut() {
             device.plugin.parameters.splice(0..0, parameters);
@@ -297,22 +296,22 @@ impl Apparatus {
         scene
     }
 
-    /// What a recording says of the run.
+    /// Describes the run, for a recording.
     pub(super) fn describe(&self, scene: &Scene, clock: Clock, seed: u64) -> RunDescription {
         describe(scene, &options(clock, seed), &self.plugins)
     }
 
-    /// Time the object takes to come or to go, s.
+    /// Returns the fade time of the object, s.
     pub(super) fn fade_s(&self) -> f64 {
         self.fade_s
     }
 
-    /// Lets the object come or go.
+    /// Fades the object in or out.
     pub(super) fn show(&self, controls: &Controls, shown: bool) -> Result<(), ControlError> {
         controls.set_weight(&self.stimulus.model, if shown { self.weight } else { 0.0 })
     }
 
-    /// Gives the object its next value; it should have gone before.
+    /// Sets the next value; the object should be faded out.
     pub(super) fn set(&self, controls: &Controls, value: f64) -> Result<(), ControlError> {
         let Stimulus { model, parameter } = &self.stimulus;
         let value = value.to_string();
@@ -349,7 +348,7 @@ fn text(key: &str, value: f64) -> ParameterText {
     ParameterText { key: key.to_owned(), value: value.to_string(), location }
 }
 
-/// The model of a name, or of a plugin's id.
+/// Finds a model by its name, else by its plugin's id.
 fn find_model<'s>(scene: &'s Scene, stimulus: &Stimulus) -> Result<&'s ModelUse, ApparatusError> {
     let models = &scene.models;
     let by_name = models.iter().find(|model| model.name == stimulus.model);

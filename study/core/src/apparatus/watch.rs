@@ -1,4 +1,4 @@
-//! What is taken down of a presentation: measures of the movement, and the whole of it in a recording.
+//! Observer of a presentation: computes movement measures and records every tick on request.
 
 use crate::kinematics::{KinematicsMeter, Sample};
 use flotor_core::trace::{Events, TickRecord};
@@ -7,20 +7,20 @@ use flotor_hal::Demand;
 use flotor_session::{Observer, RunRecording};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Looks at every tick of a study.
+/// Observer of every tick of a study.
 #[derive(Default)]
 pub struct Watch {
-    /// Runs while a stimulus is being felt.
+    /// Active while a stimulus is felt.
     pub meter: Option<KinematicsMeter>,
-    /// Of the trial under way.
+    /// Recording of the trial in progress.
     pub recording: RunRecording,
-    /// Outputs of the models that recordings of later trials store: the loop takes up a request some ticks later.
+    /// Model outputs to request ahead of the recordings of later trials: the loop applies a request some ticks later.
     pub ahead: Option<Demand>,
-    /// Ticks missed since somebody asked.
+    /// Ticks missed since the last reset.
     pub missed_ticks: u64,
-    /// Whether the handle was out of its range in the last tick.
+    /// True if the handle was out of its range in the last tick.
     pub out_of_range: bool,
-    /// A change of the stimulus that the model did not take.
+    /// A stimulus change that the model rejected.
     pub refused: Option<Change>,
 }
 
@@ -46,17 +46,17 @@ impl Observer for Watch {
     }
 }
 
-/// The same for the observers' thread and whoever else wants to know; never for the servo's.
+/// Shared handle to a [`Watch`] for the observers' thread and its readers; never for the servo thread.
 #[derive(Clone, Default)]
 pub struct Shared(Arc<Mutex<Watch>>);
 
 impl Shared {
-    /// What was taken down so far. Not real-time: waits for the observers.
+    /// Locks the collected data. Not real-time: waits for the observers.
     pub fn lock(&self) -> MutexGuard<'_, Watch> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Requests all that a recording stores, from now on. Not real-time.
+    /// Requests all outputs that a recording stores, from now on. Not real-time.
     pub fn expect_recordings(&self) {
         self.lock().ahead = Some(Demand::ALL);
     }
@@ -76,7 +76,7 @@ impl Observer for Shared {
     }
 }
 
-/// What a tick says of handle and force along the vertical.
+/// Extracts vertical motion and force from a tick.
 fn sample(record: &TickRecord) -> Sample {
     Sample {
         dt_s: record.dt_ns as f64 * 1.0e-9,

@@ -1,39 +1,39 @@
-//! Files that the program writes and that people complete, as BIDS asks them to: columns and keys of theirs stay, and a value
-//! of theirs stays where the program has none.
+//! Merges generated files with edits of people, as BIDS requires: preserves added columns and keys, and added values where the
+//! program has none.
 
 use super::table::MISSING;
 use serde_json::{Map, Value};
 
-/// Why a file cannot be completed without losing what stands in it.
+/// Reason why a file cannot be merged without loss.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unmergeable {
-    /// A table without its first column.
+    /// The table lacks its key column.
     #[error("its first line has no column `{0}`, with tabs between the columns")]
     NoKey(&'static str),
-    /// A line with another number of cells than there are columns.
+    /// A line whose number of cells differs from the number of columns.
     #[error("line {line} has {cells} cells, and there are {columns} columns")]
     Ragged {
         /// Line, from 1.
         line: usize,
-        /// Its cells.
+        /// Number of cells in the line.
         cells: usize,
-        /// Columns of the table.
+        /// Number of columns in the table.
         columns: usize,
     },
-    /// Text that is no JSON object.
+    /// The text is not a JSON object.
     #[error("it is no JSON object ({0})")]
     NotAnObject(String),
 }
 
-/// A table with tabs, the rows by their first cell.
+/// Tab-separated table, with rows keyed by their first cell.
 struct Table<'t> {
     columns: Vec<&'t str>,
     rows: Vec<Vec<&'t str>>,
 }
 
 impl<'t> Table<'t> {
-    /// Reads a table, with the line ends and the byte-order mark that a spreadsheet may have given it.
+    /// Parses a table; accepts the line ends and byte-order mark of a spreadsheet.
     fn read(text: &'t str, key: &'static str) -> Result<Self, Unmergeable> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
@@ -64,11 +64,11 @@ impl<'t> Table<'t> {
     }
 }
 
-/// Returns the generated table with the columns and rows that only the earlier one has, and with the earlier cell where the
-/// generated one is `n/a`; none if the earlier table says all of that already.
+/// Merges two tables: adds columns and rows of the earlier one, and replaces `n/a` by the earlier cell. Returns `None` if the
+/// result equals the earlier table.
 ///
 /// # Errors
-/// [`Unmergeable`]: the earlier text is no such table.
+/// [`Unmergeable`] if the earlier text is not such a table.
 pub(super) fn table(
     earlier: &str,
     generated: &str,
@@ -96,11 +96,11 @@ pub(super) fn table(
     Ok(Some(lines.collect()))
 }
 
-/// Returns the generated object completed by the earlier one: of a key that both have, the earlier value counts, unless the
-/// program owns the key; none if the earlier object says all of that already.
+/// Merges two objects: for a common key the earlier value wins unless the program owns the key. Returns `None` if the result equals
+/// the earlier object.
 ///
 /// # Errors
-/// [`Unmergeable`]: the earlier text is no object.
+/// [`Unmergeable`] if the earlier text is not an object.
 pub(super) fn object(
     earlier: &str,
     generated: Map<String, Value>,
@@ -120,7 +120,7 @@ pub(super) fn object(
     Ok((merged != earlier).then_some(merged))
 }
 
-/// Adds the keys of `more` that an object lacks; any other value stays.
+/// Adds the keys of `more` that an object lacks; does not change other values.
 fn complete(kept: &mut Value, more: Value) {
     if let (Value::Object(kept), Value::Object(more)) = (kept, more) {
         for (key, value) in more {

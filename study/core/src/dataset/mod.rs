@@ -1,16 +1,15 @@
-//! Where the data of a study lie, in the manner of BIDS (bids.neuroimaging.io):
+//! Folder layout of the data of a study, following BIDS (bids.neuroimaging.io):
 //!
 //! ```text
 //! DIR/dataset_description.json
 //! DIR/participants.tsv, participants.json
-//! DIR/task-jnd_beh.json                                  what the columns mean
+//! DIR/task-jnd_beh.json                                  meanings of the columns
 //! DIR/sub-01/beh/sub-01_task-jnd_beh.tsv                 one row per presentation
-//! DIR/sourcedata/sub-01/sub-01_task-jnd_log.jsonl        the event log: what everything else is made from
+//! DIR/sourcedata/sub-01/sub-01_task-jnd_log.jsonl        the event log: source of all other files
 //! ```
 //!
-//! The logs are the data. Tables are made from them, whole or not at all (written aside, then renamed), and can be made
-//! again at any time. The lists of participants and scans, and the descriptions, are completed and not replaced: BIDS asks people
-//! to add to them (`kept`).
+//! The logs are the primary data. Tables are generated from them atomically (written aside, then renamed) and can be regenerated at any
+//! time. Lists of participants and scans, and descriptions, are merged instead of replaced: BIDS asks people to extend them (`kept`).
 
 mod kept;
 mod table;
@@ -25,141 +24,141 @@ use serde_json::{Map, Value};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// A folder with the data of a study.
+/// Folder with the data of a study.
 #[derive(Clone, Debug)]
 pub struct Dataset {
     root: PathBuf,
 }
 
-/// How far a subject has come.
+/// Progress of a subject.
 pub enum Progress {
-    /// Never began.
+    /// No log yet.
     New,
-    /// Began, and did not come to the end.
+    /// Began, but is not complete.
     Partial(Box<SittingLog>),
-    /// Came to the end.
+    /// Complete.
     Complete,
 }
 
-/// What to do about subjects who have begun before.
+/// Policy for subjects with an existing log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Earlier {
-    /// Nobody may have.
+    /// Rejects such subjects.
     Refuse,
-    /// Who is complete stays so, who broke off goes on.
+    /// Skips complete subjects and resumes incomplete ones.
     Resume,
 }
 
-/// What cannot be done with a dataset.
+/// Error of a data set.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DatasetError {
-    /// A log.
+    /// Error of a log.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A file or folder.
+    /// Error of a file or folder.
     #[error("{}: {action}: {cause}", path.display())]
     File {
-        /// Which.
+        /// File or folder.
         path: PathBuf,
-        /// What was attempted.
+        /// Attempted operation.
         action: &'static str,
-        /// What the system said.
+        /// Error of the system.
         cause: std::io::Error,
     },
-    /// A file that people complete, which cannot be read any more.
+    /// A file edited by people cannot be merged.
     #[error("{}: {problem}; mend the file, or remove it to have it written anew", path.display())]
     Unmergeable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason.
         problem: Unmergeable,
     },
-    /// There is no study.
+    /// The folder has no study.
     #[error("{}: no study (no logs under sourcedata/); give the folder of `study --out`", .0.display())]
     NoStudy(PathBuf),
-    /// Sittings that do not belong together.
+    /// Logs of different studies in one folder.
     #[error("{}: {what}, unlike {}; delete the file that does not belong to the study, or use another folder", path.display(), other.display())]
     Mixed {
-        /// A log.
+        /// Path of one of the logs.
         path: PathBuf,
-        /// Another.
+        /// Log of the other study.
         other: PathBuf,
-        /// What differs.
+        /// Description of the difference.
         what: String,
     },
-    /// A log that lies where another one belongs: its subject would count twice, or as somebody else.
+    /// A log in another subject's or task's place: its subject would count twice or under another number.
     #[error("{}: is a log of {subject}, task {task}, and does not belong there; remove it, or move it to {}", path.display(), place.display())]
     Misplaced {
-        /// The log.
+        /// Path of the log.
         path: PathBuf,
-        /// Whose it is.
+        /// Subject of the log.
         subject: SubjectNumber,
-        /// Of which task.
+        /// Task of the log.
         task: &'static str,
-        /// Where such a log belongs.
+        /// Correct folder of such a log.
         place: PathBuf,
     },
-    /// A study that was begun otherwise than it is to go on.
+    /// The configuration differs from the one that the study began with.
     #[error("{}: {what}; use what it was begun with, or another folder", path.display())]
     Changed {
-        /// One of its logs.
+        /// Path of one of the study's logs.
         path: PathBuf,
-        /// What differs.
+        /// Description of the difference.
         what: String,
     },
-    /// A file that was changed since a sitting began.
+    /// An input file has changed since the sitting began.
     #[error("{}: `{}` ({}) is not the file that the sitting began with: its content is {}, and was {}; put the earlier file back, or use another folder",
         path.display(), now.name, now.used_as, now.hash, then)]
     OtherInput {
-        /// One of the logs.
+        /// Path of one of the logs.
         path: PathBuf,
-        /// The file.
+        /// The changed file.
         now: InputFile,
-        /// Hash of the file that the sitting began with.
+        /// Hash of the original file.
         then: String,
     },
-    /// A subject who has been there.
+    /// The subject is already complete.
     #[error("{subject} is already complete in {}; add --resume to skip complete subjects (simulated), choose another --subject \
         (human), or use another folder", root.display())]
     Duplicate {
-        /// Who.
+        /// Number of the subject.
         subject: SubjectNumber,
-        /// The dataset.
+        /// Root folder of the data set.
         root: PathBuf,
     },
-    /// A subject who has begun.
+    /// The subject has begun, but is not complete.
     #[error("{subject} is incomplete after {trials} trials in {}; add --resume to continue", root.display())]
     Unfinished {
-        /// Who.
+        /// Number of the subject.
         subject: SubjectNumber,
-        /// How far they came.
+        /// Number of logged trials.
         trials: usize,
-        /// The dataset.
+        /// Root folder of the data set.
         root: PathBuf,
     },
 }
 
 impl Dataset {
-    /// The data in a folder, which need not exist yet.
+    /// Returns the data set in a folder, which need not exist yet.
     #[must_use]
     pub fn at(root: &Path) -> Self {
         Self { root: root.into() }
     }
 
-    /// The folder.
+    /// Returns the root folder.
     #[must_use]
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// The log of a subject.
+    /// Returns the log path of a subject.
     #[must_use]
     pub fn log_path(&self, subject: SubjectNumber, task: &str) -> PathBuf {
         self.root.join(format!("sourcedata/{subject}/{subject}_task-{task}_log.jsonl"))
     }
 
-    /// The folder for further recordings of a subject.
+    /// Returns the folder for further recordings of a subject.
     #[must_use]
     pub fn source_folder(&self, subject: SubjectNumber) -> PathBuf {
         self.root.join(format!("sourcedata/{subject}"))
@@ -169,10 +168,10 @@ impl Dataset {
         self.root.join(format!("{subject}/beh/{subject}_task-{task}_beh.tsv"))
     }
 
-    /// All logs, read, verified and in the order of their subjects.
+    /// Reads and verifies all logs, in the order of their subjects.
     ///
     /// # Errors
-    /// A log that cannot be used, none at all, or logs of different experiments.
+    /// If a log is invalid, there is no log, or logs belong to different experiments.
     pub fn logs(&self) -> Result<Vec<SittingLog>, DatasetError> {
         let mut logs = Vec::new();
         self.each_log(|log| {
@@ -182,7 +181,7 @@ impl Dataset {
         Ok(logs)
     }
 
-    /// The same one after the other: only one is in memory.
+    /// Reads and verifies the logs one by one, so that only one is in memory.
     fn each_log(
         &self,
         mut take: impl FnMut(SittingLog) -> Result<(), DatasetError>,
@@ -217,21 +216,21 @@ impl Dataset {
         if paths.is_empty() { Err(DatasetError::NoStudy(self.root.clone())) } else { Ok(paths) }
     }
 
-    /// How far a subject has come, if the sitting may begin or go on.
+    /// Returns the progress of a subject whose sitting may begin or resume.
     ///
     /// # Errors
-    /// A log that cannot be used, one that `earlier` forbids, or a study that was begun otherwise.
+    /// If a log is invalid, `earlier` forbids to continue, or the study began with another configuration.
     pub fn progress(&self, begin: &Begin, earlier: Earlier) -> Result<Progress, DatasetError> {
         let (subject, root) = (begin.subject, self.root.clone());
         let path = self.log_path(subject, begin.protocol.task());
         let log = match SittingLog::read(&path) {
             _ if !path.exists() => None,
-            // Killed before its first line was complete: nothing happened yet.
+            // Killed before the first line was complete: nothing was recorded.
             Err(LogError { problem: LogProblem::Empty, .. }) => None,
             log => Some(Box::new(log?)),
         };
         let Some(log) = log else {
-            // Before the first line is written: two studies in one folder would make it unusable.
+            // Check before writing the first line: two studies in one folder would make the folder unusable.
             let mut logs = self.log_paths().into_iter().flatten().map(|path| SittingLog::read(&path));
             let other = logs.find_map(Result::ok);
             return other.map_or(Ok(()), |other| same_study(begin, &other)).map(|()| Progress::New);
@@ -249,10 +248,10 @@ impl Dataset {
         }
     }
 
-    /// A new sitting with its log.
+    /// Begins a sitting with a new log.
     ///
     /// # Errors
-    /// The log exists or cannot be written.
+    /// If the log exists or cannot be written.
     pub fn begin(&self, begin: Begin) -> Result<(Sitting, LogWriter), DatasetError> {
         let path = self.log_path(begin.subject, begin.protocol.task());
         let folder = self.source_folder(begin.subject);
@@ -264,10 +263,10 @@ impl Dataset {
         Ok((sitting, writer))
     }
 
-    /// Makes the tables of every sitting that is complete, and the files that describe them.
+    /// Writes the tables of every complete sitting and their description files.
     ///
     /// # Errors
-    /// A log that cannot be used, or a file that cannot be written.
+    /// If a log is invalid or a file cannot be written.
     pub fn write_tables(&self) -> Result<(), DatasetError> {
         let mut participants = table::PARTICIPANTS_HEAD.to_owned();
         let mut first = None;
@@ -298,7 +297,7 @@ impl Dataset {
         Ok(())
     }
 
-    /// Writes a table that people complete; what is theirs stays.
+    /// Merges a table with the edits of people and writes it.
     fn complete_table(&self, path: &Path, generated: &str, key: &'static str) -> Result<(), DatasetError> {
         let Some(earlier) = self.read_earlier(path)? else { return self.replace(path, generated) };
         let merged = kept::table(&earlier, generated, key);
@@ -306,7 +305,7 @@ impl Dataset {
         merged.map_or(Ok(()), |text| self.replace(path, &text))
     }
 
-    /// Writes a JSON object that people complete; what is theirs stays, but for the keys that are the program's own.
+    /// Merges a JSON object with the edits of people and writes it; keys in `owned` are always the program's.
     fn complete_object(
         &self,
         path: &Path,
@@ -319,7 +318,7 @@ impl Dataset {
         merged.map_or(Ok(()), |object| self.replace(path, &pretty(object)))
     }
 
-    /// Reads a file that was written before; none if there is no such file.
+    /// Reads an existing file; returns `None` if there is none.
     fn read_earlier(&self, path: &Path) -> Result<Option<String>, DatasetError> {
         match std::fs::read_to_string(path) {
             Ok(text) => Ok(Some(text)),
@@ -330,7 +329,7 @@ impl Dataset {
         }
     }
 
-    /// Writes a file whole or not at all.
+    /// Writes a file atomically.
     fn replace(&self, path: &Path, text: &str) -> Result<(), DatasetError> {
         if let Some(folder) = path.parent() {
             self.file(folder, "cannot make the folder", std::fs::create_dir_all(folder))?;
@@ -340,7 +339,7 @@ impl Dataset {
         self.file(path, "cannot put the table in place", std::fs::rename(&aside, path))
     }
 
-    #[allow(clippy::unused_self)] // reads as: of this dataset
+    #[allow(clippy::unused_self)] // method for readability
     fn file(
         &self,
         path: &Path,
@@ -351,7 +350,7 @@ impl Dataset {
     }
 }
 
-/// All trials of all sittings as one table with commas, a row each, for other programs; of what is excluded it says by which rule.
+/// Returns all trials of all sittings as one comma-separated table, with the rule that excluded each trial.
 #[must_use]
 pub fn trials_csv(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
     table::long(logs, excluded)
@@ -361,7 +360,7 @@ fn pretty(object: Map<String, Value>) -> String {
     serde_json::to_string_pretty(&Value::Object(object)).unwrap_or_default() + "\n"
 }
 
-/// Whether a sitting belongs to the study of a log.
+/// Checks that a sitting belongs to the study of a log.
 fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
     let path = || log.path().to_path_buf();
     if let Some(what) = begin.differs(&log.begin) {
@@ -375,8 +374,8 @@ fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
     }
 }
 
-/// Returns true for the log of a sitting. A name that begins with a dot belongs to the system: macOS puts a file `._NAME` beside each
-/// one that it copies to a stick.
+/// Returns true for the log of a sitting. Names with a leading dot are ignored: macOS adds a file `._NAME` for each file that it
+/// copies to a stick.
 fn is_log(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.ends_with("_log.jsonl") && !name.starts_with('.')

@@ -1,4 +1,4 @@
-//! The tidy tables: one row per presentation, one column per fact, `n/a` for what is not known.
+//! Tidy tables: one row per presentation, one column per variable, `n/a` for missing values.
 
 use crate::blinding::Codes;
 use crate::exclusion::Exclusion;
@@ -9,7 +9,7 @@ use crate::sitting::Verdict;
 use crate::trial::{Judgement, Position, Presented, Response};
 use serde_json::{Map, Value, json};
 
-/// Missing, as BIDS writes it.
+/// Missing value in BIDS.
 pub(super) const MISSING: &str = "n/a";
 
 /// Name and meaning of each column.
@@ -52,7 +52,7 @@ const COLUMNS: [(&str, &str); 30] = [
     ("observer", "human, or simulated: nobody was tested"),
 ];
 
-/// The table of one sitting.
+/// Returns the table of one sitting.
 pub(super) fn trials(log: &SittingLog) -> String {
     let head: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
     let codes = Codes::new(&log.begin.protocol, log.begin.seed);
@@ -60,8 +60,8 @@ pub(super) fn trials(log: &SittingLog) -> String {
     [head.join("\t")].into_iter().chain(rows).fold(String::new(), |text, line| text + &line + "\n")
 }
 
-/// All trials of all sittings as one table with commas, for other programs: subject and first modality before the columns of
-/// [`trials`], after them the movement with each stimulus and the rule that excluded the trial; a list in a cell has spaces.
+/// Returns all trials as one comma-separated table for other programs: subject and first modality, the columns of [`trials`],
+/// movement per stimulus, and the excluding rule; lists within a cell are separated by spaces.
 pub(super) fn long(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
     let head = COLUMNS.iter().map(|(name, _)| *name);
     let head = ["subject", "first_modality"].into_iter().chain(head).chain(EACH).chain(["excluded"]);
@@ -85,7 +85,7 @@ pub(super) fn long(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
     text
 }
 
-/// Columns of movement with a number for each stimulus of a trial, in order.
+/// Movement columns with one number per stimulus, in order.
 const EACH: [&str; 3] = ["speed_each", "acceleration_each", "force_each"];
 
 fn each(record: &TrialRecord) -> [String; 3] {
@@ -164,7 +164,7 @@ fn row(record: &TrialRecord, codes: &Codes, log: &SittingLog) -> Vec<String> {
     ]
 }
 
-/// The sidecar of the tables, and the keys of it that people leave alone.
+/// Returns the sidecar of the tables, and its keys that the program owns.
 pub(super) fn columns(protocol: &Protocol) -> (Map<String, Value>, &'static [&'static str]) {
     let mut sidecar = Map::new();
     sidecar.insert("TaskName".to_owned(), json!(protocol.task()));
@@ -176,7 +176,7 @@ pub(super) fn columns(protocol: &Protocol) -> (Map<String, Value>, &'static [&'s
     (sidecar, &["TaskName", "Stimulus", "Protocol"])
 }
 
-/// The description of the dataset, and the keys of it that people leave alone.
+/// Returns the description of the data set, and its keys that the program owns.
 pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'static str]) {
     let description = json!({
         "Name": format!("Perception study: {}", begin.protocol.task()),
@@ -194,20 +194,20 @@ pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'sta
 /// First column of the list of scans.
 pub(super) const SCAN: &str = "filename";
 
-/// The list of what was recorded of a subject, with the time of day; none where nobody knows it.
+/// Returns the list of a subject's recordings with the time of day; `None` if the time is unknown.
 pub(super) fn scans(log: &SittingLog) -> Option<String> {
     let (subject, task) = (log.begin.subject, log.begin.protocol.task());
     let began = log.began?;
     Some(format!("filename\tacq_time\nbeh/{subject}_task-{task}_beh.tsv\t{began}\n"))
 }
 
-/// First column of the list of who took part.
+/// First column of the list of participants.
 pub(super) const PARTICIPANT: &str = "participant_id";
 
-/// First line of the list of who took part.
+/// Header of the list of participants.
 pub(super) const PARTICIPANTS_HEAD: &str = "participant_id\tobserver\tfirst_modality\tcomplete\tpresentations\tresumed\tincidents\tage\tsex\thandedness\n";
 
-/// One who took part: a line.
+/// Returns a participant's line.
 pub(super) fn participant(log: &SittingLog) -> String {
     let subject = log.begin.subject;
     let observer = log.begin.observer_kind().word();
@@ -220,7 +220,7 @@ pub(super) fn participant(log: &SittingLog) -> String {
     format!("{subject}\t{observer}\t{first}\t{complete}\t{}\t{}\n", counts.join("\t"), person.join("\t"))
 }
 
-/// What the columns of the list of participants mean; people may leave none of it alone.
+/// Returns the descriptions of the participant columns; the program owns none of them.
 pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static str]) {
     let columns = json!({
         "observer": { "Description": "human, or simulated: nobody was tested" },

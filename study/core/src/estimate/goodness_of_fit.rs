@@ -1,5 +1,5 @@
-//! Whether answers look like those of a fitted observer (Wichmann and Hill, Perception & Psychophysics 63:1293, 2001: by simulation,
-//! because a track has too few answers at a difference for the chi-square distribution).
+//! Goodness of fit of an observer (Wichmann and Hill, Perception & Psychophysics 63:1293, 2001: by simulation, because a track has
+//! too few answers at a difference for the chi-square distribution).
 
 use super::psychometric::GoodnessOfFit;
 use super::{Observation, probability};
@@ -8,13 +8,13 @@ use crate::random::{Purpose, Stream};
 use crate::trial::Judgement;
 
 const JUDGEMENTS: [Judgement; 3] = [Judgement::Correct, Judgement::Wrong, Judgement::Unsure];
-/// Sets of answers that are simulated.
+/// Number of simulated answer sets.
 const SETS: u32 = 999;
-/// Classes of the difference, and the fewest answers of one.
+/// Maximum number of classes of the difference, and minimum number of answers per class.
 const CLASSES_MOST: usize = 4;
 const ANSWERS_LEAST: usize = 6;
 
-/// Compares answers with those of an observer. The simulation has a seed of its own: equal answers have equal probabilities.
+/// Tests the fit of an observer to answers. The simulation has a fixed seed, so equal answers give equal probabilities.
 pub(super) fn of(observations: &[Observation], observer: &TernaryObserver) -> GoodnessOfFit {
     let mut sorted = observations.to_vec();
     sorted.sort_by(|a, b| a.delta.total_cmp(&b.delta));
@@ -62,7 +62,7 @@ pub(super) fn of(observations: &[Observation], observer: &TernaryObserver) -> Go
     }
 }
 
-/// Classes of about as many answers each, in order of the difference; equal differences are in one class.
+/// Splits answers, sorted by difference, into classes of about equal size; equal differences share a class.
 fn classes(sorted: &[Observation]) -> Vec<&[Observation]> {
     let most = (sorted.len() / ANSWERS_LEAST).clamp(1, CLASSES_MOST);
     let mut found = Vec::new();

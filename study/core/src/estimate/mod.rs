@@ -1,8 +1,8 @@
-//! Thresholds from answers: better than the mean of a few reversals.
+//! Threshold estimators that use all answers, more precise than the mean of a few reversals.
 //!
-//! An observer is described by two numbers (`sigma`, `criterion`; see [`TernaryObserver`]), held against the answers by
-//! their likelihood and a weak prior. [`most_likely`] finds the best pair for any trials, however they were placed;
-//! [`Posterior`] holds the probability of many pairs, from which the next trial can be chosen as well.
+//! An observer has two parameters (`sigma`, `criterion`; see [`TernaryObserver`]), estimated by the likelihood of the answers and a
+//! weak prior. [`most_likely`] finds the best pair for any trials, however placed; [`Posterior`] holds the probabilities of many
+//! pairs, from which the next trial can be chosen as well.
 
 mod goodness_of_fit;
 mod most_likely;
@@ -20,31 +20,30 @@ use flotor_statistics::distribution::normal_below;
 use posterior_density::{LapsePrior, Nodes, PosteriorDensity};
 use serde::{Deserialize, Serialize};
 
-/// One answer: the difference it was given at, as a share of the base, and what it was worth.
+/// One answer: its difference, as a share of the base, and its judgement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// Difference.
+    /// Difference of comparison and base, as a share of the base.
     pub delta: f64,
-    /// Worth.
+    /// Judgement of the answer.
     pub judgement: Judgement,
 }
 
-/// What is held likely before the first answer: the threshold lognormal about the middle of those published for
-/// stiffness (8 to 25 %, whose geometric mean is 14 %), so wide that all of them lie within one deviation; the criterion
-/// normal where it is not negative, from people who always answer to those who say "I don't know" in half of the
-/// trials. The threshold and not sigma, because it is what is asked for: who never says "I don't know" has another sigma
-/// at the same threshold, and a prior on sigma would draw the two apart.
+/// Prior before the first answer: the threshold lognormal about the middle of those published for stiffness (8 to 25 %, whose geometric
+/// mean is 14 %), so wide that all of them lie within one deviation; the criterion a non-negative normal, from people who always answer to
+/// people who say "I don't know" in half of the trials. The prior is on the threshold, not on sigma, because the threshold is the quantity
+/// of interest: an observer without "I don't know" has another sigma at the same threshold, and a prior on sigma would separate the two.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
     /// Median of the threshold, as a share of the base.
     pub threshold_median: f64,
-    /// Deviation of its logarithm.
+    /// Deviation of the logarithm of the threshold.
     pub threshold_spread: f64,
     /// Most likely criterion.
     pub criterion_mode: f64,
-    /// Its deviation.
+    /// Deviation of the criterion.
     pub criterion_spread: f64,
-    /// Share of trials answered by chance, held fixed: it keeps one slip from outweighing all other answers.
+    /// Fixed share of trials answered by chance: prevents one slip from outweighing all other answers.
     pub lapse: f64,
 }
 
@@ -61,13 +60,13 @@ impl Default for Prior {
 }
 
 impl Prior {
-    /// The observer of this criterion who reaches the target at this difference, while attentive.
+    /// Returns the observer with a given criterion who, while attentive, reaches the target at `threshold`.
     fn observer(&self, threshold: f64, criterion: f64, target: f64) -> TernaryObserver {
         let sigma = threshold / unit_threshold(criterion, target);
         TernaryObserver { sigma, criterion, bias: 0.0, lapse: self.lapse }
     }
 
-    /// Logarithm of the density over the logarithm of the threshold and the criterion, up to a constant.
+    /// Returns the logarithm of the density over log threshold and criterion, up to a constant.
     fn log_density(&self, log_threshold: f64, criterion: f64) -> f64 {
         if criterion < 0.0 {
             return f64::NEG_INFINITY;
@@ -78,9 +77,9 @@ impl Prior {
     }
 }
 
-/// The threshold of an attentive observer of sigma 1: where `P(correct) + P(don't know) / 2` is the target.
+/// Returns the threshold of an attentive observer of sigma 1: the solution of `P(correct) + P(don't know) / 2 = target`.
 ///
-/// Newton's method; a test holds it against bisection.
+/// Newton's method; a test compares it with bisection.
 fn unit_threshold(criterion: f64, target: f64) -> f64 {
     let density = |x: f64| libm::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
     let mut delta = criterion.max(0.1);
@@ -95,19 +94,19 @@ fn unit_threshold(criterion: f64, target: f64) -> f64 {
     delta
 }
 
-/// What answers say about an observer.
+/// Estimated observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Sigma.
+    /// Deviation of the noise, as a share of the base.
     pub sigma: f64,
-    /// Criterion.
+    /// Criterion for "I don't know", in deviations of the noise.
     pub criterion: f64,
-    /// The difference at which the target is reached.
+    /// Difference at which the target is reached, as a share of the base.
     pub threshold: f64,
 }
 
-/// Estimates the observer by the means of the posterior, sigma and threshold by geometric ones, and says which ends of the threshold
-/// the answers do not bound.
+/// Estimates the observer by posterior means, geometric for sigma and threshold, and returns the ends of the threshold that the
+/// answers do not bound.
 pub(crate) fn posterior_mean(
     observations: &[Observation],
     prior: &Prior,
@@ -124,13 +123,13 @@ pub(crate) fn posterior_mean(
     (estimate, NotBounded::of(posterior.is_bounded))
 }
 
-/// Probability that an observer answers so.
+/// Returns the probability of an observer's answer.
 fn probability(observer: &TernaryObserver, observation: &Observation) -> f64 {
     let [correct, wrong] = observer.correct_and_wrong(observation.delta);
     match observation.judgement {
         Judgement::Correct => correct,
         Judgement::Wrong => wrong,
-        // Rounding may leave a little less than nothing.
+        // Rounding may give a slightly negative probability.
         Judgement::Unsure => (1.0 - correct - wrong).max(f64::MIN_POSITIVE),
     }
 }

@@ -1,20 +1,19 @@
-//! The observer most likely in the light of prior and answers (maximum a posteriori).
+//! Most likely observer given prior and answers (maximum a posteriori).
 //!
-//! Where a density is highest depends on the scale it is over. Here it is the density over the slope, which is as 1 / threshold, in
-//! which the likelihood of answers is closest to symmetric; over the threshold or its logarithm the estimate of a single track
-//! would be several percent low.
+//! The mode of a density depends on its scale. Here the density is over the slope, proportional to 1 / threshold, in which the likelihood
+//! is closest to symmetric; over the threshold or its logarithm the estimate of a single track would be several percent low.
 
 use super::{Estimate, Observation, Prior, probability};
 
-/// Steps of the first, coarse look, each way from the median of the prior, and their size in deviations of it.
+/// Steps of the coarse grid search in each direction from the prior's median, and their size in deviations of the prior.
 const COARSE_STEPS: i32 = 6;
 const COARSE_SIZE: f64 = 0.5;
-/// Halvings of the search that follows: 0.25 deviations down to 1e-5 of them.
+/// Halvings of the compass search: 0.25 down to 1e-5 deviations.
 const HALVINGS: u32 = 15;
 
-/// Finds the most likely observer, and the difference at which that observer reaches the target.
+/// Finds the most likely observer and the difference at which the observer reaches the target.
 ///
-/// Which procedure placed the trials does not matter: given the differences, the answers have the same likelihood.
+/// The estimate does not depend on the procedure that placed the trials: given the differences, the likelihood is the same.
 #[must_use]
 pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> Estimate {
     let (centre, spread) = (
@@ -29,7 +28,7 @@ pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> 
         let observer = prior.observer(libm::exp(threshold), criterion, target);
         let likelihood: f64 =
             observations.iter().map(|observation| libm::log(probability(&observer, observation))).sum();
-        // A density over the logarithm, times the threshold: over the slope.
+        // Adding the log threshold converts the density over the logarithm to that over the slope.
         likelihood + log_density + threshold
     };
     let step =
@@ -66,6 +65,6 @@ pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> 
     }
     let [log_threshold, criterion] = best;
     let threshold = libm::exp(log_threshold);
-    // The threshold is that of attention: lapses are not a matter of sensitivity.
+    // Threshold of an attentive observer: lapses do not measure sensitivity.
     Estimate { sigma: prior.observer(threshold, criterion, target).sigma, criterion, threshold }
 }

@@ -1,30 +1,29 @@
-//! Probabilities of many observers at once, and the next difference that would tell most about them.
+//! Posterior over a grid of observers, and selection of the most informative next difference.
 //!
-//! The method of QUEST+ (Watson, Journal of Vision 17(3):10, 2017) with three answers. What a trial tells is the mutual
-//! information of its answer and the observer: the entropy of the answer as one now expects it, less the entropy it
-//! would have if one knew the observer.
+//! Implements QUEST+ (Watson, Journal of Vision 17(3):10, 2017) with three answers. The information of a trial is the mutual
+//! information of answer and observer: the entropy of the predicted answer less its expected entropy for a known observer.
 
 use super::{Observation, Prior, probability};
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
 
 const JUDGEMENTS: [Judgement; 3] = [Judgement::Correct, Judgement::Wrong, Judgement::Unsure];
-/// Observers: so many values of the threshold, evenly in its logarithm, times so many of the criterion, evenly from 0.
+/// Grid of observers: thresholds evenly spaced in their logarithm, times criteria evenly spaced from 0.
 const THRESHOLDS: u32 = 31;
 const CRITERIA: u32 = 10;
-/// The grid reaches so many deviations of the prior.
+/// Extent of the grid, in deviations of the prior.
 const REACH: f64 = 3.0;
-/// Differences to choose from, evenly spaced in their logarithm.
+/// Number of candidate differences, evenly spaced in their logarithm.
 const DELTAS: u32 = 40;
 
-/// What does not change from trial to trial.
+/// Grid of observers and candidate differences, constant over a track.
 #[derive(Clone, Debug)]
 pub struct PosteriorGrid {
     observers: Vec<Member>,
     deltas: Vec<f64>,
 }
 
-/// One of the observers of a grid.
+/// One observer of a grid.
 #[derive(Clone, Debug)]
 struct Member {
     observer: TernaryObserver,
@@ -34,7 +33,7 @@ struct Member {
 }
 
 impl PosteriorGrid {
-    /// Observers of a prior, and differences between two bounds.
+    /// Builds the grid from a prior and the bounds of the differences.
     #[must_use]
     pub fn new(prior: &Prior, target: f64, least_delta: f64, most_delta: f64) -> Self {
         let share = |index: u32, of: u32| f64::from(index) / f64::from(of.saturating_sub(1).max(1));
@@ -67,14 +66,14 @@ fn entropy(shares: &[f64]) -> f64 {
     shares.iter().filter(|share| **share > 0.0).map(|share| -share * libm::log(*share)).sum()
 }
 
-/// How probable each observer of a grid is.
+/// Probability of each observer of a grid.
 #[derive(Clone, Debug)]
 pub struct Posterior {
     weights: Vec<f64>,
 }
 
 impl Posterior {
-    /// Before the first answer.
+    /// Returns the normalised prior.
     #[must_use]
     pub fn new(grid: &PosteriorGrid) -> Self {
         let mut posterior = Self { weights: grid.observers.iter().map(|member| member.prior).collect() };
@@ -82,7 +81,7 @@ impl Posterior {
         posterior
     }
 
-    /// Takes an answer in, at any difference.
+    /// Updates the posterior by an answer to any difference.
     pub fn answer(&mut self, grid: &PosteriorGrid, observation: &Observation) {
         for (weight, member) in self.weights.iter_mut().zip(&grid.observers) {
             *weight *= probability(&member.observer, observation);
@@ -95,7 +94,7 @@ impl Posterior {
         self.weights.iter_mut().for_each(|weight| *weight /= sum);
     }
 
-    /// The difference whose answer tells most.
+    /// Returns the difference with the most informative answer.
     #[must_use]
     pub fn best_delta(&self, grid: &PosteriorGrid) -> f64 {
         let mut best = (f64::NEG_INFINITY, 0.0);

@@ -1,33 +1,33 @@
-//! The posterior of threshold, criterion and lapse over all real values they can have, by quadrature.
+//! Posterior of threshold, criterion and lapse by quadrature over their whole range.
 //!
-//! A grid with fixed ends would cut an interval where answers say little. Here the threshold's range is found first: as far as the
-//! posterior is above `e^-28` of its largest value.
+//! A grid with fixed ends would truncate the interval where answers carry little information. Here the range of the threshold is
+//! determined first, as far as the posterior exceeds `e^-28` of its maximum.
 
 use super::{Observation, Prior, unit_threshold};
 use crate::trial::Judgement;
 use flotor_statistics::distribution::normal_below;
 use flotor_statistics::quadrature::{Density, Node, gauss_legendre};
 
-/// The range of the threshold is looked for so many deviations of the prior to both sides, in steps of half of one.
+/// Half width of the search for the threshold's range, in deviations of the prior, and its step.
 const REACH: i32 = 8;
 const STEP: f64 = 0.5;
-/// Logarithm of the density that ends the range, below the largest.
+/// Logarithmic drop below the maximum at which the range ends.
 const NEGLIGIBLE: f64 = 28.0;
-/// The criterion reaches so many deviations above its most likely value.
+/// Upper end of the criterion, in deviations above its mode.
 const CRITERION_REACH: f64 = 7.0;
-/// Half of the chi-square below which 95 % lie, with one degree of freedom: the drop of a log-likelihood that bounds a parameter.
+/// Half of the 95 % quantile of chi-square with one degree of freedom: the drop of the log-likelihood at the bound of a parameter.
 const BOUND: f64 = 1.920_729_410_347_062;
-/// No answer is held less likely.
+/// Lower limit of the probability of an answer, against underflow.
 const LEAST_PROBABILITY: f64 = 1.0e-30;
-/// Equal answers whose probabilities are multiplied: their product is a number yet.
+/// Maximum number of equal answers per group, so that the product of their probabilities does not underflow.
 const EQUAL_MOST: usize = 8;
-/// A product below it is turned into its logarithm.
+/// Limit below which a product is converted to its logarithm.
 const LEAST_PRODUCT: f64 = 1.0e-60;
 
 /// Prior of the share of trials without attention.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum LapsePrior {
-    /// The share itself.
+    /// Known share.
     Known(f64),
     /// Exponential with this mean, up to 1.
     Exponential(f64),
@@ -42,7 +42,7 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// Enough to find the range.
+    /// Node counts for the search of the range.
     const OF_THE_SEARCH: Self = Self { thresholds: 0, criteria: 12, lapses: 12 };
 }
 
@@ -61,13 +61,13 @@ struct Lapse {
     log_density: f64,
 }
 
-/// Equal answers to one difference.
+/// Equal answers to one difference, counted by kind.
 struct Equal {
     delta: f64,
     counts: [usize; 3],
 }
 
-/// The observers that a prior holds possible, and what they have to explain.
+/// Observers of a prior, and the answers to explain.
 struct Model<'a> {
     prior: &'a Prior,
     answers: Vec<Equal>,
@@ -75,19 +75,19 @@ struct Model<'a> {
     lapses: Vec<Lapse>,
 }
 
-/// The posterior.
+/// Marginal densities and means of the posterior.
 pub(super) struct PosteriorDensity {
-    /// Of the logarithm of the threshold.
+    /// Density of the logarithm of the threshold.
     pub(super) log_threshold: Density,
-    /// Of the root of the lapse, where it is not known.
+    /// Density of the root of the lapse, if the lapse is unknown.
     pub(super) root_lapse: Option<Density>,
     /// Posterior means: logarithms of threshold and sigma, criterion, lapse.
     pub(super) mean_log_threshold: f64,
     pub(super) mean_log_sigma: f64,
     pub(super) mean_criterion: f64,
     pub(super) mean_lapse: f64,
-    /// Whether the answers alone bound the threshold below and above: a threshold without end has a likelihood outside of the 95 %
-    /// interval of the likelihood ratio.
+    /// True where the answers alone bound the threshold below and above: an infinite threshold lies outside the 95 % interval of
+    /// the likelihood ratio.
     pub(super) is_bounded: [bool; 2],
 }
 
@@ -126,7 +126,7 @@ impl<'a> Model<'a> {
         self.prior.log_density(log_threshold, self.prior.criterion_mode)
     }
 
-    /// Logarithms of the likelihood times the density of criterion and lapse, criterion by lapse.
+    /// Returns the logarithms of likelihood times density for each criterion and lapse.
     fn cells(&self, log_threshold: f64) -> Vec<f64> {
         let threshold = libm::exp(log_threshold);
         let mut cells = Vec::with_capacity(self.criteria.len() * self.lapses.len());
@@ -145,7 +145,7 @@ impl<'a> Model<'a> {
         cells
     }
 
-    /// Logarithm of the likelihood of a threshold, averaged over criterion and lapse, up to a constant.
+    /// Returns the log-likelihood of a threshold, averaged over criterion and lapse, up to a constant.
     fn log_likelihood(&self, log_threshold: f64) -> f64 {
         let cells = self.cells(log_threshold);
         let most = cells.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -156,7 +156,7 @@ impl<'a> Model<'a> {
     }
 }
 
-/// Logarithm of the likelihood of answers, from what an attentive observer does and the share of lapses.
+/// Returns the log-likelihood of answers, from the probabilities of an attentive observer and the share of lapses.
 fn log_likelihood(attentive: &[([f64; 2], [usize; 3])], lapse: f64) -> f64 {
     let (mut log, mut product) = (0.0, 1.0);
     for ([correct, wrong], counts) in attentive {
@@ -176,7 +176,7 @@ fn log_likelihood(attentive: &[([f64; 2], [usize; 3])], lapse: f64) -> f64 {
     log + libm::log(product)
 }
 
-/// Groups answers of the same kind to the same difference.
+/// Groups equal answers to equal differences.
 fn equal(observations: &[Observation]) -> Vec<Equal> {
     let mut sorted = observations.to_vec();
     sorted.sort_by(|a, b| a.delta.total_cmp(&b.delta));
@@ -190,7 +190,7 @@ fn equal(observations: &[Observation]) -> Vec<Equal> {
 }
 
 impl PosteriorDensity {
-    /// The posterior after answers.
+    /// Computes the posterior given the answers.
     pub(super) fn new(
         observations: &[Observation],
         prior: &Prior,
@@ -243,7 +243,7 @@ impl PosteriorDensity {
             root_lapse: matches!(lapse_prior, LapsePrior::Exponential(_))
                 .then(|| Density::new(&roots, [0.0, 1.0], &by_lapse)),
             mean_log_threshold,
-            // Each observer's sigma is the threshold over the criterion's unit.
+            // Sigma is the threshold over the criterion's unit threshold.
             mean_log_sigma: mean_log_threshold - of_criterion(|one| libm::log(one.unit)),
             mean_criterion: of_criterion(|one| one.value),
             mean_lapse,
@@ -252,8 +252,8 @@ impl PosteriorDensity {
     }
 }
 
-/// The range of the logarithm of the threshold outside of which the posterior is negligible, and whether its likelihood falls off at
-/// each end of the search.
+/// Returns the range of the log threshold outside which the posterior is negligible, and whether the likelihood falls off at each
+/// end of the search.
 fn range(model: &Model<'_>) -> ([f64; 2], [bool; 2]) {
     let (median, spread) = (libm::log(model.prior.threshold_median), model.prior.threshold_spread);
     let at = |step: i32| median + spread * STEP * f64::from(step);

@@ -1,8 +1,7 @@
-//! The psychometric function of one subject in one condition: threshold and lapse with intervals, and whether the answers are those
-//! of somebody whom such a function describes.
+//! Psychometric function of one subject in one condition: threshold and lapse with intervals, and goodness of fit.
 //!
-//! The posterior is that of the [`Prior`] of the other estimators and, for the lapse, of an exponential prior with a mean of 2 %
-//! (Kuss, Jäkel and Wichmann 2005 use one of that size). An interval holds 95 % of it.
+//! The posterior combines the [`Prior`] of the other estimators with an exponential prior of the lapse, mean 2 % (as in Kuss, Jäkel
+//! and Wichmann 2005). Intervals hold 95 % of the posterior.
 
 use super::posterior_density::{LapsePrior, Nodes, PosteriorDensity};
 use super::{Observation, Prior, goodness_of_fit};
@@ -11,52 +10,52 @@ use flotor_statistics::distribution::binomial_at_least;
 use serde::Serialize;
 
 const MEAN_LAPSE: f64 = 0.02;
-/// Nodes that give quantiles to six digits.
+/// Node counts for quantiles accurate to six digits.
 const NODES: Nodes = Nodes { thresholds: 96, criteria: 40, lapses: 48 };
 
-/// The psychometric function of a subject's answers in one condition.
+/// Psychometric function of one subject in one condition.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Psychometric {
-    /// Answers it is made from.
+    /// Number of answers.
     pub answers: usize,
-    /// Answers that name one of the pair.
+    /// Number of answers other than "I don't know".
     pub named: usize,
-    /// Those of them that are wrong.
+    /// Number of wrong answers.
     pub wrong: usize,
-    /// Probability of so many wrong answers or more by chance.
+    /// Probability of at least this many wrong answers by guessing.
     pub p_chance: f64,
     /// Median of the threshold, as a share of the base.
     pub threshold: f64,
-    /// 95 % of it; none where the answers bound no end, and only the prior would.
+    /// 95 % interval of the threshold; `None` at an end that only the prior bounds.
     pub threshold_interval: [Option<f64>; 2],
-    /// The ends that the answers do not bound.
+    /// Ends of the threshold that the answers do not bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_bounded: Option<NotBounded>,
     /// Mean of the criterion.
     pub criterion: f64,
     /// Mean share of trials without attention.
     pub lapse: f64,
-    /// The smallest lapse that 97.5 % lie below.
+    /// Upper bound of the lapse (97.5 % quantile).
     pub lapse_most: f64,
-    /// How well the function describes the answers.
+    /// Goodness of fit.
     pub fit: GoodnessOfFit,
 }
 
-/// Ends of an interval that the answers do not bound: without the prior, a threshold without end there would be inside the 95 %
-/// interval of the likelihood ratio.
+/// Ends of an interval that the answers do not bound: without the prior, the interval of the likelihood ratio (95 %) would be
+/// infinite there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NotBounded {
-    /// Any smaller threshold explains the answers as well.
+    /// Arbitrarily small thresholds fit as well.
     Below,
-    /// Any larger one does.
+    /// Arbitrarily large thresholds fit as well.
     Above,
-    /// Both.
+    /// Both ends are unbounded.
     Both,
 }
 
 impl NotBounded {
-    /// The open ends, from whether the lower and the upper are bounded.
+    /// Converts the flags for the lower and the upper end.
     pub(super) fn of(is_bounded: [bool; 2]) -> Option<Self> {
         match is_bounded {
             [true, true] => None,
@@ -66,7 +65,7 @@ impl NotBounded {
         }
     }
 
-    /// Describes the open end.
+    /// Returns a text for tables.
     #[must_use]
     pub fn text(self) -> &'static str {
         match self {
@@ -77,18 +76,19 @@ impl NotBounded {
     }
 }
 
-/// Pearson's chi-square of the three kinds of answers in classes of the difference, against the fitted function.
+/// Pearson's chi-square of the three kinds of answers in classes of the difference, against the fitted observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GoodnessOfFit {
     /// Sum over classes and kinds of the squared distance over the number expected.
     pub chi_square: f64,
-    /// Classes of the difference.
+    /// Number of classes of the difference.
     pub classes: usize,
-    /// Probability of a larger sum: the share among simulated sets of answers of the fitted observer at the same differences.
+    /// Probability of a larger sum: share among answer sets simulated from the fitted observer at the same differences.
     pub p: f64,
 }
 
-/// Estimates the psychometric function of answers; `target` is the share of correct answers at the threshold. None without answers.
+/// Estimates the psychometric function of answers; `target` is the share of correct answers at the threshold. Returns `None`
+/// without answers.
 #[must_use]
 pub fn psychometric(observations: &[Observation], prior: &Prior, target: f64) -> Option<Psychometric> {
     if observations.is_empty() {

@@ -1,13 +1,13 @@
-//! Whether rules make sense for an experiment.
+//! Validation of exclusion rules against an experiment.
 
 use super::ExclusionRules;
 use crate::protocol::Protocol;
 
 impl ExclusionRules {
-    /// Whether the rules make sense for this experiment.
+    /// Checks the rules against an experiment.
     ///
     /// # Errors
-    /// The first that does not, in words.
+    /// The first invalid rule, as text.
     pub fn check(&self, protocol: &Protocol) -> Result<(), String> {
         let shares = [
             ("most_false_alarms", self.most_false_alarms),
@@ -31,7 +31,7 @@ impl ExclusionRules {
                 return Err(format!("exclusion.{rule}: a number above 0"));
             }
         }
-        // A log is JSON, which has no infinity: a longest time without end would make it unreadable.
+        // A log is JSON, which cannot represent infinity: an infinite longest time would make the log unreadable.
         let are_times =
             |[shortest, longest]: [f64; 2]| 0.0 <= shortest && shortest < longest && longest.is_finite();
         if self.response_time_s.is_some_and(|times| !are_times(times)) {

@@ -1,4 +1,4 @@
-//! Interruptions and disturbances of a sitting, as an ethics board asks for them.
+//! Interruptions and disturbances of a sitting, as ethics boards require them.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -9,43 +9,43 @@ use std::fmt;
 pub enum Incident {
     /// The emergency stop was pressed.
     EmergencyStop {
-        /// Where: key, signal, window, device.
+        /// Source: key, signal, window, device.
         source: String,
     },
-    /// The run ended by itself, or could not go on.
+    /// The run ended by itself or failed.
     RunEnded {
-        /// Why.
+        /// Error or reason of the end.
         reason: String,
     },
-    /// The window in front of the person was closed, or standard input was.
+    /// The window in front of the person, or standard input, was closed.
     WindowClosed,
-    /// Somebody pressed the key that stops the sitting.
+    /// The stop key was pressed.
     Stopped,
-    /// The program was asked to end: by a signal, or by a program that watches.
+    /// A signal or a client requested the end of the program.
     Signal,
-    /// The handle was pushed back at the edge of its range.
+    /// The handle was pushed out of its range.
     OutOfRange,
-    /// Ticks of the servo were missed.
+    /// The servo missed ticks.
     MissedTicks {
-        /// How many.
+        /// Number of missed ticks.
         ticks: u64,
     },
-    /// The system's time of day was set; times of the sitting go on without a jump.
+    /// The system's time of day was set; the times of the sitting are unaffected.
     TimeOfDaySet {
-        /// How far forward, ms.
+        /// Forward change, ms.
         by_ms: i64,
     },
-    /// The sitting broke off without a line of its own: the process was killed, or the power failed. Written when it goes on.
+    /// The sitting ended without a log entry: the process was killed or the power failed. Logged on resumption.
     Killed,
-    /// The movement of a trial could not be recorded; the sitting went on.
+    /// The recording of a trial failed; the sitting continued.
     NotRecorded {
-        /// Why.
+        /// Error of the recording.
         reason: String,
     },
 }
 
 impl Incident {
-    /// Returns true if the sitting is over until it is resumed.
+    /// Returns true if the sitting is interrupted until it is resumed.
     pub(super) fn ends_the_sitting(&self) -> bool {
         match self {
             Self::EmergencyStop { .. }

@@ -6,10 +6,9 @@
 //! {"chain":"...","event":{"trial":{...}},"time":"2026-11-25T18:34:09.123Z"}    with a person
 //! ```
 //!
-//! `chain` is the SHA-256 of the chain of the line before and of all that follows it on its own line, so a changed, missing or
-//! exchanged line breaks the chain from there on: a guard against accidents. Whoever means to forge a log can compute the chain
-//! anew. A last line without its end is what a killed process leaves: the
-//! event it would have told never happened.
+//! `chain` is the SHA-256 of the previous line's chain and of the rest of its own line, so a changed, missing or exchanged line
+//! breaks the chain from there on: protection against accidents, not against forgery, because anyone can recompute the chain. An
+//! incomplete last line is left by a killed process and is ignored.
 
 mod incident;
 mod reader;
@@ -28,68 +27,68 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// Revision of the format: 2 has times of day and incidents, 3 has answers that were taken back, 4 has the contents of files and the
-/// time of day that was set, 5 has sittings that broke off without a reason.
+/// Revision of the format: 2 adds times of day and incidents, 3 withdrawn answers, 4 hashes of input files and changes of the time
+/// of day, 5 sittings that ended without a reason.
 pub const FORMAT: u32 = 5;
 
-/// What a line says.
+/// Event of a line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Event {
-    /// The first line: everything needed to do it again.
+    /// First line, with all inputs needed to repeat the sitting.
     Begin(Box<Begin>),
     /// A trial was presented and answered.
     Trial(Box<TrialEvent>),
-    /// The answer to the last trial was taken back; the trial is open again, and what followed from the answer is void.
+    /// The answer to the last trial was withdrawn; the trial is open again, and consequences of the answer are void.
     Withdrawn {
-        /// The trial.
+        /// Trial number.
         trial: u32,
     },
-    /// The sitting was taken up again.
+    /// The sitting was resumed.
     Resume {
-        /// Trials found and replayed.
+        /// Number of replayed trials.
         trials: u32,
         /// Version of the program.
         version: String,
     },
-    /// Something the experimenter wants to be known.
+    /// Note of the experimenter.
     Note {
-        /// In their words.
+        /// Text of the note.
         text: String,
     },
-    /// Something interrupted or disturbed the sitting.
+    /// An interruption or disturbance.
     Incident(Incident),
-    /// Everything was presented.
+    /// The sitting is complete.
     End {
-        /// Presentations in all.
+        /// Total number of presentations.
         trials: u32,
     },
 }
 
-/// The first line of a log.
+/// First line of a log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Begin {
     /// Revision of the format.
     pub format: u32,
     /// Version of the program.
     pub version: String,
-    /// Who sits.
+    /// Number of the subject.
     pub subject: SubjectNumber,
     /// Seed of order, presentation and simulated answers.
     pub seed: u64,
-    /// The study file that was followed, if there was one.
+    /// Study file in use; `None` without a study file.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub plan: Option<Plan>,
-    /// The experiment.
+    /// Experiment with its settings.
     pub protocol: Protocol,
-    /// What is known of the person; nothing is requested.
+    /// Optional data on the person.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub person: Option<Person>,
-    /// Who answers, with everything that decides how, as JSON.
+    /// Observer with all parameters that affect the answers, as JSON; `"human"` for a person.
     pub observer: serde_json::Value,
-    /// What presents the stimuli, with everything that decides how, as JSON.
+    /// Apparatus with all settings that affect the stimuli, as JSON.
     pub apparatus: serde_json::Value,
-    /// Files that decide what is presented, by their content; a log of an earlier revision has none.
+    /// Files that determine the stimuli, with their hashes; empty in logs of earlier revisions.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub inputs: Vec<InputFile>,
 }
@@ -100,12 +99,12 @@ pub struct Begin {
 pub enum ObserverKind {
     /// A person.
     Human,
-    /// A program with known thresholds.
+    /// A simulated observer with known thresholds.
     Simulated,
 }
 
 impl ObserverKind {
-    /// Returns the word of the tables.
+    /// Returns the label used in tables.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -114,7 +113,7 @@ impl ObserverKind {
         }
     }
 
-    /// Returns the restriction that every result of such answers must carry; none for people.
+    /// Returns the restriction to attach to every result; `None` for people.
     #[must_use]
     pub fn restriction(self) -> Option<&'static str> {
         match self {
@@ -124,19 +123,19 @@ impl ObserverKind {
     }
 }
 
-/// A file that decides what a sitting presents.
+/// File that determines the stimuli of a sitting.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputFile {
-    /// Its use: `measured.curve`, `spring` for the file of a plugin.
+    /// Purpose: `measured.curve`, or `spring` for the file of a plugin.
     pub used_as: String,
-    /// Its name, without its folder.
+    /// File name without folder.
     pub name: String,
-    /// Hash of its content, as text.
+    /// Hash of the content, as text.
     pub hash: String,
 }
 
 impl Begin {
-    /// What makes this a sitting of another study than an earlier one, as text; the subject and the version may differ.
+    /// Describes the first difference from an earlier sitting's configuration; subject and version may differ.
     #[must_use]
     pub fn differs(&self, earlier: &Self) -> Option<String> {
         let own = |what: String, is_same: bool| (!is_same).then_some(what);
@@ -157,7 +156,7 @@ impl Begin {
         what.map(|what| format!("begun with {what}"))
     }
 
-    /// The first file with another content than the file of the same use in an earlier sitting, and that file.
+    /// Returns the first input file whose content differs from the earlier file of the same purpose, and the earlier file.
     #[must_use]
     pub fn changed_input<'b>(&'b self, earlier: &'b Self) -> Option<(&'b InputFile, &'b InputFile)> {
         self.inputs.iter().find_map(|now| {
@@ -166,7 +165,7 @@ impl Begin {
         })
     }
 
-    /// Returns true for the sitting of a person, where times of day mean something.
+    /// Returns true for the sitting of a person, whose events have times of day.
     #[must_use]
     pub fn is_of_a_person(&self) -> bool {
         self.observer_kind() == ObserverKind::Human
@@ -182,20 +181,20 @@ impl Begin {
         }
     }
 
-    /// Rate of the servo, Hz, where a scene was presented.
+    /// Returns the servo rate, Hz, if a scene was presented.
     #[must_use]
     pub fn rate_hz(&self) -> Option<f64> {
         let scene = self.apparatus.get("scene").filter(|scene| scene.is_object()).unwrap_or(&self.apparatus);
         scene.get("rate_hz")?.as_f64()
     }
 
-    /// What does not count, as the study file said.
+    /// Returns the exclusion rules of the study file.
     #[must_use]
     pub fn exclusion(&self) -> ExclusionRules {
         self.plan.as_ref().map(|plan| plan.exclusion.clone()).unwrap_or_default()
     }
 
-    /// Digest of the configuration: equal for sittings that differ in the subject only.
+    /// Returns a digest of the configuration, equal for sittings that differ only in the subject.
     #[must_use]
     pub fn config_hash(&self) -> String {
         let text = serde_json::to_string(&(self.seed, &self.protocol, &self.observer, &self.apparatus));
@@ -204,24 +203,24 @@ impl Begin {
     }
 }
 
-/// A study file: what was decided before there were data.
+/// Study file, fixed before data collection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Its name.
+    /// File name.
     pub file: String,
-    /// SHA-256 of its text.
+    /// SHA-256 of the text.
     pub sha256: String,
-    /// Its text, so that a change can be shown.
+    /// Full text, so that a change can be shown.
     #[serde(skip_serializing_if = "String::is_empty", default)]
     pub text: String,
-    /// What does not count.
+    /// Exclusion rules.
     #[serde(skip_serializing_if = "ExclusionRules::are_none", default)]
     pub exclusion: ExclusionRules,
 }
 
 impl Plan {
-    /// How the file that is followed now differs from the earlier one, in words; an equal digest is an equal text, whatever its name.
-    /// The number of subjects and the folder of the data may change: neither is a part of what a sitting presents.
+    /// Describes the difference of the current file from the earlier one. Equal digests mean equal texts, regardless of the file
+    /// names. The number of subjects and the data folder may differ: neither affects a sitting.
     fn differs(now: Option<&Self>, earlier: Option<&Self>) -> Option<String> {
         match (earlier, now) {
             (None, None) => None,
@@ -237,8 +236,7 @@ impl Plan {
     }
 }
 
-/// Returns the text of a study file without the content of the lines that set the number of subjects or the folder of the data; all
-/// lines keep their numbers.
+/// Blanks the lines of a study file that set the number of subjects or the data folder; line numbers do not change.
 fn without_size_and_folder(text: &str) -> String {
     let sets = |line: &str, key: &str| {
         line.trim_start().strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
@@ -249,7 +247,7 @@ fn without_size_and_folder(text: &str) -> String {
         .collect()
 }
 
-/// The lines that changed from one version of a text to the next; nothing of an early log, which has the digest alone.
+/// Describes the changed lines between two versions of a text; empty for an early log, which has only the digest.
 fn changed(before: &str, after: &str) -> String {
     if before.is_empty() {
         return String::new();
@@ -272,7 +270,7 @@ fn changed(before: &str, after: &str) -> String {
     format!(": line {} on had {}, and has {} now", same + 1, middle(&before), middle(&after))
 }
 
-/// What is another part of a sitting, with the first place where the two differ.
+/// Names a changed part of a sitting and the first difference.
 fn another(what: &str, earlier: &impl Serialize, now: &impl Serialize) -> String {
     let [earlier, now] =
         [serde_json::to_value(earlier), serde_json::to_value(now)].map(Result::unwrap_or_default);
@@ -282,9 +280,9 @@ fn another(what: &str, earlier: &impl Serialize, now: &impl Serialize) -> String
     }
 }
 
-/// The first place where two values differ, with both.
+/// Returns the path of the first difference of two values, with both values.
 fn difference(earlier: &Value, now: &Value, place: String) -> Option<String> {
-    /// Longer values are not shown.
+    /// Longest value that is shown, characters.
     const MOST: usize = 60;
     match (earlier, now) {
         (Value::Object(one), Value::Object(two)) => {
@@ -305,37 +303,37 @@ fn difference(earlier: &Value, now: &Value, place: String) -> Option<String> {
     }
 }
 
-/// What BIDS has columns for, as far as somebody has said it.
+/// Optional data on a person, for the BIDS columns.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Person {
     /// Age, years.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub age: Option<u16>,
-    /// Sex, in a word.
+    /// Sex, one word.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub sex: Option<String>,
-    /// The hand that is preferred: left, right or ambidextrous.
+    /// Preferred hand: left, right or ambidextrous.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub handedness: Option<String>,
 }
 
-/// A trial with what came of it.
+/// Trial with its answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrialEvent {
-    /// What was presented.
+    /// The presented trial.
     pub trial: Trial,
-    /// The answer.
+    /// Answer of the subject.
     pub response: Response,
-    /// What it was worth.
+    /// Judgement of the answer.
     pub verdict: Verdict,
-    /// What happened meanwhile.
+    /// Measurements during the presentation.
     pub exploration: Exploration,
 }
 
-/// The chain before the first line.
+/// Chain value before the first line.
 const CHAIN_START: &str = "flotor-study-log";
 
-/// The chain of a line.
+/// Returns the chain value of a line.
 fn chain(before: &str, event: &str) -> String {
     let mut digest = Sha256::new();
     digest.update(before.as_bytes());
@@ -343,7 +341,7 @@ fn chain(before: &str, event: &str) -> String {
     hexadecimal(&digest.finalize())
 }
 
-/// SHA-256 of a text, as the log names what was shown.
+/// Returns the SHA-256 of a text, hexadecimal.
 #[must_use]
 pub fn digest(text: &str) -> String {
     hexadecimal(&Sha256::digest(text.as_bytes()))
@@ -353,23 +351,23 @@ fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// A line as it is written, without its end.
+/// Formats a line without its line end.
 fn line(chain: &str, event: &str) -> String {
     format!("{{\"chain\":\"{chain}\",\"event\":{event}}}")
 }
 
-/// What is chained of an event with a time.
+/// Appends the time to an event, giving the chained text.
 fn stamped(event: &str, time: TimeOfDay) -> String {
     format!("{event},\"time\":\"{time}\"")
 }
 
-/// Event and time of what is chained; an event ends with a brace.
+/// Splits the chained text into event and time; an event ends with a brace.
 fn unstamped(chained: &str) -> (&str, Option<&str>) {
     let time = chained.strip_suffix('"').and_then(|rest| rest.rsplit_once(",\"time\":\""));
     time.map_or((chained, None), |(event, time)| (event, Some(time)))
 }
 
-/// Chain of a line, and what is chained of it.
+/// Splits a line into its chain value and the chained text.
 fn parts(line: &str) -> Option<(&str, &str)> {
     let rest = line.strip_prefix("{\"chain\":\"")?;
     let (chain, rest) = rest.split_once("\",\"event\":")?;

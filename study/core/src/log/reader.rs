@@ -1,4 +1,4 @@
-//! Reads a log back, distrusting every line: chain, text, order, and whether the experiment really went so.
+//! Reads and verifies a log: chain, syntax, order of events, and a replay of the experiment.
 
 use super::{Begin, CHAIN_START, Event, FORMAT, Incident, LogWriter, TrialEvent, chain, parts, unstamped};
 use crate::sitting::{AnswerError, Sitting, TrackResult};
@@ -7,18 +7,18 @@ use crate::trial::{Response, Trial};
 use flotor_hal::read_file;
 use std::path::{Path, PathBuf};
 
-/// Size of the longest log, bytes: hundreds of hours of a sitting.
+/// Maximum size of a log, bytes: hundreds of hours.
 const MOST_BYTES: u64 = 256 << 20;
 
-/// Why a log cannot be used: the file, the line (counted from 1; 0 for the file as a whole) and the reason.
+/// Error of a log: file, line (from 1; 0 for the whole file) and problem.
 #[derive(Debug, thiserror::Error)]
 #[error("{}{}: {problem}", path.display(), line_text(*.line))]
 pub struct LogError {
-    /// The file.
+    /// Path of the log.
     pub path: PathBuf,
-    /// The line.
+    /// Line number, from 1; 0 for the whole file.
     pub line: usize,
-    /// What is wrong.
+    /// Reason.
     #[source]
     pub problem: LogProblem,
 }
@@ -27,45 +27,45 @@ fn line_text(line: usize) -> String {
     if line == 0 { String::new() } else { format!(":{line}") }
 }
 
-/// What is wrong with a log.
+/// Problem with a log.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogProblem {
     /// The file could not be read or written.
     #[error("{action}: {cause}")]
     File {
-        /// What was attempted.
+        /// Attempted operation.
         action: &'static str,
-        /// What the system said.
+        /// Error of the system.
         cause: std::io::Error,
     },
-    /// Another process writes to it, or has written to it since it was read.
+    /// Another process has the log open, or has written to it since it was read.
     #[error("another process is running this sitting; end it there before it is continued here")]
     InUse,
-    /// No log at all.
+    /// The log has no complete line.
     #[error("has no complete line, so nothing was recorded; remove the file")]
     Empty,
-    /// A line that is not made like one.
+    /// A line with invalid syntax.
     #[error("is not a line of an event log: {0}")]
     Text(String),
-    /// The chain does not continue.
+    /// The hash chain is broken.
     #[error(
         "the hash chain is broken: this line or an earlier one was changed, removed or exchanged; use an unchanged \
          copy"
     )]
     Chain,
-    /// A revision this program does not know.
+    /// Unknown format revision.
     #[error(
         "format {found} is not supported, this version reads up to {FORMAT}; use the version that wrote it"
     )]
     Format {
-        /// The format found.
+        /// Revision found in the log.
         found: u32,
     },
-    /// An event where it cannot be.
+    /// Event out of sequence.
     #[error("{0}")]
     Order(&'static str),
-    /// The experiment would have presented something else.
+    /// The replayed experiment would have presented another trial.
     #[error(
         "trial {number} does not follow from protocol, seed and answers; another version of the program wrote \
          it"
@@ -79,7 +79,7 @@ pub enum LogProblem {
     Answer {
         /// Trial, from 1.
         number: u32,
-        /// Why.
+        /// Error of the answer.
         cause: AnswerError,
     },
 }
@@ -94,34 +94,34 @@ impl LogError {
     }
 }
 
-/// A trial as the log has it.
+/// Logged trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrialRecord {
-    /// Trial, answer and what came of it.
+    /// Trial, answer and judgement.
     pub event: TrialEvent,
-    /// The threshold the trial completed, if it was the last of its track.
+    /// Threshold of the track that this trial completed; `None` otherwise.
     pub track: Option<TrackResult>,
 }
 
-/// A log that was read and found right.
+/// Verified log.
 pub struct SittingLog {
     /// The first line.
     pub begin: Begin,
-    /// Trials in order.
+    /// Trials in order of presentation.
     pub trials: Vec<TrialRecord>,
-    /// Answers that were taken back: no longer among the trials.
+    /// Withdrawn answers, not among the trials.
     pub withdrawn: Vec<TrialEvent>,
-    /// Notes of the experimenter, each with the trials before it.
+    /// Notes of the experimenter, each with the number of trials before it.
     pub notes: Vec<(u32, String)>,
-    /// Interruptions and disturbances, each with the trials before it.
+    /// Interruptions and disturbances, each with the number of trials before it.
     pub incidents: Vec<(u32, Option<TimeOfDay>, Incident)>,
-    /// When it began, with a person.
+    /// Start of the sitting; `None` for simulated observers.
     pub began: Option<TimeOfDay>,
-    /// Whether the sitting came to its end.
+    /// True if the sitting is complete.
     pub complete: bool,
-    /// How often it was taken up again.
+    /// Number of resumptions.
     pub resumed: u32,
-    /// The last event, notes aside, says why the sitting is over for now.
+    /// True if the last event, notes aside, explains the end or interruption of the sitting.
     has_reason_to_end: bool,
     sitting: Sitting,
     path: PathBuf,
@@ -131,8 +131,7 @@ pub struct SittingLog {
 }
 
 impl SittingLog {
-    /// Reads a log, checks its chain, and goes through the experiment with its answers: every trial must be the one
-    /// the state machine asks for, every verdict the one it gives.
+    /// Reads a log, checks its chain, and replays the experiment: every trial and verdict must equal that of the state machine.
     ///
     /// # Errors
     /// [`LogError`] with line and reason.
@@ -149,7 +148,7 @@ impl SittingLog {
             let not_text = || at(number, LogProblem::Text("it is not UTF-8".to_owned()));
             let text = std::str::from_utf8(bytes).map_err(|_| not_text())?;
             let text = text.strip_suffix('\n').unwrap_or(text);
-            // Line ends that a copy through Windows or git has changed.
+            // Line ends may have been changed by a copy through Windows or git.
             let text = text.strip_suffix('\r').unwrap_or(text);
             let (found, event) = parts(text)
                 .ok_or_else(|| at(number, LogProblem::Text("no `chain` and `event`".to_owned())))?;
@@ -238,7 +237,7 @@ impl SittingLog {
 
     fn replay(&mut self, event: TrialEvent) -> Result<(), LogProblem> {
         let number = event.trial.number;
-        // To the bit: JSON keeps every digit of a number.
+        // Bit-exact: JSON keeps every digit of a number.
         if self.sitting.next() != Some(event.trial) {
             return Err(LogProblem::Diverges { number });
         }
@@ -253,7 +252,7 @@ impl SittingLog {
         Ok(())
     }
 
-    /// Goes back to where the sitting stood before its last trial: through all answers before it, anew.
+    /// Returns to the state before the last trial, by replaying all earlier answers.
     fn withdraw(&mut self, number: u32) -> Result<(), LogProblem> {
         const LAST: &str = "`withdrawn` of another trial than the last";
         let is_last = |last: &TrialRecord| last.event.trial.number == number;
@@ -267,50 +266,50 @@ impl SittingLog {
         Ok(())
     }
 
-    /// Whether the trial that is open was answered before, and the answer taken back.
+    /// Returns true if the open trial was answered before and the answer withdrawn.
     #[must_use]
     pub fn is_answered_anew(&self) -> bool {
         let open = self.sitting.presented() + 1;
         self.withdrawn.last().is_some_and(|last| last.trial.number == open)
     }
 
-    /// The file.
+    /// Returns the path of the log.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Thresholds found so far.
+    /// Returns the thresholds of completed tracks.
     #[must_use]
     pub fn tracks(&self) -> &[TrackResult] {
         self.sitting.results()
     }
 
-    /// The answers, for whoever wants to go through them again.
+    /// Returns trials and answers, for replay.
     pub fn answers(&self) -> impl Iterator<Item = (Trial, Response)> {
         self.trials.iter().map(|record| (record.event.trial, record.event.response))
     }
 
-    /// Adds a note of the experimenter, also to a sitting that is complete.
+    /// Adds a note of the experimenter, also to a complete sitting.
     ///
     /// # Errors
-    /// What the system said.
+    /// If the log is in use or cannot be written.
     pub fn annotate(self, text: &str) -> Result<(), LogError> {
         self.writer()?.write(&Event::Note { text: text.to_owned() })
     }
 
-    /// The log to go on with; with a person, the time of day is in every line.
+    /// Opens the log for writing, with times of day for a person.
     fn writer(&self) -> Result<LogWriter, LogError> {
         let writer =
             LogWriter::append(&self.path, [self.complete_bytes, self.read_bytes], self.chain.clone())?;
         Ok(if self.begin.is_of_a_person() { writer.stamped() } else { writer })
     }
 
-    /// Returns the sitting where it stopped, and the log to go on with: a line that was never completed is cut off, and the
-    /// resumption is noted. If a person's sitting broke off without a reason in the log, that is an incident.
+    /// Returns the sitting at its next trial, and the open log: truncates an incomplete line and logs the resumption. If a person's
+    /// sitting was interrupted without a logged reason, logs [`Incident::Killed`].
     ///
     /// # Errors
-    /// What the system said.
+    /// If the log is in use or cannot be written.
     pub fn resume(self, version: &str) -> Result<(Sitting, LogWriter), LogError> {
         let mut writer = self.writer()?;
         let trials = self.sitting.presented();

@@ -1,4 +1,4 @@
-//! Adds lines to a log and does not return before they are on disk.
+//! Appends lines to a log and syncs each to disk.
 
 use super::{CHAIN_START, Event, Incident, LogError, LogProblem, chain, line, stamped};
 use crate::platform::open_alone;
@@ -7,7 +7,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{Error, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// An open log, which no other process writes to meanwhile.
+/// Open log, locked against other writers.
 pub struct LogWriter {
     file: File,
     path: PathBuf,
@@ -15,7 +15,7 @@ pub struct LogWriter {
     stamps: Stamps,
 }
 
-/// Whether lines have a time of day.
+/// Time stamps of the lines.
 #[derive(Clone, Copy, Debug)]
 enum Stamps {
     None,
@@ -23,10 +23,10 @@ enum Stamps {
 }
 
 impl LogWriter {
-    /// A new log. A file without a complete line is none: whoever wrote it was killed before anything happened.
+    /// Creates a log. Overwrites a file without a complete line: its writer was killed before the first event.
     ///
     /// # Errors
-    /// The log exists, is open elsewhere, or cannot be created.
+    /// If the log exists, is open in another process, or cannot be created.
     pub fn create(path: &Path) -> Result<Self, LogError> {
         let failed = |cause| LogError::file(path, "cannot create the log", cause);
         let mut options = OpenOptions::new();
@@ -38,18 +38,17 @@ impl LogWriter {
             return Err(failed(Error::from(ErrorKind::AlreadyExists)));
         }
         cut(&mut file, 0).map_err(failed)?;
-        // The name of a new file is kept by its folder: without this a crash may leave the file nameless.
+        // Sync the folder, too: without this a crash may lose the new file's name.
         if let Some(folder) = path.parent().and_then(|folder| File::open(folder).ok()) {
             let _ = folder.sync_all();
         }
         Ok(Self { file, path: path.into(), chain: CHAIN_START.to_owned(), stamps: Stamps::None })
     }
 
-    /// Continues a log of `read_bytes` after its `complete_bytes`, whose chain is known. The rest is a line that was never completed,
-    /// and is cut off.
+    /// Continues a log of `read_bytes` after its `complete_bytes`, with the given chain value. Truncates the incomplete line after them.
     ///
     /// # Errors
-    /// The log is open elsewhere, has changed since it was read, or cannot be written.
+    /// If the log is open in another process, has changed since it was read, or cannot be written.
     pub(super) fn append(
         path: &Path,
         [complete_bytes, read_bytes]: [u64; 2],
@@ -68,7 +67,7 @@ impl LogWriter {
     /// Checks that no other process writes to a log.
     ///
     /// # Errors
-    /// [`LogProblem::InUse`], or what the system says.
+    /// [`LogProblem::InUse`], or errors of the file system.
     pub(crate) fn check_free(path: &Path) -> Result<(), LogError> {
         let opened = open_alone(OpenOptions::new().write(true), path);
         match opened.map_err(|cause| LogError::file(path, "cannot open the log", cause))? {
@@ -77,13 +76,13 @@ impl LogWriter {
         }
     }
 
-    /// The same, with the time of day in every line from now on.
+    /// Enables the time of day in every line from now on.
     #[must_use]
     pub fn stamped(self) -> Self {
         Self { stamps: Stamps::Of(SittingClock::start()), ..self }
     }
 
-    /// The time of day by the clock of the log, where its lines have one.
+    /// Returns the time of day by the log's clock; `None` without time stamps.
     #[must_use]
     pub fn now(&self) -> Option<TimeOfDay> {
         match self.stamps {
@@ -92,10 +91,10 @@ impl LogWriter {
         }
     }
 
-    /// Writes an event, and before it that the time of day was set, if it was. When this returns, it is on disk.
+    /// Writes an event, preceded by an incident if the system's time of day was set. Returns once the event is on disk.
     ///
     /// # Errors
-    /// What the system said.
+    /// If the file cannot be written.
     pub fn write(&mut self, event: &Event) -> Result<(), LogError> {
         let jump = match &mut self.stamps {
             Stamps::Of(clock) if !matches!(event, Event::Begin(_)) => clock.take_jump_ms(),
@@ -123,7 +122,7 @@ impl LogWriter {
         let before = self.file.metadata().map(|file| file.len());
         let written = self.file.write_all(&bytes).and_then(|()| self.file.sync_data());
         if let Err(cause) = written {
-            // A part of a line in the middle would make the whole log unreadable.
+            // A partial line in the middle would make the whole log unreadable.
             let _ = before.and_then(|length| self.file.set_len(length));
             return Err(LogError::file(&self.path, "cannot write the log", cause));
         }
@@ -132,7 +131,7 @@ impl LogWriter {
     }
 }
 
-/// Cuts a file off after so many bytes, and goes on there.
+/// Truncates a file and moves to its end.
 fn cut(file: &mut File, bytes: u64) -> Result<(), Error> {
     file.set_len(bytes)?;
     file.seek(SeekFrom::End(0)).map(drop)

@@ -1,15 +1,15 @@
-//! How a simulated subject's hand explores: its own pace, reach and grip, all along.
+//! Movement of a simulated subject's hand, constant over the sitting: pace, reach and grip.
 
 use crate::protocol::SubjectNumber;
 use crate::random::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
-/// The movement of a hand on a vertical object: it aims at places, down and up about one below home at a pace of its own, whatever
-/// it feels. The hand is compliant, so a stiffer object moves less under it and pushes back more: speed and acceleration fall with
-/// the stiffness and force rises, contrary to section 5 of CMU-RI-TR-07-21 (`docs/src/experiments.md`, Simulated observers).
+/// Intended movement of a hand on a vertical object: up and down about a point below home at a constant pace, independent of the
+/// force. The hand is compliant, so a stiffer object moves less and pushes back more: speed and acceleration fall with the
+/// stiffness and force rises, contrary to section 5 of CMU-RI-TR-07-21 (`docs/src/experiments.md`, Simulated observers).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HandManner {
-    /// Cycles per second.
+    /// Cycles per second, Hz.
     pub frequency_hz: f64,
     /// Middle of the intended movement above home, m.
     pub centre_m: f64,
@@ -21,8 +21,8 @@ pub struct HandManner {
     pub tremor_m: f64,
 }
 
-/// What people do on average: 1.5 cycles a second, from 2 mm above home to 10 mm below, held firmly (2 N/mm: the grip of
-/// the simulated hand), with the tremor of a braced hand (15 to 250 µm).
+/// Average hand: 1.5 cycles per second, from 2 mm above home to 10 mm below, a firm grip (2 N/mm, as the simulated hand), and the
+/// tremor of a braced hand (15 to 250 µm).
 const AVERAGE: HandManner = HandManner {
     frequency_hz: 1.5,
     centre_m: -4.0e-3,
@@ -32,11 +32,11 @@ const AVERAGE: HandManner = HandManner {
 };
 /// Spread between people, as the deviation of the logarithm.
 const SPREAD: f64 = 0.15;
-/// Nobody is farther from the average than this many deviations: the handle stays in its range.
+/// Largest deviation from the average, in standard deviations: the handle stays in its range.
 const FARTHEST: f64 = 2.0;
 
 impl HandManner {
-    /// The hand of a subject: follows from seed and number alone.
+    /// Returns the hand of a subject, a function of seed and number alone.
     #[must_use]
     pub fn of(seed: u64, subject: SubjectNumber) -> Self {
         let mut stream = Stream::new(seed, Purpose::Hand, subject.get(), 0);

@@ -1,7 +1,6 @@
-//! Simulated subjects: what somebody with known thresholds would answer.
+//! Simulated subjects with known thresholds.
 //!
-//! A subject's answers depend on the seed, their number and the number of the trial alone, so a sitting continued after
-//! a crash gets the answers it would have got.
+//! Answers depend only on the seed, the subject's number and the trial number, so a sitting resumed after a crash gets the same answers.
 
 mod hand;
 mod ternary;
@@ -15,7 +14,7 @@ use crate::trial::{Modality, Phase, Position, Presented, Response, Trial};
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// How well a modality tells differences.
+/// Sensitivity to differences in one modality.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensitivity {
     /// Difference of one standard deviation of the noise, as a share of the base.
@@ -24,26 +23,25 @@ pub struct Sensitivity {
     pub criterion: f64,
 }
 
-/// A quality of which a Weber fraction is published.
+/// Quality with a published Weber fraction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Percept {
-    /// Stiffness that is pressed.
+    /// Stiffness, felt by pressing.
     Stiffness,
-    /// Weight that pulls at the hand.
+    /// Weight pulling at the hand.
     FeltForce,
-    /// Constant resistance that is pushed against.
+    /// Constant resistance to a push.
     ExertedForce,
 }
 
-/// The people a study draws its simulated subjects from.
+/// Distribution of simulated subjects in a study.
 ///
-/// The defaults are of stiffness: those whose expected result equals the published one (Weber fractions of 14.2 and 17.2 %, about
-/// 200 pairs, t(15) of 3.3).
+/// The defaults are for stiffness and reproduce the published result (Weber fractions of 14.2 and 17.2 %, about 200 pairs, t(15) of 3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Population {
-    /// With vision.
+    /// Mean sensitivity with vision and haptics.
     pub vh: Sensitivity,
-    /// Without.
+    /// Mean sensitivity with haptics alone.
     pub h: Sensitivity,
     /// Spread of sensitivity between subjects (deviation of its logarithm).
     pub subject_spread: f64,
@@ -51,13 +49,13 @@ pub struct Population {
     pub modality_spread: f64,
     /// Further spread between a subject's bases (deviation of the logarithm).
     pub base_spread: f64,
-    /// Spread of the criterion between subjects, as a share of it.
+    /// Spread of the criterion between subjects, as a share of the mean criterion.
     pub criterion_spread: f64,
-    /// Spread of a preference for the second of a pair, in standard deviations of the noise.
+    /// Spread of the preference for the second stimulus, in standard deviations of the noise.
     pub bias_spread: f64,
     /// Share of trials answered without attention, first or second by chance.
     pub lapse: f64,
-    /// Spread between subjects of the exponent by which a rating rises with the stimulus (mean 1; Stevens's power law).
+    /// Spread between subjects of the exponent of ratings against the stimulus (mean 1; Stevens's power law).
     pub rating_exponent_spread: f64,
     /// Noise of a rating (deviation of its logarithm).
     pub rating_noise: f64,
@@ -84,11 +82,11 @@ impl Default for Population {
 }
 
 impl Population {
-    /// Returns the people who judge a quality.
+    /// Returns the population for judging a quality.
     ///
-    /// Of forces the published fractions are thresholds at about 75 %: 5.9 % of weights of 0.3 to 3 kg (Fechner's data, after Laming
-    /// 1986), 7 % of constant resistances of 2.5 to 10 N (Pang, Tan and Durlach 1991, Percept. Psychophys. 49:531). On
-    /// neither is an effect of vision assumed.
+    /// For forces the published fractions are thresholds at about 75 %: 5.9 % of weights of 0.3 to 3 kg (Fechner's data, after
+    /// Laming 1986), 7 % of constant resistances of 2.5 to 10 N (Pang, Tan and Durlach 1991, Percept. Psychophys. 49:531). No
+    /// effect of vision is assumed for either.
     #[must_use]
     pub fn judging(percept: Percept) -> Self {
         match percept {
@@ -98,7 +96,7 @@ impl Population {
         }
     }
 
-    /// Returns the usual people, but with these mean thresholds at 75 %, shares of the base, with vision and without.
+    /// Returns the default population with other mean thresholds at 75 %, shares of the base, with and without vision.
     #[must_use]
     pub fn with_thresholds([vh, h]: [f64; 2]) -> Self {
         let usual = Self::default();
@@ -109,7 +107,7 @@ impl Population {
         Self { vh: of(usual.vh, vh), h: of(usual.h, h), ..usual }
     }
 
-    /// How a modality tells differences on average.
+    /// Returns the mean sensitivity of a modality.
     #[must_use]
     pub fn sensitivity(&self, modality: Modality) -> Sensitivity {
         match modality {
@@ -134,7 +132,7 @@ pub struct SimulatedSubject {
 }
 
 impl SimulatedSubject {
-    /// A subject drawn from a population; `middle` is the middle of the stimuli they will rate.
+    /// Draws a subject from a population; `middle` is the mean of the stimuli to be rated.
     #[must_use]
     pub fn new(population: &Population, seed: u64, subject: SubjectNumber, middle: f64) -> Self {
         let mut stream = Stream::new(seed, Purpose::Subject, subject.get(), 0);
@@ -165,7 +163,7 @@ impl SimulatedSubject {
         }
     }
 
-    /// How this subject tells differences from this base.
+    /// Returns the subject's observer for a modality and base.
     #[must_use]
     pub fn observer(&self, modality: Modality, base: f64) -> TernaryObserver {
         let observer = match modality {
@@ -175,9 +173,9 @@ impl SimulatedSubject {
         if self.population.base_spread == 0.0 {
             return observer;
         }
-        // A stream named by the base itself: the same deviation whenever it comes up.
+        // The stream is named by the base itself, so the deviation is the same whenever the base recurs.
         let bits = base.to_bits();
-        #[allow(clippy::cast_possible_truncation)] // the halves of a name, mixed
+        #[allow(clippy::cast_possible_truncation)] // hash of the bits
         let name = (bits ^ (bits >> 32)) as u32 | 1;
         let deviation = Stream::new(self.seed, Purpose::Subject, self.subject.get(), name).normal();
         TernaryObserver {
@@ -186,13 +184,13 @@ impl SimulatedSubject {
         }
     }
 
-    /// Draws the noise of answers for this stimulus: the same subject has other noise with another object.
+    /// Selects the answers' noise for a stimulus: a subject has other noise with another object.
     #[must_use]
     pub fn about(self, stimulus: &Stimulus) -> Self {
         Self { answer_seed: self.seed ^ xxh3_64(stimulus.to_string().as_bytes()), ..self }
     }
 
-    /// The answer to a trial.
+    /// Returns the answer to a trial.
     #[must_use]
     pub fn respond(&self, trial: &Trial) -> Response {
         if trial.phase == Phase::Practice {
@@ -203,7 +201,7 @@ impl SimulatedSubject {
             Presented::One { value } => {
                 let rise = self.rating_exponent * libm::log(value / self.middle);
                 let noise = stream.normal() * self.population.rating_noise;
-                // People do not write ratings with sixteen digits, and none that is not above 0.
+                // Round as people do: about three digits, above 0.
                 let step = self.rating_modulus / 100.0;
                 let steps = (100.0 * libm::exp(rise + noise)).round().max(1.0);
                 Response::Rating(steps * step)

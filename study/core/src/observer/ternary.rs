@@ -4,22 +4,21 @@ use crate::random::Stream;
 use crate::trial::Response;
 use flotor_statistics::distribution::normal_below;
 
-/// Somebody who compares two stimuli: evidence is the difference in units of its noise, and below a criterion there is
-/// no answer.
+/// Observer who compares two stimuli: evidence is the difference in units of its noise; below a criterion the answer is "I don't know".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TernaryObserver {
     /// Difference of one standard deviation of the noise, as a share of the base.
     pub sigma: f64,
     /// Evidence below which the answer is "I don't know".
     pub criterion: f64,
-    /// Preference for the second.
+    /// Preference for the second stimulus, in deviations of the noise.
     pub bias: f64,
     /// Share of trials answered by chance.
     pub lapse: f64,
 }
 
 impl TernaryObserver {
-    /// Probability of naming the larger one (averaged over which comes second), and of naming the smaller one.
+    /// Returns the probabilities of naming the larger stimulus (averaged over both orders) and the smaller one.
     #[must_use]
     pub fn correct_and_wrong(&self, delta: f64) -> [f64; 2] {
         let share = |sign: f64| {
@@ -32,8 +31,7 @@ impl TernaryObserver {
         [1.0, -1.0].map(|sign| (1.0 - self.lapse) * share(sign) + 0.5 * self.lapse)
     }
 
-    /// The difference at which `P(correct) + P(don't know) / 2` is the target: where a weighted up-down track is in
-    /// balance.
+    /// Returns the difference at which `P(correct) + P(don't know) / 2` equals the target: the equilibrium of a weighted up-down track.
     #[must_use]
     pub fn threshold(&self, target: f64) -> f64 {
         let reached = |delta: f64| {
@@ -41,7 +39,7 @@ impl TernaryObserver {
             0.5 * (1.0 + correct - wrong) >= target
         };
         let (mut low, mut high) = (0.0, self.sigma);
-        // No difference reaches a target that lapses rule out.
+        // Lapses can make a target unreachable.
         while !reached(high) {
             high *= 2.0;
             if high > 1.0e6 * self.sigma {
@@ -55,7 +53,7 @@ impl TernaryObserver {
         high
     }
 
-    /// The answer to a pair that differs by so much, positive if the second is larger.
+    /// Draws the answer to a pair with a given relative difference, positive if the second is larger.
     pub(crate) fn respond(&self, second_minus_first: f64, stream: &mut Stream) -> Response {
         let (lapse, guess, noise) = (stream.uniform(), stream.coin(), stream.normal());
         if lapse < self.lapse {

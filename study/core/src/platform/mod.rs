@@ -1,4 +1,4 @@
-//! Exclusive writing to a file, by the means of each system.
+//! Exclusive write access to a file, per operating system.
 
 #[cfg(not(windows))]
 mod unix;

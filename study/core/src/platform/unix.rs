@@ -1,14 +1,14 @@
-//! Linux: a lock on the file. The kernel releases it with the last descriptor, so after every end of the process.
+//! Linux: a file lock, which the kernel releases when the process ends.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Error, ErrorKind};
 use std::path::Path;
 
-/// Opens a file that no other writer opens while this one is open; `None` if another has it. A file system without locks gives the
-/// file to all.
+/// Opens a file with exclusive write access; returns `None` if another writer has it open. Without support for locks in the file
+/// system, access is not exclusive.
 ///
 /// # Errors
-/// What the system says.
+/// If the file cannot be opened or locked.
 pub(crate) fn open_alone(options: &OpenOptions, path: &Path) -> Result<Option<File>, Error> {
     let file = options.open(path)?;
     match file.try_lock() {

@@ -1,4 +1,4 @@
-//! Windows: a share mode, which refuses other writers and admits readers.
+//! Windows: a share mode that rejects other writers and admits readers.
 
 use std::fs::{File, OpenOptions};
 use std::io::Error;
@@ -8,10 +8,10 @@ use std::path::Path;
 const FILE_SHARE_READ: u32 = 1;
 const ERROR_SHARING_VIOLATION: i32 = 32;
 
-/// Opens a file that no other writer opens while this one is open; `None` if another has it.
+/// Opens a file with exclusive write access; returns `None` if another writer has it open.
 ///
 /// # Errors
-/// What the system says.
+/// If the file cannot be opened.
 pub(crate) fn open_alone(options: &OpenOptions, path: &Path) -> Result<Option<File>, Error> {
     match options.clone().share_mode(FILE_SHARE_READ).open(path) {
         Ok(file) => Ok(Some(file)),

@@ -1,4 +1,4 @@
-//! Adaptive procedures: which difference comes next, when it is enough, and what the threshold is.
+//! Adaptive procedures: choice of the next difference, end of a track, and threshold.
 //!
 //! Differences are shares of the base (0.4: the comparison differs by 40 %).
 
@@ -12,13 +12,13 @@ use crate::estimate::NotBounded;
 use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
 
-/// A procedure and its settings.
+/// Procedure with its settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Procedure {
     /// Unforced weighted up-down (Kaernbach 2001).
     WeightedUpDown(WeightedUpDownRule),
-    /// Trials where they tell most, a fixed number of them.
+    /// QUEST+ with a fixed number of trials.
     QuestPlus(QuestPlusRule),
 }
 
@@ -29,10 +29,10 @@ impl Default for Procedure {
 }
 
 impl Procedure {
-    /// Settings that cannot work.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// Names the first one.
+    /// The first invalid setting.
     pub fn check(&self) -> Result<(), InvalidRule> {
         match self {
             Self::WeightedUpDown(rule) => rule.check(),
@@ -40,7 +40,7 @@ impl Procedure {
         }
     }
 
-    /// A new track.
+    /// Starts a new track.
     #[must_use]
     pub fn start(&self) -> Track {
         match self {
@@ -49,8 +49,8 @@ impl Procedure {
         }
     }
 
-    /// Trials a track takes, about: an adaptive one ends when it has turned often enough (18 with the thesis's settings
-    /// and observers like its subjects).
+    /// Returns the expected number of trials per track (18 for weighted up-down, with the thesis's settings and observers like its
+    /// subjects).
     #[must_use]
     pub fn trials_about(&self) -> u32 {
         match self {
@@ -59,7 +59,7 @@ impl Procedure {
         }
     }
 
-    /// Trials a track takes at least: each reversal is one, and no first trial is a reversal.
+    /// Returns the minimum number of trials per track: each reversal needs a trial, and the first trial cannot be a reversal.
     #[must_use]
     pub fn trials_least(&self) -> u32 {
         match self {
@@ -68,7 +68,7 @@ impl Procedure {
         }
     }
 
-    /// The largest difference a track can ask for.
+    /// Returns the largest difference a track can present.
     #[must_use]
     pub fn largest_delta(&self) -> f64 {
         match self {
@@ -77,7 +77,7 @@ impl Procedure {
         }
     }
 
-    /// The share of correct answers whose difference is the threshold.
+    /// Returns the share of correct answers at the threshold.
     #[must_use]
     pub fn target(&self) -> f64 {
         match self {
@@ -87,7 +87,7 @@ impl Procedure {
     }
 }
 
-/// One run of a procedure.
+/// Track of a procedure in progress.
 #[derive(Clone, Debug)]
 pub enum Track {
     /// Unforced weighted up-down.
@@ -97,7 +97,7 @@ pub enum Track {
 }
 
 impl Track {
-    /// The difference to present next.
+    /// Returns the difference to present next.
     #[must_use]
     pub fn delta(&self) -> f64 {
         match self {
@@ -106,7 +106,7 @@ impl Track {
         }
     }
 
-    /// Takes an answer in. Returns whether it turned the direction.
+    /// Processes an answer. Returns true for a reversal of the direction.
     pub fn answer(&mut self, judgement: Judgement) -> bool {
         match self {
             Self::WeightedUpDown(track) => track.answer(judgement),
@@ -117,7 +117,7 @@ impl Track {
         }
     }
 
-    /// Whether it is over.
+    /// Returns true if the track is over.
     #[must_use]
     pub fn is_done(&self) -> bool {
         match self {
@@ -126,7 +126,7 @@ impl Track {
         }
     }
 
-    /// The ends of the threshold that the answers do not bound, once the track is over.
+    /// Returns the ends of the threshold that the answers do not bound, once the track is over.
     #[must_use]
     pub fn not_bounded(&self) -> Option<NotBounded> {
         match self {
@@ -135,7 +135,7 @@ impl Track {
         }
     }
 
-    /// The threshold, once it is over.
+    /// Returns the threshold, once the track is over.
     #[must_use]
     pub fn threshold(&self) -> Option<f64> {
         match self {

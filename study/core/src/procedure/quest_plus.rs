@@ -1,4 +1,4 @@
-//! Trials placed where their answer tells most, in the manner of QUEST+ (Watson 2017), with three answers.
+//! Trials placed where their answer is most informative, after QUEST+ (Watson 2017), with three answers.
 
 use super::InvalidRule;
 use crate::estimate::{Estimate, NotBounded, Observation, Posterior, PosteriorGrid, Prior, posterior_mean};
@@ -6,16 +6,16 @@ use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Settings.
+/// Settings of QUEST+.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct QuestPlusRule {
-    /// Trials of a track.
+    /// Number of trials of a track.
     pub trials: u32,
-    /// Share of correct answers whose difference is the threshold.
+    /// Share of correct answers at the threshold.
     pub target: f64,
-    /// Smallest and largest difference to choose from.
+    /// Smallest and largest candidate difference.
     pub deltas: [f64; 2],
-    /// What is held likely beforehand.
+    /// Prior of the observer.
     pub prior: Prior,
 }
 
@@ -26,10 +26,10 @@ impl Default for QuestPlusRule {
 }
 
 impl QuestPlusRule {
-    /// Settings that cannot work.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// Names the first one.
+    /// The first invalid setting.
     pub fn check(&self) -> Result<(), InvalidRule> {
         if self.trials == 0 {
             return Err(InvalidRule::new("--trials", self.trials, "must be 1 or more"));
@@ -53,7 +53,7 @@ impl QuestPlusRule {
     }
 }
 
-/// A track under way.
+/// Track in progress.
 #[derive(Clone, Debug)]
 pub struct QuestPlus {
     rule: QuestPlusRule,
@@ -64,7 +64,7 @@ pub struct QuestPlus {
 }
 
 impl QuestPlus {
-    /// Before the first trial.
+    /// Starts a track before its first trial.
     #[must_use]
     pub fn new(rule: &QuestPlusRule) -> Self {
         let [least, most] = rule.deltas;
@@ -74,13 +74,13 @@ impl QuestPlus {
         Self { rule: rule.clone(), grid, posterior, delta, answers: Vec::new() }
     }
 
-    /// The difference to present next.
+    /// Returns the difference to present next.
     #[must_use]
     pub fn delta(&self) -> f64 {
         self.delta
     }
 
-    /// Takes an answer in. After the end it changes nothing.
+    /// Processes an answer; ignored after the end of the track.
     pub fn answer(&mut self, judgement: Judgement) {
         if self.is_done() {
             return;
@@ -91,13 +91,13 @@ impl QuestPlus {
         self.delta = self.posterior.best_delta(&self.grid);
     }
 
-    /// Whether it is over.
+    /// Returns true if the track is over.
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.answers.len() >= self.rule.trials as usize
     }
 
-    /// Estimates the observer from the answers so far, with the ends of the threshold that they do not bound.
+    /// Estimates the observer from the answers so far, and returns the ends of the threshold that they do not bound.
     #[must_use]
     pub fn estimate(&self) -> (Estimate, Option<NotBounded>) {
         posterior_mean(&self.answers, &self.rule.prior, self.rule.target)

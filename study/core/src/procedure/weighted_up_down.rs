@@ -1,11 +1,11 @@
-//! The unforced weighted up-down rule (Kaernbach, Perception & Psychophysics 63:1377, 2001).
+//! Unforced weighted up-down rule (Kaernbach, Perception & Psychophysics 63:1377, 2001).
 //!
-//! A correct answer makes the difference smaller by a step D1, a wrong one larger by `D2 = D1 p / (1 - p)`, and "I
-//! don't know" larger by `D3 = D1 (p - 1/m) / (1 - p)` (his equations 5 and 7), with p the share of correct answers
-//! aimed at and m = 2 alternatives. Where the expected step is zero, `P(correct) + P(don't know) / m = p`.
+//! A correct answer reduces the difference by a step D1, a wrong one increases it by `D2 = D1 p / (1 - p)`, and "I don't know" by
+//! `D3 = D1 (p - 1/m) / (1 - p)` (his equations 5 and 7), with p the target share of correct answers and m = 2 alternatives. Where
+//! the expected step is zero, `P(correct) + P(don't know) / m = p`.
 //!
-//! What CMU-RI-TR-07-21 (section 4.2) leaves open is an option here, and its default reproduces the published
-//! distribution of simulated estimates.
+//! Points left open by CMU-RI-TR-07-21 (section 4.2) are options here; their defaults reproduce the published distribution of
+//! simulated estimates.
 
 use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
@@ -13,59 +13,59 @@ use serde::{Deserialize, Serialize};
 /// Alternatives of a comparison: first or second.
 const ALTERNATIVES: f64 = 2.0;
 
-/// Which step size moves the difference at a reversal that halves it.
+/// Step size applied at a reversal that halves the step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum StepAtReversal {
-    /// The halved one, at once
+    /// Halved step, at once
     #[default]
     New,
-    /// The old one; the halved one from the next trial on
+    /// Old step; the halved one from the next trial on
     Old,
 }
 
-/// Which differences the threshold is the mean of: whether the trials of the first and the last reversal that count do.
+/// Trials in the mean: those at the first and last counted reversal included or not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Averaging {
-    /// Both count
+    /// Both included
     #[default]
     BothEnds,
-    /// The trial of the first does not
+    /// Trial of the first reversal excluded
     AfterFirst,
-    /// The trial of the last does not
+    /// Trial of the last reversal excluded
     BeforeLast,
 }
 
-/// Settings of the rule.
+/// Settings of the weighted up-down rule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WeightedUpDownRule {
-    /// First difference.
+    /// First difference, as a share of the base.
     pub initial_delta: f64,
-    /// First step D1 of a correct answer.
+    /// First step D1 of a correct answer, as a share of the base.
     pub first_step: f64,
-    /// Share of correct answers aimed at.
+    /// Target share of correct answers.
     pub target: f64,
-    /// The reversals at which the steps are halved.
+    /// Reversals at which the steps are halved, from 1.
     pub halve_at: Vec<u32>,
-    /// The reversal after which the track is over.
+    /// Reversal that ends the track, from 1.
     pub stop_after: u32,
-    /// The reversal from which on differences count.
+    /// First reversal of the mean, from 1.
     pub average_from: u32,
-    /// Whether the trials of the first and last of these reversals count.
+    /// Treatment of the first and last reversal in the mean.
     pub averaging: Averaging,
-    /// Which step is applied at a halving reversal.
+    /// Step size at a halving reversal.
     pub step_at_reversal: StepAtReversal,
-    /// The difference never becomes smaller than this, which is above 0: without a difference no answer is right or wrong.
+    /// Smallest difference, above 0: without a difference no answer is right or wrong.
     pub floor: f64,
-    /// Nor larger than this.
+    /// Largest difference, as a share of the base.
     pub ceiling: f64,
-    /// A track that takes longer is over without a threshold.
+    /// Maximum number of trials; a longer track ends without a threshold.
     pub trials_most: u32,
 }
 
 impl Default for WeightedUpDownRule {
-    /// The settings of CMU-RI-TR-07-21, section 4.2; of the floor, which the thesis leaves open, 1 %.
+    /// Returns the settings of CMU-RI-TR-07-21, section 4.2, and a floor of 1 %, which the thesis leaves open.
     fn default() -> Self {
         Self {
             initial_delta: 0.40,
@@ -83,30 +83,30 @@ impl Default for WeightedUpDownRule {
     }
 }
 
-/// A setting that cannot work.
+/// Invalid setting.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{setting} {value}: {legal}")]
 pub struct InvalidRule {
-    /// Its option on the command line.
+    /// Command-line option of the setting.
     pub setting: &'static str,
-    /// Its value.
+    /// Rejected value, as text.
     pub value: String,
-    /// What is legal.
+    /// Description of the legal values.
     pub legal: String,
 }
 
 impl InvalidRule {
-    /// A complaint about a setting.
+    /// Creates the error for a setting.
     pub fn new(setting: &'static str, value: impl ToString, legal: impl Into<String>) -> Self {
         Self { setting, value: value.to_string(), legal: legal.into() }
     }
 }
 
 impl WeightedUpDownRule {
-    /// Settings that cannot work.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// Names the first one.
+    /// The first invalid setting.
     pub fn check(&self) -> Result<(), InvalidRule> {
         let share = |setting, value: f64, least: f64, most: f64, legal| {
             let inside = value > least && value < most;
@@ -140,13 +140,13 @@ impl WeightedUpDownRule {
         Ok(())
     }
 
-    /// D2 over D1: how much further a wrong answer moves than a correct one.
+    /// Returns D2 / D1, the ratio of the steps after wrong and correct answers.
     #[must_use]
     pub fn wrong_ratio(&self) -> f64 {
         self.target / (1.0 - self.target)
     }
 
-    /// D3 over D1: the same for "I don't know".
+    /// Returns D3 / D1, the ratio of the steps after "I don't know" and correct answers.
     #[must_use]
     pub fn unsure_ratio(&self) -> f64 {
         (self.target - 1.0 / ALTERNATIVES) / (1.0 - self.target)
@@ -159,7 +159,7 @@ enum Direction {
     Up,
 }
 
-/// A track under way.
+/// Track in progress.
 #[derive(Clone, Debug)]
 pub struct WeightedUpDown {
     rule: WeightedUpDownRule,
@@ -173,7 +173,7 @@ pub struct WeightedUpDown {
 }
 
 impl WeightedUpDown {
-    /// At the first difference.
+    /// Starts a track at the first difference.
     #[must_use]
     pub fn new(rule: &WeightedUpDownRule) -> Self {
         Self {
@@ -188,31 +188,31 @@ impl WeightedUpDown {
         }
     }
 
-    /// The difference to present next.
+    /// Returns the difference to present next.
     #[must_use]
     pub fn delta(&self) -> f64 {
         self.delta
     }
 
-    /// The step D1 in force.
+    /// Returns the current step D1.
     #[must_use]
     pub fn step(&self) -> f64 {
         self.step
     }
 
-    /// Reversals so far.
+    /// Returns the number of reversals so far.
     #[must_use]
     pub fn reversals(&self) -> u32 {
         self.reversals
     }
 
-    /// Trials so far.
+    /// Returns the number of trials so far.
     #[must_use]
     pub fn trials(&self) -> u32 {
         self.trials
     }
 
-    /// Takes an answer in. Returns whether it turned the direction. After the end it changes nothing.
+    /// Processes an answer. Returns true for a reversal; ignores answers after the end of the track.
     pub fn answer(&mut self, judgement: Judgement) -> bool {
         if self.is_done() {
             return false;
@@ -244,7 +244,7 @@ impl WeightedUpDown {
         turned
     }
 
-    /// Whether the trial just answered counts for the threshold.
+    /// Returns true if the current trial is part of the mean.
     fn counts(&self, turned: bool) -> bool {
         let WeightedUpDownRule { average_from, stop_after, averaging, .. } = self.rule;
         let first = turned && self.reversals == average_from;
@@ -257,13 +257,13 @@ impl WeightedUpDown {
             }
     }
 
-    /// Whether it is over.
+    /// Returns true if the track is over.
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.reversals >= self.rule.stop_after || self.trials >= self.rule.trials_most
     }
 
-    /// Mean of the differences that count; none before the last reversal, nor if it never came.
+    /// Returns the mean of the counted differences; `None` before the last reversal, or if the track ended without it.
     #[must_use]
     pub fn threshold(&self) -> Option<f64> {
         let complete = self.reversals >= self.rule.stop_after && self.counted > 0;

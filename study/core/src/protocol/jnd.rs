@@ -1,4 +1,4 @@
-//! Just noticeable difference: pairs of stimuli, an adaptive procedure for each base and modality.
+//! Just noticeable difference: pairs of stimuli, an adaptive track for each base and modality.
 
 use super::{
     AtBoundary, Checks, FirstModality, ProtocolError, Stimulus, at_least_one, extremes,
@@ -7,7 +7,7 @@ use super::{
 use crate::procedure::Procedure;
 use serde::{Deserialize, Serialize};
 
-/// On which side of the base the comparison lies.
+/// Side of the base on which the comparison lies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum ComparisonSide {
@@ -20,7 +20,7 @@ pub enum ComparisonSide {
     Random,
 }
 
-/// Which of a pair is presented first.
+/// Order of presentation within a pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum PresentationOrder {
@@ -33,53 +33,53 @@ pub enum PresentationOrder {
     ComparisonFirst,
 }
 
-/// Four springs before the first trial, in each modality: three comparisons that sample the range of bases and the
+/// Demonstration before the first trial, in each modality: four springs in three comparisons that sample the range of bases and the
 /// kinds of difference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JndDemo {
-    /// Whether there is one.
+    /// True if the demonstration is presented.
     pub shown: bool,
-    /// A difference that is close but can be told, as a share.
+    /// A small but noticeable difference, as a share of the base.
     pub close: f64,
-    /// A difference that can hardly be told.
+    /// A barely noticeable difference, as a share of the base.
     pub nearly_equal: f64,
 }
 
 impl Default for JndDemo {
-    /// The thesis names the kinds, not the numbers: one Weber fraction above its result, and a fifth of it.
+    /// Returns one Weber fraction above the thesis's result, and a fifth of it; the thesis names only the kinds of difference.
     fn default() -> Self {
         Self { shown: true, close: 0.20, nearly_equal: 0.03 }
     }
 }
 
-/// A just-noticeable-difference experiment.
+/// Settings of a just-noticeable-difference experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JndProtocol {
-    /// What is varied.
+    /// The varied parameter.
     pub stimulus: Stimulus,
-    /// The bases, in the stimulus's unit.
+    /// Bases, in the stimulus's unit.
     pub bases: Vec<f64>,
-    /// Replications, each all bases in one modality; the modality alternates.
+    /// Number of replications, each all bases in one modality; the modality alternates.
     pub replications: u32,
-    /// Which modality comes first.
+    /// Modality that comes first.
     pub first_modality: FirstModality,
-    /// Which difference comes next.
+    /// Adaptive procedure.
     pub procedure: Procedure,
     /// Side of the comparison.
     pub side: ComparisonSide,
     /// Order within a pair.
     pub order: PresentationOrder,
-    /// When the handle leaves its range.
+    /// Action when the handle leaves its range.
     pub at_boundary: AtBoundary,
-    /// Practice.
+    /// Practice before the first trial.
     pub demo: JndDemo,
-    /// Trials that check the subject, in each track.
+    /// Check trials in each track.
     #[serde(default, skip_serializing_if = "Checks::are_none")]
     pub checks: Checks,
 }
 
 impl Default for JndProtocol {
-    /// CMU-RI-TR-07-21, section 4.2.
+    /// Returns the settings of CMU-RI-TR-07-21, section 4.2.
     fn default() -> Self {
         Self {
             stimulus: Stimulus::default(),
@@ -97,8 +97,8 @@ impl Default for JndProtocol {
 }
 
 impl JndProtocol {
-    /// A difference that nobody misses, as a share of the base: the first of a track of the thesis, more than twice the mean threshold
-    /// of its subjects.
+    /// An obvious difference, as a share of the base: the first of a track of the thesis, more than twice the mean threshold of its
+    /// subjects.
     pub const LARGE_DELTA: f64 = 0.4;
 
     pub(super) fn check(&self) -> Result<(), ProtocolError> {
@@ -127,7 +127,7 @@ impl JndProtocol {
         Ok(())
     }
 
-    /// Smallest and largest value that can be asked for.
+    /// Returns the smallest and largest value that can be presented.
     pub(super) fn extremes(&self) -> [f64; 2] {
         let [least, most] = extremes(self.bases.iter().copied());
         let delta = self.procedure.largest_delta();
@@ -138,7 +138,7 @@ impl JndProtocol {
         }
     }
 
-    /// Practice, and what each track takes.
+    /// Returns the expected number of presentations, practice included.
     pub(super) fn presentations_about(&self) -> u64 {
         let practice = if self.demo.shown { 6 } else { 0 };
         practice
@@ -147,7 +147,7 @@ impl JndProtocol {
                 * self.bases.len() as u64
     }
 
-    /// The four springs of the demo: lowest base, highest, one close to it, one nearly equal to that.
+    /// Returns the four springs of the demonstration: lowest base, highest base, one close to the highest, one nearly equal to that.
     #[must_use]
     pub fn demo_values(&self) -> [f64; 4] {
         let [least, most] = extremes(self.bases.iter().copied());

@@ -1,11 +1,11 @@
-//! Magnitude estimation with free modulus: one stimulus, any number.
+//! Magnitude estimation with free modulus: one stimulus, rated by any positive number.
 
 use super::{
     AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, extremes, positive_and_different,
 };
 use serde::{Deserialize, Serialize};
 
-/// How ratings of subjects with different ranges are made comparable.
+/// Normalisation of ratings across subjects with different ranges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum RatingScale {
@@ -16,37 +16,37 @@ pub enum RatingScale {
     /// Divided by the subject's geometric mean (modulus equalisation); needs positive ratings
     #[value(name = "geometric-mean")]
     DividedByGeometricMean,
-    /// As they are
+    /// Unchanged
     Raw,
 }
 
-/// A magnitude-estimation experiment.
+/// Settings of a magnitude-estimation experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MagnitudeProtocol {
-    /// What is varied.
+    /// The varied parameter.
     pub stimulus: Stimulus,
-    /// The stimuli, in the stimulus's unit.
+    /// Stimuli, in the stimulus's unit.
     pub values: Vec<f64>,
-    /// Replications in each modality, each all stimuli in an order of its own.
+    /// Replications in each modality, each all stimuli in a random order.
     pub replications: u32,
-    /// Which modality comes first.
+    /// Modality that comes first.
     pub first_modality: FirstModality,
-    /// Stimuli shown before each modality, the smallest and the largest among them.
+    /// Number of stimuli demonstrated before each modality, smallest and largest among them.
     pub demo: u32,
-    /// When the handle leaves its range.
+    /// Action when the handle leaves its range.
     pub at_boundary: AtBoundary,
-    /// Stimuli presented once more in each replication, to check how alike the ratings are; they do not count.
+    /// Stimuli presented once more in each replication, to check the consistency of ratings; they do not count.
     #[serde(default, skip_serializing_if = "is_0")]
     pub repeat_checks: u32,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+#[allow(clippy::trivially_copy_pass_by_ref)] // signature required by serde
 fn is_0(number: &u32) -> bool {
     *number == 0
 }
 
 impl Default for MagnitudeProtocol {
-    /// CMU-RI-TR-07-21, section 4.1.
+    /// Returns the settings of CMU-RI-TR-07-21, section 4.1.
     fn default() -> Self {
         Self {
             stimulus: Stimulus::default(),
@@ -61,7 +61,7 @@ impl Default for MagnitudeProtocol {
 }
 
 impl MagnitudeProtocol {
-    /// So many values from the first to the last at equal distances.
+    /// Returns `count` evenly spaced values from `first` to `last`.
     #[must_use]
     pub fn evenly(first: f64, last: f64, count: u32) -> Vec<f64> {
         let steps = f64::from(count.saturating_sub(1).max(1));
@@ -78,13 +78,13 @@ impl MagnitudeProtocol {
         Ok(())
     }
 
-    /// Demo and replications in both modalities, without repeats.
+    /// Returns the number of presentations in both modalities, demonstration included, repeats excluded.
     pub(super) fn presentations(&self) -> u64 {
         let one = self.values.len() as u64 + u64::from(self.repeat_checks);
         2 * (u64::from(self.demo) + u64::from(self.replications) * one)
     }
 
-    /// Smallest and largest stimulus.
+    /// Returns the smallest and largest stimulus.
     pub(super) fn extremes(&self) -> [f64; 2] {
         extremes(self.values.iter().copied())
     }

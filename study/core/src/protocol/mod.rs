@@ -1,7 +1,6 @@
-//! The experiments, with every choice in them.
+//! Settings of the experiments.
 //!
-//! A protocol says what is presented; which subject gets what in which order follows from the subject's number and the
-//! seed ([`crate::sitting`]).
+//! A protocol defines the stimuli; their order for each subject follows from the subject's number and the seed ([`crate::sitting`]).
 
 mod jnd;
 mod magnitude;
@@ -13,27 +12,27 @@ use crate::procedure::InvalidRule;
 use crate::trial::Modality;
 use serde::{Deserialize, Serialize};
 
-/// What is varied: a parameter of a force model.
+/// Varied parameter of a force model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stimulus {
     /// Name of the model in the scene.
     pub model: String,
-    /// Id of its parameter.
+    /// Id of the model's parameter.
     pub parameter: String,
 }
 
-/// What people are asked about.
+/// Quality judged by the subject.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quality {
-    /// How stiff it is.
+    /// Stiffness of the object.
     Stiffness,
-    /// How strong.
+    /// Strength of the force.
     Force,
 }
 
 impl Stimulus {
-    /// Name and unit, from the parameter's id, whose unit stands in it: `gamma_n` is gamma in newtons.
+    /// Returns name and unit, from the unit suffix of the parameter's id: `gamma_n` is gamma in newtons.
     #[must_use]
     pub fn name_and_unit(&self) -> (String, &'static str) {
         const UNITS: [(&str, &str); 9] = [
@@ -52,13 +51,13 @@ impl Stimulus {
         (name.replace('_', " "), unit)
     }
 
-    /// Returns true where the value is proportional to a stiffness.
+    /// Returns true if the value is proportional to a stiffness.
     #[must_use]
     pub fn is_stiffness(&self) -> bool {
         self.parameter.starts_with("gamma") || self.parameter.contains("stiffness")
     }
 
-    /// What people are asked about when this is varied: a force where the parameter is one, else stiffness.
+    /// Returns the judged quality: force for a force parameter, else stiffness.
     #[must_use]
     pub fn quality(&self) -> Quality {
         if self.parameter.starts_with("force") { Quality::Force } else { Quality::Stiffness }
@@ -66,7 +65,7 @@ impl Stimulus {
 }
 
 impl Default for Stimulus {
-    /// The spring's axial rigidity, as in CMU-RI-TR-07-21.
+    /// Returns the spring's axial rigidity, as in CMU-RI-TR-07-21.
     fn default() -> Self {
         Self { model: "spring".to_owned(), parameter: "gamma_n".to_owned() }
     }
@@ -78,19 +77,19 @@ impl std::fmt::Display for Stimulus {
     }
 }
 
-/// Which modality a subject starts with.
+/// Rule for the first modality of a subject.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FirstModality {
-    /// Subjects of odd number start with vision and haptics, those of even number with haptics alone.
+    /// Odd subject numbers start with vision and haptics, even ones with haptics alone.
     #[default]
     BySubjectNumber,
-    /// All start with the same.
+    /// All subjects start with the same modality.
     Always(Modality),
 }
 
 impl FirstModality {
-    /// The modality this subject starts with.
+    /// Returns the first modality of a subject.
     #[must_use]
     pub fn of(self, subject: SubjectNumber) -> Modality {
         match self {
@@ -101,16 +100,16 @@ impl FirstModality {
     }
 }
 
-/// What happens when the handle was pushed out of its range during a trial.
+/// Action when the handle was pushed out of its range during a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AtBoundary {
-    /// The trial is presented again, up to so many times; its answer counts only then.
+    /// Presents the trial again, up to `most` times; earlier answers do not count.
     Repeat {
-        /// Repeats of one trial.
+        /// Maximum number of repeats of one trial.
         most: u32,
     },
-    /// The answer counts, the hit is noted.
+    /// Counts the answer and records the hit.
     Keep,
 }
 
@@ -120,42 +119,42 @@ impl Default for AtBoundary {
     }
 }
 
-/// Trials that check whether a subject does what they are asked; none of them counts.
+/// Check trials for attentive subjects; they do not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Checks {
-    /// Pairs without any difference, in each track.
+    /// Pairs of equal stimuli, per track.
     pub catch: u32,
-    /// Pairs of the track presented once more in the same order, in each track.
+    /// Pairs presented once more in the same order, per track.
     pub repeats: u32,
-    /// Pairs with a difference that everybody feels, in each track.
+    /// Pairs with an obvious difference, per track.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obvious: Option<ObviousPairs>,
 }
 
-/// Pairs with a difference that everybody feels.
+/// Pairs with an obvious difference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObviousPairs {
-    /// Pairs in each track.
+    /// Number of pairs per track.
     pub count: u32,
-    /// Their difference, as a share of the base.
+    /// Difference, as a share of the base.
     pub delta: f64,
 }
 
 impl Checks {
-    /// Whether there are none, as in protocols from before there were any.
+    /// Returns true without checks, as in protocols of earlier versions.
     #[must_use]
     pub fn are_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Checks in a track.
+    /// Returns the number of checks per track.
     #[must_use]
     pub fn in_a_track(self) -> u32 {
         self.catch + self.repeats + self.obvious.map_or(0, |pairs| pairs.count)
     }
 }
 
-/// Number of a subject, from 1: all that is known of a person here.
+/// Subject number, from 1; the only personal data required here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "u16", into = "u16")]
 pub struct SubjectNumber(u16);
@@ -164,13 +163,13 @@ impl SubjectNumber {
     /// Largest number; three digits in file names.
     pub const MOST: u16 = 999;
 
-    /// A number from 1 to 999.
+    /// Creates a subject number; `None` outside 1 to 999.
     #[must_use]
     pub fn new(number: u16) -> Option<Self> {
         (1..=Self::MOST).contains(&number).then_some(Self(number))
     }
 
-    /// The number.
+    /// Returns the number.
     #[must_use]
     pub fn get(self) -> u16 {
         self.0
@@ -192,13 +191,13 @@ impl From<SubjectNumber> for u16 {
 }
 
 impl std::fmt::Display for SubjectNumber {
-    /// As in file names: `sub-07`.
+    /// Formats the number as in file names: `sub-07`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "sub-{:02}", self.0)
     }
 }
 
-/// An experiment.
+/// Experiment with its settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "task", rename_all = "kebab-case")]
 pub enum Protocol {
@@ -208,47 +207,47 @@ pub enum Protocol {
     Magnitude(MagnitudeProtocol),
 }
 
-/// A protocol that cannot be carried out.
+/// Invalid setting of a protocol.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProtocolError {
-    /// A list that may not be.
+    /// An empty list.
     #[error("{list} is empty; give at least one value")]
     Empty {
-        /// Which.
+        /// Command-line option of the list.
         list: &'static str,
     },
-    /// A value that may not be.
+    /// An invalid value.
     #[error("{what} {value}: {legal}")]
     Value {
-        /// Which.
+        /// Command-line option of the value.
         what: &'static str,
-        /// Its value.
+        /// Rejected value.
         value: f64,
-        /// What is legal.
+        /// Description of the legal values.
         legal: &'static str,
     },
-    /// A setting of the procedure.
+    /// Invalid setting of the procedure.
     #[error(transparent)]
     Rule(#[from] InvalidRule),
-    /// Stimuli outside the range the model declares.
+    /// Stimuli outside the range of the model's parameter.
     #[error(
         "stimulus {stimulus} = {value} is outside its range {least} to {most}; change the values or the difference"
     )]
     Range {
-        /// What is varied.
+        /// The varied parameter.
         stimulus: String,
-        /// The value outside.
+        /// Value outside the range.
         value: f64,
-        /// Smallest legal.
+        /// Smallest legal value.
         least: f64,
-        /// Largest legal.
+        /// Largest legal value.
         most: f64,
     },
 }
 
 impl Protocol {
-    /// Word of the task in file names.
+    /// Returns the task label in file names.
     #[must_use]
     pub fn task(&self) -> &'static str {
         match self {
@@ -257,7 +256,7 @@ impl Protocol {
         }
     }
 
-    /// The levels of the stimulus that are analysed: bases, or stimuli rated.
+    /// Returns the analysed levels of the stimulus: bases, or rated stimuli.
     #[must_use]
     pub fn levels(&self) -> &[f64] {
         match self {
@@ -266,7 +265,7 @@ impl Protocol {
         }
     }
 
-    /// What is varied.
+    /// Returns the varied parameter.
     #[must_use]
     pub fn stimulus(&self) -> &Stimulus {
         match self {
@@ -275,7 +274,7 @@ impl Protocol {
         }
     }
 
-    /// What happens when the handle leaves its range.
+    /// Returns the action when the handle leaves its range.
     #[must_use]
     pub fn at_boundary(&self) -> AtBoundary {
         match self {
@@ -284,7 +283,7 @@ impl Protocol {
         }
     }
 
-    /// Which modality comes first.
+    /// Returns the rule for the first modality.
     #[must_use]
     pub fn first_modality(&self) -> FirstModality {
         match self {
@@ -293,7 +292,7 @@ impl Protocol {
         }
     }
 
-    /// Presentations of a sitting, about: adaptive tracks take more or fewer.
+    /// Returns the expected number of presentations in a sitting; adaptive tracks vary.
     #[must_use]
     pub fn presentations_about(&self) -> u64 {
         match self {
@@ -302,7 +301,7 @@ impl Protocol {
         }
     }
 
-    /// Stimuli of one presentation.
+    /// Returns the number of stimuli per presentation.
     #[must_use]
     pub fn stimuli_in_a_trial(&self) -> f64 {
         match self {
@@ -311,10 +310,10 @@ impl Protocol {
         }
     }
 
-    /// Whether it can be carried out at all.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// The first thing that cannot be.
+    /// The first invalid setting.
     pub fn check(&self) -> Result<(), ProtocolError> {
         match self {
             Self::Jnd(protocol) => protocol.check(),
@@ -322,7 +321,7 @@ impl Protocol {
         }
     }
 
-    /// Whether there are trials that check the subject.
+    /// Returns true if the protocol has check trials.
     #[must_use]
     pub fn has_checks(&self) -> bool {
         match self {
@@ -331,7 +330,7 @@ impl Protocol {
         }
     }
 
-    /// Smallest and largest stimulus that may be presented.
+    /// Returns the smallest and largest stimulus that may be presented.
     #[must_use]
     pub fn extremes(&self) -> [f64; 2] {
         match self {
@@ -340,7 +339,7 @@ impl Protocol {
         }
     }
 
-    /// Whether all stimuli lie in the range of the parameter.
+    /// Checks that all stimuli lie in the range of the parameter.
     ///
     /// # Errors
     /// [`ProtocolError::Range`] with the first value outside.

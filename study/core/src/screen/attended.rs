@@ -1,4 +1,4 @@
-//! The state machine behind the screens: which comes after which, and what an input does to a sitting.
+//! State machine of the screens of a person's sitting.
 
 use super::{Input, May, Pause, Question, Screen, TrialView};
 use crate::kinematics::StimulusKinematics;
@@ -9,44 +9,44 @@ use crate::time_of_day::TimeOfDay;
 use crate::trial::{Exploration, Modality, Position, Presented, Response, Trial};
 use std::collections::VecDeque;
 
-/// What became of an input.
+/// Effect of an input.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// There is another screen.
+    /// Another screen is shown.
     Shown,
-    /// A trial was answered: to be logged before the next screen is shown.
+    /// A trial was answered; log it before showing the next screen.
     Answered(Box<TrialEvent>),
-    /// The answer to this trial was taken back: to be logged before the question is shown again.
+    /// The answer to this trial was withdrawn; log it before showing the question again.
     Withdrawn(u32),
-    /// Practised before the sitting goes on, in words: to be logged before the next screen is shown.
+    /// Description of a practice trial before the sitting resumes; log it before showing the next screen.
     Practised(String),
-    /// A text was read: to be logged before the next screen is shown.
+    /// A text was read; log it before showing the next screen.
     Read(String),
-    /// To be logged; the screen stays.
+    /// Note to be logged; the screen does not change.
     Note(String),
     /// The person stopped.
     Stopped,
 }
 
-/// How one stimulus was felt.
+/// Exploration of one stimulus.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Felt {
-    /// Measures of the movement, where they are kept.
+    /// Movement measures; `None` if not recorded.
     pub kinematics: Option<StimulusKinematics>,
-    /// Whether the handle left its range.
+    /// True if the handle left its range.
     pub boundary_hit: bool,
-    /// Ticks the servo missed meanwhile.
+    /// Ticks the servo missed during the stimulus.
     pub missed_ticks: u64,
 }
 
-/// An input that does not fit the screen; nothing has changed.
+/// Input rejected on the current screen; the state is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputError {
-    /// Nothing is asked now, or something is.
+    /// The input does not fit the screen; the text explains why.
     #[error("{0}")]
     NotNow(&'static str),
-    /// A rating that no ratio scale has.
+    /// A rating of 0 or below, which a ratio scale does not have.
     #[error("a rating is a number above 0")]
     NotAbove0,
     /// The answer does not fit the question.
@@ -54,27 +54,26 @@ pub enum InputError {
     Answer(#[from] AnswerError),
 }
 
-/// Where a trial stands.
+/// Stage of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     Ready(Pause),
-    /// Index of the stimulus.
+    /// Index of the stimulus being felt.
     Feel(usize),
     Ask,
 }
 
-/// What a person may still take back.
+/// Availability of a withdrawal.
 #[derive(Clone, Debug)]
 enum Undo {
-    /// The last answer: where everything stood before it.
+    /// The last answer can be withdrawn; holds the state before it.
     Possible(Box<Before>),
-    /// Nothing: the trial that is open now was answered once before.
+    /// The open trial was answered and withdrawn once already.
     Used,
-    /// Nothing.
     Impossible,
 }
 
-/// Where a sitting stood before an answer.
+/// State before an answer.
 #[derive(Clone, Debug)]
 struct Before {
     sitting: Sitting,
@@ -83,31 +82,31 @@ struct Before {
     again: u32,
 }
 
-/// A person's sitting.
+/// Screen state machine of a person's sitting.
 #[derive(Clone, Debug)]
 pub struct Attended {
     sitting: Sitting,
     quality: Quality,
-    /// What is to be read before the first trial, the next one first.
+    /// Texts to read before the first trial, next one first.
     texts: VecDeque<String>,
     stage: Stage,
     exploration: Exploration,
     of_about: u64,
     rest_every: u32,
     since_rest: u32,
-    /// How often a trial may be felt again; none: without limit.
+    /// Maximum number of repetitions of a trial on request; unlimited if `None`.
     again_most: Option<u32>,
-    /// How often this one was.
+    /// Repetitions of the current trial so far.
     again: u32,
     undo: Undo,
-    /// Practice that is offered before the sitting goes on.
+    /// Practice offered before the sitting resumes.
     offered: Vec<Trial>,
-    /// Practice under way, the next trial first.
+    /// Practice in progress, next trial first.
     practice: VecDeque<Trial>,
 }
 
 impl Attended {
-    /// A sitting at its first trial, or where it broke off; a rest is offered after so many trials (0: never).
+    /// Creates the state machine at the first or next trial; offers a rest after every `rest_every` trials (0: never).
     #[must_use]
     pub fn new(sitting: Sitting, protocol: &Protocol, rest_every: u32) -> Self {
         Self {
@@ -127,36 +126,36 @@ impl Attended {
         }
     }
 
-    /// The same, with texts to be read before it begins: consent, instructions.
+    /// Adds texts to be read before the sitting begins: consent, instructions.
     #[must_use]
     pub fn after_reading(self, texts: impl IntoIterator<Item = String>) -> Self {
         Self { texts: texts.into_iter().collect(), ..self }
     }
 
-    /// The same, where a trial may be felt again so many times at most.
+    /// Limits the repetitions of a trial on request.
     #[must_use]
     pub fn with_again_at_most(self, times: u32) -> Self {
         Self { again_most: Some(times), ..self }
     }
 
-    /// The same, with practice offered before it goes on.
+    /// Offers practice before the sitting resumes.
     #[must_use]
     pub fn with_practice_offered(self) -> Self {
         Self { offered: self.sitting.practice(), ..self }
     }
 
-    /// The same, where the answer to the trial that is open was taken back before: that happens once.
+    /// Marks the open trial as answered and withdrawn before; it cannot be withdrawn again.
     #[must_use]
     pub fn with_answer_taken_back(self) -> Self {
         Self { undo: Undo::Used, ..self }
     }
 
-    /// The trial that is open.
+    /// Returns the open trial.
     fn trial(&self) -> Option<Trial> {
         self.practice.front().copied().or_else(|| self.sitting.next())
     }
 
-    /// What is shown now; the same however often it is asked.
+    /// Returns the current screen; does not change the state.
     #[must_use]
     pub fn screen(&self) -> Screen {
         let Some(trial) = self.trial() else { return Screen::Over };
@@ -171,7 +170,7 @@ impl Attended {
         }
     }
 
-    /// The stimulus to be felt now and the trial it belongs to: for the apparatus, not for eyes.
+    /// Returns the current stimulus and its trial, for the apparatus; never to be shown to the person.
     #[must_use]
     pub fn stimulus(&self) -> Option<(Trial, f64)> {
         let trial = self.trial()?;
@@ -181,22 +180,22 @@ impl Attended {
         }
     }
 
-    /// A stimulus can be felt from this moment on; of a trial the first counts.
+    /// Records the time when a stimulus can be felt; the first of a trial counts.
     pub fn felt_from(&mut self, time: TimeOfDay) {
         self.exploration.onset.get_or_insert(time);
     }
 
-    /// Takes in how the stimulus was felt that has just gone.
+    /// Adds the exploration of the stimulus that has just ended.
     pub fn felt(&mut self, felt: Felt) {
         self.exploration.kinematics.extend(felt.kinematics);
         self.exploration.boundary_hit |= felt.boundary_hit;
         self.exploration.missed_ticks += felt.missed_ticks;
     }
 
-    /// Takes in what a person did, `time_s` after the screen came up.
+    /// Applies a person's input, `time_s` after the screen was shown.
     ///
     /// # Errors
-    /// [`InputError`]; the screen stays as it is.
+    /// [`InputError`]; the screen does not change.
     pub fn input(&mut self, input: Input, time_s: f64) -> Result<Step, InputError> {
         let Some(trial) = self.trial() else {
             return match input {
@@ -225,7 +224,7 @@ impl Attended {
             (_, Input::Withdraw) => self.withdraw(),
             (Stage::Ready(_), Input::Continue) => self.go_to(Stage::Feel(0)),
             (Stage::Feel(index), Input::Continue) => {
-                // The next one was felt: from now on the answer to the one before may depend on it.
+                // From here on the previous answer could be influenced by the next stimulus.
                 if matches!(self.undo, Undo::Possible(_)) {
                     self.undo = Undo::Impossible;
                 }
@@ -250,19 +249,19 @@ impl Attended {
         }
     }
 
-    /// Presentations so far.
+    /// Returns the number of presentations so far.
     #[must_use]
     pub fn presented(&self) -> u32 {
         self.sitting.presented()
     }
 
-    /// Whether everything was presented.
+    /// Returns true if all trials were presented.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.sitting.is_over()
     }
 
-    // A `Result`, so that every arm above reads the same.
+    // Returns a `Result`, so that all match arms above are alike.
     #[allow(clippy::unnecessary_wraps)]
     fn go_to(&mut self, stage: Stage) -> Result<Step, InputError> {
         self.stage = stage;
@@ -274,7 +273,7 @@ impl Attended {
             return self.practised(trial, response);
         }
         let mut exploration = self.exploration.clone();
-        // Of an answer that replaces another, the time to that one, too.
+        // Add the time to a withdrawn answer.
         exploration.response_time_s = Some(exploration.response_time_s.unwrap_or(0.0) + time_s);
         let before = self.sitting.clone();
         let verdict = self.sitting.answer(response, &exploration)?;
@@ -320,7 +319,7 @@ impl Attended {
         }
     }
 
-    /// Straight to the next stimulus, unless there is something to say first.
+    /// Returns the next stage: the next stimulus, or a pause with its reason.
     fn next_stage(&mut self, before: &Trial, verdict: Verdict) -> Stage {
         let Some(next) = self.trial() else { return Stage::Ask };
         let pause = if verdict == Verdict::Repeated {
@@ -340,7 +339,7 @@ impl Attended {
         pause.map_or(Stage::Feel(0), Stage::Ready)
     }
 
-    /// How often the trial may still be felt again; none: without limit.
+    /// Returns the remaining repetitions of the trial; unlimited if `None`.
     fn again_left(&self) -> Option<u32> {
         self.again_most.map(|most| most.saturating_sub(self.again))
     }
@@ -359,7 +358,7 @@ impl Attended {
     }
 
     fn view(&self, trial: &Trial) -> TrialView {
-        // Practice before a sitting goes on is of the trial that it goes on with.
+        // Practice before a resumed sitting shows the number of the next trial.
         let number = if trial.number == 0 { self.presented() + 1 } else { trial.number };
         TrialView {
             number,
@@ -383,7 +382,7 @@ fn position(trial: &Trial, index: usize) -> Option<Position> {
 }
 
 fn question(trial: &Trial) -> Question {
-    // In practice, too: what is asked for the first time should not count.
+    // In practice, too, so that the question is familiar before trials count.
     match trial.presented {
         Presented::Pair(_) => Question::WhichIsMore,
         Presented::One { .. } => Question::HowMuch,

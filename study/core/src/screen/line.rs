@@ -1,28 +1,28 @@
-//! What a sitting and a window that is another program say to each other, one line of JSON each.
+//! Messages between a sitting and the separate window program, one line of JSON each.
 
 use super::{Input, Screen};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// A line for a window.
+/// Message to the window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Told {
-    /// What is shown from now on.
+    /// New screen.
     Screen(Screen),
-    /// To be seen and heard at once; the screen stays.
+    /// Warning to show at once, visibly and audibly; the screen does not change.
     Warning {
-        /// Of what.
+        /// Kind of warning.
         warning: Warning,
     },
-    /// An input was not taken; the screen stays.
+    /// Input rejected; the screen does not change.
     Refused {
-        /// Why.
+        /// Reason for the rejection.
         refused: String,
     },
 }
 
-/// What a person has to be warned of.
+/// Kind of warning to a person.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Warning {
@@ -30,24 +30,24 @@ pub enum Warning {
     OutOfRange,
 }
 
-/// A line from a window.
+/// Message from the window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Said {
-    /// What the person does.
+    /// Input of the person.
     Input(Input),
-    /// How the window stands; not needed by who has none.
+    /// State of the window; not sent by front ends without one.
     Window {
-        /// Its state.
+        /// State of the window.
         window: WindowState,
     },
 }
 
 impl Said {
-    /// Reads a line of a window.
+    /// Parses a line from the window.
     ///
     /// # Errors
-    /// What is wrong with the line, in words.
+    /// The syntax error, as text.
     pub fn read(line: &str) -> Result<Self, String> {
         let value: Value =
             serde_json::from_str(line).map_err(|error| format!("the line is no JSON: {error}"))?;
@@ -64,11 +64,11 @@ impl Said {
     }
 }
 
-/// How a window stands.
+/// State of a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum WindowState {
-    /// In front of the person.
+    /// The window is visible to the person.
     Open,
 }
 

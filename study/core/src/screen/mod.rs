@@ -1,9 +1,8 @@
-//! A person's way through a sitting, screen by screen: what is shown now, and what they may do about it.
+//! Screens and inputs of a person's sitting.
 //!
-//! Made for any front end, a terminal or a window alike: show [`Attended::screen`], wait for an [`Input`], hand it to
-//! [`Attended::input`]. Screens and inputs are plain data (serde), so they also travel as lines of JSON ([`Told`], [`Said`]): the
-//! viewer's window is a program of its own. No screen says which stimulus it is, not even by a
-//! code: the answer to a code can be learnt.
+//! A front end (terminal or window) shows [`Attended::screen`], waits for an [`Input`], and passes it to [`Attended::input`].
+//! Screens and inputs are plain data (serde) and also travel as lines of JSON ([`Told`], [`Said`]) to the viewer, a separate
+//! program. No screen identifies the stimulus, not even by a code: the answer to a code could be learnt.
 //!
 //! ```text
 //! Ready -> Feel (first) -> Feel (second) -> Ask -> Ready or Feel of the next trial ... -> Over
@@ -22,42 +21,42 @@ use crate::protocol::Quality;
 use crate::trial::{Phase, Position, Response};
 use serde::{Deserialize, Serialize};
 
-/// What is shown now.
+/// Current screen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "screen", rename_all = "kebab-case")]
 pub enum Screen {
-    /// A text of the experimenter, such as a consent or instructions; [`Input::Continue`] says that it was read.
+    /// A text of the experimenter, such as a consent or instructions; [`Input::Continue`] confirms it.
     Read {
-        /// The text; its first line is a title.
+        /// Text; its first line is the title.
         text: String,
     },
-    /// Words before the next trial; [`Input::Continue`] goes on.
+    /// A message before the next trial; [`Input::Continue`] proceeds.
     Ready {
-        /// Why.
+        /// Reason for the pause.
         reason: Pause,
-        /// What is to come.
+        /// The next trial.
         next: TrialView,
     },
-    /// A stimulus is there to be felt; [`Input::Continue`] when it was.
+    /// A stimulus to be felt; [`Input::Continue`] ends it.
     Feel {
-        /// The trial.
+        /// Trial of the stimulus.
         trial: TrialView,
-        /// Which of a pair; none where there is only one.
+        /// Position in a pair; `None` for a single stimulus.
         position: Option<Position>,
     },
-    /// A question; [`Input::Answer`].
+    /// A question, answered by [`Input::Answer`].
     Ask {
-        /// The trial.
+        /// Trial of the question.
         trial: TrialView,
-        /// The question.
+        /// Kind of question.
         question: Question,
     },
-    /// Everything was presented.
+    /// All trials were presented.
     Over,
 }
 
 impl Screen {
-    /// The trial that it is about, if it is about one.
+    /// Returns the trial of the screen, if it has one.
     #[must_use]
     pub fn trial(&self) -> Option<&TrialView> {
         match self {
@@ -69,91 +68,91 @@ impl Screen {
     }
 }
 
-/// Why nothing is felt just now.
+/// Reason for a pause between stimuli.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pause {
-    /// The sitting begins, or goes on after it broke off.
+    /// The sitting begins or resumes.
     Welcome,
-    /// From practice to what counts, or to practice again.
+    /// Practice ends, or begins again.
     PhaseChanges,
-    /// The object will be seen from now on, or no longer.
+    /// The object becomes visible, or invisible.
     ModalityChanges,
     /// Time to rest the hand.
     Rest,
-    /// The handle left its range: the trial comes again.
+    /// The handle left its range: the trial is repeated.
     OutOfRange,
 }
 
-/// What may be asked.
+/// Kind of question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Question {
-    /// Which had more of it: [`Response::First`], [`Response::Second`] or [`Response::DontKnow`].
+    /// Which stimulus had more of the quality: [`Response::First`], [`Response::Second`] or [`Response::DontKnow`].
     WhichIsMore,
-    /// How much: [`Response::Rating`], any number above 0 of one's own.
+    /// Magnitude on a free scale: [`Response::Rating`], any number above 0.
     HowMuch,
 }
 
-/// What a front end may know of a trial.
+/// Data of a trial for a front end, without the stimulus.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrialView {
     /// Count of presentations in the sitting, from 1.
     pub number: u32,
-    /// About how many there will be.
+    /// Estimated number of presentations in the sitting.
     pub of_about: u64,
-    /// Whether it counts.
+    /// Phase as shown to the subject: a check appears as a counted trial.
     pub phase: Phase,
-    /// Whether the object is to be seen.
+    /// True if the object is visible.
     pub object_is_shown: bool,
-    /// How often it had to be repeated.
+    /// Number of repeats so far.
     pub repeat: u32,
-    /// How many stimuli it has: one to be rated, or two to be compared.
+    /// Number of stimuli: one to rate, or two to compare.
     pub stimuli: usize,
-    /// What is judged.
+    /// Judged quality.
     pub quality: Quality,
-    /// What the person may do now besides going on and answering.
+    /// Optional inputs available now.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub may: Vec<May>,
 }
 
-/// Something that a person may do, but need not.
+/// Optional input of a person.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum May {
-    /// Feel the trial once more: [`Input::Again`].
+    /// Repeat the trial: [`Input::Again`].
     Again {
-        /// So many more times; none: without limit.
+        /// Remaining repetitions; unlimited if `None`.
         left: Option<u32>,
     },
-    /// Take the last answer back: [`Input::Withdraw`].
+    /// Withdraw the last answer: [`Input::Withdraw`].
     Withdraw,
     /// Practise before the sitting goes on: [`Input::Practise`].
     Practise,
 }
 
-/// What a person does.
+/// Input of a person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "input", rename_all = "kebab-case")]
 pub enum Input {
-    /// Goes on.
+    /// Proceeds to the next screen.
     Continue,
-    /// Wants to feel the trial once more, from the first stimulus on.
+    /// Repeats the trial from the first stimulus on.
     Again,
     /// Answers the question.
     Answer {
-        /// The answer.
+        /// Answer to the question.
         response: Response,
     },
-    /// Takes the last answer back, once for each trial and before the next stimulus was felt: its question is open again.
+    /// Withdraws the last answer, once per trial and before the next stimulus was felt: its question is open again.
     Withdraw,
-    /// Practises before the sitting goes on; none of it counts.
+    /// Starts practice before the sitting resumes; practice does not count.
     Practise,
-    /// A note of the experimenter; the screen stays.
+    /// Adds a note of the experimenter; the screen does not change.
     Note {
-        /// In their words.
+        /// Text of the note.
         text: String,
     },
-    /// Enough for now.
+    /// Stops the sitting.
     Stop,
 }

@@ -1,4 +1,4 @@
-//! Options that decide how results are computed: on the command line, and planned in a study file.
+//! Options of an analysis, from the command line or planned in a study file.
 
 use clap::{Args, ValueEnum};
 use flotor_analysis::{AnalysisOptions, Estimator};
@@ -6,7 +6,7 @@ use flotor_statistics::anova::SumOfSquares;
 use flotor_study::protocol::{Protocol, RatingScale};
 use serde::Deserialize;
 
-/// Options that decide how results are computed.
+/// Options that affect results.
 #[derive(Args, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Choices {
     /// Threshold estimator
@@ -20,13 +20,13 @@ pub(crate) struct Choices {
     ratings: RatingScale,
 }
 
-/// `--type`
+/// Values of `--type`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
 enum Sums {
-    /// Each effect beyond those that do not contain it
+    /// Each effect adjusted for those that do not contain it
     #[value(name = "II")]
     Two,
-    /// Each effect beyond all others
+    /// Each effect adjusted for all others
     #[default]
     #[value(name = "III")]
     Three,
@@ -55,10 +55,10 @@ impl Choices {
         }
     }
 
-    /// Returns the planned options; an option that the table lacks has its default.
+    /// Parses the planned options; a missing option has its default.
     ///
     /// # Errors
-    /// The first value that the option does not take, with those that it takes.
+    /// The first invalid value, with the valid ones.
     pub(crate) fn planned(table: &PlannedTable) -> Result<Self, String> {
         Ok(Self {
             estimator: planned("estimator", table.estimator.as_deref())?,
@@ -67,7 +67,7 @@ impl Choices {
         })
     }
 
-    /// Returns name and value of each option that changes a result of this task.
+    /// Returns name and value of each option that affects this task.
     pub(crate) fn of_task(self, protocol: &Protocol) -> [(&'static str, String); 2] {
         let own = match protocol {
             Protocol::Jnd(_) => ("estimator", word(&self.estimator)),
@@ -76,7 +76,7 @@ impl Choices {
         [own, ("type", word(&self.sums))]
     }
 
-    /// Returns the options of this task that differ from planned ones, as text.
+    /// Describes the options of this task that deviate from the plan.
     pub(crate) fn deviations(self, from: Self, protocol: &Protocol) -> Vec<String> {
         let both = self.of_task(protocol).into_iter().zip(from.of_task(protocol));
         let different = both.filter(|(used, planned)| used != planned);
@@ -92,7 +92,7 @@ fn planned<T: ValueEnum + Default>(name: &str, text: Option<&str>) -> Result<T, 
     })
 }
 
-/// Returns the word of a value on the command line.
+/// Returns the name of a value on the command line.
 fn word(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }

@@ -1,4 +1,4 @@
-//! The origin of a result: who answered, what was planned, and everything needed to compute it again.
+//! Provenance of a result: observers, plan, and all inputs needed to reproduce it.
 
 use super::choices::Choices;
 use crate::study::plan::{Planned, planned};
@@ -10,7 +10,7 @@ use flotor_study::protocol::Protocol;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// The origin of a result.
+/// Provenance of a result.
 #[derive(Serialize)]
 pub(crate) struct Provenance {
     /// Origin of the answers.
@@ -18,52 +18,52 @@ pub(crate) struct Provenance {
     pub(crate) observer: ObserverKind,
     /// Seed of order, presentation and simulated answers.
     seed: u64,
-    /// Version of the program that carried the study out.
+    /// Version of the program that ran the study.
     version: String,
     /// Digest of the configuration of the sittings.
     configuration: String,
-    /// Options of the analysis that change a result of this task.
+    /// Options of the analysis that affect this task.
     options: BTreeMap<&'static str, String>,
-    /// Rule by which the tracks of a difference experiment came to thresholds.
+    /// Adaptive procedure of a difference experiment.
     #[serde(skip_serializing_if = "Option::is_none")]
     threshold_rule: Option<Procedure>,
     /// Exclusion rules of the study file.
     exclusion_rules: ExclusionRules,
     /// SHA-256 of the exclusion rules as JSON.
     exclusion_sha256: String,
-    /// The study file.
+    /// Study file; `None` without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     study_file: Option<StudyFile>,
     /// Agreement of the analysis with the study file.
     plan: Agreement,
 }
 
-/// The study file that the sittings followed.
+/// Study file of the sittings.
 #[derive(Serialize)]
 struct StudyFile {
     name: String,
     sha256: String,
     text: String,
-    /// What it says of the analysis.
+    /// Planned analysis, as text.
     analysis: String,
 }
 
-/// Agreement of an analysis with its plan.
+/// Agreement of an analysis with the study file.
 #[derive(Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Agreement {
-    /// There is no study file.
+    /// No study file.
     NoPlan,
-    /// Options, rules and number of subjects are those of the study file.
+    /// Options, rules and number of subjects match the study file.
     AsPlanned,
-    /// Some are not.
+    /// Deviations from the study file.
     NotAsPlanned(Vec<String>),
-    /// The log has no text of the study file that this version can read.
+    /// The log has no study file that this version can parse.
     Unknown,
 }
 
 impl Provenance {
-    /// Returns the origin of a result of these logs, computed by these choices after these exclusions.
+    /// Builds the provenance of an analysis.
     pub(crate) fn of(begin: &Begin, logs: &[SittingLog], choices: Choices, applied: &Applied) -> Self {
         let rules = begin.exclusion();
         let planned = begin.plan.as_ref().map(|plan| planned(&plan.text));
@@ -94,7 +94,7 @@ impl Provenance {
         }
     }
 
-    /// Returns name and value of everything that is printed, in order.
+    /// Returns names and values in the order of printing.
     pub(crate) fn lines(&self) -> Vec<(&'static str, String)> {
         let observer = self.observer.restriction().unwrap_or("people").to_owned();
         let options: Vec<String> =
@@ -121,13 +121,13 @@ impl Provenance {
         lines
     }
 
-    /// Returns the block of a text.
+    /// Formats the provenance as a text block.
     pub(crate) fn to_text(&self) -> String {
         let line = |(name, value): (&'static str, String)| format!("\n  {name:<30}{value}");
         format!("  Provenance{}", self.lines().into_iter().map(line).collect::<String>())
     }
 
-    /// Returns the text of the study file, if the logs have one.
+    /// Returns name and text of the study file, if any.
     pub(crate) fn study_file(&self) -> Option<(&str, &str)> {
         self.study_file.as_ref().map(|file| (file.name.as_str(), file.text.as_str()))
     }

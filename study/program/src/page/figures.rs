@@ -1,5 +1,5 @@
-//! The figures of a study: 17 and 18 of CMU-RI-TR-07-21 with this study's data, the subjects behind them, and how people moved.
-//! `tracks` and `psychometric` have the answers of a difference experiment.
+//! Figures of a study: figures 17 and 18 of CMU-RI-TR-07-21 with the study's data, individual subjects, and movements. `tracks` and
+//! `psychometric` plot the answers of a difference experiment.
 
 mod psychometric;
 mod tracks;
@@ -13,28 +13,28 @@ use flotor_study::trial::Modality;
 pub(super) use psychometric::psychometric;
 pub(super) use tracks::tracks;
 
-/// Height of a figure of one panel, px.
+/// Height of a single-panel figure, px.
 const HEIGHT_PX: f64 = 340.0;
 
-/// The look of error bars over filled bars: the colour of text.
+/// Style slot of error bars over filled bars: the text colour.
 const INK: usize = 6;
 
-/// What an error bar shows.
+/// Legend of an error bar.
 const ONE_ERROR: &str = "± 1 standard error";
 
-/// The modalities with the words of the legends, in the colours they have everywhere.
+/// Modalities with their legends, in the order of their colours.
 const MODALITIES: [(Modality, &str); 2] =
     [(Modality::Vh, "vision + haptics"), (Modality::H, "haptics alone")];
 
-/// Figure 18: thresholds as bars over the base, a bar for each modality, with standard errors; what the thesis's Weber
-/// fractions come to at each base.
+/// Plots figure 18: thresholds as bars over the base, one bar per modality, with standard errors and the thresholds of the thesis's
+/// Weber fractions.
 pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> Figure {
     let cells = |modality| analysis.thresholds.iter().filter(move |cell| cell.modality == modality);
     let mut bases: Vec<f64> = cells(Modality::Vh).map(|cell| cell.base).collect();
     bases.sort_by(f64::total_cmp);
     let gap =
         bases.windows(2).filter_map(|pair| Some(pair.get(1)? - pair.first()?)).fold(f64::INFINITY, f64::min);
-    // Two bars and their distance fill two thirds of the gap between bases.
+    // Two bars and their gap fill two thirds of the distance between bases.
     let width = if gap.is_finite() { gap / 3.0 } else { bases.first().map_or(1.0, |base| base / 10.0) };
     let centre = |slot: usize, base: f64| base + if slot == 0 { -0.5 * width } else { 0.5 * width };
     let (name, unit) = stimulus.name_and_unit();
@@ -65,7 +65,7 @@ pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> Figure 
         .panel(panel)
 }
 
-/// Every subject's Weber fraction in one modality against the other.
+/// Plots every subject's Weber fraction in one modality against the other.
 pub(super) fn subjects(analysis: &JndAnalysis) -> Figure {
     let mut points: Vec<(String, [Vec<f64>; 2])> = Vec::new();
     for row in &analysis.responses {
@@ -92,13 +92,13 @@ pub(super) fn subjects(analysis: &JndAnalysis) -> Figure {
         .panel(panel)
 }
 
-/// Figure 17: mean ratings over the stimulus, with standard errors and the linear trend.
+/// Plots figure 17: mean ratings over the stimulus, with standard errors and the linear trend.
 pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Figure {
     let cells = |modality| analysis.ratings.iter().filter(move |cell| cell.modality == modality);
     let values: Vec<f64> = cells(Modality::Vh).map(|cell| cell.stimulus).collect();
     let span = values.iter().fold(0.0_f64, |most, value| most.max(*value))
         - values.iter().fold(f64::INFINITY, |least, value| least.min(*value));
-    // Beside each other, so that neither hides the other's error.
+    // Offset horizontally, so that neither error bar hides the other.
     let beside = |slot: usize, x: f64| x + if slot == 0 { -0.004 * span } else { 0.004 * span };
     let mut panel = Panel::new(Axis::linear("Rating, scaled", ""));
     for (slot, (modality, name)) in MODALITIES.into_iter().enumerate() {
@@ -122,7 +122,7 @@ pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Figu
         .panel(panel)
 }
 
-/// How people moved, over the stimulus; nothing where it was not measured.
+/// Plots movement measures over the stimulus; `None` without measurements.
 pub(super) fn movements(
     measures: &[KinematicMeasure],
     levels: &[f64],
@@ -161,7 +161,7 @@ pub(super) fn movements(
     Some(figure)
 }
 
-/// A bar of one standard error each way.
+/// Returns an error bar of one standard error in each direction.
 fn error_bar(x: f64, value: &MeanInterval) -> ErrorBar {
     ErrorBar::around(x, value.mean, value.se)
 }

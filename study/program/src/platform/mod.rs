@@ -1,4 +1,4 @@
-//! What differs between systems for the commands of experiments: the free space of a disk.
+//! Free space of a disk, per operating system.
 
 #[cfg(not(windows))]
 mod unix;

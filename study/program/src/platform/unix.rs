@@ -1,8 +1,8 @@
-//! Unix: statistics of a file system.
+//! Unix: file system statistics.
 
 use std::path::Path;
 
-/// Bytes that this user may still write to the disk of a folder that exists. Not real-time.
+/// Returns the free bytes of an existing folder's disk, for this user; `None` if unknown. Not real-time.
 pub(crate) fn free_bytes(folder: &Path) -> Option<f64> {
     let disk = rustix::fs::statvfs(folder).ok()?;
     Some(disk.f_bavail as f64 * disk.f_frsize as f64)

@@ -1,11 +1,11 @@
 //! Windows: free space of a volume, within the user's quota.
-#![allow(unsafe_code)] // one question to the system; tests/tests/system/architecture.rs lists it
+#![allow(unsafe_code)] // one system call; tests/tests/system/architecture.rs lists it
 
 use std::os::windows::ffi::OsStrExt;
 use std::path::Path;
 use windows_sys::Win32::Storage::FileSystem::GetDiskFreeSpaceExW;
 
-/// Bytes that this user may still write to the disk of a folder that exists. Not real-time.
+/// Returns the free bytes of an existing folder's disk, for this user; `None` if unknown. Not real-time.
 pub(crate) fn free_bytes(folder: &Path) -> Option<f64> {
     let name: Vec<u16> = folder.as_os_str().encode_wide().chain([0]).collect();
     let mut free = 0;

@@ -6,7 +6,7 @@ use flotor_command::{CommandError, print_result, progress_bar, style};
 use flotor_study::bias::{BiasRow, observer_of, rows};
 use rayon::prelude::*;
 
-/// Observers: true threshold as a share of the base, and criterion. First the two of the default population, then one
+/// Simulated observers: true threshold as a share of the base, and criterion. First the two of the default population, then one
 /// threshold over the range of criteria.
 const OBSERVERS: [(f64, f64); 7] =
     [(0.1114, 1.0), (0.1357, 1.0), (0.142, 0.0), (0.142, 0.25), (0.142, 0.5), (0.142, 0.75), (0.142, 1.0)];

@@ -1,4 +1,4 @@
-//! Choices of a protocol on the command line.
+//! Command-line values of protocol settings.
 
 use clap::ValueEnum;
 use flotor_command::options::real;
@@ -6,7 +6,7 @@ use flotor_study::observer::{Percept, Population};
 use flotor_study::protocol::{AtBoundary, FirstModality, Quality, Stimulus};
 use flotor_study::trial::Modality;
 
-/// `--first`
+/// Values of `--first`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum FirstChoice {
     /// Odd subject numbers vision and haptics, even ones haptics alone
@@ -28,7 +28,7 @@ impl From<FirstChoice> for FirstModality {
     }
 }
 
-/// `--boundary`
+/// Values of `--boundary`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum BoundaryChoice {
     /// Repeat the trial, at most three times
@@ -47,7 +47,7 @@ impl From<BoundaryChoice> for AtBoundary {
     }
 }
 
-/// `--procedure`
+/// Values of `--procedure`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum ProcedureChoice {
     /// Kaernbach's rule, as in the thesis
@@ -57,7 +57,7 @@ pub(super) enum ProcedureChoice {
     Questplus,
 }
 
-/// `--apparatus`
+/// Values of `--apparatus`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum PresentationOption {
     /// A scene, felt by a simulated hand
@@ -67,30 +67,30 @@ pub(super) enum PresentationOption {
     None,
 }
 
-/// `--noise`
+/// Values of `--noise`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum NoiseOption {
-    /// On, if this machine can play it
+    /// Play if this machine can
     #[default]
     Auto,
-    /// On, or an error
+    /// Play, or fail
     On,
-    /// Off
+    /// Do not play
     Off,
 }
 
-/// `--way`
+/// Values of `--way`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum ForceWay {
-    /// A weight: it pulls down
+    /// A weight, which pulls down
     #[default]
     Felt,
-    /// A resistance: it is pushed against
+    /// A resistance to the pushing hand
     Exerted,
 }
 
 impl ForceWay {
-    /// The setting of the load that makes it so.
+    /// Returns the settings of the load for this kind of force.
     pub(super) fn load(self) -> &'static [&'static str] {
         match self {
             Self::Felt => &["load.kind=felt"],
@@ -98,22 +98,21 @@ impl ForceWay {
         }
     }
 
-    /// Settings of the simulated hand of the built-in scene, where they differ from those for a spring.
+    /// Returns the settings of the simulated hand that differ from those for a spring, for the built-in scene.
     pub(super) fn hand(self) -> &'static [&'static str] {
         match self {
-            // Only the hand supports a weight: the softest hand (1.5 N/mm) yields by 12 mm to the heaviest weight of the
-            // default bases (17.5 N), which is the whole range below home. So its intended position is above home, and it
-            // lifts the weight a little.
+            // Only the hand supports a weight: the softest hand (1.5 N/mm) yields by 12 mm to the heaviest weight of the default bases
+            // (17.5 N), the whole range below home. The intended position is therefore above home, and the hand lifts the weight a little.
             Self::Felt => &["device.hand_centre_mm=4", "device.hand_amplitude_mm=3"],
             Self::Exerted => &[],
         }
     }
 }
 
-/// Returns the simulated people who judge pairs of a stimulus.
+/// Returns the population that judges pairs of a stimulus.
 ///
 /// # Errors
-/// No Weber fraction of the stimulus is published.
+/// If no Weber fraction of the stimulus is published.
 pub(super) fn population(stimulus: &Stimulus, way: Option<ForceWay>) -> Result<Population, String> {
     let percept = match (stimulus.quality(), way) {
         (Quality::Force, Some(ForceWay::Exerted)) => Percept::ExertedForce,
@@ -129,7 +128,7 @@ pub(super) fn population(stimulus: &Stimulus, way: Option<ForceWay>) -> Result<P
     Ok(Population::judging(percept))
 }
 
-/// `VH,H`: two shares between 0 and 1.
+/// Parses `VH,H`: two shares between 0 and 1.
 pub(super) fn thresholds(text: &str) -> Result<[f64; 2], String> {
     let (vh, h) = text.split_once(',').ok_or("write VH,H, like 0.14,0.17")?;
     let both = [real(vh)?, real(h)?];
@@ -137,7 +136,7 @@ pub(super) fn thresholds(text: &str) -> Result<[f64; 2], String> {
     if are_shares { Ok(both) } else { Err("both are shares above 0 and below 1".to_owned()) }
 }
 
-/// `LEAST-MOST`, of which the first is smaller.
+/// Parses `LEAST-MOST`, with the first value smaller.
 pub(super) fn range(text: &str) -> Result<(f64, f64), String> {
     let (least, most) = text.split_once('-').ok_or("write LEAST-MOST, like 12-48")?;
     let (least, most) = (real(least)?, real(most)?);

@@ -1,6 +1,6 @@
-//! A measured force-length curve of a real spring: read, fitted, and turned into a spring to be served beside others.
+//! Measured force-length curves of real springs: parsing, fitting, and conversion to a curve for the model `measured`.
 //!
-//! A table has a header and two columns, the force and one of two lengths:
+//! A table has a header and two columns, force and either length or compression:
 //!
 //! ```text
 //! length_mm,force_n            or   compression_mm,force_n
@@ -14,75 +14,75 @@ use flotor_statistics::describe::mean;
 use flotor_statistics::regression::{self, Line};
 use serde::Serialize;
 
-/// A measured curve.
+/// Measured curve of a spring.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct MeasuredCurve {
-    /// Compression, m, and force, N: in the order measured.
+    /// Compression, m, and force, N, in the order of measurement.
     pub(super) points: Vec<(f64, f64)>,
-    /// Length without load, m, where the table gives lengths or somebody measured it.
+    /// Length without load, m; `None` if the table has compressions and no length was given.
     pub(super) free_length_m: Option<f64>,
 }
 
-/// The part of the deflection a stiffness is fitted to, as shares of the largest: ends that do not lie flat yet, and
-/// coils that begin to touch, are no property of the wire (EN 15800 measures a spring's rate between 30 and 70 %).
+/// Fitted range of the deflection, as shares of the largest: ends that are not seated yet, and coils that begin to touch, do not
+/// represent the wire (EN 15800 measures a spring's rate between 30 and 70 %).
 pub(super) const FITTED: [f64; 2] = [0.3, 0.7];
 
-/// A spring fitted to a curve.
+/// Linear spring fitted to a curve.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct SpringFit {
     /// Stiffness, N/m.
     pub(super) stiffness_n_per_m: f64,
-    /// Its 95 % confidence interval, N/m.
+    /// 95 % confidence interval of the stiffness, N/m.
     pub(super) stiffness_interval_n_per_m: [f64; 2],
     /// Compression at which the fitted line meets zero force, m: play of the fixture.
     pub(super) offset_m: f64,
-    /// Length without load, m, if it is known.
+    /// Length without load, m; `None` if unknown.
     pub(super) free_length_m: Option<f64>,
     /// Compression rigidity, N: stiffness times free length.
     pub(super) gamma_n: Option<f64>,
-    /// R² of the line over the fitted part.
+    /// R² of the line over the fitted range.
     pub(super) r_squared: f64,
-    /// Points of the fitted part.
+    /// Number of points in the fitted range.
     pub(super) points: usize,
-    /// Largest distance of any point, the ends included, from the line, as a share of the largest force.
+    /// Largest deviation of any measured point from the line, as a share of the largest force.
     pub(super) nonlinearity: f64,
 }
 
-/// A measured curve made fit to be felt: without the scatter of the bench, and with a force that never falls.
+/// Measured curve prepared for rendering: smoothed, and with a force that never falls.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct ServedCurve {
-    /// Compression, m, and force, N: the first (0, 0), both growing.
+    /// Compression, m, and force, N: starts at (0, 0), both increasing.
     pub(super) knots: Vec<(f64, f64)>,
-    /// Root mean square distance of the measured points from the curve, N: scatter, friction, and what was smoothed.
+    /// Root mean square deviation of the measured points from the curve, N: scatter, friction, and smoothing.
     pub(super) rms_n: f64,
 }
 
-/// Equal parts of the deflection within which points are averaged: finer than a hand moves between two ticks, coarse enough
-/// to hold points of both strokes.
+/// Number of equal parts of the deflection for averaging: finer than a hand moves between two ticks, coarse enough to hold points
+/// of both strokes.
 const PARTS: u32 = 64;
 
-/// Why a curve cannot be used.
+/// Reason why a curve is unusable.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub(super) enum CurveError {
-    /// A line that is not made like one, counted from 1.
+    /// Invalid line.
     #[error("line {line}: {problem}")]
     Line {
-        /// Which.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong.
+        /// Description of the problem.
         problem: String,
     },
-    /// The length without load is not known.
+    /// The length without load is unknown.
     #[error("the table has compressions only; give the length without load (--free-length-mm)")]
     NoFreeLength,
-    /// Too little in the fitted part.
+    /// Too few points in the fitted range.
     #[error("the middle of the deflection (30 to 70 %) has too few points: {0}")]
     Statistics(#[from] StatisticsError),
-    /// Not a spring.
+    /// The force decreases with compression.
     #[error("the force falls as the spring is compressed ({0:.1} N/m); are length and compression mixed up?")]
     Falling(f64),
-    /// Too few different lengths to serve the curve itself.
+    /// Too few different compressions for a curve.
     #[error("the curve needs points at three lengths at least; there are {0}")]
     Sparse(usize),
 }
@@ -93,7 +93,7 @@ impl From<TextProblem> for CurveError {
     }
 }
 
-/// What the first column is.
+/// Quantity of the first column.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Abscissa {
     Length,
@@ -101,10 +101,10 @@ enum Abscissa {
 }
 
 impl MeasuredCurve {
-    /// Reads a table. With lengths, the longest is the free length unless `free_length_m` says better.
+    /// Parses a table. In a table of lengths, the longest is the free length unless `free_length_m` is given.
     ///
     /// # Errors
-    /// [`CurveError::Line`].
+    /// [`CurveError::Line`] for an invalid header or line.
     pub(super) fn parse(text: &str, free_length_m: Option<f64>) -> Result<Self, CurveError> {
         let table = Table::parse(text, HashLines::Comments)?;
         let abscissa = match table.columns().join(",").as_str() {
@@ -134,7 +134,7 @@ impl MeasuredCurve {
     /// Fits a linear spring to the middle of the deflection.
     ///
     /// # Errors
-    /// [`CurveError`]: too few points there, a force that falls.
+    /// [`CurveError`], if the range has too few points or the force falls.
     pub(super) fn fit(&self) -> Result<SpringFit, CurveError> {
         let deepest_m = self.points.iter().map(|(x, _)| *x).fold(0.0, f64::max);
         let [from_m, to_m] = FITTED.map(|share| share * deepest_m);
@@ -158,15 +158,15 @@ impl MeasuredCurve {
         })
     }
 
-    /// The curve to be felt: points averaged in small parts of the deflection (both strokes, if both were measured), from no
-    /// force at no compression, and nowhere falling (isotonic regression by pooling adjacent violators).
+    /// Computes the curve for rendering: averages points in small parts of the deflection (over both strokes, if measured), starts
+    /// at zero force and compression, and never falls (isotonic regression by pooling adjacent violators).
     ///
     /// # Errors
-    /// [`CurveError::Sparse`].
+    /// [`CurveError::Sparse`] if the points are too few.
     pub(super) fn served(&self) -> Result<ServedCurve, CurveError> {
         let deepest_m = self.points.iter().map(|(x, _)| *x).fold(0.0, f64::max);
         let part_m = deepest_m / f64::from(PARTS);
-        // Part 0 is around no compression, where the spring gives no force.
+        // Part 0 is around zero compression, where the force is zero.
         let mut parts: Vec<(f64, f64, f64)> = vec![(0.0, 0.0, 0.0); PARTS as usize + 1];
         for (x_m, force_n) in self.points.iter().filter(|(x_m, _)| *x_m > 0.5 * part_m) {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive, at most PARTS
@@ -194,7 +194,7 @@ impl MeasuredCurve {
 }
 
 impl ServedCurve {
-    /// The table the force model `measured` reads.
+    /// Formats the table for the force model `measured`.
     #[must_use]
     pub(super) fn to_table(&self) -> String {
         let row = |(x_m, force_n): &(f64, f64)| format!("{:.6},{force_n:.6}\n", x_m * 1.0e3);
@@ -203,7 +203,7 @@ impl ServedCurve {
     }
 }
 
-/// The non-decreasing values nearest to weighted ones: neighbours in the wrong order become their mean.
+/// Returns the closest non-decreasing values by weighted least squares: pools neighbours in the wrong order into their mean.
 fn never_falling(weighted: &[(f64, f64)]) -> Vec<f64> {
     let mut blocks: Vec<(f64, f64, usize)> = Vec::new();
     for (weight, value) in weighted {
@@ -217,7 +217,7 @@ fn never_falling(weighted: &[(f64, f64)]) -> Vec<f64> {
     blocks.into_iter().flat_map(|(_, value, count)| std::iter::repeat_n(value, count)).collect()
 }
 
-/// Straight between knots, the last force beyond them, none before.
+/// Interpolates linearly between knots; constant beyond the last, zero before the first.
 fn between(knots: &[(f64, f64)], x_m: f64) -> f64 {
     let after = knots.partition_point(|(at, _)| *at <= x_m);
     match (after.checked_sub(1).and_then(|before| knots.get(before)), knots.get(after)) {

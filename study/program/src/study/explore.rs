@@ -1,5 +1,5 @@
-//! `flotor study explore`: a spring to feel while its dimensions and its material change, without trials: the immediate
-//! use that the thesis names (CMU-RI-TR-07-21, section 7).
+//! `flotor study explore`: feel a spring while changing its dimensions and material, without trials: the immediate use suggested by
+//! the thesis (CMU-RI-TR-07-21, section 7).
 
 use super::front::lines_of;
 use clap::Args;
@@ -129,7 +129,7 @@ fn end(
     }
 }
 
-/// A spring of wire, so that every dimension and the material may change.
+/// Returns the scene to explore; by default a physical wire spring, so that all dimensions and the material are parameters.
 fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
     let scene = match &arguments.scene {
         Some(path) => Scene::load(path),
@@ -148,15 +148,15 @@ fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
     Ok(scene)
 }
 
-/// Executes typed lines: changes the model and reports what the hand felt.
+/// Command prompt: changes the model and reports the forces at the hand.
 struct Prompt {
     controls: Controls,
     registry: Registry,
     model: String,
-    /// All changes so far: a new model gets them too.
+    /// All changes so far, applied again to a replacement model.
     settings: Vec<(String, String)>,
     watch: Shared,
-    /// How many times stiffer the hand feels the model.
+    /// Ratio of the stiffness at the hand to that of the model.
     mapping: f64,
 }
 
@@ -191,7 +191,7 @@ impl Prompt {
             return format!("  {error}");
         }
         self.settings.extend(changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())));
-        // Until it has faded in and a hand has gone up and down once.
+        // Wait for the fade-in and one up and down movement of the hand.
         std::thread::sleep(Duration::from_millis(200));
         let refused = self.watch.lock().refused.take();
         if let Some(Change { parameter, value, .. }) = refused {
@@ -203,7 +203,7 @@ impl Prompt {
         self.felt()
     }
 
-    /// A model reads fixed parameters at its creation: swaps in a new one, with all earlier changes.
+    /// Replaces the model, with all earlier changes: fixed parameters are read at creation.
     fn swap(&self, changes: &[(&str, &str)]) -> Result<(), ControlError> {
         let before = self.settings.iter().map(|(key, value)| (key.as_str(), value.as_str()));
         let all: Vec<(&str, &str)> = before.chain(changes.iter().copied()).collect();
@@ -226,7 +226,7 @@ impl Prompt {
         schema.iter().map(line).collect::<Vec<_>>().join("\n")
     }
 
-    /// Stiffness and force at the hand since the last request, as text.
+    /// Describes the stiffness and force at the hand since the last request.
     fn felt(&self) -> String {
         let felt = self.watch.lock().meter.replace(KinematicsMeter::default());
         let words = |felt: StimulusKinematics| {
@@ -239,7 +239,7 @@ impl Prompt {
     }
 }
 
-/// The model's own stiffness beside the one at the hand, N/m, where a mapping makes them differ.
+/// Describes the model's own stiffness if a mapping makes it differ from `at_hand`, N/m.
 fn model_text(at_hand: f64, mapping: f64) -> String {
     if (mapping - 1.0).abs() < 1.0e-6 || mapping <= 0.0 {
         return String::new();

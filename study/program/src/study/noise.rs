@@ -1,5 +1,5 @@
-//! White noise on headphones, against the sound of the device (CMU-RI-TR-07-21, section 4). Flotor has no sound of its
-//! own: it writes samples to a player of the system, where there is one.
+//! White noise on headphones, to mask the sound of the device (CMU-RI-TR-07-21, section 4). Samples are piped to a player of the
+//! system, if there is one.
 
 use flotor_core::Random;
 use flotor_servo::last_stop::spawn_unblocked;
@@ -7,28 +7,28 @@ use std::io::Write;
 use std::process::{Child, Command, Stdio};
 use std::thread::JoinHandle;
 
-/// Samples per second and channel.
+/// Sample rate, Hz.
 const RATE_HZ: u32 = 44_100;
-/// Loudest sample, of 32767: a quarter of full scale, so that the volume of the system decides.
+/// Peak sample, of 32767: a quarter of full scale; the system volume sets the loudness.
 const LOUDEST: i16 = 8_000;
 
-/// Players that take 16-bit samples from standard input: name and arguments.
+/// Players that accept 16-bit samples on standard input: name and arguments.
 const PLAYERS: [(&str, &[&str]); 3] = [
     ("pw-cat", &["--playback", "--rate", "44100", "--channels", "1", "--format", "s16", "-"]),
     ("paplay", &["--raw", "--rate=44100", "--channels=1", "--format=s16le"]),
     ("aplay", &["-q", "-t", "raw", "-f", "S16_LE", "-r", "44100", "-c", "1"]),
 ];
 
-/// Noise, for as long as it lives.
+/// White noise, played until dropped.
 pub(super) struct WhiteNoise {
     player: Child,
-    /// Ends when the player does.
+    /// Writer thread, which ends with the player.
     feeder: Option<JoinHandle<()>>,
     name: &'static str,
 }
 
 impl WhiteNoise {
-    /// Starts the first player there is; none if this machine has no player or no sound.
+    /// Starts the first available player; `None` without a player or sound card.
     #[must_use]
     pub(super) fn start() -> Option<Self> {
         PLAYERS.iter().find_map(|(name, arguments)| {
@@ -41,13 +41,13 @@ impl WhiteNoise {
                 while pipe.write_all(&tenth_of_a_second(&mut random)).is_ok() {}
             });
             let mut started = Self { player, feeder: feeder.ok(), name };
-            // A player without a sound card ends at once.
+            // A player without a sound card exits at once.
             std::thread::sleep(std::time::Duration::from_millis(200));
             started.is_playing().then_some(started)
         })
     }
 
-    /// The player's name.
+    /// Returns the player's name.
     #[must_use]
     pub(super) fn player(&self) -> &'static str {
         self.name
@@ -68,7 +68,7 @@ impl Drop for WhiteNoise {
     }
 }
 
-/// A sample of noise, -`LOUDEST` to `LOUDEST`.
+/// Draws a sample of noise, -`LOUDEST` to `LOUDEST`.
 fn sample(random: &mut Random) -> i16 {
     #[allow(clippy::cast_possible_truncation)] // at most LOUDEST
     let sample = (random.symmetric() * f64::from(LOUDEST)) as i16;

@@ -1,4 +1,4 @@
-//! `--observer human`: one person, one sitting, in real time.
+//! `--observer human`: one sitting of one person, in real time.
 
 use super::front::{JsonLines, ScreenOption, Terminal, Window, lines_of};
 use super::noise::WhiteNoise;
@@ -23,7 +23,7 @@ use serde_json::json;
 use std::io::{BufReader, Stdout, stdin, stdout};
 use std::path::Path;
 
-/// Presents a study to a person: everything is checked, the loop runs and the window is open before the log begins.
+/// Runs the sitting of a person. Checks the configuration, starts the loop and opens the window before the log begins.
 pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -> Result<(), CommandError> {
     let dataset = Dataset::at(&common.out);
     let subject = subject(common, &dataset, protocol)?;
@@ -52,7 +52,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     };
     let files =
         (dataset.source_folder(subject).join("motion"), format!("{subject}_task-{}", protocol.task()));
-    // A consent is given once, before the first trial; instructions are read again when the sitting goes on.
+    // Consent is given once, before the first trial; instructions are shown again when the sitting resumes.
     let has_begun = earlier.as_ref().is_some_and(|log| !log.trials.is_empty());
     let consent = common.consent.iter().filter(|_| !has_begun);
     let texts =
@@ -64,7 +64,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     }
     let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
     let presented = earlier.as_ref().map_or(0, |log| log.trials.len());
-    // A track may take longer than most do: a trial in any case.
+    // Tracks may need more trials than expected: plan for at least one.
     let trials = protocol.presentations_about().saturating_sub(presented as u64).max(1) as f64;
     let bytes_per_s = if kinematics == Kinematics::Full { apparatus.recording_bytes_per_s() } else { 0.0 };
     space::check(&common.out, Need { stimuli: trials * protocol.stimuli_in_a_trial(), bytes_per_s })?;
@@ -110,7 +110,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         attended = attended.with_again_at_most(times);
     }
     let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), least, &mut |_| ());
-    // What is in the log is in the tables, however the sitting ended.
+    // Write the tables from the log, however the sitting ended.
     let tables = dataset.write_tables();
     let ended = ending.and_then(|ending| rig.finish_after(ending)).map_err(|error| {
         note(broken_off(subject, &attended));
@@ -132,7 +132,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     }
 }
 
-/// What is to be read, from a file.
+/// Reads a text to be shown to the person.
 fn text_of(path: &Path) -> Result<String, CommandError> {
     let text =
         read_text(path, "the text").map_err(|wrong| CommandError::Usage(wrong.in_file(path.display())))?;
@@ -143,13 +143,13 @@ fn text_of(path: &Path) -> Result<String, CommandError> {
     Ok(text)
 }
 
-/// Returns the error of the apparatus.
+/// Converts an apparatus error.
 fn outside(cause: OutsideError) -> CommandError {
     let message = cause.to_string();
     super::outside(cause, message)
 }
 
-/// How far a sitting came, and how it goes on.
+/// Describes the progress of an interrupted sitting and how to resume.
 fn broken_off(subject: SubjectNumber, attended: &Attended) -> String {
     let presented = attended.presented();
     format!(
@@ -193,7 +193,7 @@ fn failed(error: impl std::fmt::Display) -> CommandError {
     CommandError::Failed(error.to_string())
 }
 
-/// The requested number, or the first free one.
+/// Returns the requested subject number, or the first free one.
 fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<SubjectNumber, CommandError> {
     let is_new = |number: &SubjectNumber| !dataset.log_path(*number, protocol.task()).exists();
     let named = common.subject.and_then(SubjectNumber::new);
@@ -204,7 +204,7 @@ fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<Su
     })
 }
 
-/// Noise if requested; a note or an error if this machine cannot play it.
+/// Starts the noise if requested; prints a note or returns an error if this machine cannot play it.
 fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
     if common.noise == NoiseOption::Off {
         return Ok(None);

@@ -1,8 +1,7 @@
-//! `flotor study run`: a study that is a file.
+//! `flotor study run`: runs a study from a file.
 //!
-//! A file `NAME.study.toml` says what the options of an experiment say, once for all subjects, and what is decided before the data are
-//! seen: exclusion rules and the plan of the analysis. Its digest goes into every log, so that nobody has to ask later which version
-//! of the plan a sitting followed.
+//! A file `NAME.study.toml` sets the options of an experiment for all subjects, and what is fixed before data collection: exclusion
+//! rules and the plan of the analysis. Every log contains the digest of the file, so that the version of the plan is documented.
 
 use super::{StudyArguments, Task};
 use crate::analyse::choices::{Choices, PlannedTable};
@@ -17,11 +16,11 @@ use serde::Deserialize;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
-/// What the name of a study file ends with.
+/// Suffix of a study file's name.
 const ENDING: &str = ".study.toml";
-/// Options whose values are files or folders: relative to that of the study file.
+/// Options with paths, relative to the folder of the study file.
 const PATHS: [&str; 6] = ["out", "scene", "consent", "instructions", "texts", "plugin-path"];
-/// Options that decide how `study run` goes on; a file has no say in them.
+/// Options that are only valid on the command line of `study run`.
 const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
 
 #[derive(Args)]
@@ -59,22 +58,22 @@ pub(super) struct RunArguments {
     further: Vec<OsString>,
 }
 
-/// The file.
+/// Content of a study file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyFile {
-    /// The experiment.
+    /// Task of the experiment.
     task: TaskName,
-    /// When a sitting or a trial does not count, decided beforehand.
+    /// Exclusion rules, fixed before data collection.
     #[serde(default)]
     exclusion: ExclusionRules,
-    /// What is to be computed, decided beforehand, for people.
+    /// Planned analysis as text, fixed before data collection.
     #[serde(default)]
     analysis: String,
-    /// Options of `flotor analyse`, decided beforehand.
+    /// Planned options of `flotor analyse`.
     #[serde(default)]
     analyse: PlannedTable,
-    /// Options of the experiment, by their names without dashes.
+    /// Options of the experiment, by long name without dashes.
     #[serde(default)]
     options: toml::Table,
 }
@@ -101,17 +100,17 @@ impl StudyFile {
     }
 }
 
-/// What a study file decides of the analysis.
+/// Analysis plan of a study file.
 pub(crate) struct Planned {
-    /// In words, for people.
+    /// Description for people.
     pub(crate) analysis: String,
     /// Options of `flotor analyse`.
     pub(crate) choices: Choices,
-    /// Number of subjects, if it is stated.
+    /// Planned number of subjects, if stated.
     pub(crate) subjects: Option<usize>,
 }
 
-/// Returns what the text of a study file decides of the analysis; none if this version cannot read the text.
+/// Parses the analysis plan from the text of a study file; `None` if this version cannot parse it.
 pub(crate) fn planned(text: &str) -> Option<Planned> {
     let study = StudyFile::read(Path::new(""), text).ok()?;
     let choices = Choices::planned(&study.analyse).ok()?;
@@ -143,7 +142,7 @@ impl RunArguments {
     }
 }
 
-/// Carries out what the file says: begins, or goes on with what was broken off; complete subjects are skipped.
+/// Runs a study file: begins or resumes the study, and skips complete subjects.
 pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let (file, further) = arguments.file_and_options();
     let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
@@ -168,7 +167,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     super::run(&study)
 }
 
-/// The one study file of a folder.
+/// Finds the only study file of a folder.
 fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
     let entries = std::fs::read_dir(folder)
         .map_err(|cause| CommandError::Usage(format!("{}: {cause}", folder.display())))?;
@@ -189,7 +188,7 @@ fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
     }
 }
 
-/// The command line that says what a study file says, from the task on, and what does not count.
+/// Converts a study file to command-line arguments, from the task on, and its exclusion rules.
 fn words(
     file: &Path,
     text: &str,
@@ -209,7 +208,7 @@ fn words(
     let folder = file.parent().unwrap_or(Path::new(""));
     let said = Said(&further);
     let mut words: Vec<OsString> = vec![task.into()];
-    // Folders that are searched after those of the command line.
+    // Plugin folders of the file, searched after those of the command line.
     let mut last: Vec<OsString> = Vec::new();
     for (key, value) in &study.options {
         let name = key.replace('_', "-");
@@ -249,7 +248,7 @@ fn words(
             let one = [OsString::from(format!("--{name}")), value];
             match name.as_str() {
                 "plugin-path" => last.extend(one),
-                // A setting of the command line replaces the one of the same parameter; others stay.
+                // A setting on the command line replaces the file's setting of the same parameter; others are added.
                 "set" if said.sets(&one[1]) => {}
                 "set" => words.extend(one),
                 _ if said.has(&name) => {}
@@ -265,7 +264,7 @@ fn words(
     Ok((words, study.exclusion))
 }
 
-/// The options of the command line, which go before those of the file.
+/// Options given on the command line, which override those of the file.
 struct Said<'a>(&'a [OsString]);
 
 impl Said<'_> {
@@ -274,7 +273,7 @@ impl Said<'_> {
         self.0.iter().any(|word| *word == *long || word.to_string_lossy().starts_with(&with_value))
     }
 
-    /// Whether the parameter of `PLUGIN.KEY=VALUE` is set.
+    /// Returns true if the command line sets the parameter of `PLUGIN.KEY=VALUE`.
     fn sets(&self, setting: &OsStr) -> bool {
         let key = |text: &str| text.split('=').next().unwrap_or_default().to_owned();
         let wanted = key(&setting.to_string_lossy());
@@ -293,7 +292,7 @@ fn kind(value: &toml::Value) -> &'static str {
     }
 }
 
-/// A value as the command line has it; none of a table, a list or a date.
+/// Formats a value for the command line; `None` for a table, list, boolean or date.
 fn plain(value: &toml::Value) -> Option<String> {
     match value {
         toml::Value::String(text) => Some(text.clone()),
@@ -302,7 +301,7 @@ fn plain(value: &toml::Value) -> Option<String> {
     }
 }
 
-/// A reason in one line, with the file it is about.
+/// Formats a reason as one line, with the file name.
 fn of_file(file: &Path, reason: &str) -> String {
     let lines = reason.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("Usage:"));
     let reason = lines.take_while(|line| !line.starts_with("For more")).collect::<Vec<_>>().join(" ");

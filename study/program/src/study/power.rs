@@ -1,4 +1,4 @@
-//! `flotor study power`: how many subjects a difference experiment needs.
+//! `flotor study power`: sample size of a difference experiment.
 
 use clap::Args;
 use flotor_analysis::power::{Power, population, power, study};
@@ -41,7 +41,7 @@ pub(super) struct PowerArguments {
     json: JsonOption,
 }
 
-/// `8..32`
+/// Parses a range like `8..32`.
 fn sizes(text: &str) -> Result<(u16, u16), String> {
     let wrong =
         || format!("`{text}` is no range of subjects; write 8..32, from 3 to {}", SubjectNumber::MOST);
@@ -77,7 +77,7 @@ pub(super) fn run(arguments: &PowerArguments) -> Result<(), CommandError> {
     let progress = progress_bar(counts.len() as u64 * u64::from(arguments.runs), "{percent:>3} %  {elapsed}");
     let of_size = |subjects: u16| -> Power {
         let one = |run: u32| {
-            // Each size has seeds of its own: no study is part of another, and the rows are independent.
+            // Seeds differ between sizes, so that the rows are statistically independent.
             let number = u64::from(subjects) << 32 | u64::from(run);
             let seed = arguments.seed.wrapping_mul(1_000_003).wrapping_add(number);
             progress.inc(1);

@@ -1,32 +1,32 @@
-//! Whether a sitting finds room on the disk, before a person sits down.
+//! Check of the free disk space before a person's sitting.
 
 use crate::platform::free_bytes;
 use flotor_command::{CommandError, note};
 use std::path::Path;
 
-/// How long one stimulus of a person is assumed to last with all that belongs to it: fades, answer, rest, s.
+/// Assumed time per stimulus of a person, with fades, answer and rest, s.
 const STIMULUS_S: f64 = 8.0;
-/// What must be there in any case: so many stimuli, or what is left of the sitting.
+/// Minimum number of stimuli that must fit on the disk, or the rest of the sitting if shorter.
 const LEAST_STIMULI: f64 = 20.0;
-/// A line of the event log and one of each table, bytes.
+/// Size of one answer in the event log and the tables, bytes.
 const ANSWER_BYTES: f64 = 4.0e3;
 
-/// What a sitting will write.
+/// Expected output of a sitting.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Need {
-    /// Stimuli still to come, about.
+    /// Estimated number of remaining stimuli.
     pub(super) stimuli: f64,
-    /// What a second of movement takes, bytes; 0 where it is not recorded.
+    /// Recorded movement, bytes per second; 0 without recording.
     pub(super) bytes_per_s: f64,
 }
 
-/// What there is to say of the room there is.
+/// Result of comparing need and free space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Room {
     Enough,
-    /// For a part of the sitting: what all of it needs, bytes.
+    /// Enough for a part of the sitting; holds the bytes for all of it.
     Short(f64),
-    /// Not even for its beginning: what that needs, bytes.
+    /// Not enough to begin; holds the bytes for the minimum.
     None(f64),
 }
 
@@ -45,8 +45,8 @@ impl Need {
     }
 }
 
-/// Refuses a disk on which a sitting cannot even begin, and notes one that a whole sitting may fill. A disk that does not say how much is
-/// free is taken as it is.
+/// Rejects a disk without space to begin a sitting, and prints a note if the whole sitting may not fit. Skips the check if the free
+/// space is unknown.
 pub(super) fn check(folder: &Path, need: Need) -> Result<(), CommandError> {
     let exists =
         folder.ancestors().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });

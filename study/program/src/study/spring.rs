@@ -1,5 +1,4 @@
-//! `flotor study spring`: a spring fitted to the measured curve of a real one, its plot, and scenes of the fitted spring or of
-//! the curve itself.
+//! `flotor study spring`: fits a spring to a measured curve, plots it, and writes scenes of the fitted spring or of the curve.
 
 use super::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use clap::Args;
@@ -106,7 +105,7 @@ fn to_text(fit: &SpringFit, served: &ServedCurve) -> String {
     .join("\n")
 }
 
-/// The measurement with both springs over it: the fitted one, and the curve as it is served.
+/// Plots the measurement with the fitted spring and the rendered curve.
 fn picture(curve: &MeasuredCurve, fit: &SpringFit, served: &ServedCurve) -> String {
     let points = || curve.points.iter().map(|(x_m, force_n)| (x_m * 1.0e3, *force_n));
     let deepest_mm = points().map(|(x_mm, _)| x_mm).fold(0.0, f64::max);
@@ -133,7 +132,7 @@ fn picture(curve: &MeasuredCurve, fit: &SpringFit, served: &ServedCurve) -> Stri
         .to_svg()
 }
 
-/// The fitted spring by the law of the built-in scene of experiments.
+/// Returns the scene of the fitted spring, for the model of the built-in study scene.
 fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> Result<String, CurveError> {
     let (free_length_m, gamma_n) = fit.free_length_m.zip(fit.gamma_n).ok_or(CurveError::NoFreeLength)?;
     let parameters = format!(
@@ -147,10 +146,10 @@ fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> Result<String, Curve
     Ok(life_size(head, "spring", &parameters))
 }
 
-/// How long a spring of unknown length is drawn, as a share of how far it was compressed: it was not solid then.
+/// Drawn length of a spring of unknown length, as a multiple of the largest compression.
 const DRAWN: f64 = 1.5;
 
-/// The curve itself.
+/// Returns the scene of the measured curve.
 fn curve_scene(table: &Path, fit: &SpringFit, served: &ServedCurve, coil_diameter_mm: Option<f64>) -> String {
     let table = table.file_name().unwrap_or_default().to_string_lossy();
     let deepest_m = served.knots.last().map_or(0.0, |(x_m, _)| *x_m);
@@ -172,7 +171,7 @@ fn coil(diameter_mm: Option<f64>) -> String {
     diameter_mm.map_or_else(String::new, |mm| format!("coil_diameter_mm = {mm}\n"))
 }
 
-/// A scene with a model millimetre for millimetre and newton for newton: scaled, it would not be the real spring any more.
+/// Returns a scene without scaling of motion or force: the model represents a real spring.
 fn life_size(head: &str, plugin: &str, parameters: &str) -> String {
     format!(
         "{head}rate_hz = 1000\n\n[device]\nplugin = \"simulated\"\n\n[[model]]\nplugin = \"{plugin}\"\n\n\

@@ -1,28 +1,28 @@
-//! What is analysed: subjects, their groups, and what they were measured under.
+//! Design of an analysis of variance: subjects, groups, and conditions.
 
 use crate::StatisticsError;
 use crate::count;
 use crate::linear::Matrix;
 
-/// A factor that divides the subjects into groups.
+/// Factor that divides the subjects into groups.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BetweenFactor {
-    /// Its name in the table.
+    /// Factor name in the table.
     pub name: String,
-    /// The group of each subject, counted from 0.
+    /// Group of each subject, from 0.
     pub groups: Vec<usize>,
 }
 
-/// A factor all of whose levels every subject was measured at.
+/// Factor with repeated measures: every subject is measured at all levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WithinFactor {
-    /// Its name in the table.
+    /// Factor name in the table.
     pub name: String,
-    /// How many levels it has.
+    /// Number of levels, 2 or more.
     pub levels: usize,
 }
 
-/// A checked design with its responses.
+/// Checked design with its responses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Design {
     between: Vec<BetweenFactor>,
@@ -30,7 +30,7 @@ pub struct Design {
     responses: Matrix,
 }
 
-/// A set of factors, by their place in the design: an effect within or between.
+/// Set of factors by their indices in the design: an effect within or between subjects.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Term(Vec<usize>);
 
@@ -43,7 +43,7 @@ impl Term {
         other.0.iter().all(|factor| self.0.contains(factor))
     }
 
-    /// All sets of so many factors: the empty one, then by size.
+    /// Returns all sets of factors in order of size, the empty set first.
     fn all(factors: usize) -> Vec<Self> {
         let mut terms = vec![Self(Vec::new())];
         for factor in 0..factors {
@@ -57,11 +57,12 @@ impl Term {
 }
 
 impl Design {
-    /// Checks a design. `responses[subject]` has one value per cell of the within-subject factors, the levels of the
-    /// last factor running fastest; without such factors, one value.
+    /// Checks a design. `responses[subject]` has one value per cell of the within-subject factors, with the levels of the last
+    /// factor varying fastest; without such factors, one value.
     ///
     /// # Errors
-    /// Names what does not fit: counts, a group without subjects, too few subjects, a value that is not finite.
+    /// [`StatisticsError::Design`] for wrong counts, a group without subjects, or a value that is not finite;
+    /// [`StatisticsError::TooFew`] for too few subjects.
     pub fn new(
         between: Vec<BetweenFactor>,
         within: Vec<WithinFactor>,
@@ -103,7 +104,7 @@ impl Design {
         Ok(design)
     }
 
-    /// Every combination of groups has a subject, and somewhere there are two.
+    /// Checks that every combination of groups has a subject, and at least one has two.
     fn check_groups(&self) -> Result<(), StatisticsError> {
         let combinations: usize = self.between.iter().map(BetweenFactor::count).product();
         let combination = |subject: usize| {
@@ -129,7 +130,7 @@ impl Design {
         Ok(())
     }
 
-    /// How many subjects.
+    /// Returns the number of subjects.
     #[must_use]
     pub fn subjects(&self) -> usize {
         self.responses.rows()
@@ -153,7 +154,7 @@ impl Design {
         between.chain(within).collect::<Vec<_>>().join(":")
     }
 
-    /// The columns of an effect between subjects, coded to sum to zero over the groups of each factor.
+    /// Returns the design columns of an effect between subjects, coded to sum to zero over the groups of each factor.
     pub(super) fn coded(&self, term: &Term) -> Matrix {
         let factors = term.0.iter().filter_map(|index| self.between.get(*index));
         let intercept = Matrix::from_fn(self.subjects(), 1, |_, _| 1.0);
@@ -165,8 +166,7 @@ impl Design {
         })
     }
 
-    /// Orthonormal contrasts of an effect within subjects, over all cells: its own factors by contrasts, the others by
-    /// their mean.
+    /// Returns orthonormal contrasts of an effect within subjects, over all cells: contrasts of its own factors, means over the others.
     pub(super) fn contrasts(&self, term: &Term) -> Matrix {
         let one = Matrix::from_fn(1, 1, |_, _| 1.0);
         self.within.iter().enumerate().fold(one, |contrasts, (index, factor)| {
@@ -201,7 +201,7 @@ fn constant(levels: usize) -> Matrix {
     Matrix::from_fn(levels, 1, |_, _| 1.0 / count(levels).sqrt())
 }
 
-/// Each level against the mean of those before it, of length one.
+/// Returns normalised Helmert contrasts: each level against the mean of the previous ones.
 fn helmert(levels: usize) -> Matrix {
     Matrix::from_fn(levels, levels - 1, |level, column| {
         let before = count(column + 1);

@@ -1,13 +1,12 @@
 //! Analysis of variance with factors between subjects and within them.
 //!
-//! One row per subject, one response per cell of the within-subject factors. Effects within subjects are tested as a
-//! general linear model of orthonormal contrasts: the responses of a subject are multiplied by contrasts of the
-//! within-subject factors, and the between-subject design explains those. The sums of squares are traces of the
-//! hypothesis and error matrices of that model, which is what `car::Anova` does in R; it stays right for groups of
-//! unequal size, where type II and type III differ:
+//! One row per subject, one response per cell of the within-subject factors. Effects within subjects are tested by a general linear
+//! model of orthonormal contrasts: the responses of a subject are multiplied by contrasts of the within-subject factors, and the
+//! between-subject design explains the products. The sums of squares are traces of the hypothesis and error matrices of that model,
+//! as in `car::Anova` of R; they are valid for groups of unequal size, where type II and type III differ:
 //!
-//! - **Type III**: each effect beyond all others, with effects coded to sum to zero.
-//! - **Type II**: each effect beyond all others that do not contain it.
+//! - **Type III**: each effect adjusted for all others, with effects coded to sum to zero.
+//! - **Type II**: each effect adjusted for all others that do not contain it.
 //!
 //! Greenhouse and Geisser's epsilon (1959) and Huynh and Feldt's (1976, with Lecoutre's correction of 1991) scale the
 //! degrees of freedom of effects whose contrasts vary unequally.
@@ -23,85 +22,83 @@ use crate::{ROUNDING, StatisticsError, count};
 use design::Term;
 use serde::Serialize;
 
-/// What an effect is tested beyond.
+/// Type of the sums of squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum SumOfSquares {
-    /// All effects that do not contain it.
+    /// Type II: adjusted for all effects that do not contain the tested one.
     #[serde(rename = "II")]
     Two,
-    /// All others.
+    /// Type III: adjusted for all other effects.
     #[default]
     #[serde(rename = "III")]
     Three,
 }
 
-/// One line of the table.
+/// Row of the table: one effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effect {
-    /// The factors, joined by colons: `modality:base`.
+    /// Factors, joined by colons: `modality:base`.
     pub effect: String,
-    /// Sum of squares.
+    /// Sum of squares of the effect.
     pub sum_of_squares: f64,
-    /// Degrees of freedom.
+    /// Degrees of freedom of the effect.
     pub df: f64,
-    /// Sum of squares of the error it is tested against.
+    /// Sum of squares of the error.
     pub error_sum_of_squares: f64,
     /// Degrees of freedom of the error.
     pub error_df: f64,
-    /// F; NaN (`null` in JSON) where the error is nothing but rounding errors of the responses.
+    /// F; NaN (`null` in JSON) if the error consists of rounding errors only.
     pub f: f64,
-    /// Probability of a larger F without the effect; NaN as [`Self::f`].
+    /// Probability of a larger F without the effect; NaN like [`Self::f`].
     pub p: f64,
-    /// Share of what the effect and its error explain together; NaN as [`Self::f`]. Larger in the mean than that of the population,
-    /// which [`partial_omega_squared`] estimates.
+    /// Share of effect in the sum of squares of effect and error; NaN like [`Self::f`]. Biased upwards, unlike [`partial_omega_squared`].
     pub partial_eta_squared: f64,
-    /// Partial omega squared with its interval, without a correction for unequally varying contrasts; none where there is nothing
-    /// to test.
+    /// Partial omega squared with its interval, without sphericity correction; `None` without a test.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub partial_omega_squared: Option<EffectSize>,
-    /// The reason why there is no F.
+    /// Reason for a missing F.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "reason")]
     pub not_testable: Option<StatisticsError>,
-    /// Share of what the effect and all errors explain together (Olejnik and Algina 2003, all factors manipulated).
+    /// Share of the effect in the sum of squares of effect and all errors (Olejnik and Algina 2003, all factors manipulated).
     pub generalised_eta_squared: f64,
-    /// Corrections where the effect has more than one contrast within subjects.
+    /// Sphericity corrections; `None` unless the effect has more than one contrast within subjects.
     pub sphericity: Option<Sphericity>,
 }
 
 impl Effect {
-    /// Whether there is an F: an effect that scaling has removed from all responses has none, nor one without an error.
+    /// Returns true if the effect has an F. An effect without error, or removed by scaling of all responses, has none.
     #[must_use]
     pub fn is_testable(&self) -> bool {
         self.not_testable.is_none()
     }
 }
 
-#[allow(clippy::ref_option)] // as serde asks
+#[allow(clippy::ref_option)] // signature required by serde
 fn reason<S: serde::Serializer>(reason: &Option<StatisticsError>, serializer: S) -> Result<S::Ok, S::Error> {
     reason.as_ref().map(ToString::to_string).serialize(serializer)
 }
 
-/// Least degrees of freedom that are left of those of the residuals: fewer are rounding errors.
+/// Smallest residual degrees of freedom after subtraction; less is rounding error.
 const LEAST_LEFT: f64 = 1.0e-9;
 
-/// How unequally the contrasts of an effect vary, and p-values that include it.
+/// Sphericity estimates and corrected p-values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sphericity {
-    /// Greenhouse and Geisser's epsilon: 1 where all contrasts vary equally and independently.
+    /// Greenhouse and Geisser's epsilon: 1 for equal and independent variances of all contrasts.
     pub epsilon_gg: f64,
-    /// p-value with degrees of freedom scaled by it.
+    /// p-value with degrees of freedom scaled by `epsilon_gg`.
     pub p_gg: f64,
-    /// Huynh and Feldt's epsilon, which may exceed 1; its least value, one over the contrasts, where a single degree of freedom
-    /// is left to the residuals.
+    /// Huynh and Feldt's epsilon, which may exceed 1; its minimum, one over the number of contrasts, if the residuals have a single
+    /// degree of freedom.
     pub epsilon_hf: f64,
-    /// p-value with degrees of freedom scaled by it, at most by 1.
+    /// p-value with degrees of freedom scaled by `epsilon_hf`, limited to 1.
     pub p_hf: f64,
 }
 
-/// The table of a design.
+/// Computes the analysis-of-variance table of a design.
 ///
-/// Effects come in this order: factors between subjects and their interactions first, then each term within subjects
-/// followed by its interactions with those.
+/// Order of the effects: factors between subjects and their interactions, then each term within subjects followed by its
+/// interactions with the between-subject terms.
 #[must_use]
 pub fn analyse(design: &Design, kind: SumOfSquares) -> Vec<Effect> {
     let between = design.between_terms();
@@ -115,7 +112,7 @@ pub fn analyse(design: &Design, kind: SumOfSquares) -> Vec<Effect> {
         error_total += error.trace();
         for term in &between {
             if within.is_empty() && term.is_empty() {
-                continue; // the grand mean: nobody asks whether it is zero
+                continue; // grand mean: not tested
             }
             let (smaller, larger) = nested(design, &between, term, kind);
             let hypothesis = larger.products_beyond(&smaller, &contrasts);
@@ -136,7 +133,7 @@ pub fn analyse(design: &Design, kind: SumOfSquares) -> Vec<Effect> {
     effects
 }
 
-/// The models without and with a term that its sum of squares compares.
+/// Returns the models without and with a term, whose difference is the term's sum of squares.
 fn nested(design: &Design, all: &[Term], term: &Term, kind: SumOfSquares) -> (Basis, Basis) {
     let kept = |other: &&Term| match kind {
         SumOfSquares::Two => !other.contains(term),
@@ -179,7 +176,7 @@ fn test(
         p: tested(fisher_above(f, df, error_df)),
         partial_eta_squared: tested(squares / (squares + error_squares)),
         partial_omega_squared: not_testable.is_none().then(|| partial_omega_squared(f, df, error_df)),
-        generalised_eta_squared: f64::NAN, // known once all errors are
+        generalised_eta_squared: f64::NAN, // set when all errors are known
         sphericity: (contrasts > 1 && not_testable.is_none())
             .then(|| sphericity(error, f, df, error_df, count(residual_df))),
         not_testable,
@@ -190,15 +187,15 @@ fn sphericity(error: &Matrix, f: f64, df: f64, error_df: f64, residual_df: f64) 
     let contrasts = count(error.columns());
     let epsilon_gg = error.trace() * error.trace() / (contrasts * error.trace_of_square());
     let epsilon_hf = if residual_df > 1.0 {
-        // What is left is 0 where all the error there can be varies equally: rounding must not turn its sign.
+        // The difference is 0 if the error varies equally in all directions: rounding must not change its sign.
         let left = (residual_df - contrasts * epsilon_gg).max(LEAST_LEFT);
         ((residual_df + 1.0) * contrasts * epsilon_gg - 2.0) / (contrasts * left)
     } else {
-        // A single degree of freedom has a single direction of error: nothing is known of how contrasts vary, and the formula is 0 / 0.
+        // With one degree of freedom the error has one direction: the variances of contrasts are unknown, and the formula is 0 / 0.
         1.0 / contrasts
     };
     let scaled = |epsilon: f64| {
-        // Below its least possible value the estimate is rounding or too small a sample.
+        // Below the minimum the estimate is due to rounding or too small a sample.
         let epsilon = epsilon.clamp(1.0 / contrasts, 1.0);
         fisher_above(f, epsilon * df, epsilon * error_df)
     };

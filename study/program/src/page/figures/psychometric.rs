@@ -1,4 +1,4 @@
-//! The psychometric function: the share of right answers over the difference, and the function fitted to each subject.
+//! Figure of the psychometric functions: share of correct answers over the difference, with the fitted function of each subject.
 
 use super::{HEIGHT_PX, MODALITIES};
 use flotor_analysis::SubjectRecord;
@@ -10,17 +10,17 @@ use flotor_study::protocol::JndProtocol;
 use flotor_study::sitting::Verdict;
 use flotor_study::trial::{Judgement, Modality, Phase, Presented};
 
-/// Width of a group of differences, as a share of the base, and the fewest answers that a group is drawn with.
+/// Width of a group of differences, as a share of the base, and the minimum number of answers in a plotted group.
 const GROUP: f64 = 0.05;
 const FEWEST_ANSWERS: usize = 5;
 
 /// Points of a curve.
 const CURVE_POINTS: u32 = 80;
 
-/// The look of the functions of single subjects.
+/// Style slot of the functions of single subjects.
 const GREY: usize = 7;
 
-/// Draws the answers of all subjects, all bases together, and the most likely function of each subject.
+/// Plots the answers of all subjects, pooled over bases, and the most likely function of each subject.
 pub(in super::super) fn psychometric(protocol: &JndProtocol, subjects: &[SubjectRecord]) -> Figure {
     let target = protocol.procedure.target();
     let figure = Figure::new("Psychometric functions", Axis::linear("Difference", "% of the base"))
@@ -41,7 +41,7 @@ pub(in super::super) fn psychometric(protocol: &JndProtocol, subjects: &[Subject
         .fold(figure, Figure::panel)
 }
 
-/// The judged answers of a subject in a modality.
+/// Returns the judged answers of a subject in a modality.
 fn observations(record: &SubjectRecord, modality: Modality) -> Vec<Observation> {
     let here =
         record.counted().filter(|event| event.trial.modality == modality && event.trial.phase == Phase::Main);
@@ -82,20 +82,20 @@ fn panel(slot: usize, name: &str, of_subjects: &[Vec<Observation>], target: f64,
         .mark(Mark::at_y(100.0 * target, format!("{:.0} %", 100.0 * target)))
 }
 
-/// The observer who is most likely to give these answers.
+/// Returns the most likely observer for the answers.
 fn observer(observations: &[Observation], target: f64) -> TernaryObserver {
     let prior = Prior::default();
     let estimate = most_likely(observations, &prior, target);
     TernaryObserver { sigma: estimate.sigma, criterion: estimate.criterion, bias: 0.0, lapse: prior.lapse }
 }
 
-/// The share of right answers, where "I don't know" counts half.
+/// Returns the share of correct answers; "I don't know" counts half.
 fn share_right(observer: &TernaryObserver, delta: f64) -> f64 {
     let [correct, wrong] = observer.correct_and_wrong(delta);
     0.5 * (1.0 + correct - wrong)
 }
 
-/// The share of right answers in groups of differences, %, with one standard error each way.
+/// Returns the share of correct answers in groups of differences, %, with one standard error in each direction.
 fn groups(of_subjects: &[Vec<Observation>]) -> Vec<ErrorBar> {
     let all: Vec<&Observation> = of_subjects.iter().flatten().collect();
     let largest = all.iter().map(|one| one.delta).fold(0.0, f64::max);
@@ -118,7 +118,7 @@ fn groups(of_subjects: &[Vec<Observation>]) -> Vec<ErrorBar> {
     found
 }
 
-/// How far an answer is right.
+/// Returns the score of an answer, 0 to 1.
 fn worth(judgement: Judgement) -> f64 {
     match judgement {
         Judgement::Correct => 1.0,

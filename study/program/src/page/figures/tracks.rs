@@ -1,4 +1,4 @@
-//! The adaptive tracks of a subject, a panel each: differences presented, what was answered, and where the direction turned.
+//! Figure of a subject's adaptive tracks, one panel each: differences, answers, and reversals.
 
 use super::MODALITIES;
 use flotor_analysis::SubjectRecord;
@@ -8,21 +8,21 @@ use flotor_study::protocol::Stimulus;
 use flotor_study::sitting::{TrackResult, Verdict};
 use flotor_study::trial::{Judgement, Presented};
 
-/// Looks of answers that are not right, and of reversals.
+/// Style slots of wrong answers, "I don't know", and reversals.
 const WRONG: usize = 6;
 const UNSURE: usize = 4;
 const REVERSAL: usize = 7;
 
-/// An answer of a track.
+/// Answer of a track.
 struct Answer {
-    /// Number in the track, from 1.
+    /// Number of the trial in the track, from 1.
     trial: f64,
     difference_percent: f64,
     judgement: Judgement,
     is_reversal: bool,
 }
 
-/// Draws the tracks of a subject.
+/// Plots the tracks of a subject.
 pub(in super::super) fn tracks(record: &SubjectRecord, stimulus: &Stimulus) -> Figure {
     let answers: Vec<(&TrackResult, Vec<Answer>)> =
         record.tracks.iter().map(|track| (track, answers(record, track))).collect();
@@ -46,7 +46,7 @@ pub(in super::super) fn tracks(record: &SubjectRecord, stimulus: &Stimulus) -> F
         .fold(figure, |figure, (track, answers)| figure.panel(panel(track, answers, unit, largest)))
 }
 
-/// The judged answers of a track, in order.
+/// Returns the judged answers of a track, in order.
 fn answers(record: &SubjectRecord, track: &TrackResult) -> Vec<Answer> {
     let judged = |event: &TrialEvent| match (event.trial.presented, event.verdict) {
         (Presented::Pair(pair), Verdict::Judged { judgement, reversal }) => {
@@ -76,7 +76,7 @@ fn panel(track: &TrackResult, answers: &[Answer], unit: &str, largest: f64) -> P
     let of =
         |judgement: Judgement| answers.iter().filter(move |answer| answer.judgement == judgement).map(place);
     let reversals = answers.iter().filter(|answer| answer.is_reversal).map(place);
-    // The unit is in the subtitle: a heading of this width has no room for it.
+    // The unit is in the subtitle: panel headings are too narrow.
     let panel = Panel::new(Axis::linear("", "").range(0.0, 1.08 * largest))
         .title(format!("{} {unit}, {name}, track {}", track.base, track.track))
         .series(Series::line("", answers.iter().map(place)).slot(slot).faint())

@@ -1,4 +1,4 @@
-//! Screens and inputs as lines of JSON, for a window that is another program.
+//! Screens and inputs as lines of JSON, for a separate window program.
 
 use super::MOMENT;
 use flotor_study::apparatus::attend::{FrontEnd, Heard};
@@ -7,14 +7,14 @@ use flotor_study::screen::{Said, Screen, Told, Warning};
 use std::io::{ErrorKind, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
-/// The two directions of a window.
+/// Front end over lines of JSON in both directions.
 pub(in crate::study) struct JsonLines<W> {
     lines: Receiver<String>,
     out: W,
 }
 
 impl<W: Write> JsonLines<W> {
-    /// A window that is heard and told things here.
+    /// Creates the front end from input lines and an output stream.
     pub(in crate::study) fn new(lines: Receiver<String>, out: W) -> Self {
         Self { lines, out }
     }
@@ -22,7 +22,7 @@ impl<W: Write> JsonLines<W> {
     fn report(&mut self, told: &Told) -> Result<(), OutsideError> {
         let line = serde_json::to_string(told)?;
         match writeln!(self.out, "{line}").and_then(|()| self.out.flush()) {
-            // A window that has gone says so by falling silent.
+            // Ignored: a closed window is detected by the end of its input.
             Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
             other => Ok(other?),
         }
@@ -38,7 +38,7 @@ impl<W: Write> FrontEnd for JsonLines<W> {
         let line = match self.lines.recv_timeout(MOMENT) {
             Ok(line) => line,
             Err(RecvTimeoutError::Timeout) => return Ok(Heard::Nothing),
-            // The window is closed.
+            // The input has ended: the window is closed.
             Err(RecvTimeoutError::Disconnected) => return Ok(Heard::Closed),
         };
         match Said::read(&line) {

@@ -1,4 +1,4 @@
-//! Where a person sees screens and answers: words on a terminal, the viewer's window, or lines of JSON for a window of one's own.
+//! Front ends of a person's sitting: text on a terminal, the viewer's window, or lines of JSON for another window.
 
 mod json;
 mod terminal;
@@ -13,22 +13,22 @@ use std::io::BufRead;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-/// How long the handle goes unwatched at most while somebody thinks.
+/// Timeout of one poll for input, so that the handle is watched meanwhile.
 const MOMENT: Duration = Duration::from_millis(50);
 
-/// `--screen`
+/// Values of `--screen`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum ScreenOption {
     /// The viewer's window, in front of the person
     #[default]
     Viewer,
-    /// Words on this terminal, answers by keyboard
+    /// Text on this terminal, answers by keyboard
     Terminal,
-    /// A screen per line of JSON on standard output, an input per line on standard input
+    /// One screen per line of JSON on standard output, one input per line on standard input
     Json,
 }
 
-/// `--stop-key`
+/// Values of `--stop-key`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum StopKeyOption {
     /// Escape
@@ -41,7 +41,7 @@ pub(super) enum StopKeyOption {
 }
 
 impl StopKeyOption {
-    /// As the viewer takes it.
+    /// Returns the name in the viewer's options.
     fn word(self) -> &'static str {
         match self {
             Self::Escape => "escape",
@@ -51,10 +51,10 @@ impl StopKeyOption {
     }
 }
 
-/// Lines as they come.
+/// Reads lines in a background thread and returns their channel.
 pub(super) fn lines_of(reader: impl BufRead + Send + 'static) -> std::io::Result<Receiver<String>> {
     let (sender, lines) = channel();
-    // Ends with its reader or with the process: nothing can call it back from a read.
+    // Detached: a blocking read cannot be interrupted; the thread ends with its reader or the process.
     std::thread::Builder::new().name("flotor-answers".to_owned()).spawn(move || {
         for line in reader.lines().map_while(Result::ok) {
             if sender.send(line).is_err() {

@@ -1,4 +1,4 @@
-//! Text on a terminal, answers by keyboard.
+//! Front end on a terminal, with answers by keyboard.
 
 use super::{MOMENT, lines_of};
 use flotor_command::say;
@@ -11,13 +11,13 @@ use flotor_study::trial::{Phase, Position, Response};
 use std::io::{BufReader, IsTerminal, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
-/// A person at this terminal.
+/// Front end on this terminal.
 pub(in crate::study) struct Terminal {
     lines: Receiver<String>,
 }
 
 impl Terminal {
-    /// Listens to standard input from now on.
+    /// Starts reading standard input.
     pub(in crate::study) fn listen() -> std::io::Result<Self> {
         Ok(Self { lines: lines_of(BufReader::new(std::io::stdin()))? })
     }
@@ -25,7 +25,7 @@ impl Terminal {
 
 impl FrontEnd for Terminal {
     fn show(&mut self, screen: &Screen) -> Result<(), OutsideError> {
-        // What was typed before there was something to answer is no answer. A script at a pipe knows what comes.
+        // Discard input typed before the screen was shown. Piped input is kept: a script knows the sequence.
         if std::io::stdin().is_terminal() {
             while self.lines.try_recv().is_ok() {}
         }
@@ -50,7 +50,7 @@ impl FrontEnd for Terminal {
     }
 
     fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
-        // The bell is the beep of the thesis; the masking noise is another signal.
+        // The bell replaces the beep of the thesis.
         ring_bell();
         say!("  {} the handle is out of its range: move it back", style::warning("!"));
         Ok(())
@@ -67,7 +67,7 @@ fn ring_bell() {
     let _ = std::io::stdout().write_all(b"\x07");
 }
 
-/// A screen as text.
+/// Formats a screen as text.
 fn words(screen: &Screen) -> String {
     match screen {
         Screen::Read { text } => {
@@ -108,7 +108,7 @@ fn words(screen: &Screen) -> String {
     }
 }
 
-/// The keys for what a person may do but need not.
+/// Describes the keys of optional inputs.
 fn others(trial: &TrialView) -> String {
     let key = |may: &May| match may {
         May::Practise => "; p practises first".to_owned(),
@@ -136,7 +136,7 @@ fn pause(reason: Pause, next: &TrialView) -> &'static str {
     }
 }
 
-/// Meaning of a typed line.
+/// Parses a typed line.
 fn typed(line: &str, screen: &Screen) -> Result<Input, String> {
     let line = line.trim();
     let answer = |response| Ok(Input::Answer { response });

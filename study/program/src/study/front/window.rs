@@ -1,4 +1,4 @@
-//! The viewer's window: a process of its own that watches the run, shows what it is told and says what the person does.
+//! Front end in the viewer's window: a separate process that displays the run and the screens and sends the person's inputs.
 
 use super::{JsonLines, StopKeyOption, lines_of};
 use flotor_command::CommandError;
@@ -11,21 +11,21 @@ use std::path::Path;
 use std::process::{ChildStdin, Stdio};
 use std::time::Duration;
 
-/// How often it is looked whether the window is still there.
+/// Poll interval for the exit of the viewer.
 const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
-/// A window in front of a person. Dropped, it closes.
+/// Viewer window in front of a person. Dropping it closes the window.
 pub(in crate::study) struct Window {
-    /// What is said to it and heard of it.
+    /// Messages to and from the window.
     pub(in crate::study) lines: JsonLines<ChildStdin>,
     viewer: Running,
 }
 
 impl Window {
-    /// Opens a window on the run of this process, and waits until it is there.
+    /// Opens a window on the run of this process and waits until it is visible.
     ///
     /// # Errors
-    /// There is no viewer, or it cannot open a window and has said why.
+    /// If there is no viewer, or the viewer cannot open a window and has printed the reason.
     pub(in crate::study) fn open(
         stop_key: StopKeyOption,
         texts: Option<&Path>,
@@ -44,7 +44,7 @@ impl Window {
             return Err(CommandError::Failed("cannot open the pipes of the viewer".to_owned()));
         };
         let heard = lines_of(BufReader::new(output)).map_err(failed)?;
-        // Its first word is that it is open; it says none when it cannot be.
+        // The first message reports the open window; without a window, the stream ends.
         if heard.recv().is_err() {
             let why = "the viewer opened no window (its message is above); --screen terminal needs none";
             return Err(CommandError::Usage(why.to_owned()));
@@ -52,7 +52,7 @@ impl Window {
         Ok(Self { lines: JsonLines::new(heard, input), viewer })
     }
 
-    /// Waits until the person closes the window, or somebody stops the study.
+    /// Waits until the person closes the window or a stop is requested.
     pub(in crate::study) fn wait_closed(mut self, stop: &StopSwitch) {
         while self.viewer.0.try_wait().is_ok_and(|status| status.is_none()) && !stop.is_stop_asked() {
             std::thread::sleep(LOOK_PERIOD);
