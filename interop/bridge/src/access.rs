@@ -1,4 +1,4 @@
-//! Keys and access control: one command makes a network of which every member is known and may do what it may.
+//! Keys and access control: one command sets up a network whose members are all known, each with its rights.
 
 use crate::keys::{Name, ROOT};
 use crate::link::MEMBER;
@@ -15,52 +15,52 @@ use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Who is to be a member.
+/// Members of a network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Members {
-    /// Names or addresses under which the bridge is reached.
+    /// Names or addresses of the bridge's host.
     pub hosts: Vec<String>,
-    /// Who may do what. Names of people or machines, each once.
+    /// Names of people or machines, each once, with their rights.
     pub peers: Vec<(Name, Right)>,
-    /// How long the keys are good for: who leaves without being told out is out by then.
+    /// Validity of the keys: without a revocation, a leaving member loses access at its end.
     pub valid: Duration,
 }
 
-/// How long keys are good for unless told otherwise: a year.
+/// Default validity of the keys: a year.
 pub const VALID: Duration = Duration::from_secs(365 * DAY_S);
 const DAY_S: u64 = 86_400;
-/// Under this key a configuration says until when its certificate is good, s since 1970.
+/// Configuration key of the certificate's expiry, s since 1970.
 pub const EXPIRES: &str = "expires_s";
-/// Under this key a configuration names the file of its stop keys ([`crate::stop_channel`]).
+/// Configuration key of the file of stop keys ([`crate::stop_channel`]).
 pub const STOP_KEYS: &str = "stop_keys";
 
-/// Why there are no keys.
+/// Error of writing keys.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AccessError {
-    /// A file could not be made.
+    /// A file could not be created.
     #[error("{}: {cause}; keys are written once, into a folder you may write to", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         #[source]
         cause: io::Error,
     },
-    /// Two members of one name, or one of a name that is taken.
+    /// A member's name appears twice, or is reserved.
     #[error("`{0}` is there twice: a peer has one right, and `bridge`, `authority` and `anyone` are taken")]
     Twice(Name),
-    /// A certificate could not be made.
+    /// A certificate could not be created.
     #[error("no certificate: {0}")]
     Certificate(#[from] rcgen::Error),
 }
 
-/// The bridge's own name among the files.
+/// File name of the bridge, reserved among the members.
 const BRIDGE: &str = "bridge";
-/// The name of who guarantees for all.
+/// File name of the certificate authority, reserved among the members.
 const AUTHORITY: &str = "authority";
 
-/// Writes certificates, keys and one Zenoh configuration for the bridge and each member; the configurations written.
+/// Writes certificates, keys and one Zenoh configuration for the bridge and each member; returns the paths of the configurations.
 ///
 /// # Errors
 /// [`AccessError`]; no file is ever replaced.
@@ -108,8 +108,8 @@ fn write_stop_keys(folder: &Path, members: &Members) -> Result<(), AccessError> 
     if all.is_empty() { Ok(()) } else { write(&folder.join(format!("{BRIDGE}.stop")), &all, Readers::Owner) }
 }
 
-/// Who guarantees for all members, and the certificate by which they know it. Its key is thrown away: a new member means new keys
-/// for all, and nobody can ever add one secretly.
+/// Creates the certificate authority of all members, and its certificate. The authority's key is discarded: a new member requires
+/// new keys for all, and nobody can ever add a member secretly.
 fn authority(valid: Duration) -> Result<(Issuer<'static, KeyPair>, String), AccessError> {
     let mut parameters = CertificateParams::default();
     expire(&mut parameters, valid);
@@ -131,8 +131,8 @@ fn member(name: &str, hosts: &[String], valid: Duration) -> Result<CertificatePa
     Ok(parameters)
 }
 
-/// Returns the first file with a private key that others than its owner may read or write: one that the TLS part of a Zenoh
-/// configuration names, the stop keys, or the configuration itself if it holds a key.
+/// Returns the first file with a private key that others than its owner may read or write: a file named by the TLS section of a
+/// Zenoh configuration, the stop keys, or the configuration itself if it contains a key.
 pub(crate) fn exposed_key(tls: &Value, metadata: &Value, config: Option<&Path>) -> Option<PathBuf> {
     let text = |key: &str| tls.get(key).and_then(Value::as_str);
     let ends = ["listen", "connect"];
@@ -140,17 +140,17 @@ pub(crate) fn exposed_key(tls: &Value, metadata: &Value, config: Option<&Path>) 
     let named = named.chain(metadata.get(STOP_KEYS).and_then(Value::as_str)).map(PathBuf::from);
     let inline = ends.iter().filter_map(|end| text(&format!("{end}_private_key_base64")));
     let holding = inline.filter_map(|_| config.map(Path::to_path_buf));
-    // Zenoh reports a file that is missing.
+    // Zenoh reports a missing file.
     let is_exposed =
         |file: &PathBuf| file.metadata().is_ok_and(|found| found.permissions().mode() & 0o077 != 0);
     named.chain(holding).find(is_exposed)
 }
 
-/// Good from yesterday, for clocks that differ, to as long from now as chosen.
+/// Sets the validity: from yesterday, for clocks that differ, to the chosen time from now.
 fn expire(parameters: &mut CertificateParams, valid: Duration) {
     let at = |s: u64| date_time_ymd(1970, 1, 1) + Duration::from_secs(s);
     parameters.not_before = at(now_s().saturating_sub(DAY_S));
-    // Certificates know no year 10000.
+    // Certificates end before year 10000.
     parameters.not_after = at(now_s().saturating_add(valid.as_secs()).min(8000 * 365 * DAY_S));
 }
 
@@ -158,7 +158,7 @@ pub(crate) fn now_s() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }
 
-/// What a Zenoh configuration says of keys: both ends show theirs.
+/// Returns the TLS section of a Zenoh configuration: both ends present certificates.
 fn tls(folder: &Path, name: &str) -> Value {
     let file = |name: &str, kind: &str| folder.join(format!("{name}.{kind}")).display().to_string();
     json!({
@@ -194,7 +194,7 @@ fn peer_config(folder: &Path, name: &str, members: &Members) -> Value {
     })
 }
 
-/// What this program reads in a configuration: name, end of the validity, and stop keys.
+/// Returns the metadata that this program reads in a configuration: name, expiry, and stop keys.
 fn metadata(folder: &Path, name: &str, members: &Members) -> Value {
     let expires_s = now_s().saturating_add(members.valid.as_secs());
     if members.peers.is_empty() {
@@ -203,7 +203,7 @@ fn metadata(folder: &Path, name: &str, members: &Members) -> Value {
     json!({ MEMBER: name, EXPIRES: expires_s, STOP_KEYS: folder.join(format!("{name}.stop")) })
 }
 
-/// The access control of a bridge without keys: it cannot tell anybody apart, but nobody tells anything in its name.
+/// Returns the access control of a bridge without keys: peers are not distinguished, but none can publish as the bridge.
 pub(crate) fn of_anyone() -> Vec<(&'static str, Value)> {
     let rules: Vec<Value> = rules().into_iter().chain(asking(&Name::anyone(), Right::Own)).collect();
     let allowed: Vec<Value> = rules.iter().map(|rule| rule["id"].clone()).collect();
@@ -220,7 +220,7 @@ fn rule(id: &str, flow: &str, messages: Value, keys: Vec<String>) -> Value {
     json!({ "id": id, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": keys })
 }
 
-/// What everybody may do that gets in: the bridge tells, they listen; who may couple puts what its hand does.
+/// Returns the rules for all peers: they receive the bridge's messages; peers with the right to couple publish the hand's state.
 fn rules() -> Vec<Value> {
     let of_any = |keys: &[&str]| keys.iter().map(|key| format!("{ROOT}/*/{key}")).collect::<Vec<_>>();
     vec![
@@ -240,7 +240,7 @@ fn rules() -> Vec<Value> {
     ]
 }
 
-/// What a member may ask for, under its own name only: a rule for each right up to its own.
+/// Returns the rules for a member's requests, under the member's own name only: one for each right up to the member's.
 fn asking(name: &Name, right: Right) -> Vec<Value> {
     let rights = Right::ALL.into_iter().filter(|other| *other <= right);
     let asks = rights.map(|right| {
@@ -250,7 +250,7 @@ fn asking(name: &Name, right: Right) -> Vec<Value> {
     asks.collect()
 }
 
-/// Nobody may do anything, but: the bridge tells everybody, members may listen and ask by their rights.
+/// Returns the access control of a bridge: deny by default; all peers receive, members send requests by their rights.
 fn access_control(members: &Members) -> Value {
     let mut rules = rules();
     let mut policies = Vec::new();
@@ -258,7 +258,7 @@ fn access_control(members: &Members) -> Value {
         let asking = asking(name, *right);
         let mut allowed = vec![json!("tell"), json!("listen")];
         allowed.extend(asking.iter().map(|rule| rule["id"].clone()));
-        // Who holds the other end of a coupling moves the hand here.
+        // The other end of a coupling moves the hand here, so it needs the right to operate.
         allowed.extend((*right >= Right::Operate).then_some(json!("couple")));
         policies.push(json!({ "rules": allowed, "subjects": [name.to_string()] }));
         rules.extend(asking);
@@ -279,7 +279,7 @@ const fn word(right: Right) -> &'static str {
     }
 }
 
-/// Who may read a file.
+/// Read permission of a file.
 #[derive(Clone, Copy)]
 enum Readers {
     All,

@@ -1,4 +1,4 @@
-//! A remote run as if it ran here: the viewer and everything else that watches runs of this machine sees it.
+//! Republishes a remote run locally, for the viewer and all other clients of runs on this machine.
 
 use crate::link::LinkError;
 use crate::remote::{Errand, Remote, Told};
@@ -9,23 +9,23 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How long to wait for messages before looking whether to stop.
+/// Timeout of a message, and poll interval for a stop.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
-/// Why a remote run does not appear here.
+/// Error of republishing a remote run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AttachError {
-    /// The network.
+    /// Error of the network.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// This machine.
+    /// Error of the local publication.
     #[error(transparent)]
     Publish(#[from] PublishError),
 }
 
 impl Serve for Errand {
-    /// Carries the request to the remote host, and its answer back.
+    /// Forwards the request to the remote host, and waits for the reply.
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         if matches!(ask, Ask::Swap { .. }) {
             let words = "a model is swapped on the host's own machine, where its plugin's file is";
@@ -36,10 +36,10 @@ impl Serve for Errand {
     }
 }
 
-/// Shows one remote run after the other here until told to stop. `tell` gets a line for people when something changes.
+/// Republishes one remote run after the other until stopped. `tell` receives a line for people at each change.
 ///
 /// # Errors
-/// [`AttachError`].
+/// [`AttachError`] of the network or of this machine.
 pub fn attach(
     remote: &Remote,
     directory: &Directory,
@@ -68,7 +68,7 @@ pub fn attach(
     Ok(())
 }
 
-/// Shows one run; how it ended.
+/// Republishes one run until it ends or `stop` is set; returns its end.
 fn show(remote: &Remote, publication: &Publication, stop: &AtomicBool) -> End {
     while !stop.load(Ordering::Relaxed) {
         match remote.next(LOOK_PERIOD) {

@@ -1,13 +1,13 @@
-//! Bilateral teleoperation: carries what the two ends of a coupling tell each other, between a host here and a bridge elsewhere.
+//! Bilateral teleoperation: transports the messages of the two ends of a coupling, between a host here and a remote bridge.
 //!
 //! ```text
 //!  host -> peer socket -> couple -> flotor/NAME/couple/COUPLING -> serve -> peer socket -> host
 //!       <-             <-        <- flotor/NAME/news/COUPLING   <-       <-             <-
 //! ```
 //!
-//! Both directions are best effort, and only the newest counts: what finds no room is dropped, here and in Zenoh. Nothing of it
-//! is trusted: what is no [`Dispatch`] is refused and counted; a host hears one partner, and believes of its claims what it can check
-//! (`flotor_coupling`).
+//! Both directions are best effort, and only the newest message counts: without room a message is dropped, here and in Zenoh.
+//! No message is trusted: one that is no [`Dispatch`] is rejected and counted; a host accepts one partner, and checks the partner's
+//! claims as far as possible (`flotor_coupling`).
 
 use crate::keys::Name;
 use crate::link::LinkError;
@@ -24,21 +24,21 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
-/// Pause between two looks at both sides: half a period at 1 kHz.
+/// Poll interval of both sides: half a period at 1 kHz.
 const LOOK_PERIOD: Duration = Duration::from_micros(500);
-/// Messages from the network that waits for the host at most: more is old.
+/// Limit on pending messages from the network; further ones are dropped.
 const MOST_WAITING: usize = 64;
-/// How often it is looked which couplings there are.
+/// Poll interval for new couplings.
 const FIND_PERIOD: Duration = Duration::from_millis(200);
 
-/// Which end of the network this program is.
+/// Role of this program on the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// The bridge itself, which tells everybody and lets itself be told.
+    /// Bridge: publishes to all peers, and accepts messages.
     Serving,
-    /// The same, but nobody may move its hand.
+    /// Bridge whose hand no peer may move: publishes, and accepts no messages.
     ServingDeaf,
-    /// Who came to it.
+    /// Peer that connects to a bridge.
     Visiting,
 }
 
@@ -59,24 +59,24 @@ impl Side {
     }
 }
 
-/// What was carried for a coupling.
+/// Message counts of a coupling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Carried {
-    /// Messages of the host here, put on the network.
+    /// Messages of the host here, sent to the network.
     pub told: u64,
-    /// Messages from the network, given to the host here.
+    /// Messages from the network, passed to the host here.
     pub heard: u64,
-    /// What came from the network and was no message.
+    /// Malformed messages from the network.
     pub refused: u64,
 }
 
-/// Counts that the network's threads and ours add to.
+/// Counters shared with the network's threads.
 #[derive(Default)]
 struct Counts {
     told: AtomicU64,
     heard: AtomicU64,
     refused: AtomicU64,
-    /// The run here, and the one that the other end answers; 0: none, or not known.
+    /// Run id here, and run id that the other end answers; 0: none, or unknown.
     here: AtomicU64,
     answered: AtomicU64,
 }
@@ -88,29 +88,29 @@ impl Counts {
         Carried { told, heard, refused }
     }
 
-    /// Whether the other end holds another run than the one here.
+    /// Returns whether the other end is coupled to another run.
     fn is_held_by_another(&self) -> bool {
         let [here, answered] = [&self.here, &self.answered].map(|run| run.load(Ordering::Relaxed));
         here != 0 && answered != 0 && here != answered
     }
 }
 
-/// Why messages are not carried.
+/// Error of the transport of a coupling.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CoupleError {
-    /// The network.
+    /// Error of the network.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// This machine.
+    /// Error of the local directory of couplings.
     #[error(transparent)]
     Directory(#[from] DirectoryError),
-    /// No thread.
+    /// A thread could not be created.
     #[error("no thread: {0}")]
     Thread(#[from] std::io::Error),
 }
 
-/// Carries for every coupling of the hosts that run here, as they come and go.
+/// Peer links of all couplings of the hosts that run here.
 pub struct Couplers {
     session: Session,
     directory: Directory,
@@ -121,7 +121,7 @@ pub struct Couplers {
 }
 
 impl Couplers {
-    /// None yet: [`Couplers::follow`] looks for them.
+    /// Creates an empty set; [`Couplers::follow`] finds the couplings.
     #[must_use]
     pub fn new(session: &Session, directory: &Directory, name: &Name, side: Side) -> Self {
         Self {
@@ -134,10 +134,10 @@ impl Couplers {
         }
     }
 
-    /// Takes up what has come and closes what has gone, if it is time to look. `tell` gets a line for people about each.
+    /// Starts links for new couplings and drops those of ended runs, once per poll interval. `tell` receives a line for people on each.
     ///
     /// # Errors
-    /// [`CoupleError`].
+    /// [`CoupleError`] of a new link.
     pub fn follow(&mut self, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
         if self.looked.is_some_and(|at| at.elapsed() < FIND_PERIOD) {
             return Ok(());
@@ -163,25 +163,25 @@ impl Couplers {
         Ok(())
     }
 
-    /// The couplings whose other end holds another run than the one here: this one is let in by nobody.
+    /// Returns the couplings whose other end is coupled to another run, and therefore rejects the run here.
     #[must_use]
     pub fn held_by_others(&self) -> Vec<String> {
         let held = self.here.iter().filter(|(_, coupler)| coupler.counts.is_held_by_another());
         held.map(|(name, _)| name.clone()).collect()
     }
 
-    /// What was carried for each.
+    /// Returns the message counts by coupling.
     #[must_use]
     pub fn carried(&self) -> BTreeMap<String, Carried> {
         self.here.iter().map(|(name, coupler)| (name.clone(), coupler.counts.now())).collect()
     }
 }
 
-/// Joins the couplings of hosts here with those of the same name behind a bridge, until told to stop. `tell` gets a line for
-/// people when something changes.
+/// Links the couplings of hosts here to those of the same name behind a bridge, until stopped. `tell` receives a line for
+/// people at each change.
 ///
 /// # Errors
-/// [`CoupleError`].
+/// [`CoupleError`] of a link.
 pub fn couple(
     session: &Session,
     directory: &Directory,
@@ -215,7 +215,7 @@ pub fn couple(
     Ok(())
 }
 
-/// A thread that carries for one coupling, both ways; it ends when dropped, or when the host has.
+/// Peer link of one coupling, in both directions; its thread ends when dropped, or when the host has ended.
 struct Coupler {
     counts: Arc<Counts>,
     stop: Arc<AtomicBool>,
@@ -235,7 +235,7 @@ impl Coupler {
         let (sender, from_network) = sync_channel(MOST_WAITING);
         let of_callback = Arc::clone(&counts);
         let hear = move |sample: zenoh::sample::Sample| {
-            // A long one is not even copied.
+            // Check the length before copying.
             let payload = sample.payload();
             let dispatch =
                 (payload.len() == DISPATCH_BYTES).then(|| Dispatch::from_bytes(&payload.to_bytes()));
@@ -252,7 +252,7 @@ impl Coupler {
         let hears = side.hears(name, &found.name);
         let hears = hears.map(|key| session.declare_subscriber(key).callback(hear).wait()).transpose();
         let hears = hears.map_err(LinkError::from)?;
-        // Before everything else. Not each by itself: what the network is too slow for shares a batch, and is not dropped.
+        // Highest priority. Not express: on a slow network messages share a batch instead of being dropped.
         let tells = session
             .declare_publisher(side.tells(name, &found.name))
             .congestion_control(CongestionControl::Drop)
@@ -277,7 +277,7 @@ impl Drop for Coupler {
     }
 }
 
-/// Both ways, until told to stop or until the host is gone.
+/// Transports messages in both directions until `stop` is set or the host is gone.
 fn carry(
     mut socket: PeerSocket,
     from_network: &Receiver<Dispatch>,
@@ -293,7 +293,7 @@ fn carry(
                 return;
             }
         }
-        // Of what comes together only the last is new. What the host says is its own: nothing is refused there.
+        // Only the last pending message is new. Messages of the host are local: none is rejected.
         let mut newest = None;
         while let Ok(Some(dispatch)) = socket.hear() {
             newest = Some(dispatch);

@@ -1,4 +1,4 @@
-//! A recording of a remote run.
+//! Recording of a remote run.
 
 use crate::link::LinkError;
 use crate::remote::{Remote, Told};
@@ -7,47 +7,47 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How long to wait for messages before looking whether to stop.
+/// Timeout of a message, and poll interval for a stop.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
-/// Why there is no recording.
+/// Error of a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum KeepError {
-    /// The network.
+    /// Error of the network.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The file.
+    /// Error of the file.
     #[error(transparent)]
     Record(#[from] RecordError),
 }
 
-/// What came of a recording.
+/// Result of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kept {
     /// Ticks in the file.
     pub ticks: u64,
-    /// Ticks that were lost on the way. The recording has a note at each gap.
+    /// Ticks lost in transit. The recording contains a note at each gap.
     pub lost: u64,
-    /// How it ends.
+    /// Cause of the end.
     pub end: RecordingEnd,
 }
 
-/// How a recording ends.
+/// Cause of the end of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RecordingEnd {
-    /// The run is over; its message.
+    /// The run ended, with this message.
     Over(String),
-    /// Whoever recorded has stopped.
+    /// The recorder was stopped.
     Stopped,
-    /// The bridge went without a word.
+    /// The bridge disappeared without an end message.
     Cut,
 }
 
-/// Records one remote run, from now to its end or until told to stop.
+/// Records one remote run, from now to its end or until stopped.
 ///
 /// # Errors
-/// [`KeepError`].
+/// [`KeepError`] of the network or of the file.
 pub fn keep(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<Kept, KeepError> {
     let mut kept = Kept { ticks: 0, lost: 0, end: RecordingEnd::Stopped };
     let Some((_, run)) = remote.wait_for_run(stop)? else { return Ok(kept) };

@@ -1,41 +1,41 @@
-//! What is where on the network.
+//! Zenoh keys and the messages on each.
 //!
 //! | key | what | how |
 //! |---|---|---|
-//! | `flotor/NAME/alive` | a bridge is there | liveliness token |
-//! | `flotor/NAME/status` | JSON [`crate::status::Status`] | published when it changes, and for who asks |
-//! | `flotor/NAME/greeting` | JSON [`flotor_live::Greeting`]: plugins, parameters, limits | for who asks |
-//! | `flotor/NAME/run` | protobuf `flotor.Run` | for who asks: late joiners miss nothing they need |
+//! | `flotor/NAME/alive` | presence of a bridge | liveliness token |
+//! | `flotor/NAME/status` | JSON [`crate::status::Status`] | published on change, and on query |
+//! | `flotor/NAME/greeting` | JSON [`flotor_live::Greeting`]: plugins, parameters, limits | on query |
+//! | `flotor/NAME/run` | protobuf `flotor.Run` | on query: late joiners miss nothing they need |
 //! | `flotor/NAME/tf` | protobuf `foxglove.FrameTransform` | published, one a tick |
 //! | `flotor/NAME/tick` | protobuf `flotor.Tick` | published, one a tick, after its pose |
 //! | `flotor/NAME/change` | protobuf `flotor.Change` | published |
 //! | `flotor/NAME/end` | JSON [`flotor_live::End`] | published |
-//! | `flotor/NAME/news/COUPLING` | a [`flotor_core::peer::Dispatch`]: what this end of a coupling tells the other | published, best effort |
-//! | `flotor/NAME/couple/COUPLING` | the same, of the other end | put by who holds it |
-//! | `flotor/NAME/ask/REQUEST/MEMBER` | JSON [`crate::request::NumberedRequest`] | a request, answered |
+//! | `flotor/NAME/news/COUPLING` | [`flotor_core::peer::Dispatch`] of this end of a coupling | published, best effort |
+//! | `flotor/NAME/couple/COUPLING` | [`flotor_core::peer::Dispatch`] of the other end | put by the peer, best effort |
+//! | `flotor/NAME/ask/REQUEST/MEMBER` | JSON [`crate::request::NumberedRequest`] | request with a reply |
 //!
-//! The messages are those of a recording. What may be asked for is one key for each right, so that Zenoh's access control
-//! decides who has it, and as whom: see [`crate::request::Request::key`].
+//! The messages are those of a recording. Each request has a key of its own, so that Zenoh's access control decides by key
+//! which member may send it: see [`crate::request::Request::key`].
 
 use std::fmt;
 
-/// All that this program puts on a network.
+/// First part of all keys of this program.
 pub const ROOT: &str = "flotor";
 
-/// What the others call a bridge: a part of a key.
+/// Name of a bridge or a member: one part of a key.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Name(String);
 
-/// A text that is no name.
+/// The text is no valid name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no name: letters a to z, digits and hyphens, at most 40")]
 pub struct NoName(String);
 
 impl Name {
-    /// Checks a name.
+    /// Checks a name: 1 to 40 lower-case letters, digits and hyphens.
     ///
     /// # Errors
-    /// [`NoName`].
+    /// [`NoName`] for any other text.
     pub fn new(text: &str) -> Result<Self, NoName> {
         let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
         match text.len() {
@@ -44,13 +44,13 @@ impl Name {
         }
     }
 
-    /// Who asks where there are no keys.
+    /// Returns the member name of all peers of a bridge without keys.
     #[must_use]
     pub fn anyone() -> Self {
         Self(crate::request::ANYONE.to_owned())
     }
 
-    /// The name of this machine, as far as it can be one.
+    /// Returns the name of this machine, with other characters replaced by hyphens.
     #[must_use]
     pub fn of_this_machine() -> Self {
         let system = rustix::system::uname();
@@ -60,13 +60,13 @@ impl Name {
         Self::new(&text).unwrap_or_else(|_| Self("host".to_owned()))
     }
 
-    /// A key of this bridge.
+    /// Returns the key of a message of this bridge.
     #[must_use]
     pub fn key(&self, what: &str) -> String {
         format!("{ROOT}/{self}/{what}")
     }
 
-    /// The bridge a key belongs to.
+    /// Returns the bridge that a key belongs to.
     #[must_use]
     pub fn of_key(key: &str) -> Option<Self> {
         let name = key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?;
@@ -83,7 +83,7 @@ impl fmt::Display for Name {
 impl std::str::FromStr for Name {
     type Err = NoName;
 
-    /// `NAME`, or `zenoh/NAME` as the other commands write it.
+    /// Parses `NAME`, or `zenoh/NAME` as the other commands write it.
     fn from_str(text: &str) -> Result<Self, NoName> {
         Self::new(text.strip_prefix("zenoh/").unwrap_or(text))
     }

@@ -1,4 +1,4 @@
-//! A running host on a network, over [Zenoh](https://zenoh.io): for a viewer, a recorder or an operator elsewhere.
+//! A running host on a network, over [Zenoh](https://zenoh.io): for a remote viewer, recorder or operator.
 //!
 //! ```text
 //!  machine A                                              machine B
@@ -7,10 +7,10 @@
 //!  flotor run <-> peer socket <-> bridge serve <-> network <-> bridge couple <-> peer socket <-> flotor run
 //! ```
 //!
-//! [`serve`] is the one end: a watcher of the host like any other ([`flotor_live`]), whose words it puts on keys
-//! ([`keys`]) in the messages of a recording. [`remote`] is the other, [`attach`] shows what it hears as if it ran there,
-//! and [`keep`] records it. [`couple`] holds a hand here and one there together. Requests go back the same way ([`request`]); who may ask for what is Zenoh's access control, for which
-//! [`access`] writes keys and configurations. An emergency stop goes a second way beside Zenoh: [`stop_channel`].
+//! [`serve`] is one end: a client of the host ([`flotor_live`]) that publishes the host's messages on keys ([`keys`]) in the format
+//! of a recording. [`remote`] is the other end; [`attach`] republishes a remote run locally, and [`keep`] records it. [`couple`]
+//! links a hand here to a remote one. Requests take the reverse path ([`request`]); Zenoh's access control decides who may send
+//! which, by keys and configurations from [`access`]. An emergency stop takes a second path beside Zenoh: [`stop_channel`].
 //!
 //! Not real-time: nothing here runs in the process of a servo.
 

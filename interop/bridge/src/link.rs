@@ -1,4 +1,4 @@
-//! The way onto the network.
+//! Session on the network.
 
 use crate::access;
 use crate::keys::Name;
@@ -11,61 +11,61 @@ use std::ops::Deref;
 use std::path::PathBuf;
 use zenoh::{Config, Session, Wait};
 
-/// Protocol of a socket in the file system.
+/// Zenoh protocol of Unix sockets.
 const UNIX: &str = "unixsock-stream/";
-/// How the sockets of bridges are called: `bridge-NAME`.
+/// Prefix of the sockets of bridges: `bridge-NAME`.
 const SOCKET: &str = "bridge-";
-/// Under this key of its configuration a member finds its name.
+/// Configuration key of the member's name.
 pub const MEMBER: &str = "member";
 
-/// How to reach others.
+/// Command line options of a session.
 #[derive(Args, Clone, Debug, Default)]
 pub struct LinkOptions {
     /// Zenoh configuration (JSON5): endpoints, keys, access control; `flotor bridge keys` writes some
     #[arg(long, value_name = "FILE", global = true)]
     pub config: Option<PathBuf>,
-    /// Where to be reached, such as tls/0.0.0.0:7447 (repeatable)
+    /// Endpoint to listen on, such as tls/0.0.0.0:7447 (repeatable)
     #[arg(long, value_name = "ENDPOINT", global = true)]
     pub listen: Vec<String>,
-    /// Whom to reach, such as tls/lab.example.org:7447 (repeatable)
+    /// Endpoint to connect to, such as tls/lab.example.org:7447 (repeatable)
     #[arg(long, value_name = "ENDPOINT", global = true)]
     pub connect: Vec<String>,
-    /// Listen or connect beyond this machine without keys: whoever is reached there has the rights of --allow
+    /// Listen or connect beyond this machine without keys: every peer there has the rights of --allow
     #[arg(long, global = true)]
     pub without_keys: bool,
 }
 
-/// Why there is no network.
+/// Error of opening or using a session.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// The configuration is none.
+    /// The configuration is invalid.
     #[error("the configuration{} cannot be used: {reason}", file.as_ref().map_or(String::new(), |f| format!(" {}", f.display())))]
     Config {
-        /// The file.
+        /// Path of the configuration; `None` without one.
         file: Option<PathBuf>,
-        /// What is wrong.
+        /// Cause.
         reason: String,
     },
-    /// Whoever has read a key is a member for as long as its certificate is valid.
+    /// A private key is readable by other users: a reader of the key is a member for as long as the certificate is valid.
     #[error("other users may read the key in {}; `chmod 600 {}`, and if another user may have read the file, make new keys", file.display(), file.display())]
     ExposedKey {
-        /// The file with the key.
+        /// Path of the file with the key.
         file: PathBuf,
     },
-    /// Others than this user could do anything.
+    /// An endpoint is open to other users, and without keys they would have all rights of `--allow`.
     #[error(
         "`{endpoint}` is open to others, and only keys distinguish members: `flotor bridge keys` makes some for --config, or say \
          --without-keys as well"
     )]
     WithoutKeys {
-        /// Where it would listen.
+        /// Offending endpoint.
         endpoint: String,
     },
-    /// No session.
+    /// The session cannot be opened.
     #[error("cannot open the session: {0}; is the endpoint free, and the peer there?")]
     Open(String),
-    /// The network refuses something.
+    /// The network refuses an operation.
     #[error("the network refuses: {0}")]
     Network(String),
 }
@@ -76,16 +76,16 @@ impl From<zenoh::Error> for LinkError {
     }
 }
 
-/// Which end of a link this program is.
+/// Role of this program on a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// Is reached by others.
+    /// Accepts connections of peers.
     Serving,
-    /// Reaches others.
+    /// Connects to peers.
     Visiting,
 }
 
-/// A session, and as whom it asks.
+/// Open session, and the member name of this program.
 #[derive(Clone)]
 pub struct Link {
     session: Session,
@@ -96,26 +96,26 @@ pub struct Link {
 }
 
 impl Link {
-    /// Whether the keys were made before there were stop keys: an emergency stop of a member goes by a session alone, which a flood of
+    /// Returns whether the keys predate stop keys: a member's emergency stop then relies on a session alone, which a flood of
     /// connections delays.
     #[must_use]
     pub fn lacks_stop_keys(&self) -> bool {
         self.lacks_stop_keys
     }
 
-    /// The second way of an emergency stop, where the keys have one.
+    /// Returns the second path of an emergency stop; `None` if the keys have none.
     #[must_use]
     pub fn stop_channel(&self) -> Option<&StopChannel> {
         self.stop_channel.as_ref()
     }
 
-    /// As whom it asks: the name of the member in its configuration; without keys, anyone.
+    /// Returns the member name of this program in its configuration; without keys, `anyone`.
     #[must_use]
     pub fn member(&self) -> &Name {
         &self.member
     }
 
-    /// How many days its keys are still good for.
+    /// Returns the remaining validity of the keys, days.
     #[must_use]
     pub fn days_left(&self) -> Option<u64> {
         Some(self.expires_s?.saturating_sub(access::now_s()) / 86_400)
@@ -131,8 +131,8 @@ impl Deref for Link {
 }
 
 impl LinkOptions {
-    /// The same with where to listen, or whom to reach, where nothing was said: sockets in the folder of this user's runs, which
-    /// nobody else may enter. A bridge listens on its own; visitors go to all that are there.
+    /// Fills in default endpoints if none are given: sockets in the folder of this user's runs, which no other user may
+    /// enter. A bridge listens on its own socket; visitors connect to all sockets found.
     #[must_use]
     pub fn or_this_user(mut self, directory: &Directory, serves: Option<&Name>) -> Self {
         if self.config.is_some() || !self.listen.is_empty() || !self.connect.is_empty() {
@@ -152,7 +152,7 @@ impl LinkOptions {
         self
     }
 
-    /// The first endpoint at which more than this user gets in.
+    /// Returns the first endpoint that other users can reach.
     #[must_use]
     pub fn open_to_others(&self) -> Option<&str> {
         self.listen
@@ -163,7 +163,7 @@ impl LinkOptions {
     }
 }
 
-/// Whether an endpoint can be reached from this machine only.
+/// Returns whether an endpoint can be reached from this machine only.
 fn is_loopback(endpoint: &str) -> bool {
     let address = endpoint.split_once('/').map_or("", |(_, address)| address);
     let host = address.rsplit_once(':').map_or(address, |(host, _)| host).trim_matches(['[', ']']);
@@ -172,10 +172,10 @@ fn is_loopback(endpoint: &str) -> bool {
         || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
 }
 
-/// A session. Nothing is searched for by multicast: who is to be reached is said, by somebody.
+/// Opens a session. No multicast search: all peers come from the endpoints.
 ///
 /// # Errors
-/// [`LinkError`].
+/// [`LinkError`] of the configuration, the keys or the session.
 pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     let mut config = config_of(options)?;
     if let Some(file) = exposed_key(options, &config) {
@@ -184,11 +184,11 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     let wrong =
         |error: zenoh::Error| LinkError::Config { file: options.config.clone(), reason: error.to_string() };
     let has_rules = has_rules(&config);
-    // A configuration is somebody's own; what it means for a visitor is not known here.
+    // A visitor's configuration is the user's own; its access rules are not known here.
     let is_known = end == End::Serving || options.config.is_none();
     if is_known && !(options.config.is_some() && has_rules) && !options.without_keys {
         let places = ["listen/endpoints", "connect/endpoints"];
-        // A visitor goes wherever it is sent, and lets in nobody.
+        // A visitor connects to the given endpoints, and accepts no connections.
         let places = places.get(..if end == End::Serving { 2 } else { 1 }).unwrap_or_default();
         let endpoints = places.iter().flat_map(|key| endpoints_in(&says(&config, key).unwrap_or_default()));
         if let Some(endpoint) = endpoints.into_iter().find(|endpoint| !is_loopback(endpoint)) {
@@ -197,7 +197,7 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     }
     let stop_channel = stop_channel_of(options, &config, end)?;
     if end == End::Serving && !has_rules {
-        // Whoever it is: only the bridge tells.
+        // Any peer may connect, but only the bridge may publish.
         for (key, value) in access::of_anyone() {
             config.insert_json5(&format!("access_control/{key}"), &value.to_string()).map_err(wrong)?;
         }
@@ -211,15 +211,15 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     Ok(Link { session, member, expires_s, stop_channel, lacks_stop_keys })
 }
 
-/// The second way of an emergency stop of a visitor, without a session, whose opening may wait for others.
+/// Returns a visitor's second path of an emergency stop without opening a session, which may block.
 ///
 /// # Errors
-/// [`LinkError`].
+/// [`LinkError`] of the configuration.
 pub fn stop_channel(options: &LinkOptions) -> Result<Option<StopChannel>, LinkError> {
     stop_channel_of(options, &config_of(options)?, End::Visiting)
 }
 
-/// The stop channel of one end. Without access control everybody has the rights of the bridge, with the key that everybody knows.
+/// Returns the stop channel of one end. Without access control all peers have the rights of the bridge, with a public key.
 fn stop_channel_of(
     options: &LinkOptions,
     config: &Config,
@@ -249,14 +249,14 @@ fn stop_channel_of(
     }))
 }
 
-/// The `host:port` of an endpoint of the internet, for datagrams; none where the system chooses the port.
+/// Returns the `host:port` of an internet endpoint, for datagrams; `None` where the system chooses the port.
 fn datagram_address(endpoint: &str) -> Option<String> {
     let (protocol, address) = endpoint.split_once('/')?;
     let address = address.split(['?', '#']).next()?;
     (matches!(protocol, "tcp" | "tls") && !address.ends_with(":0")).then(|| address.to_owned())
 }
 
-/// The name of the member in the metadata of a configuration; without keys, anyone.
+/// Returns the member name in the metadata of a configuration; without keys, `anyone`.
 fn member_of(metadata: &Value) -> Name {
     let member = metadata.get(MEMBER).and_then(Value::as_str).and_then(|name| Name::new(name).ok());
     member.unwrap_or_else(Name::anyone)
@@ -270,7 +270,7 @@ fn config_of(options: &LinkOptions) -> Result<Config, LinkError> {
         config.insert_json5("mode", "\"peer\"").map_err(wrong)?;
         config.insert_json5("scouting/multicast/enabled", "false").map_err(wrong)?;
         config.insert_json5("scouting/gossip/enabled", "false").map_err(wrong)?;
-        // Without this, a visitor would listen on all interfaces.
+        // Otherwise Zenoh lets a visitor listen on all interfaces.
         config.insert_json5("listen/endpoints", &list(&options.listen)).map_err(wrong)?;
         config.insert_json5("connect/endpoints", &list(&options.connect)).map_err(wrong)?;
         return Ok(config);
@@ -297,7 +297,7 @@ fn exposed_key(options: &LinkOptions, config: &Config) -> Option<PathBuf> {
     access::exposed_key(&part("transport/link/tls"), &part("metadata"), options.config.as_deref())
 }
 
-/// All endpoints of a configuration, which may have some for each mode.
+/// Collects all endpoints of a configuration, which may list some per mode.
 fn endpoints_in(value: &Value) -> Vec<String> {
     match value {
         Value::String(endpoint) => vec![endpoint.clone()],

@@ -1,4 +1,4 @@
-//! `flotor bridge`: a running host on a network.
+//! Program `flotor bridge`: a running host on a network.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use flotor_bridge::access::{Members, write_keys};
@@ -54,7 +54,7 @@ enum Command {
         /// The bridge
         name: Name,
     },
-    /// Hold a hand here and one there together: carry the peer state of couplings with `partner = "elsewhere"`
+    /// Couple a hand here to a remote one: carry the peer state of couplings with `partner = "elsewhere"`
     Couple {
         /// The bridge
         name: Name,
@@ -67,31 +67,31 @@ enum Command {
         #[arg(value_name = "FILE.mcap")]
         file: PathBuf,
     },
-    /// Ask a remote run for something
+    /// Send a request to a remote run
     Ask {
         /// The bridge
         name: Name,
         #[command(subcommand)]
         request: RequestArgument,
     },
-    /// List the bridges that can be seen
+    /// List the bridges on the network
     List,
-    /// Write keys and configurations: who is a member of the network, and what each may do
+    /// Write keys and configurations: the members of the network and their rights
     Keys(KeysArguments),
 }
 
 #[derive(Args)]
 struct ServeArguments {
-    /// What others call this bridge (default: the machine's name)
+    /// Name of this bridge on the network (default: the machine's name)
     #[arg(long)]
     name: Option<Name>,
-    /// The most that may be asked for; who may is up to the network's access control
+    /// Highest right whose requests are accepted; the network's access control decides per member
     #[arg(long, value_enum, default_value = "watch")]
     allow: Allow,
     /// A scene that may be started from the network, with `--allow own`
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Put one tick in N on the network
+    /// Publish one tick in N
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
 }
@@ -102,7 +102,7 @@ enum Allow {
     Watch,
     /// Also change parameters, end a run in order
     Operate,
-    /// Also start the scene, take an emergency stop back
+    /// Also start the scene, release an emergency stop
     Own,
 }
 
@@ -118,16 +118,16 @@ enum RequestArgument {
         #[arg(required = true, value_name = "PLUGIN.KEY=VALUE", value_parser = set_value)]
         values: Vec<SetValue>,
     },
-    /// Change how much of a model is felt
+    /// Change the blend weight of a model
     Weight {
-        /// Its name in the scene
+        /// Name of the model in the scene
         model: String,
         /// 0 to 1
         weight: f64,
     },
     /// Start the bridge's scene
     Start,
-    /// Take an emergency stop back
+    /// Release an emergency stop
     Release,
 }
 
@@ -144,10 +144,10 @@ struct KeysArguments {
     /// A member who may also change parameters (repeatable)
     #[arg(long, value_name = "NAME")]
     operate: Vec<Name>,
-    /// A member who may also start runs and take an emergency stop back (repeatable)
+    /// A member who may also start runs and release an emergency stop (repeatable)
     #[arg(long, value_name = "NAME")]
     own: Vec<Name>,
-    /// How long the keys are good for
+    /// Validity of the keys, in days
     #[arg(long, value_name = "DAYS", default_value = "365", value_parser = clap::value_parser!(u64).range(1..=36_500))]
     days: u64,
 }
@@ -158,7 +158,7 @@ fn set_value(text: &str) -> Result<SetValue, String> {
     Ok(SetValue { plugin: plugin.to_owned(), parameter: parameter.to_owned(), value: value.to_owned() })
 }
 
-/// Exit code of what the user has to change.
+/// Exit code for errors of the command line or the configuration.
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
@@ -276,7 +276,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Reports keys that expire soon, and keys without a second way of an emergency stop.
+/// Warns of keys that expire soon, and of keys without a second path for an emergency stop.
 fn tell_of_keys(link: &Link, tell: &mut dyn FnMut(&str)) {
     if link.lacks_stop_keys() {
         tell(

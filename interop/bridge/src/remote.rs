@@ -1,4 +1,4 @@
-//! A run on another machine: what it tells, and how it is asked for something.
+//! Client of a bridge: receives a remote run, and sends requests.
 
 use crate::keys::Name;
 use crate::link::{Link, LinkError};
@@ -18,23 +18,23 @@ use zenoh::query::{ConsolidationMode, QueryTarget, Reply};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
-/// Ticks that wait here at most: eight seconds at 1 kHz. What finds no room is counted as lost.
+/// Limit on queued ticks: eight seconds at 1 kHz. Further ticks are counted as lost.
 const MOST_TICKS: usize = 8192;
-/// Everything that waits here at most: who falls behind with ticks still hears of the end.
+/// Limit on all queued events: a client that is behind with ticks still receives the end.
 const MOST_WAITING: usize = 2 * MOST_TICKS;
-/// How long a bridge may take to answer.
+/// Timeout of a reply.
 const ANSWER_WAIT: Duration = Duration::from_secs(3);
-/// The same for the emergency stop: until the hosts have confirmed an earlier one, and this one.
+/// Timeout of the reply to an emergency stop: until the hosts have confirmed an earlier one, and this one.
 const STOP_WAIT: Duration = Duration::from_secs(5);
-/// How long a bridge may take to be seen by a new session, and how often it is looked for.
+/// Timeout and poll interval of the first contact of a new session with a bridge.
 const SEEN_WAIT: Duration = Duration::from_secs(1);
 const SEEN_PERIOD: Duration = Duration::from_millis(20);
-/// How often a request for the current run is made anew because that has changed meanwhile.
+/// Limit on retries of a request because the current run has changed meanwhile.
 const MOST_LOOKS: u32 = 5;
-/// Pause between two looks for a bridge or run that is not there.
+/// Poll interval while bridge or run are absent.
 const LOOK_PERIOD: Duration = Duration::from_millis(300);
 
-/// What a remote run tells.
+/// Event of a remote run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Told {
     /// A tick.
@@ -43,11 +43,11 @@ pub enum Told {
     Change(Change),
     /// The run is over.
     End(End),
-    /// The bridge cannot be seen any more.
+    /// The bridge has disappeared from the network.
     Gone,
 }
 
-/// A bridge on the network, from afar.
+/// Client of a bridge on the network.
 pub struct Remote {
     session: Session,
     name: Name,
@@ -58,24 +58,24 @@ pub struct Remote {
     _alive: Subscriber<()>,
 }
 
-/// Carries requests to a bridge, from any thread; clone it freely.
+/// Client for sending requests, from any thread; clones share the state.
 #[derive(Clone)]
 pub struct Errand {
     session: Session,
     name: Name,
-    /// As whom it asks: the name in the keys.
+    /// Member name in the keys.
     member: Name,
-    /// The last that was used; held until the letter has left, for letters to leave in the order of their numbers.
+    /// Last request number; locked until the request is sent, so that requests leave in the order of their numbers.
     number: Arc<Mutex<u64>>,
-    /// Process of the run that is meant; 0: the current one.
+    /// Process of the requested run; 0: the current one.
     run: Arc<AtomicU64>,
 }
 
 impl Remote {
-    /// Listens to a bridge, whether it is there yet or not.
+    /// Subscribes to a bridge, present or not.
     ///
     /// # Errors
-    /// [`LinkError`]: the network refuses.
+    /// If the network refuses.
     pub fn listen(session: &Link, name: &Name) -> Result<Self, LinkError> {
         let (sender, told) = channel();
         let queue = Queue { sender, waiting: Arc::default(), lost: Arc::default() };
@@ -110,10 +110,10 @@ impl Remote {
         })
     }
 
-    /// Waits for a run: who it is, and how it was set up. Nothing if told to stop.
+    /// Waits for a run; returns its greeting and description, `None` once `stop` is set.
     ///
     /// # Errors
-    /// [`LinkError`]: the network refuses.
+    /// If the network refuses.
     pub fn wait_for_run(&self, stop: &AtomicBool) -> Result<Option<(Greeting, RunDescription)>, LinkError> {
         while !stop.load(Ordering::Relaxed) {
             let greeting =
@@ -128,7 +128,7 @@ impl Remote {
         Ok(None)
     }
 
-    /// the next report; nothing if there is none in this time.
+    /// Waits for the next event; `None` on timeout.
     #[must_use]
     pub fn next(&self, timeout: Duration) -> Option<Told> {
         match self.told.recv_timeout(timeout) {
@@ -141,21 +141,21 @@ impl Remote {
         }
     }
 
-    /// Ticks that were published and did not get here, as far as is known.
+    /// Returns the number of ticks known to be lost on the network or in the queue.
     #[must_use]
     pub fn lost(&self) -> u64 {
         self.queue.lost.load(Ordering::Relaxed)
     }
 
-    /// How the bridge is doing.
+    /// Requests the status of the bridge; `None` without a reply.
     ///
     /// # Errors
-    /// [`LinkError`]: the network refuses.
+    /// If the network refuses.
     pub fn status(&self) -> Result<Option<Status>, LinkError> {
         self.errand.status()
     }
 
-    /// The way to ask for something.
+    /// Returns a client for requests to the bridge.
     #[must_use]
     pub fn errand(&self) -> Errand {
         self.errand.clone()
@@ -172,14 +172,14 @@ fn get(session: &Session, name: &Name, what: &str) -> Result<Option<Vec<u8>>, Li
 }
 
 impl Errand {
-    /// Asks for something and waits for the answer: the reason if it is refused.
+    /// Sends a request and waits for the reply.
     ///
     /// # Errors
-    /// In words, for people.
+    /// The cause as text: the reason of a refusal, or no reply.
     pub fn run(&self, request: Request) -> Result<(), String> {
         let right = request.right();
         if right == Right::Watch {
-            // Of the emergency stop nothing is asked first.
+            // An emergency stop needs no status first.
             return seen(|| done(&self.send(request.clone(), &Status::default())?));
         }
         let is_for_the_current = right == Right::Own || self.run.load(Ordering::Relaxed) == 0;
@@ -195,7 +195,7 @@ impl Errand {
             }
             looks += 1;
             match done(&self.send(request.clone(), &status)?) {
-                // A run has begun or ended since the status said which one is on.
+                // Retry: a run has begun or ended since the status.
                 Err(words)
                     if is_for_the_current && looks < MOST_LOOKS && words == Refusal::Stale.to_string() => {}
                 answered => return answered?.ok_or_else(|| NOBODY_ANSWERS.to_owned()),
@@ -223,20 +223,20 @@ impl Errand {
         let wait = if request == Request::EmergencyStop { STOP_WAIT } else { ANSWER_WAIT };
         let letter = NumberedRequest { session, number: *number, run, ticket, request };
         let get = self.session.get(key).timeout(wait).payload(letter.to_bytes());
-        // Bridges on two machines may have one name: whatever is asked is done when all of them have.
+        // Bridges on two machines may have one name: all of them must have carried out the request.
         let get = get.target(QueryTarget::All).consolidation(ConsolidationMode::None);
         get.wait().map_err(|error| LinkError::from(error).to_string())
     }
 }
 
-/// Why there is no answer, as far as can be known here.
+/// Error text for a missing reply, with the possible causes.
 const NOBODY_ANSWERS: &str = "nobody answers: the bridge is gone, or does not take this request, or not from this peer; \
                               `flotor bridge serve --allow` and the network's access control say who may";
 
-/// What comes back.
+/// Replies to a query.
 type Answers = FifoChannelHandler<Reply>;
 
-/// Asks until there is an answer: a session that was opened a moment ago may not know of the bridge yet.
+/// Retries until there is a reply: a new session may not have discovered the bridge yet.
 fn seen<T>(ask: impl Fn() -> Result<Option<T>, String>) -> Result<T, String> {
     let until = Instant::now() + SEEN_WAIT;
     loop {
@@ -248,7 +248,7 @@ fn seen<T>(ask: impl Fn() -> Result<Option<T>, String>) -> Result<T, String> {
     }
 }
 
-/// Whether all that answer have done it; nothing if none does.
+/// Checks that all replies confirm the request; `None` without a reply.
 fn done(answers: &Answers) -> Result<Option<()>, String> {
     let mut is_answered = None;
     for answer in answers.iter() {
@@ -261,13 +261,13 @@ fn done(answers: &Answers) -> Result<Option<()>, String> {
     Ok(is_answered)
 }
 
-/// What is answered first, if anything is.
+/// Returns the payload of the first reply.
 fn first(answers: &Answers) -> Option<Vec<u8>> {
     let sample = answers.iter().find_map(|answer| answer.into_result().ok());
     sample.map(|sample| sample.payload().to_bytes().into_owned())
 }
 
-/// The way from the network's threads to who listens: of bounded length, and what is lost on it is counted.
+/// Queue from the network's threads to the caller, of bounded length; lost ticks are counted.
 #[derive(Clone)]
 struct Queue {
     sender: Sender<Told>,
@@ -284,7 +284,7 @@ impl Queue {
             return;
         }
         self.waiting.fetch_add(1, Ordering::Relaxed);
-        // Without a listener there is nobody to tell.
+        // Fails without a receiver.
         let _ = self.sender.send(told);
     }
 
@@ -293,7 +293,7 @@ impl Queue {
     }
 }
 
-/// Puts messages together to what they tell, in the network's thread.
+/// Decoder that assembles messages into events, on the network's thread.
 struct Ear {
     queue: Queue,
     pose: Option<Vec<u8>>,
@@ -322,7 +322,7 @@ impl Ear {
         }
     }
 
-    /// The end; what was to come before it and did not is lost.
+    /// Decodes the end; missing ticks before it are counted as lost.
     fn end(&mut self, payload: &[u8], last: Option<u64>) -> Option<Told> {
         if let (Some(heard), Some(last)) = (self.number, last) {
             self.queue.lose(last.saturating_sub(heard));
@@ -331,7 +331,7 @@ impl Ear {
         serde_json::from_slice(payload).ok().map(Told::End)
     }
 
-    /// A tick, if its pose came before it; gaps in the numbers are losses.
+    /// Decodes a tick if its pose came before it; gaps in the numbers are counted as lost.
     fn tick(&mut self, payload: &[u8], number: Option<u64>) -> Option<Told> {
         if let Some(number) = number {
             let missing = self.number.map_or(0, |last| number.saturating_sub(last).saturating_sub(1));
@@ -347,10 +347,10 @@ impl Ear {
     }
 }
 
-/// Bridges that can be seen.
+/// Returns the names of all bridges on the network.
 ///
 /// # Errors
-/// [`LinkError`]: the network refuses.
+/// If the network refuses.
 pub fn bridges(session: &Session) -> Result<Vec<Name>, LinkError> {
     let answers = session.liveliness().get("flotor/*/alive").timeout(ANSWER_WAIT).wait()?;
     let mut names: Vec<Name> = answers

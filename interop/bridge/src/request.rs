@@ -1,4 +1,4 @@
-//! What peers may ask for, and which letters are not even read.
+//! Requests of remote peers, and their admission control with replay protection.
 
 use crate::keys::Name;
 use flotor_live::{Ask, SetValue};
@@ -6,61 +6,61 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-/// A longer letter is refused before it is looked at, bytes.
+/// Limit on the length of a request, bytes; longer ones are rejected unread.
 pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
-/// Sessions of a member whose last number is remembered for each right; of more, the one that asked longest ago is forgotten.
+/// Limit on the sessions per member and right whose last number is stored; above, the least recent session is dropped.
 const MOST_SESSIONS: usize = 256;
-/// Members that are distinguished, the access control of our keys knows far fewer; of more, the one that asked longest ago is forgotten.
+/// Limit on the stored members, many more than our keys have; above, the least recent member is dropped.
 const MOST_MEMBERS: usize = 1024;
-/// How old the bridge's word may be on which a run is started or the emergency stop released, ms.
+/// Maximum ticket age for start and release, ms.
 const FRESH_MS: u64 = 10_000;
-/// Who asks where there are no keys: nobody is distinguished there.
+/// Member name of all peers without keys.
 pub const ANYONE: &str = "anyone";
 
-/// Something a peer asks for.
+/// Request of a peer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "request", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Request {
-    /// The emergency stop. Anybody's.
+    /// Press the emergency stop; permitted to all.
     EmergencyStop,
-    /// New values for live parameters.
+    /// Change live parameters.
     Set {
-        /// The values.
+        /// New values.
         values: Vec<SetValue>,
     },
-    /// How much of a model is felt, 0 to 1.
+    /// Change the blend weight of a model.
     Weight {
-        /// Its name in the scene.
+        /// Name of the model in the scene.
         model: String,
-        /// The new weight.
+        /// New weight, 0 to 1.
         weight: f64,
     },
-    /// An orderly end of the run.
+    /// End the run in order.
     Stop,
-    /// Runs the bridge's scene.
+    /// Start the bridge's scene.
     Start,
-    /// Takes the emergency stop back, so that a scene may be started again.
+    /// Release the emergency stop, so that a scene may be started again.
     Release,
 }
 
-/// Who may ask for what. Each includes the ones before it.
+/// Rights of a member. Each includes the previous ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Right {
-    /// See everything, and press the emergency stop.
+    /// Observe, and press the emergency stop.
     #[default]
     Watch,
     /// Change parameters, end a run in order.
     Operate,
-    /// Start runs, take an emergency stop back.
+    /// Start runs, release an emergency stop.
     Own,
 }
 
 impl Right {
-    /// All of them, the least first.
+    /// All rights, the least first.
     pub const ALL: [Right; 3] = [Right::Watch, Right::Operate, Right::Own];
 
-    /// Parts of the keys on which this right's own requests arrive; the name of the member comes last.
+    /// Returns the key parts on which this right's own requests arrive; the name of the member comes last.
     #[must_use]
     pub const fn keys(self) -> &'static [&'static str] {
         match self {
@@ -72,7 +72,7 @@ impl Right {
 }
 
 impl Request {
-    /// What it takes to have it followed.
+    /// Returns the right that the request requires.
     #[must_use]
     pub const fn right(&self) -> Right {
         match self {
@@ -82,7 +82,7 @@ impl Request {
         }
     }
 
-    /// The parts of the key on which it must arrive, before the member's name: access control sees keys, not letters.
+    /// Returns the key part on which the request must arrive, before the member's name: access control sees keys, not payloads.
     #[must_use]
     pub const fn key(&self) -> &'static str {
         match self {
@@ -95,7 +95,7 @@ impl Request {
         }
     }
 
-    /// What the host is asked for; nothing where the bridge itself is meant.
+    /// Converts the request to one for the host; `None` for requests to the bridge itself.
     #[must_use]
     pub fn ask(&self) -> Option<Ask> {
         match self {
@@ -107,7 +107,7 @@ impl Request {
         }
     }
 
-    /// Of what somebody asked a local host for; nothing where that concerns this machine only.
+    /// Converts a request to a local host; `None` for one that concerns this machine only.
     #[must_use]
     pub fn of_ask(ask: Ask) -> Option<Self> {
         match ask {
@@ -120,88 +120,88 @@ impl Request {
     }
 }
 
-/// The bridge's word on which a request is made: which start of the bridge, and when, by its own clock.
+/// Ticket from the bridge's status on which a request is based: start of the bridge, and time by the bridge's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ticket {
-    /// The bridge's start, ns since 1970: no request is valid for another.
+    /// Start of the bridge, ns since 1970; requests for another start are rejected.
     pub began: u64,
-    /// Time since then, ms.
+    /// Time since the start, ms.
     pub at_ms: u64,
 }
 
-/// A request with what makes it valid once.
+/// Request with number and ticket, valid once.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NumberedRequest {
-    /// The session of the member: anything that no other of its sessions calls itself. Who the member is says the key.
+    /// Session of the member: any text that is unique among the member's sessions. The key names the member.
     pub session: String,
-    /// Higher than that of the session's letter before.
+    /// Number, higher than those of the session's earlier requests.
     pub number: u64,
-    /// Process of the run that is meant, from its greeting; 0: none is on.
+    /// Process of the requested run, from its greeting; 0: no run.
     pub run: u32,
-    /// From the bridge's status.
+    /// Ticket from the bridge's status.
     pub ticket: Ticket,
-    /// What is wished.
+    /// The request.
     pub request: Request,
 }
 
 impl NumberedRequest {
-    /// As it is sent.
+    /// Encodes the request as JSON.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        // None of its parts fails to become JSON.
+        // Serialisation of these types cannot fail.
         serde_json::to_vec(self).unwrap_or_default()
     }
 }
 
-/// Why a letter was not followed.
+/// Reason why a request was rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "kebab-case")]
 pub enum Refusal {
-    /// No letter at all, or on the wrong key.
+    /// Not a request, or on the wrong key.
     #[error("this is no request that belongs on this key")]
     Malformed,
-    /// Longer than any request.
+    /// Longer than [`MAX_REQUEST_BYTES`].
     #[error("longer than {MAX_REQUEST_BYTES} bytes, which no request is")]
     TooLong,
-    /// Its number is not higher than that of the peer's last.
+    /// Number not higher than that of the session's last request.
     #[error("a request with this number, or a higher one, came before: requests are valid once")]
     Replayed,
-    /// It is meant for a run that is over, or none is on.
+    /// Meant for a run that has ended, or there is no run.
     #[error("no run is on, or not the one that was meant")]
     Stale,
-    /// It was made on the word of an earlier start of the bridge, or too long ago.
+    /// Based on a ticket of an earlier start of the bridge, or too old.
     #[error("asked too long ago, or before the bridge started; ask again")]
     Expired,
-    /// More requests than the host answers.
+    /// Too many requests are pending.
     #[error("too many requests wait for the host's answer; ask again")]
     Busy,
 }
 
-/// Lets letters through once. The emergency stop alone is let through however often: a stop too many is safe.
+/// Replay protection: accepts each request once, but emergency stops always, because a repeated stop is safe.
 #[derive(Debug)]
 pub struct Gate {
     began: u64,
     since: Instant,
-    /// By right and member: nobody uses up numbers or room of another.
+    /// Sessions by right and member, so that no member can exhaust numbers or capacity of another.
     members: BTreeMap<(Right, Name), Sessions>,
-    /// Letters of unknown members on an older word than this are refused, ms.
+    /// Requests of unknown members with an older ticket are rejected, ms.
     forgotten_ms: u64,
     refused: BTreeMap<Refusal, u64>,
 }
 
-/// The sessions of a member.
+/// Stored sessions of a member.
 #[derive(Debug, Default)]
 struct Sessions {
     last: BTreeMap<String, Last>,
-    /// Letters of unknown sessions on an older word than this are refused, ms: they may be of a forgotten one.
+    /// Requests of unknown sessions with an older ticket are rejected, ms: the session may have been dropped.
     forgotten_ms: u64,
-    /// The newest word on which it asked, ms.
+    /// Newest ticket of the member, ms.
     asked_ms: u64,
 }
 
-/// The last letter of a session.
+/// Last request of a session.
 #[derive(Clone, Copy, Debug)]
 struct Last {
     number: u64,
@@ -223,28 +223,28 @@ impl Default for Gate {
 }
 
 impl Gate {
-    /// The bridge's word, for requests that are made on it.
+    /// Returns a ticket for new requests.
     #[must_use]
     pub fn ticket(&self) -> Ticket {
         let at_ms = u64::try_from(self.since.elapsed().as_millis()).unwrap_or(u64::MAX);
         Ticket { began: self.began, at_ms }
     }
 
-    /// What a letter on a key (`flotor/NAME/ask/REQUEST/MEMBER`) asks for, while `run` is the current run (0: none).
+    /// Admits a request on a key (`flotor/NAME/ask/REQUEST/MEMBER`), while `run` is the current run (0: none).
     ///
     /// # Errors
-    /// [`Refusal`], counted.
+    /// [`Refusal`], which is counted.
     pub fn admit(&mut self, key: &str, payload: &[u8], run: u32) -> Result<Request, Refusal> {
         self.read(key, payload, run).map_err(|refusal| self.refuse(refusal))
     }
 
-    /// Counts a refusal, whoever decided on it.
+    /// Counts a refusal and returns it.
     pub fn refuse(&mut self, refusal: Refusal) -> Refusal {
         *self.refused.entry(refusal).or_default() += 1;
         refusal
     }
 
-    /// How many were refused, by reason.
+    /// Returns the number of refusals, by reason.
     #[must_use]
     pub fn refused(&self) -> &BTreeMap<Refusal, u64> {
         &self.refused
@@ -257,7 +257,7 @@ impl Gate {
         let (member, letter) = letter_on(key, payload).ok_or(Refusal::Malformed)?;
         let now = self.ticket();
         let right = letter.request.right();
-        // Whoever presses the emergency stop means whatever runs.
+        // An emergency stop applies to any run.
         let is_meant = match right {
             Right::Watch => return Ok(letter.request),
             Right::Operate => run != 0 && letter.run == run,
@@ -271,7 +271,7 @@ impl Gate {
         if is_meant { Ok(letter.request) } else { Err(Refusal::Stale) }
     }
 
-    /// A number is valid once.
+    /// Rejects a replayed number, and stores the new one.
     fn use_up(&mut self, member: (Right, Name), letter: &NumberedRequest) -> Result<(), Refusal> {
         if !self.members.contains_key(&member) {
             if letter.ticket.at_ms < self.forgotten_ms {
@@ -305,13 +305,13 @@ impl Gate {
     }
 }
 
-/// Whether a letter on its key presses the emergency stop: that needs nothing that a gate remembers, and waits for none.
+/// Returns whether a payload on its key is an emergency stop; needs no state and no lock of a gate.
 #[must_use]
 pub fn is_emergency_stop(key: &str, payload: &[u8]) -> bool {
     letter_on(key, payload).is_some_and(|(_, letter)| letter.request == Request::EmergencyStop)
 }
 
-/// A letter, and whose it is, if it belongs on its key.
+/// Parses a request and its member, if it belongs on its key.
 fn letter_on(key: &str, payload: &[u8]) -> Option<(Name, NumberedRequest)> {
     let letter = exactly(payload)?;
     let (key, member) = key.rsplit_once('/')?;
@@ -320,7 +320,7 @@ fn letter_on(key: &str, payload: &[u8]) -> Option<(Name, NumberedRequest)> {
     (belongs && (1..=64).contains(&letter.session.len())).then_some((member, letter))
 }
 
-/// A letter that says what we read, and not a word more: an unknown key anywhere is a misunderstanding.
+/// Parses strictly: rejects unknown keys at any depth.
 fn exactly(payload: &[u8]) -> Option<NumberedRequest> {
     let said: serde_json::Value = serde_json::from_slice(payload).ok()?;
     let letter: NumberedRequest = serde_json::from_slice(payload).ok()?;

@@ -1,51 +1,51 @@
-//! How a bridge is doing: what is lost or refused is shown.
+//! Status of a bridge, with losses and refusals.
 
 use crate::couple::Carried;
 use crate::request::{Refusal, Right, Ticket};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a bridge says of itself.
+/// Status of a bridge.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Status {
-    /// What it does.
+    /// State of the bridge.
     pub state: State,
-    /// Process of the run; 0 without one.
+    /// Process id of the run; 0 without one.
     pub run: u32,
-    /// Title of its scene.
+    /// Title of the run's scene; empty without a run.
     pub title: String,
-    /// Ticks put on the network since the bridge started.
+    /// Number of ticks published since the bridge started.
     pub published: u64,
-    /// Ticks of this run that the host dropped because the bridge did not take them in time.
+    /// Number of ticks of this run that the host dropped because the bridge was late.
     pub dropped: u64,
-    /// Requests not followed, by reason.
+    /// Number of rejected requests, by reason.
     pub refused: BTreeMap<Refusal, u64>,
-    /// The most that may be asked for here.
+    /// Highest right whose requests are accepted.
     #[serde(default)]
     pub allow: Right,
-    /// The bridge's word now: requests are made on it.
+    /// Current ticket, on which requests are based.
     #[serde(default)]
     pub ticket: Ticket,
-    /// What was carried for each coupling with another host.
+    /// Message counts by coupling with another host.
     #[serde(default)]
     pub couplings: BTreeMap<String, Carried>,
 }
 
-/// What a bridge does.
+/// State of a bridge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum State {
-    /// No host runs on its machine.
+    /// No run on the bridge's machine.
     #[default]
     Waiting,
-    /// A host runs.
+    /// A run is in progress.
     Running,
-    /// The emergency stop of its machine is pressed, and its owner has not released it.
+    /// The emergency stop of the bridge's machine is pressed, and not released yet.
     EmergencyStopped,
 }
 
 impl State {
-    /// For people.
+    /// Returns the display name of the state.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {

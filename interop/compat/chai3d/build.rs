@@ -1,4 +1,4 @@
-//! How the library is linked: its name for the loader; never unloaded, because its threads go on; its own calls stay its own.
+//! Linker arguments: name of the library; no unloading, because its threads go on; binding of its own calls within the library.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

@@ -1,4 +1,4 @@
-//! Times the model's batch call from Rust: the yardstick of `bench/batch.py`. Prints seconds, best of the rounds.
+//! Times the model's batch call from Rust, as reference for `bench/batch.py`. Prints the time of the fastest round, s.
 //!
 //! Usage: batch_seconds PLUGIN.so POSES ROUNDS
 

@@ -1,4 +1,4 @@
-//! One exception for all that can go wrong: its text says what, where and what to do.
+//! Exception class of the package: its text states the problem, the place and the remedy.
 
 use pyo3::PyErr;
 use pyo3::exceptions::PyException;
@@ -10,13 +10,13 @@ pyo3::create_exception!(
     "Something Flotor refuses or cannot do; the text says what, where and what to do."
 );
 
-/// Remedies of the command line, and what Python has in their place: the wheel has no command.
+/// Remedies for the command line, and their replacements in Python: the wheel has no command.
 const REMEDIES: [(&str, &str); 2] = [
     ("`flotor plugins` lists", "`flotor.plugins()` lists"),
     ("`flotor plugins ID` lists", "`flotor.Model(ID).parameters` lists"),
 ];
 
-/// Any error of the host as the one exception.
+/// Converts any error of the host to the exception.
 pub(crate) fn refuse(error: impl std::fmt::Display) -> PyErr {
     let text = REMEDIES.iter().fold(error.to_string(), |text, (command, call)| text.replace(command, call));
     FlotorError::new_err(text)

@@ -1,6 +1,6 @@
-//! The native half of the Python package `flotor`: `python/flotor` gives it its public face.
+//! Native part of the Python package `flotor`; `python/flotor` contains the public interface.
 //!
-//! - [`rows`]: the contract's structs as NumPy records, so that arrays cross without copying.
+//! - [`rows`]: the contract's structs as NumPy records, so that arrays are passed without copies.
 //! - [`model`]: a force model, in batches or at single poses as `flotor eval` does.
 //! - [`run`]: scenes in virtual time.
 //! - [`recording`]: recordings as columns.
@@ -15,7 +15,7 @@ mod sweep;
 
 use pyo3::prelude::*;
 
-/// Filled by the functions above; documented in `_flotor.pyi`.
+/// Module with the items above; documented in `_flotor.pyi`.
 #[pymodule]
 mod _flotor {
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! A force model in Python's hands.
+//! Python class of a force model.
 
 use crate::error::refuse;
 use crate::rows::{InputRow, OutputRow};
@@ -15,22 +15,22 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
-/// One parameter of a plugin's schema.
+/// Parameter of a plugin's schema.
 #[pyclass(frozen, get_all, module = "flotor")]
 pub(crate) struct Parameter {
-    /// What it is called in scenes and commands.
+    /// Key in scenes and commands.
     id: String,
-    /// Unit of its number.
+    /// Unit of the value.
     unit: String,
-    /// What it means.
+    /// Description.
     doc: String,
-    /// Smallest legal number (None for choices and text).
+    /// Smallest legal value (None for choices and text).
     min: Option<f64>,
-    /// Largest legal number.
+    /// Largest legal value (None for choices and text).
     max: Option<f64>,
-    /// Number or word used when nothing is set.
+    /// Default, a number or a word.
     default: String,
-    /// Legal words of a choice.
+    /// Legal words of a choice; empty for other kinds.
     choices: Vec<String>,
 }
 
@@ -52,13 +52,13 @@ impl Parameter {
 type Columns<'py> =
     (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Vec<&'static str>);
 
-/// A force model. Safe to share between threads: calls wait for each other.
+/// A force model. May be shared between threads: calls are serialised.
 #[pyclass(frozen, module = "flotor")]
 pub(crate) struct Model {
     plugin: Plugin,
     settings: Vec<Setting>,
     instance: Mutex<flotor_hal::abi::loader::Model>,
-    /// Where it was made: a lock that another thread held at an `os.fork()` is never given back in the child.
+    /// Process of creation: a lock held by another thread at an `os.fork()` is never released in the child.
     process: u32,
 }
 
@@ -94,7 +94,7 @@ impl Model {
         self.plugin.parameters().iter().map(describe).collect()
     }
 
-    /// The value in force of a parameter, presets resolved.
+    /// Returns the current value of a parameter, presets resolved.
     fn parameter(&self, id: &str) -> PyResult<f64> {
         let index = self.plugin.parameters().iter().position(|parameter| parameter.id() == id);
         let index = index.ok_or_else(|| refuse(format!("`{}` has no parameter `{id}`", self.id())))?;
@@ -116,21 +116,21 @@ impl Model {
         Ok(())
     }
 
-    /// Steps through rows in order, in place; the model's own batch code, without copies, without the GIL.
+    /// Steps through rows in order, in place, with the model's own batch code, without copies and without the GIL.
     fn step_batch(
         &self,
         py: Python<'_>,
         inputs: PyReadonlyArray1<'_, InputRow>,
         mut outputs: PyReadwriteArray1<'_, OutputRow>,
     ) -> PyResult<()> {
-        // NumPy takes any address for a record, and only says so in a flag: a slice does not.
+        // NumPy accepts any address for a record, with a flag for misaligned data; a slice requires alignment.
         if !(inputs.data().is_aligned() && outputs.data().is_aligned()) {
             return Err(refuse(
                 "inputs or outputs do not lie on a multiple of 8 bytes; pass a copy of the array",
             ));
         }
         let inputs = InputRow::peel(inputs.as_slice()?);
-        // NumPy tells views of one array apart, not two arrays on one buffer.
+        // NumPy distinguishes views of one array, but not two arrays on one buffer.
         let [read, written] = [inputs.as_ptr() as usize, outputs.data() as usize];
         let (read_end, written_end) =
             (read + size_of_val(inputs), written + outputs.len() * size_of::<OutputRow>());
@@ -151,7 +151,7 @@ impl Model {
         })
     }
 
-    /// What `flotor eval` answers: forces, torques, energies (NaN where there is none), statuses.
+    /// Evaluates poses like `flotor eval`: returns forces, torques, energies (NaN where there is none), statuses.
     fn evaluate<'py>(
         &self,
         py: Python<'py>,
@@ -174,7 +174,7 @@ impl Model {
             })
             .collect();
         let travel = if successive { Travel::Successive } else { Travel::FromHome };
-        // Instances of its own: the answer is the command's, whatever was stepped before.
+        // Separate instances: the result does not depend on earlier steps.
         let evaluation =
             Evaluation { plugin: &self.plugin, settings: &self.settings, travel, details: Details::Omitted };
         let answers = py.detach(|| evaluation.answers(&handles, &|| ())).map_err(refuse)?;
@@ -187,8 +187,8 @@ impl Model {
 }
 
 impl Model {
-    /// A panic of the model does not poison it: the contract reports panics as a status. In a child of `os.fork()` nothing is
-    /// waited for.
+    /// Locks the model. Ignores poisoning: the contract reports panics of a model as a status. Does not wait in a child of
+    /// `os.fork()`.
     fn lock(&self) -> PyResult<MutexGuard<'_, flotor_hal::abi::loader::Model>> {
         if self.process == std::process::id() {
             return Ok(self.instance.lock().unwrap_or_else(PoisonError::into_inner));

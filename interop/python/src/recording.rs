@@ -1,4 +1,4 @@
-//! A recording as columns.
+//! Recordings as columns for Python.
 
 use crate::error::refuse;
 use flotor_core::trace::TickRecord;
@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-/// Reads a recording into a dictionary of arrays, one row a tick, and says whether its end is there.
+/// Reads a recording into a dictionary of arrays, one row per tick; also returns whether the recording is complete.
 #[pyfunction]
 pub(crate) fn read_recording(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyDict>, bool)> {
     let (records, ending) = py
@@ -36,7 +36,7 @@ pub(crate) fn read_recording(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'
         matrix(&columns, &records, torque, move |r| pick(r).torque_nm)?;
     }
     matrix(&columns, &records, "model_force_n", |r| r.model.force().to_array())?;
-    // A column only of what was computed; NaN in the ticks without it.
+    // Columns of computed outputs only; NaN in ticks without a value.
     if records.iter().any(|r| r.model.torque().is_some()) {
         let torque_nm = |r: &TickRecord| r.model.torque().map_or([f64::NAN; 3], |torque| torque.to_array());
         matrix(&columns, &records, "model_torque_nm", torque_nm)?;

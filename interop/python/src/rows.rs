@@ -1,4 +1,4 @@
-//! The contract's step structs as NumPy records: a NumPy array of them *is* the slice a model steps through.
+//! The contract's step structs as NumPy records: an array of records has the memory layout of the slice that a model steps through.
 
 #![allow(unsafe_code)] // listed in tests/tests/system/architecture.rs
 
@@ -9,18 +9,18 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyList};
 use std::mem::offset_of;
 
-/// One element of an array of inputs.
+/// Element of an array of inputs.
 #[repr(transparent)]
 #[derive(Clone, Copy)]
 pub(crate) struct InputRow(Input);
 
-/// One element of an array of outputs.
+/// Element of an array of outputs.
 #[repr(transparent)]
 #[derive(Clone, Copy)]
 pub(crate) struct OutputRow(Output);
 
 impl InputRow {
-    /// The same memory as the contract's struct.
+    /// Views the rows as the contract's structs.
     pub(crate) fn peel(rows: &[InputRow]) -> &[Input] {
         // SAFETY: `InputRow` is `repr(transparent)` over `Input`, so layout, length and lifetime are the same.
         unsafe { std::slice::from_raw_parts(rows.as_ptr().cast(), rows.len()) }
@@ -28,7 +28,7 @@ impl InputRow {
 }
 
 impl OutputRow {
-    /// The same memory as the contract's struct.
+    /// Views the rows as the contract's structs.
     pub(crate) fn peel_mut(rows: &mut [OutputRow]) -> &mut [Output] {
         // SAFETY: `OutputRow` is `repr(transparent)` over `Output`; the borrow stays exclusive.
         unsafe { std::slice::from_raw_parts_mut(rows.as_mut_ptr().cast(), rows.len()) }
@@ -85,7 +85,7 @@ unsafe impl Element for OutputRow {
     }
 }
 
-/// A NumPy record dtype from name, format and offset of its fields; made once.
+/// Returns a NumPy record dtype, created once from names, formats and offsets of its fields.
 fn record<'py>(
     py: Python<'py>,
     once: &'static PyOnceLock<Py<PyArrayDescr>>,
@@ -101,7 +101,7 @@ fn record<'py>(
         layout.set_item("formats", formats)?;
         layout.set_item("offsets", offsets)?;
         layout.set_item("itemsize", size_bytes)?;
-        // NumPy then lays arrays of them out as the structs are, and knows of one that is not.
+        // Then NumPy lays out arrays like the structs, and detects misaligned ones.
         layout.set_item("aligned", true)?;
         let dtype = PyArrayDescr::new(py, layout)?;
         assert_eq!(dtype.itemsize(), size_bytes, "NumPy read the record layout differently");
@@ -112,13 +112,13 @@ fn record<'py>(
     dtype.expect("a constant layout that NumPy accepts").bind(py).clone()
 }
 
-/// `numpy.dtype` of one row of `Model.step_batch`'s inputs.
+/// Returns the `numpy.dtype` of a row of `Model.step_batch`'s inputs.
 #[pyfunction]
 pub(crate) fn input_dtype(py: Python<'_>) -> Bound<'_, PyArrayDescr> {
     InputRow::get_dtype(py)
 }
 
-/// `numpy.dtype` of one row of `Model.step_batch`'s outputs.
+/// Returns the `numpy.dtype` of a row of `Model.step_batch`'s outputs.
 #[pyfunction]
 pub(crate) fn output_dtype(py: Python<'_>) -> Bound<'_, PyArrayDescr> {
     OutputRow::get_dtype(py)

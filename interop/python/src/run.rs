@@ -1,4 +1,4 @@
-//! Scenes in virtual time, and what plugins there are.
+//! Runs of scenes in virtual time, and the list of plugins.
 
 use crate::error::refuse;
 use flotor_core::LARGEST_SEED;
@@ -8,7 +8,7 @@ use flotor_session::scene::{PluginKeyValue, Scene};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// Id, kind, version and file of every plugin found; none of them is opened.
+/// Returns id, kind, version and file of every plugin found; opens none.
 #[pyfunction]
 pub(crate) fn plugins(folders: Vec<PathBuf>) -> Vec<(String, &'static str, String, PathBuf)> {
     let registry = Registry::search(&folders);
@@ -18,7 +18,7 @@ pub(crate) fn plugins(folders: Vec<PathBuf>) -> Vec<(String, &'static str, Strin
         .collect()
 }
 
-/// Runs a scene (the demo if there is none) in virtual time; the summary of `flotor run --json` as JSON text.
+/// Runs a scene (the demo if `None`) in virtual time; returns the summary of `flotor run --json` as JSON text.
 #[pyfunction]
 #[pyo3(signature = (scene, *, folders, duration_s, rate_hz, seed, settings, recording))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of Python

@@ -1,4 +1,4 @@
-//! Sweeps, a task at a time: what any executor needs.
+//! Python class of a sweep, task by task, for any executor.
 
 use crate::error::refuse;
 use flotor_sweep::plan::Plan;
@@ -7,7 +7,7 @@ use flotor_sweep::{table, task};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// A prepared sweep and its folder of finished tasks.
+/// A prepared sweep with its folder of finished tasks.
 #[pyclass(frozen, module = "flotor")]
 pub(crate) struct Sweep {
     sweep: task::Sweep,
@@ -25,19 +25,19 @@ impl Sweep {
         Ok(Self { tasks: sweep.tasks(), sweep, store, out })
     }
 
-    /// Keys of all tasks, in order of their rows.
+    /// Keys of all tasks, in the order of their rows.
     #[getter]
     fn keys(&self) -> Vec<String> {
         self.tasks.iter().map(|task| task.key.clone()).collect()
     }
 
-    /// Numbers of the tasks that are not finished.
+    /// Returns the numbers of the unfinished tasks.
     fn open_tasks(&self) -> Vec<usize> {
         let open = self.tasks.iter().enumerate().filter(|(_, task)| !self.store.holds(task));
         open.map(|(number, _)| number).collect()
     }
 
-    /// Does a task unless it is finished, and puts it away; without the GIL.
+    /// Executes a task unless it is finished, and stores its rows; without the GIL.
     fn do_task(&self, py: Python<'_>, number: usize) -> PyResult<()> {
         let task = self.tasks.get(number);
         let task =
@@ -51,7 +51,7 @@ impl Sweep {
         .map_err(refuse)
     }
 
-    /// Writes `results.parquet` once every task is finished.
+    /// Writes `results.parquet` if all tasks are finished; returns its path.
     fn write_table(&self, py: Python<'_>) -> PyResult<PathBuf> {
         py.detach(|| {
             let path = self.out.join("results.parquet");

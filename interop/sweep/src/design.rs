@@ -1,28 +1,28 @@
-//! From axes to points: which value each axis has in row number `i`.
+//! Design of a sweep: from axes to the values of each row.
 
 use crate::plan::{Axis, Layout, Plan, Scale, Values};
 use flotor_hal::math;
 use flotor_lab::sampling::Sobol;
 use serde::{Deserialize, Serialize};
 
-/// A value in a row: of an axis, or of an answer.
+/// Cell of a row: the value of an axis or of a result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Cell {
-    /// A number; null in JSON if not finite, NaN in the table.
+    /// Number; null in JSON if not finite, NaN in the table.
     Number(Option<f64>),
-    /// A word.
+    /// Word, such as a choice or a status.
     Word(String),
 }
 
 impl Cell {
-    /// A number, finite or not.
+    /// Creates a number cell, finite or not.
     #[must_use]
     pub fn number(value: f64) -> Self {
         Self::Number(value.is_finite().then_some(value))
     }
 
-    /// The value as it is written in a setting.
+    /// Formats the value as in a setting.
     #[must_use]
     pub fn text(&self) -> String {
         match self {
@@ -32,23 +32,23 @@ impl Cell {
     }
 }
 
-/// The points of a plan, in order of their rows.
+/// Points of a plan, in the order of their rows.
 pub struct Design<'a> {
     plan: &'a Plan,
     sobol: Option<Sobol>,
 }
 
-/// One row: values of the axes, and the seed.
+/// Point of a plan: values of the axes, and seed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Values, one an axis.
+    /// Values, one per axis.
     pub values: Vec<Cell>,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
 impl<'a> Design<'a> {
-    /// The design of a plan.
+    /// Creates the design of a plan.
     #[must_use]
     pub fn new(plan: &'a Plan) -> Self {
         let sobol = match plan.layout {
@@ -58,7 +58,7 @@ impl<'a> Design<'a> {
         Self { plan, sobol }
     }
 
-    /// Row number `row`, from 0; seeds vary fastest, then the last axis.
+    /// Returns the point of row `row`, from 0; seeds vary fastest, then the last axis.
     #[must_use]
     pub fn point(&self, row: u64) -> Point {
         let seeds = self.plan.seeds.len() as u64;
@@ -92,7 +92,7 @@ impl<'a> Design<'a> {
 }
 
 impl Values {
-    /// The value at a part 0..1 of a range.
+    /// Returns the value at a fraction, 0 to 1, of a range; NaN for lists.
     fn at(&self, part: f64) -> f64 {
         match self {
             Self::Range { from, to, scale: Scale::Linear, .. } => from + (to - from) * part,
@@ -101,13 +101,13 @@ impl Values {
         }
     }
 
-    /// Grid value number `index`.
+    /// Returns the grid value with an index.
     fn nth(&self, index: u64) -> Cell {
         let listed = usize::try_from(index).unwrap_or(usize::MAX);
         match self {
             Self::Numbers(values) => Cell::number(values.get(listed).copied().unwrap_or(f64::NAN)),
             Self::Words(words) => Cell::Word(words.get(listed).cloned().unwrap_or_default()),
-            // The last value exactly, whatever the rounding of the way there.
+            // Returns `to` exactly, without rounding.
             Self::Range { to, steps, .. } if index + 1 == u64::from(*steps) => Cell::number(*to),
             Self::Range { steps, .. } => Cell::number(self.at(index as f64 / f64::from(steps - 1))),
         }

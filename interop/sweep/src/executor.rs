@@ -1,25 +1,25 @@
-//! Tasks on the cores of this machine.
+//! Local executor: runs tasks on the cores of this machine.
 
 use crate::store::{Store, StoreError};
 use crate::task::{Sweep, Task};
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// How a local execution went.
+/// Result of a local execution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Tasks that were finished before.
+    /// Number of tasks that were finished before.
     pub found: usize,
-    /// Tasks finished now.
+    /// Number of tasks finished now.
     pub done: usize,
-    /// True if `stop` ended it early.
+    /// True if `stop` ended the execution early.
     pub stopped: bool,
 }
 
-/// Does every task that is not in the store yet; `on_task` hears of each finished one (found ones first).
+/// Executes every task that is not in the store; calls `on_task` for each finished one (found ones first).
 ///
 /// # Errors
-/// The first [`StoreError`]; what was finished stays finished.
+/// The first [`StoreError`]; finished tasks stay in the store.
 pub fn execute(
     sweep: &Sweep,
     store: &Store,
@@ -42,7 +42,7 @@ pub fn execute(
         Ok(())
     };
     std::thread::scope(|scope| {
-        // Where the system has too few threads, this one does the rest.
+        // With too few threads, this one executes the rest.
         let start = |_| std::thread::Builder::new().spawn_scoped(scope, work).ok();
         let workers: Vec<_> = (1..jobs.get()).filter_map(start).collect();
         let own = std::iter::once(work());

@@ -1,4 +1,4 @@
-//! Sweeps: the same question at many parameters, poses and seeds, into one table.
+//! Sweeps: evaluations or runs over many parameters, poses and seeds, into one table.
 //!
 //! ```text
 //! PLAN.toml -> plan (axes, seeds, what to run) -> tasks (blocks of points, keyed by content)
@@ -6,16 +6,16 @@
 //!           -> table (Parquet) -> picture (SVG)
 //! ```
 //!
-//! A task is a pure function of its content: plan, points and plugin files. Its key is a hash of exactly that, its
-//! result one file named by the key that appears whole or not at all. So a killed sweep goes on where it was, two
-//! workers may do the same task, and whoever does it, the table has the same bytes.
+//! A task is a pure function of its content: plan, points and plugin files. Its key is a hash of that content, its
+//! result one file named by the key and written atomically. A killed sweep therefore resumes, two workers may execute the
+//! same task, and the table has the same bytes with any executor.
 //!
-//! - [`plan`]: what is asked, read from TOML and checked.
+//! - [`plan`]: the plan of a sweep, read from TOML and checked.
 //! - [`design`]: from axes to points.
-//! - [`task`]: a block of points, its key, and how it is run.
+//! - [`task`]: a block of points, its key, and its execution.
 //! - [`store`]: finished tasks on disk.
 //! - [`executor`]: tasks on the cores of this machine.
-//! - [`table`]: rows into Parquet, and [`picture`] of them.
+//! - [`table`]: writes rows to Parquet. [`picture`]: draws them.
 
 pub mod design;
 pub mod executor;

@@ -1,4 +1,4 @@
-//! `flotor-sweep`, what `flotor sweep` starts.
+//! Program `flotor-sweep`, started by `flotor sweep`.
 
 use clap::Parser;
 use flotor_command::options::{JsonOption, PluginPathOption, arguments};
@@ -26,16 +26,16 @@ use std::sync::atomic::AtomicBool;
 struct Arguments {
     /// The plan (TOML)
     plan: PathBuf,
-    /// Where finished tasks and results.parquet go (default: the plan's name without .toml)
+    /// Folder of finished tasks and results.parquet (default: the plan's name without .toml)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Tasks at a time (default: one a core)
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
-    /// Draw the answers as SVG
+    /// Draw the results as SVG
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Answers to draw (default: the first four numbers)
+    /// Results to draw (default: the first four numbers)
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     draw: Vec<String>,
     #[command(flatten)]
@@ -44,7 +44,7 @@ struct Arguments {
     plugin_path: PluginPathOption,
 }
 
-/// Exit codes of the `flotor` commands: 2 is usage or configuration, 1 anything else.
+/// Errors by exit code of the `flotor` commands: 2 is usage or configuration, 1 anything else.
 enum Failure {
     Usage(String),
     Other(String),

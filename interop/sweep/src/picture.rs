@@ -1,4 +1,4 @@
-//! A sweep at a glance: the first answers over the first axis, a line for every value of the second.
+//! Overview picture of a sweep: the first results over the first axis, a line for every value of the second.
 
 use crate::design::Cell;
 use crate::plan::Plan;
@@ -6,10 +6,10 @@ use crate::table::number;
 use crate::task::{Column, ColumnKind};
 use flotor_plot::{Axis, Figure, Panel, Series};
 
-/// Lines in a panel: more cannot be distinguished.
+/// Limit on the lines of a panel: more cannot be distinguished.
 const MOST_LINES: usize = 6;
 
-/// Draws the answers `wanted` (all numeric ones if empty, four at most) of a finished sweep as SVG.
+/// Draws the results `wanted` (all numeric ones if empty, four at most) of a finished sweep as SVG.
 #[must_use]
 pub fn draw(plan: &Plan, columns: &[Column], rows: &[Vec<Cell>], wanted: &[String]) -> String {
     let answers = plan.axes.len() + 1;
@@ -22,7 +22,7 @@ pub fn draw(plan: &Plan, columns: &[Column], rows: &[Vec<Cell>], wanted: &[Strin
     let across =
         plan.axes.iter().zip(columns).position(|(_, column)| column.kind == ColumnKind::Number).unwrap_or(0);
     let name = |at: usize| columns.get(at).map(|column| column.name.clone()).unwrap_or_default();
-    // The other axis that varies most slowly tells lines apart.
+    // The slowest other axis distinguishes the lines.
     let lines = (0..plan.axes.len()).find(|axis| *axis != across);
     let mut figure = Figure::new(&plan.title, Axis::linear(name(across), ""));
     figure =
@@ -39,7 +39,7 @@ pub fn draw(plan: &Plan, columns: &[Column], rows: &[Vec<Cell>], wanted: &[Strin
 
 type Line = (String, Vec<(f64, f64)>);
 
-/// Mean over everything else at each place, a line a value of the axis `lines`.
+/// Returns the means over all other axes at each position, a line for each value of the axis `lines`.
 fn grouped(rows: &[Vec<Cell>], across: usize, lines: Option<usize>, answer: usize) -> Vec<Line> {
     let mut labels: Vec<String> = Vec::new();
     let mut groups: Vec<Vec<(f64, f64)>> = Vec::new();
@@ -59,7 +59,7 @@ fn grouped(rows: &[Vec<Cell>], across: usize, lines: Option<usize>, answer: usiz
     labels.into_iter().zip(groups).step_by(thinned).map(|(label, points)| (label, means(points))).collect()
 }
 
-/// Points at one place become their mean.
+/// Averages the points with the same x.
 fn means(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.retain(|(x, _)| x.is_finite());
     points.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,84 +1,84 @@
-//! What is asked: axes, seeds, and the model or scene to ask, read from TOML and checked before anything runs.
+//! Plan of a sweep: axes, seeds, and the model or scene, read from TOML and checked before anything runs.
 
 use flotor_command::options::LARGEST_SEED;
 use flotor_hal::{TextProblem, read_file, text_from_bytes};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// A plan as read and checked.
+/// Checked plan.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// What stands over the picture.
+    /// Title of the picture.
     pub title: String,
-    /// What is asked at every point.
+    /// Evaluation or run at every point.
     pub question: Question,
-    /// How points are laid into the space of the axes.
+    /// Placement of the points in the space of the axes.
     pub layout: Layout,
-    /// What varies. The first axis varies slowest in a grid.
+    /// Varied quantities. The first axis varies slowest in a grid.
     pub axes: Vec<Axis>,
     /// Seeds at every point.
     pub seeds: Vec<u64>,
-    /// Points (times seeds) a task holds.
+    /// Rows (points times seeds) per task.
     pub block: usize,
 }
 
-/// What is asked at a point.
+/// Evaluation or run at a point.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Question {
-    /// A whole run in virtual time; axes are settings `PLUGIN.KEY`.
+    /// Run in virtual time; axes are settings `PLUGIN.KEY`.
     Run {
-        /// Scene file; relative to the plan. None: the built-in demo.
+        /// Scene file, relative to the plan; `None` for the built-in demo.
         scene: Option<PathBuf>,
-        /// How long each run takes, s of virtual time. None: what the scene says.
+        /// Duration of each run, s of virtual time; `None` for the scene's.
         duration_s: Option<f64>,
     },
-    /// A force model at a pose; axes are parameters of the model or the pose columns of `flotor eval`.
+    /// Evaluation of a force model at a pose; axes are parameters of the model or the pose columns of `flotor eval`.
     Eval {
         /// Id of the model, or path to its plugin.
         model: String,
     },
 }
 
-/// How points are laid into the space of the axes.
+/// Placement of the points in the space of the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
-    /// Every combination.
+    /// Grid of all combinations.
     Grid,
-    /// The first points of Sobol's sequence, shifted by a seed; needs ranges, at most six of them.
+    /// First points of Sobol's sequence, shifted by a seed; requires ranges, at most six of them.
     Sobol {
-        /// How many.
+        /// Number of points.
         points: u64,
         /// Shift of the sequence.
         seed: u64,
     },
 }
 
-/// One thing that varies.
+/// Varied quantity with its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     /// Setting, parameter or pose column.
     pub key: String,
-    /// The values.
+    /// Values along the axis.
     pub values: Values,
 }
 
-/// The values along an axis.
+/// Values along an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
     /// Listed numbers.
     Numbers(Vec<f64>),
     /// Listed words of a choice.
     Words(Vec<String>),
-    /// An interval, evenly or logarithmically.
+    /// Interval with equal or logarithmic spacing.
     Range {
         /// First value.
         from: f64,
         /// Last value.
         to: f64,
-        /// How many on a grid, ends included.
+        /// Number of values on a grid, ends included.
         steps: u32,
-        /// Spacing.
+        /// Linear or logarithmic spacing.
         scale: Scale,
     },
 }
@@ -94,43 +94,43 @@ pub enum Scale {
     Log,
 }
 
-/// Why a plan is refused.
+/// Error of a plan.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
     /// The file cannot be read.
     #[error("{}: cannot read the plan: {cause}", path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the plan.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         cause: std::io::Error,
     },
-    /// It is not TOML, or a key is unknown or of the wrong type.
+    /// The file is not TOML, or a key is unknown or of the wrong type.
     #[error("{}:{line}: {problem}", path.display())]
     Malformed {
-        /// The file.
+        /// Path of the plan.
         path: PathBuf,
         /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// Cause.
         problem: String,
     },
-    /// The values do not make a plan.
+    /// The values are not a valid plan.
     #[error("{}: {problem}", path.display())]
     Unfit {
-        /// The file.
+        /// Path of the plan.
         path: PathBuf,
-        /// What is wrong, and what would be right.
+        /// Cause and remedy.
         problem: String,
     },
 }
 
-/// Largest number of rows: a table of this size still fits a machine of 16 GB while it is written.
+/// Limit on the number of rows: a table of this size can still be written by a machine with 16 GB.
 const MOST_ROWS: u64 = 100_000_000;
-/// Rows of a task when the plan does not say: model evaluations are cheap, runs are not.
+/// Default number of rows per task of evaluations, which are cheap; runs get one.
 const EVAL_BLOCK: usize = 4096;
-/// Columns that are poses rather than parameters, in order.
+/// Axis keys that are pose coordinates rather than parameters, in order.
 pub const POSE_COLUMNS: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
 
 #[derive(Deserialize)]
@@ -170,14 +170,14 @@ struct AxisText {
     scale: Scale,
 }
 
-/// Longest plan, bytes.
+/// Limit on the size of a plan, bytes.
 const MOST_BYTES: u64 = 64 << 20;
 
 impl Plan {
     /// Reads a plan from its file.
     ///
     /// # Errors
-    /// [`PlanError`], with file and line or what would be right.
+    /// [`PlanError`] with file and line, or with the remedy.
     pub fn load(path: &Path) -> Result<Self, PlanError> {
         let bytes = read_file(path, MOST_BYTES)
             .map_err(|cause| PlanError::Unreadable { path: path.into(), cause })?;
@@ -189,10 +189,10 @@ impl Plan {
         Self::parse(&text, path)
     }
 
-    /// Reads a plan from text; `path` is for messages, and what scene files are relative to.
+    /// Parses a plan; `path` is for messages, and the base of relative scene files.
     ///
     /// # Errors
-    /// [`PlanError`].
+    /// [`PlanError`] of the text or its values.
     pub fn parse(text: &str, path: &Path) -> Result<Self, PlanError> {
         let file: File = toml::from_str(text).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start);
@@ -270,7 +270,7 @@ impl Plan {
         }
     }
 
-    /// Points times seeds; `None` beyond all bounds.
+    /// Returns the number of rows, points times seeds; `None` on overflow.
     #[must_use]
     pub fn row_count(&self) -> Option<u64> {
         let points = match self.layout {
@@ -284,7 +284,7 @@ impl Plan {
 }
 
 impl Values {
-    /// How many values a grid takes.
+    /// Returns the number of values on a grid.
     #[must_use]
     pub fn len(&self) -> u64 {
         match self {
@@ -294,7 +294,7 @@ impl Values {
         }
     }
 
-    /// True if there is none.
+    /// Returns true if there are no values.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0

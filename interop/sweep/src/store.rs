@@ -1,4 +1,4 @@
-//! Finished tasks on disk: one file a task, named by its key, whole or absent.
+//! Store of finished tasks on disk: one file per task, named by its key, written atomically.
 
 use crate::design::Cell;
 use crate::task::Task;
@@ -6,21 +6,21 @@ use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// A folder of finished tasks. May be shared between threads, processes and machines that see the folder.
+/// Folder of finished tasks. May be shared between threads, processes and machines with access to the folder.
 #[derive(Clone, Debug)]
 pub struct Store {
     folder: PathBuf,
 }
 
-/// Why the store cannot be used.
+/// Error of a store.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {action}: {cause}", path.display())]
 pub struct StoreError {
-    /// File or folder.
+    /// Affected file or folder.
     pub path: PathBuf,
-    /// What was attempted.
+    /// Failed action.
     pub action: &'static str,
-    /// What the system said.
+    /// Error of the system.
     pub cause: std::io::Error,
 }
 
@@ -31,10 +31,10 @@ struct Finished {
 }
 
 impl Store {
-    /// Opens a store, making its folder if need be.
+    /// Opens a store, creating its folder if necessary.
     ///
     /// # Errors
-    /// [`StoreError`].
+    /// If the folder cannot be created.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
         let folder = folder.join("tasks");
         std::fs::create_dir_all(&folder).map_err(|cause| StoreError {
@@ -45,13 +45,13 @@ impl Store {
         Ok(Self { folder })
     }
 
-    /// True if the task is finished: its file is there, whole and its own.
+    /// Returns true if the task is finished: its file exists, is complete and has the task's key.
     #[must_use]
     pub fn holds(&self, task: &Task) -> bool {
         self.rows(task).is_some()
     }
 
-    /// Rows of a finished task; `None` if it is not, or its file is damaged (then it is simply done again).
+    /// Returns the rows of a finished task; `None` if unfinished or if its file is damaged, so that the task is executed again.
     #[must_use]
     pub fn rows(&self, task: &Task) -> Option<Vec<Vec<Cell>>> {
         let bytes = std::fs::read(self.file(task)).ok()?;
@@ -59,10 +59,10 @@ impl Store {
         (finished.key == task.key && finished.rows.len() as u64 == task.count).then_some(finished.rows)
     }
 
-    /// Puts a task away: written beside, made durable, then renamed, so that a kill leaves all of it or nothing.
+    /// Stores the rows of a task atomically: written to a temporary file, synchronised, renamed.
     ///
     /// # Errors
-    /// [`StoreError`].
+    /// If the file cannot be written.
     pub fn finish(&self, task: &Task, rows: Vec<Vec<Cell>>) -> Result<(), StoreError> {
         let path = self.file(task);
         let failed =

@@ -1,4 +1,4 @@
-//! Rows into Parquet: the same rows give the same bytes, whoever answered them.
+//! Parquet table of a sweep: the same rows give the same bytes with any executor.
 
 use crate::design::Cell;
 use crate::store::Store;
@@ -13,40 +13,40 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Why there is no table.
+/// Error of writing a table.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
-    /// Tasks are not finished.
+    /// Some tasks are not finished.
     #[error("{open} of {all} tasks are not finished; run the sweep again to go on")]
     Unfinished {
-        /// How many are open.
+        /// Number of unfinished tasks.
         open: usize,
-        /// Of how many.
+        /// Number of all tasks.
         all: usize,
     },
     /// The file cannot be written.
     #[error("{}: cannot write the table: {cause}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         cause: std::io::Error,
     },
-    /// Parquet refused.
+    /// The Parquet writer failed.
     #[error("{}: cannot write the table: {cause}", path.display())]
     Parquet {
-        /// The file.
+        /// Path of the table.
         path: PathBuf,
-        /// What it said.
+        /// Error of the writer.
         cause: ParquetError,
     },
 }
 
-/// All rows of a finished sweep, in order.
+/// Returns all rows of a finished sweep, in order.
 ///
 /// # Errors
-/// [`TableError::Unfinished`].
+/// [`TableError::Unfinished`] with the number of unfinished tasks.
 pub fn rows(sweep: &Sweep, store: &Store) -> Result<Vec<Vec<Cell>>, TableError> {
     let tasks = sweep.tasks();
     let blocks: Vec<Option<Vec<Vec<Cell>>>> = tasks.iter().map(|task| store.rows(task)).collect();
@@ -57,16 +57,16 @@ pub fn rows(sweep: &Sweep, store: &Store) -> Result<Vec<Vec<Cell>>, TableError> 
     Ok(blocks.into_iter().flatten().flatten().collect())
 }
 
-/// Rows of a row group: small enough to be read in pieces, large enough to cost nothing.
+/// Rows per row group: few enough to read in pieces, enough for a negligible overhead.
 const GROUP_ROWS: usize = 1 << 20;
 
-/// Writes rows as Parquet, uncompressed.
+/// Writes rows as an uncompressed Parquet file.
 ///
 /// # Errors
-/// [`TableError`].
+/// [`TableError`] of the file or of the writer.
 pub fn write(path: &Path, columns: &[Column], rows: &[Vec<Cell>]) -> Result<(), TableError> {
     let parquet = |cause| TableError::Parquet { path: path.into(), cause };
-    // Beside and renamed: a reader never meets half a table.
+    // Write a temporary file and rename it: a reader never sees a partial table.
     let partial = path.with_extension("parquet.partial");
     let file = File::create(&partial).map_err(|cause| TableError::File { path: partial.clone(), cause })?;
     let schema = schema(columns).map_err(parquet)?;
@@ -120,7 +120,7 @@ fn write_group(
     Ok(())
 }
 
-/// A cell as a number; NaN if it is none.
+/// Returns a cell as a number; NaN for other cells.
 pub(crate) fn number(cell: Option<&Cell>) -> f64 {
     match cell {
         Some(Cell::Number(Some(value))) => *value,

@@ -1,4 +1,4 @@
-//! A block of rows: its key, and how it is answered.
+//! Tasks of a sweep: blocks of rows with their keys, and their execution.
 
 use crate::design::{Cell, Design, Point};
 use crate::plan::{POSE_COLUMNS, Plan, PlanError, Question};
@@ -12,13 +12,13 @@ use flotor_session::scene::{PluginKeyValue, Scene};
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
-/// A plan with everything loaded that its tasks need. May be shared between threads.
+/// Plan with its loaded scene or plugin. May be shared between threads.
 pub struct Sweep {
     plan: Plan,
     subject: Subject,
-    /// Names of the answers, and whether they are numbers.
+    /// Result columns.
     answers: Vec<Column>,
-    /// Digest of what is the same for all tasks: question, scene text, plugin files, axes.
+    /// Digest of the data common to all tasks: question, scene text, plugin files, axes.
     context: u128,
 }
 
@@ -27,67 +27,67 @@ enum Subject {
     Eval { plugin: Box<Plugin> },
 }
 
-/// One task: rows `first..first + count` of the plan.
+/// Task: rows `first..first + count` of the plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Task {
-    /// Hash of everything the answer depends on, 32 hexadecimal digits.
+    /// Hash of all data that the result depends on, 32 hexadecimal digits.
     pub key: String,
-    /// First row.
+    /// Index of the first row, from 0.
     pub first: u64,
     /// Number of rows.
     pub count: u64,
 }
 
-/// A column of the table.
+/// Column of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// Its name.
+    /// Name of the axis or result.
     pub name: String,
-    /// What it holds.
+    /// Type of the cells.
     pub kind: ColumnKind,
 }
 
-/// What a column holds.
+/// Type of the cells of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColumnKind {
-    /// Double-precision numbers, NaN where there is none.
+    /// Double-precision numbers; NaN for missing ones.
     Number,
-    /// Words.
+    /// Words; empty for missing ones.
     Word,
 }
 
-/// Why a sweep cannot start.
+/// Error of preparing a sweep.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SweepError {
-    /// The plan is refused.
+    /// The plan is invalid.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// A plugin is unknown or refused.
+    /// A plugin is unknown or cannot be loaded.
     #[error(transparent)]
     Lookup(#[from] flotor_session::registry::LookupError),
-    /// The scene is refused.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] flotor_session::scene::SceneError),
-    /// An axis names nothing, or its first value is refused.
+    /// An axis names no parameter, or its first value is invalid.
     #[error("axis `{key}`: {problem}")]
     Axis {
-        /// The axis.
+        /// Key of the axis.
         key: String,
-        /// What is wrong.
+        /// Cause.
         problem: String,
     },
-    /// A plugin file cannot be read for its digest.
+    /// A plugin file cannot be read, for its digest.
     #[error("cannot read `{}`: {cause}", path.display())]
     Plugin {
-        /// The file.
+        /// Path of the plugin file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         cause: std::io::Error,
     },
 }
 
-/// Answers of a run, in order of their columns.
+/// Result columns of a run.
 const RUN_COLUMNS: [(&str, ColumnKind); 8] = [
     ("ticks", ColumnKind::Number),
     ("peak_force_n", ColumnKind::Number),
@@ -98,7 +98,7 @@ const RUN_COLUMNS: [(&str, ColumnKind); 8] = [
     ("trace_digest", ColumnKind::Word),
     ("error", ColumnKind::Word),
 ];
-/// Answers of an evaluation.
+/// Result columns of an evaluation.
 const EVAL_COLUMNS: [(&str, ColumnKind); 9] = [
     ("fx_n", ColumnKind::Number),
     ("fy_n", ColumnKind::Number),
@@ -112,10 +112,10 @@ const EVAL_COLUMNS: [(&str, ColumnKind); 9] = [
 ];
 
 impl Sweep {
-    /// Loads what a plan names and checks its axes, before anything runs. `folders` are searched first.
+    /// Loads the scene or plugin of a plan and checks the axes, before anything runs. `folders` are searched first.
     ///
     /// # Errors
-    /// [`SweepError`].
+    /// [`SweepError`] of the plan, the scene, a plugin or an axis.
     pub fn prepare(plan: Plan, folders: &[PathBuf]) -> Result<Self, SweepError> {
         let registry = Registry::search(folders);
         let mut context = Xxh3::new();
@@ -154,13 +154,13 @@ impl Sweep {
         Ok(sweep)
     }
 
-    /// The plan.
+    /// Returns the plan.
     #[must_use]
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// Columns of the table: axes, seed, answers.
+    /// Returns the columns of the table: axes, seed, results.
     #[must_use]
     pub fn columns(&self) -> Vec<Column> {
         let design = Design::new(&self.plan);
@@ -172,7 +172,7 @@ impl Sweep {
         axes.chain([seed]).chain(self.answers.iter().cloned()).collect()
     }
 
-    /// All tasks, in order of their rows.
+    /// Returns all tasks, in the order of their rows.
     #[must_use]
     pub fn tasks(&self) -> Vec<Task> {
         let rows = self.plan.row_count().unwrap_or(0);
@@ -186,7 +186,7 @@ impl Sweep {
             .collect()
     }
 
-    /// Hash of the context and of every point: what the answer depends on, and nothing else.
+    /// Returns the hash of the context and of every point: all data that the result depends on, and no other.
     fn key(&self, first: u64, count: u64) -> String {
         let design = Design::new(&self.plan);
         let mut hash = Xxh3::new();
@@ -202,7 +202,7 @@ impl Sweep {
         format!("{:032x}", hash.digest128())
     }
 
-    /// Answers a task: a row of cells for every point, axes and seed first. A refused point is a row with its reason.
+    /// Executes a task: returns a row per point, axes and seed first. A rejected point is a row with the reason.
     #[must_use]
     pub fn answer(&self, task: &Task) -> Vec<Vec<Cell>> {
         let design = Design::new(&self.plan);
@@ -243,7 +243,7 @@ impl Sweep {
         }
     }
 
-    /// The scene with the settings of a point on top.
+    /// Returns the scene with the settings of a point.
     fn scene_at(&self, point: &Point, scene: &Scene) -> Result<Scene, String> {
         let mut scene = scene.clone();
         for (axis, value) in self.plan.axes.iter().zip(&point.values) {
@@ -253,7 +253,7 @@ impl Sweep {
         Ok(scene)
     }
 
-    /// Consecutive points with the same parameters share a model, so that poses go through it in batches.
+    /// Evaluates points; consecutive ones with the same parameters share a model, which gets their poses in batches.
     fn evaluate(&self, points: &[Point], plugin: &Plugin) -> Vec<Vec<Cell>> {
         let mut answers = Vec::with_capacity(points.len());
         for group in points.chunk_by(|a, b| self.parameters(a) == self.parameters(b)) {
@@ -300,7 +300,7 @@ impl Sweep {
         Handle { position_m: DVec3::new(x, y, z), rotation_rad: DVec3::new(rx, ry, rz) }
     }
 
-    /// A plan whose first row is refused for a name it does not know is refused as a whole.
+    /// Rejects the whole plan if its first row has an unknown name.
     fn check_first_row(&self) -> Result<(), SweepError> {
         let Subject::Run { scene, folders } = &self.subject else { return Ok(()) };
         let point = Design::new(&self.plan).point(0);
@@ -312,7 +312,7 @@ impl Sweep {
             Ok(_) => Ok(()),
             Err(flotor_session::RunError::Scene(error)) => Err(error.into()),
             Err(flotor_session::RunError::Lookup(error)) => Err(error.into()),
-            // Anything else belongs to this point, and goes into its row.
+            // Other errors belong to this point, and become its row.
             Err(_) => Ok(()),
         }
     }
@@ -334,7 +334,7 @@ fn refused(reason: &str) -> Vec<Cell> {
     std::iter::repeat_n(Cell::Number(None), EVAL_COLUMNS.len() - words.len()).chain(words).collect()
 }
 
-/// Every axis is a pose column or a parameter of the model.
+/// Checks that every axis is a pose column or a parameter of the model.
 fn check_model_axes(plan: &Plan, plugin: &Plugin) -> Result<(), SweepError> {
     let point = Design::new(plan).point(0);
     for (axis, value) in plan.axes.iter().zip(point.values) {
@@ -347,7 +347,7 @@ fn check_model_axes(plan: &Plan, plugin: &Plugin) -> Result<(), SweepError> {
     Ok(())
 }
 
-/// Files of the plugins a scene names.
+/// Returns the files of a scene's plugins.
 fn used_plugins(scene: &Scene, registry: &Registry) -> Result<Vec<PathBuf>, SweepError> {
     let mut files = Vec::new();
     for device in &scene.devices {

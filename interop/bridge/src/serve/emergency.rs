@@ -1,23 +1,23 @@
-//! The emergency stop from the network: presses the latch of this machine at once, and is answered when every host has confirmed.
+//! Emergency stop from the network: presses the latch of this machine at once, and replies when every host has confirmed.
 
 use flotor_live::{Directory, Latch};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Sends the answer of a press: the reason of a refusal, or none.
+/// Callback that sends the reply to a press: the reason of a refusal, or none.
 pub(super) type SendAnswer = Box<dyn FnOnce(Option<String>) + Send>;
 
-/// How long the hosts may take to confirm; who presses waits longer for the answer.
+/// Timeout of the hosts' confirmation; the peer's timeout is longer.
 const CONFIRM_WAIT: Duration = Duration::from_millis(2000);
-/// Presses that wait for an answer at most. What finds no room has pressed all the same, and is never told that it is done.
+/// Limit on presses that wait for a reply. Further presses take effect as well, but get no reply.
 const MOST_WAITING: usize = 1024;
 
-/// Returns the name under which a press of a member is kept.
+/// Returns the name under which a member's press is stored.
 pub(super) fn who(member: &str, bridge: impl std::fmt::Display) -> String {
     format!("{member} over the network (bridge {bridge})")
 }
 
-/// Presses, and lets a thread of its own ask the hosts.
+/// Emergency stop with a thread that waits for the hosts' confirmation.
 pub(super) struct Emergency {
     latch: Latch,
     pressed: SyncSender<(SendAnswer, Option<String>)>,
@@ -38,7 +38,7 @@ impl Emergency {
         &self.latch
     }
 
-    /// Before anything else the latch: a run that is not yet to be seen looks at it before it energises a device.
+    /// Presses the latch first: a run that is not visible yet checks the latch before it energises a device.
     pub(super) fn press(&self, who: &str, answer: SendAnswer) {
         let problem =
             self.latch.press(who).err().map(|error| {

@@ -1,7 +1,7 @@
-//! Where requests arrive: letters in, answers out, and what is known of the run for who asks.
+//! Request handler of a bridge: receives requests, sends replies, and answers queries about the run.
 //!
-//! The network has two threads for all members: there only the emergency stop is read, and pressed. Everything else waits in a line
-//! for a thread of its own, which a host or a member that takes nothing in may delay.
+//! The network has two threads for all members: there only the emergency stop is parsed and pressed. All else is queued
+//! for a separate thread, which a slow host or member may delay.
 
 use super::emergency::{Emergency, who};
 use super::station::{Station, json};
@@ -20,35 +20,35 @@ use std::time::{Duration, Instant};
 use zenoh::Session;
 use zenoh::query::{Query, Queryable};
 
-/// How long a host may take to answer.
+/// Timeout of a host's reply.
 const ANSWER_WAIT: Duration = Duration::from_secs(2);
-/// Requests that wait for the host at most, which answers some thousand a second. An emergency stop goes its own way.
+/// Limit on pending requests to the host, which handles some thousand a second. An emergency stop bypasses the queue.
 const MOST_OPEN: usize = 32;
-/// Requests, and questions for what is known, that wait in the line at most.
+/// Limit on queued requests and queries.
 const MOST_IN_LINE: usize = 256;
-/// Of them, longer ones than any letter.
+/// Limit on queued requests that are too long.
 const MOST_LONG_ONES: usize = 4;
-/// How often the status goes out when nothing changes: who lost one gets the next.
+/// Interval of the status while nothing changes, for peers that lost one.
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
-/// Everything a bridge knows.
+/// Request handler, with the state of the bridge.
 pub(super) struct RequestHandler {
     name: Name,
     emergency: Emergency,
     inside: Mutex<Inside>,
-    /// Letters that found no room in the line, and letters that were too long for it.
+    /// Number of requests rejected by a full queue, and of requests that were too long.
     turned_away: [AtomicU64; 2],
-    /// Of the latter, how many are in the line to be told so.
+    /// Number of too long requests in the queue, which wait for their refusal.
     long_ones: AtomicUsize,
 }
 
-/// What waits in the line.
+/// Queue entry.
 enum Asked {
-    /// For what is known, under this key.
+    /// Query for a state, with its key.
     Known(fn(&RequestHandler) -> Option<Vec<u8>>, String),
-    /// A letter.
+    /// Request.
     Letter,
-    /// Something longer than any letter.
+    /// Too long request.
     TooLong,
 }
 
@@ -59,20 +59,20 @@ struct Inside {
     launcher: Option<Launcher>,
     latch: Latch,
     reported: Option<(Status, Instant)>,
-    /// Ticks that were to be published since the bridge started, dropped ones among them.
+    /// Number of ticks to be published since the bridge started, dropped ones included.
     due: u64,
 }
 
-/// The current run.
+/// Current run.
 struct Run {
     greeting: Greeting,
     description: Vec<u8>,
     asker: Asker,
-    /// Questions on their way to the host, by the number its answer will carry.
+    /// Pending requests to the host, by request number.
     open: BTreeMap<u64, (Query, Instant)>,
 }
 
-/// Opens the handler: for reading always, for requests as far as `allow` goes.
+/// Declares the handler's queryables: for state always, for requests up to `allow`.
 pub(super) fn open(
     session: &Session,
     handler: &Arc<RequestHandler>,
@@ -92,7 +92,7 @@ pub(super) fn open(
         let key = handler.name.key(key);
         let (line, name) = (sender.clone(), key.clone());
         let ask = move |query: Query| {
-            // Nobody who asks for what is known has anything to say.
+            // A query for state has no payload.
             if query.payload().is_none() {
                 let _ = line.try_send((Asked::Known(read, name.clone()), query));
             }
@@ -104,18 +104,18 @@ pub(super) fn open(
             let key = handler.name.key(key);
             let (handler, line) = (Arc::clone(handler), sender.clone());
             let receive = move |query: Query| handler.receive(query, &line);
-            // The last part is who asks.
+            // The last part names the member.
             counter.push(session.declare_queryable(format!("{key}/*")).callback(receive).wait_now()?);
         }
     }
     Ok(counter)
 }
 
-/// Answers one after the other.
+/// Handles queue entries one by one.
 fn attend(handler: &RequestHandler, line: &Receiver<(Asked, Query)>) {
     for (asked, query) in line {
         match asked {
-            // Without a run there is nothing to say, which is an answer, too.
+            // Without a run there is no reply.
             Asked::Known(read, key) => {
                 if let Some(bytes) = read(handler) {
                     let _ = query.reply(key, bytes).wait_now();
@@ -162,7 +162,7 @@ impl RequestHandler {
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A run begins.
+    /// Stores a new run.
     pub(super) fn begin(&self, client: &Client) {
         let mut inside = self.lock();
         inside.status.run = client.greeting().process;
@@ -176,7 +176,7 @@ impl RequestHandler {
         });
     }
 
-    /// The run is over: whoever still waits for an answer gets one.
+    /// Clears the run, and refuses its pending requests.
     pub(super) fn end(&self) {
         let mut inside = self.lock();
         inside.status.run = 0;
@@ -186,26 +186,26 @@ impl RequestHandler {
         }
     }
 
-    /// Keeps the values in force for late joiners.
+    /// Updates the stored parameter values, for late joiners.
     pub(super) fn keep(&self, change: &ChangeMessage) {
         if let Some(run) = &mut self.lock().run {
             run.greeting.keep(change);
         }
     }
 
-    /// What the host could not hand over in this run so far: a gap in the numbers, for all to see.
+    /// Updates the number of ticks dropped by the host, which become a visible gap in the numbers.
     pub(super) fn dropped(&self, dropped: u64) {
         let mut inside = self.lock();
         inside.due = inside.due.saturating_add(dropped.saturating_sub(inside.status.dropped));
         inside.status.dropped = dropped;
     }
 
-    /// What was carried for couplings.
+    /// Updates the message counts of couplings.
     pub(super) fn carried(&self, couplings: BTreeMap<String, Carried>) {
         self.lock().status.couplings = couplings;
     }
 
-    /// The number of the tick to be published now.
+    /// Returns the number of the tick to publish.
     pub(super) fn publishing(&self) -> u64 {
         let mut inside = self.lock();
         inside.status.published += 1;
@@ -213,12 +213,12 @@ impl RequestHandler {
         inside.due
     }
 
-    /// The number of the last tick that was to be published.
+    /// Returns the number of the last due tick.
     pub(super) fn due(&self) -> u64 {
         self.lock().due
     }
 
-    /// The host has answered.
+    /// Forwards the host's reply to the peer.
     pub(super) fn answered(&self, answer: Answer) {
         let open = self.lock().run.as_mut().and_then(|run| run.open.remove(&answer.number));
         if let Some((query, _)) = open {
@@ -226,7 +226,7 @@ impl RequestHandler {
         }
     }
 
-    /// Publishes the status if it has changed, and gives up on answers that do not come.
+    /// Publishes the status if it has changed, and refuses requests whose reply is late.
     pub(super) fn report(&self, station: &Station) -> Result<(), LinkError> {
         let mut inside = self.lock();
         if let Some(run) = &mut inside.run {
@@ -271,11 +271,11 @@ impl RequestHandler {
         self.lock().run.as_ref().map(|run| run.description.clone())
     }
 
-    /// A letter on one of our keys, in a thread of the network: nothing here waits for anybody.
+    /// Receives a request, on a thread of the network: never blocks.
     fn receive(&self, query: Query, line: &SyncSender<(Asked, Query)>) {
         let [no_room, too_long] = &self.turned_away;
         let payload = query.payload();
-        // A long one is not even copied, and few of them are kept until their answer.
+        // Check the length before copying; few long requests are queued for a refusal.
         if payload.is_some_and(|payload| payload.len() > MAX_REQUEST_BYTES) {
             too_long.fetch_add(1, Ordering::Relaxed);
             if self.long_ones.fetch_add(1, Ordering::Relaxed) >= MOST_LONG_ONES
@@ -286,7 +286,7 @@ impl RequestHandler {
             return;
         }
         let letter = payload.map(|payload| payload.to_bytes()).unwrap_or_default();
-        // A pattern of keys names no member, and is refused.
+        // A key pattern names no member, and is refused.
         let asked = query.key_expr().as_str();
         if is_emergency_stop(asked, &letter) {
             let who = who(member(asked), &self.name);
@@ -300,7 +300,7 @@ impl RequestHandler {
         }
     }
 
-    /// A letter whose turn it is.
+    /// Admits a queued request and carries it out.
     fn admit(&self, query: Query) {
         let letter = query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default();
         let mut inside = self.lock();
@@ -336,7 +336,7 @@ impl Inside {
                 reply(&query, Some(self.gate.refuse(Refusal::Busy).to_string()));
             }
             (Some(ask), Some(run)) => match run.asker.ask(ask) {
-                // The lock is held: the answer cannot come before the question is noted.
+                // The lock is held, so that the reply cannot come before the request is stored.
                 Ok(number) => {
                     run.open.insert(number, (query, Instant::now()));
                 }
@@ -369,12 +369,12 @@ impl Inside {
     }
 }
 
-/// Who asks, from the key.
+/// Returns the member's name in a key.
 fn member(key: &str) -> &str {
     key.rsplit('/').next().unwrap_or_default()
 }
 
-/// What became of a letter. Nobody waits for whether it arrived.
+/// Sends the reply to a request; errors of the network are ignored.
 fn reply(query: &Query, refused: Option<String>) {
     let answer = json(&Answer { number: 0, refused, cause: RefusalCause::Other });
     let _ = query.reply(query.key_expr(), answer).wait_now();

@@ -1,10 +1,10 @@
-//! Starting the scene of a bridge when its owner asks for it.
+//! Start of the bridge's scene on request of its owner.
 
 use std::io;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-/// A scene that may be started from the network: one that somebody on this machine named, never one that comes from there.
+/// Starter of a scene that was named on this machine, never of one from the network.
 #[derive(Debug)]
 pub struct Launcher {
     program: PathBuf,
@@ -13,16 +13,16 @@ pub struct Launcher {
 }
 
 impl Launcher {
-    /// Of a scene, run by this `flotor` program.
+    /// Creates a launcher of a scene, run by this `flotor` program.
     #[must_use]
     pub fn new(program: PathBuf, scene: PathBuf) -> Self {
         Self { program, scene, child: None }
     }
 
-    /// Starts it.
+    /// Starts the scene.
     ///
     /// # Errors
-    /// In words: it runs already, or the system says no.
+    /// The cause as text: the scene runs already, or the system refuses.
     pub fn start(&mut self) -> Result<(), String> {
         if self.runs() {
             return Err("the scene runs already".to_owned());

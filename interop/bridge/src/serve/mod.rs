@@ -1,12 +1,12 @@
-//! A bridge: puts what a running host publishes on the network, and carries requests back.
+//! Bridge: publishes the messages of a running host on the network, and forwards requests to the host.
 //!
 //! ```text
-//!  host -> live socket -> relay -> tf, tick, change, end                    (only while somebody subscribes)
-//!  host <- live socket <- handler  <- ask/...   by letters that pass the gate  (only keys the bridge was told to open)
+//!  host -> live socket -> relay   -> tf, tick, change, end     (only while there are subscribers)
+//!  host <- live socket <- handler <- ask/..., admitted requests (only keys within the bridge's rights)
 //! ```
 //!
-//! The bridge is one of the host's watchers, in a process of its own: whatever happens to it, the host drops what the bridge does
-//! not take, counts it, and goes on.
+//! The bridge is a client of the host, in a process of its own: whatever happens to the bridge, the host drops and counts the
+//! messages that the bridge does not take, and goes on.
 
 mod emergency;
 mod handler;
@@ -27,28 +27,28 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How often a bridge without a run looks for one.
+/// Poll interval for a run.
 const LOOK_PERIOD: Duration = Duration::from_millis(200);
-/// How often it is looked whether anybody subscribes, and told how the bridge is doing.
+/// Interval of the status, and poll interval for subscribers.
 const CHECK_PERIOD: Duration = Duration::from_millis(100);
 
-/// What a bridge is to do.
+/// Configuration of a bridge.
 #[derive(Debug)]
 pub struct Service {
-    /// What the others call it.
+    /// Name of the bridge on the network.
     pub name: Name,
-    /// The most that may be asked for; who may is up to the network's access control.
+    /// Highest right whose requests are accepted; the network's access control decides per member.
     pub allow: Right,
-    /// One tick in so many.
+    /// Decimation of the ticks: one in `every` is published.
     pub every: u32,
-    /// What may be started.
+    /// Starter of the bridge's scene; `None` if no scene may be started.
     pub launcher: Option<Launcher>,
 }
 
-/// Serves until told to stop. `tell` gets a line for people when something changes.
+/// Serves until `stop` is set. `tell` receives a line for people at each change.
 ///
 /// # Errors
-/// [`CoupleError`]: the network, or this machine, refuses what a bridge needs.
+/// [`CoupleError`] of the network or of this machine.
 pub fn serve(
     session: &Link,
     directory: &Directory,
@@ -69,7 +69,7 @@ pub fn serve(
         ));
         None
     });
-    // Last of all: who sees it can ask.
+    // Declared last: a peer that sees the token can send requests.
     let _alive = session.liveliness().declare_token(name.key("alive")).wait_now()?;
     let side = if allow >= Right::Operate { Side::Serving } else { Side::ServingDeaf };
     let couplers = Couplers::new(session, directory, &name, side);
@@ -88,7 +88,7 @@ pub fn serve(
             }
             Err(LiveError::NoRun { .. }) => {}
             Err(error) => {
-                // Once: it is tried again many times a second.
+                // Report once, as this is retried many times a second.
                 let words = error.to_string();
                 if words != told {
                     tell(&words);
@@ -102,7 +102,7 @@ pub fn serve(
     Ok(())
 }
 
-/// What it takes to carry runs.
+/// Relay of a run between host and network.
 struct Relay<'s> {
     station: Station,
     handler: Arc<RequestHandler>,
@@ -112,7 +112,7 @@ struct Relay<'s> {
 }
 
 impl Relay<'_> {
-    /// Carries one run.
+    /// Relays one run until it ends.
     fn carry(&mut self, mut client: Client, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
         self.handler.begin(&client);
         let asker = client.asker();
@@ -124,7 +124,7 @@ impl Relay<'_> {
                 let is_wanted = self.station.is_wanted()?;
                 if is_wanted != is_watching {
                     is_watching = is_wanted;
-                    // A host that is gone says so below.
+                    // A lost host is reported below.
                     let every = self.every;
                     let _ = asker.ask(if is_wanted { Ask::Watch { every } } else { Ask::LookAway });
                 }
@@ -137,7 +137,7 @@ impl Relay<'_> {
                     for record in &records {
                         station.tick(record, handler.publishing())?;
                     }
-                    // A full queue keeps what is in it: what it dropped came after these.
+                    // A full queue drops the newest: the dropped ticks came after these.
                     handler.dropped(dropped);
                 }
                 Ok(Some(Event::Change(change))) => {
@@ -162,7 +162,7 @@ impl Relay<'_> {
         self.report(tell)
     }
 
-    /// Looks after the couplings, and says how the bridge is doing.
+    /// Updates the couplings and publishes the status.
     fn report(&mut self, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
         self.couplers.follow(tell)?;
         self.handler.carried(self.couplers.carried());
@@ -170,7 +170,7 @@ impl Relay<'_> {
     }
 }
 
-/// Waiting for what is over at once: all declarations here are local.
+/// Wait for operations that complete at once: all declarations here are local.
 trait WaitNow<T> {
     fn wait_now(self) -> Result<T, LinkError>;
 }

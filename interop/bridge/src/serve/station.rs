@@ -1,4 +1,4 @@
-//! What a bridge publishes.
+//! Publishers of a bridge.
 
 use super::WaitNow;
 use crate::keys::Name;
@@ -14,7 +14,7 @@ use zenoh::Session;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::CongestionControl;
 
-/// The keys on which a bridge publishes.
+/// Publishers of a bridge, by key.
 pub(super) struct Station {
     pose: Publisher<'static>,
     tick: Publisher<'static>,
@@ -26,8 +26,8 @@ pub(super) struct Station {
 
 impl Station {
     pub(super) fn declare(session: &Session, name: &Name) -> Result<Self, LinkError> {
-        // A subscriber that lags holds up the bridge, not the host, which drops and counts. One that takes nothing at all is
-        // cut off by Zenoh after a while.
+        // A slow subscriber delays the bridge, not the host, which drops and counts ticks. Zenoh disconnects a subscriber that
+        // takes nothing at all after a while.
         let publisher = |key: &str| {
             session.declare_publisher(name.key(key)).congestion_control(CongestionControl::Block).wait_now()
         };
@@ -41,13 +41,13 @@ impl Station {
         })
     }
 
-    /// Whether anybody subscribes to ticks.
+    /// Returns whether there are subscribers to ticks.
     pub(super) fn is_wanted(&self) -> Result<bool, LinkError> {
         Ok(self.tick.matching_status().wait_now()?.matching()
             || self.pose.matching_status().wait_now()?.matching())
     }
 
-    /// Publishes a tick, with its number among all that were to be: a gap in these is a loss.
+    /// Publishes a tick with its number among all due ticks: a gap shows a loss.
     pub(super) fn tick(&self, record: &TickRecord, number: u64) -> Result<(), LinkError> {
         let (pose, tick) = {
             let mut messages = self.messages.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -57,7 +57,7 @@ impl Station {
         self.tick.put(tick).attachment(number.to_le_bytes()).wait_now()
     }
 
-    /// Publishes a change, with its time.
+    /// Publishes a change with its time.
     pub(super) fn change(&self, change: &ChangeMessage) -> Result<(), LinkError> {
         let change = Change::from(change);
         self.change
@@ -66,18 +66,18 @@ impl Station {
             .wait_now()
     }
 
-    /// Publishes that the run is over, with the number of its last tick.
+    /// Publishes the end of the run with the number of the last tick.
     pub(super) fn end(&self, end: &End, last: u64) -> Result<(), LinkError> {
         self.end.put(json(end)).attachment(last.to_le_bytes()).wait_now()
     }
 
-    /// Publishes how the bridge is doing.
+    /// Publishes the status of the bridge.
     pub(super) fn status(&self, status: &Status) -> Result<(), LinkError> {
         self.status.put(json(status)).wait_now()
     }
 }
 
-/// None of our types fails to become JSON.
+/// Encodes a value as JSON; the types used here cannot fail.
 pub(super) fn json(value: &impl Serialize) -> Vec<u8> {
     serde_json::to_vec(value).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! The bridge's end of a stop channel ([`crate::stop_channel`]).
+//! Bridge's end of a stop channel ([`crate::stop_channel`]).
 
 use super::emergency::{Emergency, who};
 use crate::keys::Name;
@@ -9,17 +9,17 @@ use std::net::UdpSocket;
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
-/// Interval at which a thread looks whether the bridge is still there.
+/// Poll interval for the end of the bridge.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Ports that are listened at until this is dropped.
+/// Keeps the ports open until dropped.
 pub(super) struct Open(Arc<()>);
 
-/// Listens at each address in a thread of its own. Its presses share no thread with those of the network's sessions, in which an answer
+/// Opens a port at each address, with a thread of its own. Presses share no thread with the network's sessions, in which a reply
 /// may wait for a member.
 ///
 /// # Errors
-/// The system's error of the first port that cannot be bound.
+/// The error of the first port that cannot be bound.
 pub(super) fn open(stop: &StopChannel, name: &Name, directory: &Directory) -> io::Result<Open> {
     let open = Open(Arc::default());
     let emergency = Arc::new(Emergency::start(directory)?);
@@ -44,7 +44,7 @@ struct Port {
     name: String,
     emergency: Arc<Emergency>,
     open: Weak<()>,
-    /// What the next press repeats.
+    /// Challenge that the next press must repeat.
     challenge: Nonce,
 }
 
@@ -66,7 +66,7 @@ impl Port {
                     }
                 }
                 Content::Press(challenge) if challenge == self.challenge => {
-                    // Before anything else: without a new number this press could be replayed, which does no harm.
+                    // Renew the challenge first; without random numbers the press could be replayed, which does no harm.
                     if let Ok(next) = Nonce::new() {
                         self.challenge = next;
                     }

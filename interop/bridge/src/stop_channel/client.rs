@@ -1,4 +1,4 @@
-//! The member's end of a stop channel.
+//! Member's end of a stop channel.
 
 use super::{Content, MOST_BYTES, Nonce, StopChannel, StopMessage};
 use crate::keys::Name;
@@ -10,18 +10,18 @@ use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Time until a hello is sent again, and a new hello after a press: a flood may lose some.
+/// Retry interval of a hello, and time from a press to a new hello: a flood may lose some datagrams.
 const HELLO_WAIT: Duration = Duration::from_millis(50);
 const PRESS_WAIT: Duration = Duration::from_millis(300);
-/// Longest time for an answer, in which the bridge asks the hosts.
+/// Timeout of the final reply, which includes the hosts' confirmation.
 const ANSWER_WAIT: Duration = Duration::from_secs(5);
-/// Time for other endpoints to answer after the first: they may be other bridges of that name, or nobody.
+/// Grace period for other endpoints after the first reply: they may be further bridges of that name, or silent.
 const OTHERS_WAIT: Duration = Duration::from_secs(1);
 
-/// Presses the emergency stop by datagrams and by a session at the same time; done as soon as one way has succeeded.
+/// Presses the emergency stop by datagrams and by a session in parallel; returns as soon as one path has succeeded.
 ///
 /// # Errors
-/// In words: why neither has.
+/// The causes as text, if neither path has succeeded.
 pub fn press_both_ways(
     link: LinkOptions,
     datagrams: Option<StopChannel>,
@@ -48,10 +48,10 @@ pub fn press_both_ways(
     Err(problems.join("; "))
 }
 
-/// Presses the emergency stop at a bridge of this name at each address, and waits for the answer.
+/// Presses the emergency stop at a bridge of this name at each address, and waits for the replies.
 ///
 /// # Errors
-/// In words: nobody answers, or a bridge does not confirm.
+/// The cause as text: no reply, or a bridge does not confirm.
 fn press(stop: &StopChannel, bridge: &Name) -> Result<(), String> {
     let (sender, answers) = channel();
     for address in &stop.addresses {
@@ -66,7 +66,7 @@ fn press(stop: &StopChannel, bridge: &Name) -> Result<(), String> {
     outcome(&answers)
 }
 
-/// Waits for all answers, and after the first one only for a while: done if one is and none is a refusal.
+/// Waits for the replies, after the first one only for a grace period; succeeds with one confirmation and no refusal.
 fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), String> {
     let mut until = Instant::now() + 2 * ANSWER_WAIT;
     let mut is_done = false;
@@ -86,7 +86,7 @@ fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), Str
     }
 }
 
-/// Presses at one endpoint; returns the reason of a refusal.
+/// Presses the emergency stop at one endpoint; returns the reason of a refusal.
 fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Option<String>> {
     let places: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
     let of_family = |is_ipv4: bool, any: &str| {
@@ -96,7 +96,7 @@ fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Optio
     let sockets = [of_family(true, "0.0.0.0:0"), of_family(false, "[::]:0")];
     let sockets: Vec<_> = sockets.into_iter().flatten().collect::<io::Result<_>>()?;
     for (socket, _) in &sockets {
-        // Several are asked in turn.
+        // The sockets are polled in turn.
         socket.set_read_timeout(Some(HELLO_WAIT / 4))?;
     }
     let message = |content| {
@@ -105,13 +105,13 @@ fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Optio
     };
     let until = Instant::now() + ANSWER_WAIT;
     let mut pending = message(Content::Hello)?;
-    // Each press that was sent may be answered, the last not before the hosts have confirmed.
+    // Any press may be answered; the reply to the last one comes after the hosts have confirmed.
     let mut presses: Vec<Nonce> = Vec::new();
     while Instant::now() < until {
         let datagram = pending.sealed(&stop.keys).ok_or_else(|| io::Error::other("there is no stop key"))?;
         for (socket, places) in &sockets {
             for place in places {
-                // Where nobody listens the next system call reports it.
+                // Without a listener the next system call reports the error.
                 let _ = socket.send_to(&datagram, place);
             }
         }
@@ -128,7 +128,7 @@ fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Optio
         }
         pending = match challenge {
             Some(challenge) => message(Content::Press(challenge))?,
-            // Something was lost, or the challenge was used by another member: once more from the beginning.
+            // A datagram was lost, or another member has used the challenge: restart with a hello.
             None => message(Content::Hello)?,
         };
         presses.extend(challenge.map(|_| pending.nonce));

@@ -1,14 +1,14 @@
-//! The second way of an emergency stop: datagrams at the UDP port of the same number as an endpoint of the bridge.
+//! Second path of an emergency stop: datagrams to the UDP port of the same number as an endpoint of the bridge.
 //!
-//! A new connection waits for the handshakes that others have begun before it, and anybody may begin one. A datagram waits for none, and
-//! no answer goes to who has no key.
+//! A new connection waits for the handshakes of earlier ones, and anybody may begin a handshake. A datagram waits for none, and a
+//! sender without a key gets no reply.
 //!
 //! ```text
 //! member -> Hello                   bridge -> Challenge
 //! member -> Press the challenge     bridge presses, asks the hosts, -> Answer
 //! ```
 //!
-//! A datagram is JSON and its HMAC-SHA256 under the stop key of the member. `nonce` binds an answer to its question; a challenge is valid
+//! A datagram is JSON and its HMAC-SHA256 under the stop key of the member. `nonce` binds a reply to its request; a challenge is valid
 //! for one press, so that no press can be replayed.
 
 mod client;
@@ -25,14 +25,14 @@ use std::fmt::Write as _;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-/// Longest datagram, bytes; a longer one is cut by the system, and then its HMAC is wrong.
+/// Limit on a datagram, bytes; the system truncates a longer one, whose HMAC is then wrong.
 pub(crate) const MOST_BYTES: usize = 2048;
-/// Longest reason of a refusal in an answer, characters.
+/// Limit on the reason of a refusal, characters.
 const MOST_REASON: usize = 200;
 /// Length of a key and of an HMAC, bytes.
 const KEY_BYTES: usize = 32;
 
-/// The addresses and keys of a stop channel, of either end.
+/// Addresses and keys of one end of a stop channel.
 #[derive(Clone, Debug)]
 pub struct StopChannel {
     /// `host:port` of each endpoint.
@@ -49,20 +49,20 @@ impl StopChannel {
     }
 }
 
-/// A key for each member.
+/// Stop keys by member.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StopKeys(BTreeMap<String, hmac::Key>);
 
 impl StopKeys {
-    /// Returns the key of a network without keys, which everybody knows.
+    /// Returns the public key of a network without keys.
     pub(crate) fn of_anyone() -> Self {
         Self(BTreeMap::from([(Name::anyone().to_string(), hmac::Key::new(hmac::HMAC_SHA256, &[]))]))
     }
 
-    /// Reads a file with a line for each member: name and key in hexadecimal digits.
+    /// Reads a file with one line per member: name and key in hexadecimal digits.
     ///
     /// # Errors
-    /// The system's error, or `InvalidData`.
+    /// Errors of the file; `InvalidData` for a malformed or empty file.
     pub(crate) fn read(path: &Path) -> io::Result<Self> {
         let malformed =
             || io::Error::new(ErrorKind::InvalidData, "not a stop key; `flotor bridge keys` makes new ones");
@@ -82,14 +82,14 @@ fn bytes_of(digits: &str) -> Option<Vec<u8>> {
     (bytes.len() == KEY_BYTES).then_some(bytes)
 }
 
-/// Returns a line of a file with stop keys: a new key for a member.
+/// Returns a line of a stop key file: a new key for a member.
 ///
 /// # Errors
-/// The system has no random numbers.
+/// If the system has no random numbers.
 pub(crate) fn new_key_line(member: &str) -> io::Result<String> {
     let mut line = format!("{member} ");
     for byte in random::<KEY_BYTES>()? {
-        // Writing to a text does not fail.
+        // Writing to a string cannot fail.
         let _ = write!(line, "{byte:02x}");
     }
     line.push('\n');
@@ -102,7 +102,7 @@ fn random<const COUNT: usize>() -> io::Result<[u8; COUNT]> {
     Ok(bytes)
 }
 
-/// A number that nobody can guess, used once.
+/// Unpredictable number for a single use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Nonce([u8; 16]);
 
@@ -112,13 +112,13 @@ impl Nonce {
     }
 }
 
-/// A message of either end.
+/// Message of either end.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StopMessage {
     pub(crate) bridge: String,
     pub(crate) member: String,
-    /// Chosen by the member, repeated by the bridge.
+    /// Chosen by the member, repeated in the reply.
     pub(crate) nonce: Nonce,
     pub(crate) content: Content,
 }
@@ -129,12 +129,12 @@ pub(crate) enum Content {
     Hello,
     Challenge(Nonce),
     Press(Nonce),
-    /// The reason of a refusal; none if all runs have confirmed the stop.
+    /// Reason of a refusal; `None` if all runs have confirmed the stop.
     Answer(Option<String>),
 }
 
 impl StopMessage {
-    /// Returns the datagram: JSON and its HMAC; none if there is no key of the member.
+    /// Encodes the datagram, JSON and its HMAC; `None` without a key of the member.
     pub(crate) fn sealed(&self, keys: &StopKeys) -> Option<Vec<u8>> {
         let key = keys.0.get(&self.member)?;
         let mut bytes = serde_json::to_vec(self).ok()?;
@@ -143,7 +143,7 @@ impl StopMessage {
         Some(bytes)
     }
 
-    /// Reads a datagram; none if its HMAC is not that of a member.
+    /// Decodes a datagram; `None` if its HMAC is not that of a member.
     pub(crate) fn open(datagram: &[u8], keys: &StopKeys) -> Option<Self> {
         let (bytes, tag) = datagram.split_at_checked(datagram.len().checked_sub(KEY_BYTES)?)?;
         let message: Self = serde_json::from_slice(bytes).ok()?;
@@ -151,7 +151,7 @@ impl StopMessage {
         Some(message)
     }
 
-    /// Returns the bridge's answer to this message.
+    /// Returns the reply to this message.
     pub(crate) fn answer(&self, refused: Option<String>) -> Self {
         let reason = refused.map(|reason| reason.chars().take(MOST_REASON).collect());
         Self { content: Content::Answer(reason), ..self.clone() }

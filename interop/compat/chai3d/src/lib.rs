@@ -1,9 +1,9 @@
-//! `libhdPhantom.so`: the fourteen functions by which CHAI3D reaches a Phantom, answered by the devices of a Flotor scene.
+//! Drop-in `libhdPhantom.so`: the fourteen functions by which CHAI3D reaches a Phantom, served by the devices of a Flotor scene.
 //!
 //! Lengths in m, forces in N, torques in N·m; x towards the user, y right, z up. Every function may be called from any thread.
-//! A result of 0 is success, -1 a number that is no device, or one that is not open. What sets a force waits for the next
-//! tick: CHAI3D's loop has no other pace. CHAI3D opens and closes each device twice before the program does, so opening moves
-//! nothing, and force begins to fade in with the first command.
+//! A result of 0 is success, -1 an invalid number or a device that is not open. Functions that set a force wait for the next
+//! tick, because CHAI3D's loop has no other pace. CHAI3D opens and closes each device twice before the program does, so opening
+//! causes no motion, and force begins to fade in with the first command.
 //!
 //! Source: the interface as CHAI3D's own loader uses it (BSD-3), names and numbers only.
 #![allow(unsafe_code)] // C entry points; listed in tests/tests/system/architecture.rs
@@ -20,17 +20,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const FRAME: Frame = Frame::TowardsRightUp;
 const DONE: c_int = 0;
 const FAILED: c_int = -1;
-/// Bytes of the caller's buffer for a name.
+/// Size of the caller's buffer for a name, bytes.
 const NAME_BYTES: usize = 255;
-/// Devices that are served at most.
+/// Limit on the number of devices.
 const MOST: usize = 16;
 
-/// What was commanded last of each device: force and torque may be set apart.
+/// Last command of each device: force and torque may be set separately.
 static HELD: [Mutex<Wrench>; MOST] = [const { Mutex::new(Wrench::ZERO) }; MOST];
-/// Whether a torque of this device would be the second since its last wait.
+/// True if a further torque of the device must wait, because one was set since the last force.
 static TORQUE_WAITS: [AtomicBool; MOST] = [const { AtomicBool::new(false) }; MOST];
 
-/// The mark of a drop-in.
+/// Returns the marker of a drop-in library.
 #[unsafe(no_mangle)]
 pub extern "C" fn flotor_dropin() -> *const c_char {
     MARKER.as_ptr().cast()
@@ -42,31 +42,31 @@ fn station(id: c_int) -> Option<(&'static Host, &'static Station, usize)> {
     Some((host, host.station(number)?, number))
 }
 
-/// The station, if it is open.
+/// Returns the station if it is open.
 fn open(id: c_int) -> Option<(&'static Host, &'static Station, usize)> {
     station(id).filter(|(_, station, _)| station.is_open())
 }
 
-/// The station for a read of its sample, if it is open.
+/// Returns the station for a read, which is counted, if it is open.
 fn sampled(id: c_int) -> Option<&'static Station> {
     let (host, station, _) = open(id)?;
     host.note_read(|| ());
     Some(station)
 }
 
-/// How CHAI3D's `getPosition` and `close` want to hear of success: it takes 0 for failure there, while the original says 0.
+/// Returns the success value of `hdPhantomGetPosition` and `hdPhantomClose`: CHAI3D takes 0 for failure there, the original returns 0.
 fn done_for_chai3d() -> c_int {
     c_int::from(said("FLOTOR_PHANTOM_SUCCESS").is_some_and(|value| value == "1"))
 }
 
-/// How many devices there are.
+/// Returns the number of devices.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdPhantomGetNumDevices() -> c_int {
     let count = || host().map_or(0, |host| host.stations().len().min(MOST));
     guarded(0, || c_int::try_from(count()).unwrap_or(0))
 }
 
-/// Opens a device.
+/// Opens a device; returns its number, -1 on failure.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdPhantomOpen(id: c_int) -> c_int {
     guarded(FAILED, || {
@@ -75,7 +75,7 @@ pub extern "C" fn hdPhantomOpen(id: c_int) -> c_int {
     })
 }
 
-/// Closes a device: no force from the next tick on.
+/// Closes a device; its force ends with the next tick.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdPhantomClose(id: c_int) -> c_int {
     guarded(FAILED, || {
@@ -92,7 +92,7 @@ fn set_held(number: usize, change: impl FnOnce(&mut Wrench)) -> Wrench {
     *held
 }
 
-/// Writes a vector of an open device.
+/// Writes a vector of an open device to three places.
 ///
 /// # Safety
 /// Each place is null or may be written.
@@ -106,7 +106,7 @@ unsafe fn vector(id: c_int, places: [*mut f64; 3], of: impl FnOnce(&Station) -> 
     Some(())
 }
 
-/// Position, m.
+/// Reads the position, m.
 ///
 /// # Safety
 /// Each pointer is null or may be written.
@@ -119,7 +119,7 @@ pub unsafe extern "C" fn hdPhantomGetPosition(id: c_int, x: *mut f64, y: *mut f6
     })
 }
 
-/// Velocity, m/s.
+/// Reads the velocity, m/s.
 ///
 /// # Safety
 /// Each pointer is null or may be written.
@@ -137,7 +137,7 @@ pub unsafe extern "C" fn hdPhantomGetLinearVelocity(
     })
 }
 
-/// Rotation matrix, row by row.
+/// Reads the rotation matrix, by rows.
 ///
 /// # Safety
 /// Each pointer is null or may be written.
@@ -167,13 +167,13 @@ pub unsafe extern "C" fn hdPhantomGetRotation(
     })
 }
 
-/// Buttons, one bit each; 0 if it is not open.
+/// Returns the buttons, one bit each; 0 if the device is not open.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdPhantomGetButtons(id: c_int) -> c_int {
     guarded(0, || sampled(id).map_or(0, |station| station.state().buttons.cast_signed()))
 }
 
-/// Sends what is held now and, if it `waits`, waits for the tick that sees it.
+/// Changes the stored command and sends it; with `waits`, waits for a tick.
 fn send(id: c_int, waits: bool, change: impl FnOnce(&mut Wrench)) -> c_int {
     let Some((host, station, number)) = open(id) else { return FAILED };
     let before = set_held(number, |_| ());
@@ -184,7 +184,7 @@ fn send(id: c_int, waits: bool, change: impl FnOnce(&mut Wrench)) -> c_int {
     } else {
         set_held(number, |held| *held = before);
     }
-    // One that is refused waits too: a program that goes on asking is not to go round faster for it.
+    // A rejected command waits too: a program that retries must not loop faster for it.
     if waits {
         host.wait(station);
     }
@@ -196,7 +196,7 @@ fn in_flotor(components: [Option<f64>; 3]) -> Option<[f64; 3]> {
     Some(FRAME.to_flotor(DVec3::new(x?, y?, z?)).to_array())
 }
 
-/// Force on the hand, N; waits for the next tick.
+/// Sets the force on the hand, N; waits for the next tick.
 ///
 /// # Safety
 /// Each pointer is null or may be read.
@@ -212,7 +212,7 @@ pub unsafe extern "C" fn hdPhantomSetForce(id: c_int, x: *const f64, y: *const f
     })
 }
 
-/// Torque on the hand, N·m. After a force it does not wait once more: both belong to one tick.
+/// Sets the torque on the hand, N·m. Does not wait directly after a force: both belong to one tick.
 ///
 /// # Safety
 /// Each pointer is null or may be read.
@@ -227,7 +227,7 @@ pub unsafe extern "C" fn hdPhantomSetTorque(id: c_int, x: *const f64, y: *const 
     })
 }
 
-/// Force, N, and torque, N·m, on the hand; waits for the next tick.
+/// Sets force, N, and torque, N·m, on the hand; waits for the next tick.
 ///
 /// # Safety
 /// Each pointer is null or may be read.
@@ -250,7 +250,7 @@ pub unsafe extern "C" fn hdPhantomSetForceAndTorque(
     })
 }
 
-/// Radius of the workspace, m: known before the device is open.
+/// Reads the radius of the workspace, m; valid before the device is open.
 ///
 /// # Safety
 /// The pointer is null or may be written.
@@ -264,8 +264,8 @@ pub unsafe extern "C" fn hdPhantomGetWorkspaceRadius(id: c_int, radius: *mut f64
     })
 }
 
-/// Name of the device, known before it is open. `FLOTOR_PHANTOM_TYPE` says another one: CHAI3D gives torque only to
-/// `PHANTOM Premium 3.0 6DOF`.
+/// Reads the name of the device; valid before the device is open. `FLOTOR_PHANTOM_TYPE` replaces it: CHAI3D gives torque only
+/// to `PHANTOM Premium 3.0 6DOF`.
 ///
 /// # Safety
 /// The pointer is null or 255 bytes may be written from there on.
@@ -283,11 +283,11 @@ pub unsafe extern "C" fn hdPhantomGetType(id: c_int, name: *mut c_char) -> c_int
     })
 }
 
-/// The loop begins with the first open device: there is nothing to start.
+/// Does nothing: the loop begins with the first open device.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdPhantomStartServo() {}
 
-/// Acts when no device is open: then there is no force already.
+/// Disables the devices that are not open, whose force is zero already.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdPhantomStopServo() {
     guarded((), || {

@@ -1,9 +1,9 @@
-//! Axes: those of other makers' interfaces and Flotor's (x right, y away from the user, z up). All are right-handed, with the
+//! Axes of other makers' interfaces and of Flotor (x right, y away from the user, z up). All are right-handed, with the
 //! origin at the centre of the range.
 
 use flotor_hal::{DMat3, DQuat, DVec3};
 
-/// How an interface names the axes.
+/// Axes of an interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frame {
     /// x towards the user, y right, z up: DHD, DRD, hdPhantom, CHAI3D.
@@ -13,7 +13,7 @@ pub enum Frame {
 }
 
 impl Frame {
-    /// A vector of Flotor's frame in this one.
+    /// Converts a vector from Flotor's frame to this one.
     #[must_use]
     pub fn of_flotor(self, DVec3 { x, y, z }: DVec3) -> DVec3 {
         match self {
@@ -22,7 +22,7 @@ impl Frame {
         }
     }
 
-    /// A vector of this frame in Flotor's.
+    /// Converts a vector from this frame to Flotor's.
     #[must_use]
     pub fn to_flotor(self, DVec3 { x, y, z }: DVec3) -> DVec3 {
         match self {
@@ -31,11 +31,11 @@ impl Frame {
         }
     }
 
-    /// Rows of the rotation matrix of an orientation in Flotor's frame.
+    /// Returns the rotation matrix, by rows, of an orientation given in Flotor's frame.
     #[must_use]
     pub fn rotation(self, orientation: DQuat) -> [[f64; 3]; 3] {
         let turned = DMat3::from_quat(orientation);
-        // Column j is where the axis j of this frame goes.
+        // Column j is the image of axis j of this frame.
         let columns =
             [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| self.of_flotor(turned * self.to_flotor(axis)));
         std::array::from_fn(|row| columns.map(|column| column[row]))

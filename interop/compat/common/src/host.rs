@@ -1,4 +1,4 @@
-//! The one run of a process: prepared when it is asked for first, begun by the first open device, ended with the program.
+//! The single run of a process: prepared at the first access, begun by the first open device, ended with the program.
 
 use crate::process::{at_end, guarded, is_copy, is_first, library, notice_copies, quietly};
 use crate::run::{LockstepRun, Prepared, tell};
@@ -14,30 +14,30 @@ use std::sync::{Mutex, MutexGuard, Once, OnceLock, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// What a program finds that names no scene.
+/// Default scene for programs that name none.
 const SCENE: &str = include_str!("../scene.toml");
-/// A run lasts as long as the program: longer than anybody waits, s.
+/// Duration of a run, s: practically unlimited, as it ends with the program.
 const NO_END_S: f64 = 31_536_000.0;
-/// How long the first ticks may take to come.
+/// Timeout of the first ticks.
 const BEGIN: Duration = Duration::from_secs(10);
-/// How long the end of the run may take: force fades out, plugins close their devices.
+/// Timeout of the end of the run, in which force fades out and plugins close their devices.
 const END: Duration = Duration::from_secs(20);
-/// Pause between two looks at either.
+/// Poll interval of both waits.
 const LOOK: Duration = Duration::from_millis(1);
-/// Reads without a command that make a tick in lockstep: far more than the loop of a program has between two commands.
+/// Number of reads without a command that make a tick in lockstep: far more than a program's loop has between two commands.
 const READS_OF_A_TICK: u64 = 100;
 
 static HOST: OnceLock<Option<Host>> = OnceLock::new();
-/// Whether somebody pressed the emergency stop.
+/// True once the emergency stop was pressed.
 static IS_STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// Somebody pressed the emergency stop.
+/// Records that the emergency stop was pressed.
 pub(crate) fn note_emergency_stop() {
     IS_STOPPED.store(true, Ordering::Release);
 }
 
-/// The run of this process; none in a copy of it, or where the scene cannot be run, which was reported once. Prepares the scene
-/// when it is called first. Not real-time.
+/// Returns the run of this process, preparing the scene at the first call; `None` in a forked copy of the process, or if the scene
+/// cannot be run, which is reported once. Not real-time.
 #[must_use]
 pub fn host() -> Option<&'static Host> {
     if is_copy() {
@@ -51,38 +51,38 @@ pub fn host() -> Option<&'static Host> {
     HOST.get_or_init(prepare).as_ref()
 }
 
-/// The run of this process, as its own program wants it, instead of as the environment says; `stop` ends it. To be called once,
-/// before [`host`]. Not real-time.
+/// Prepares the run of this process with given settings instead of the environment's; `stop` ends the run. Call it once, before
+/// [`host`]. Not real-time.
 ///
 /// # Errors
-/// Why the scene cannot be run, in a line.
+/// The reason why the scene cannot be run, one line.
 pub fn prepare(settings: Settings, stop: &StopSwitch) -> Result<&'static Host, String> {
     let prepared = Host::prepare(settings, stop)?;
     HOST.get_or_init(|| Some(prepared)).as_ref().ok_or_else(|| "there is a run already".to_owned())
 }
 
-/// The run of this process, if anybody has asked for it yet. Not real-time.
+/// Returns the run of this process, if prepared already. Not real-time.
 fn host_so_far() -> Option<&'static Host> {
     if is_copy() { None } else { HOST.get()?.as_ref() }
 }
 
-/// The devices of the run of this process, if there is one.
+/// Returns the devices of this process's run; empty without one.
 pub(crate) fn stations_so_far() -> &'static [Station] {
     host_so_far().map_or(&[], Host::stations)
 }
 
-/// A run, its devices and its pace.
+/// A run with its devices and its pace.
 pub struct Host {
     stations: Vec<Station>,
     pace: Pace,
     period_ns: u64,
     stop: StopSwitch,
     stage: Mutex<Stage>,
-    /// Reads of the program since the last tick that it made.
+    /// Number of the program's reads since the last tick.
     reads: AtomicU64,
 }
 
-/// How far the run has come.
+/// Stage of the run.
 enum Stage {
     Prepared(Box<Prepared>),
     Beside(JoinHandle<()>),
@@ -144,31 +144,31 @@ impl Host {
         })
     }
 
-    /// The devices of the scene, in its order.
+    /// Returns the devices of the scene, in its order.
     #[must_use]
     pub fn stations(&self) -> &[Station] {
         &self.stations
     }
 
-    /// The device of this number.
+    /// Returns the device with a number.
     #[must_use]
     pub fn station(&self, number: usize) -> Option<&Station> {
         self.stations.get(number)
     }
 
-    /// Who makes time go on.
+    /// Returns the pace of the run.
     #[must_use]
     pub fn pace(&self) -> Pace {
         self.pace
     }
 
-    /// Nominal time between ticks, ns.
+    /// Returns the nominal time between ticks, ns.
     #[must_use]
     pub fn period_ns(&self) -> u64 {
         self.period_ns
     }
 
-    /// Time as the program should see it, ns: the machine's monotonic clock, or in lockstep that of the run.
+    /// Returns the time for the program, ns: the machine's monotonic clock, or in lockstep that of the run.
     #[must_use]
     pub fn now_ns(&self) -> u64 {
         match self.pace {
@@ -177,7 +177,7 @@ impl Host {
         }
     }
 
-    /// Lets time pass for the program: it sleeps, or in lockstep the run goes on for as long. Not real-time.
+    /// Sleeps for a time, or in lockstep advances the run by the same time. Not real-time.
     pub fn sleep(&self, time: Duration) {
         if self.pace == Pace::Real {
             return std::thread::sleep(time);
@@ -190,8 +190,8 @@ impl Host {
         }
     }
 
-    /// Opens a device: the first one begins the run. Whether it is there. Takes some 50 ms once, nothing later; moves nothing. Not
-    /// real-time.
+    /// Opens a device, the first one of which begins the run; returns whether it exists and runs. Takes some 50 ms once; causes no
+    /// motion. Not real-time.
     pub fn open(&self, number: usize) -> bool {
         let Some(station) = self.stations.get(number) else { return false };
         if !self.begin() {
@@ -201,7 +201,7 @@ impl Host {
         true
     }
 
-    /// Begins the run, if nobody has; whether it goes on.
+    /// Begins the run unless begun already; returns whether it is running.
     fn begin(&self) -> bool {
         let mut stage = self.stage();
         match std::mem::replace(&mut *stage, Stage::Over) {
@@ -250,7 +250,7 @@ impl Host {
         Stage::Beside(thread)
     }
 
-    /// Whether force can reach a hand: the run goes on.
+    /// Returns whether the run is in progress, so that force can reach a hand.
     #[must_use]
     pub fn is_running(&self) -> bool {
         match &*self.stage() {
@@ -260,14 +260,14 @@ impl Host {
         }
     }
 
-    /// Whether the run ended because somebody pressed the emergency stop, not because a device is lost.
+    /// Returns whether the emergency stop ended the run, rather than the loss of a device.
     #[must_use]
     pub fn is_stopped_for_safety(&self) -> bool {
         IS_STOPPED.load(Ordering::Acquire)
     }
 
-    /// Counts a read of the program. In lockstep the hundredth without a command makes a tick, after `before_tick`: a program that
-    /// waits until the handle moves or a button is pressed would wait for ever. Not real-time.
+    /// Counts a read of the program. In lockstep the hundredth without a command makes a tick, after `before_tick`: otherwise a program
+    /// that polls for a motion or a button would wait for ever. Not real-time.
     pub fn note_read(&self, before_tick: impl FnOnce()) {
         static WARNING: Once = Once::new();
         let reads = self.reads.fetch_add(1, Ordering::Relaxed) + 1;
@@ -283,7 +283,7 @@ impl Host {
         }
     }
 
-    /// In lockstep, one tick; whether there was one. Not real-time.
+    /// Makes one tick in lockstep; returns whether there was one. Not real-time.
     pub fn advance(&self) -> bool {
         self.reads.store(0, Ordering::Relaxed);
         match &mut *self.stage() {
@@ -292,17 +292,17 @@ impl Host {
         }
     }
 
-    /// Waits until there is a tick that the caller has not seen, a period usually and never longer than 10 ms; in lockstep the
-    /// call makes it. Whether there was one. Not real-time.
+    /// Waits for a tick that the caller has not seen, usually a period and never longer than 10 ms; in lockstep makes the tick.
+    /// Returns whether there was one. Not real-time.
     pub fn wait(&self, station: &Station) -> bool {
         self.wait_in(station, station.turn())
     }
 
-    /// The same for one of several callers that share a device, each with the ticks that it has seen. Not real-time.
+    /// Waits like [`Host::wait`], for one of several callers that share a device, each with its own record of seen ticks. Not real-time.
     pub fn wait_in(&self, station: &Station, turn: &Turn) -> bool {
         match self.pace {
             Pace::Real => station.wait_for_tick(turn),
-            // Several devices share a tick: the first that is commanded makes it.
+            // Several devices share a tick: the first command makes it.
             Pace::Lockstep if self.stations.len() > 1 => {
                 station.has_unseen_tick(turn) || self.advance() && station.has_unseen_tick(turn)
             }
@@ -336,7 +336,7 @@ extern "C" fn end_with_the_program() {
     guarded((), || host_so_far().into_iter().for_each(Host::end));
 }
 
-/// The `flotor` executable of the installation or build folder that a library lies in.
+/// Returns the `flotor` executable of the installation or build folder that contains a library.
 fn executable(folder: &Path) -> Option<PathBuf> {
     let name = format!("flotor{}", std::env::consts::EXE_SUFFIX);
     // lib/flotor/compat/NAME is four folders below the installation.
@@ -346,7 +346,7 @@ fn executable(folder: &Path) -> Option<PathBuf> {
     told.into_iter().chain(beside).chain(installed).find(|file| file.is_file())
 }
 
-/// Where the plugins of that installation or build folder are.
+/// Returns the plugin folders of the installation or build folder that contains a library.
 fn plugin_folders(folder: &Path) -> Vec<PathBuf> {
     let installed = folder.ancestors().nth(2).map(|root| root.join("plugins"));
     [folder.join("deps"), folder.to_path_buf(), folder.join("..")].into_iter().chain(installed).collect()

@@ -1,6 +1,6 @@
-//! Pointers of a program: null is legal, and means that nobody wants the value.
+//! Access to pointers of a program: null is legal, and means that the program does not request the value.
 
-/// Writes a value where the program wants it, if it does; whether it does.
+/// Writes a value unless the pointer is null; returns whether it was written.
 ///
 /// # Safety
 /// `place` is null or may be written.
@@ -13,7 +13,7 @@ pub unsafe fn put<T>(place: *mut T, value: T) -> bool {
     true
 }
 
-/// The value the program points at, if it does.
+/// Reads a value; `None` for a null pointer.
 ///
 /// # Safety
 /// `place` is null or may be read.
@@ -26,7 +26,7 @@ pub unsafe fn get<T: Copy>(place: *const T) -> Option<T> {
     Some(unsafe { place.read_unaligned() })
 }
 
-/// Writes values one after the other; whether the program wants them.
+/// Writes consecutive values unless the pointer is null; returns whether they were written.
 ///
 /// # Safety
 /// `place` is null or as many values may be written from there on.
@@ -41,7 +41,7 @@ pub unsafe fn put_all<T: Copy>(place: *mut T, values: &[T]) -> bool {
     true
 }
 
-/// The values the program points at.
+/// Reads consecutive values; `None` for a null pointer.
 ///
 /// # Safety
 /// `place` is null or as many values may be read from there on.
@@ -54,7 +54,7 @@ pub unsafe fn get_all<T: Copy, const N: usize>(place: *const T) -> Option<[T; N]
     Some(std::array::from_fn(|index| unsafe { place.add(index).read_unaligned() }))
 }
 
-/// Writes a text of at most `room` bytes with its end; longer ones are cut off.
+/// Writes a null-terminated text of at most `room` bytes, the terminator included; truncates a longer one.
 ///
 /// # Safety
 /// `place` is null or `room` bytes may be written from there on; `room` is not 0.
@@ -66,7 +66,7 @@ pub unsafe fn put_text(place: *mut std::ffi::c_char, text: &str, room: usize) {
     unsafe { put_all(place, &terminated) };
 }
 
-/// The text the program points at; what is no UTF-8 is replaced.
+/// Reads a null-terminated text; replaces invalid UTF-8. `None` for a null pointer.
 ///
 /// # Safety
 /// `place` is null or leads to a terminated text.
@@ -79,38 +79,38 @@ pub unsafe fn get_text(place: *const std::ffi::c_char) -> Option<String> {
     Some(unsafe { std::ffi::CStr::from_ptr(place) }.to_string_lossy().into_owned())
 }
 
-/// Where a program wants a value. Made by nobody but the program: it is the argument of an entry point.
+/// Output pointer of a program; only an entry point receives one, as an argument.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug)]
 pub struct Out<T>(*mut T);
 
 impl<T: Copy> Out<T> {
-    /// Writes the value, if it is wanted.
+    /// Writes the value unless the pointer is null.
     pub fn put(self, value: T) {
         // SAFETY: whoever calls an entry point passes null or a place for the value.
         unsafe { put(self.0, value) };
     }
 
-    /// Writes values one after the other, if they are wanted.
+    /// Writes consecutive values unless the pointer is null.
     pub fn put_all(self, values: &[T]) {
         // SAFETY: whoever calls an entry point passes null or a place for as many values as that writes.
         unsafe { put_all(self.0, values) };
     }
 
-    /// Whether nobody wants it.
+    /// Returns whether the pointer is null, so that the program does not request the value.
     #[must_use]
     pub fn is_null(self) -> bool {
         self.0.is_null()
     }
 }
 
-/// Where a program has values. Made by nobody but the program: it is the argument of an entry point.
+/// Input pointer of a program; only an entry point receives one, as an argument.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug)]
 pub struct In<T>(*const T);
 
 impl<T: Copy> In<T> {
-    /// The values, if they are there.
+    /// Reads consecutive values; `None` for a null pointer.
     #[must_use]
     pub fn get_all<const N: usize>(self) -> Option<[T; N]> {
         // SAFETY: whoever calls an entry point passes null or as many values as that reads.

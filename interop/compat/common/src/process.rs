@@ -1,4 +1,4 @@
-//! The process of the program: its copies, its end, its signals, and where this library lies in it.
+//! Process of the program: forked copies, end, signals, and the file of this library.
 
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
@@ -7,10 +7,10 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Once, OnceLock};
 
-/// Whether this is a copy of the process that prepared the run: the devices are not its own.
+/// True in a forked copy of the process that prepared the run: the devices belong to the original.
 static IS_COPY: AtomicBool = AtomicBool::new(false);
 
-/// True in a child that `fork` made after the scene was prepared: a drop-in does nothing there.
+/// Returns true in a child forked after the scene was prepared: a drop-in does nothing there.
 pub(crate) fn is_copy() -> bool {
     IS_COPY.load(Ordering::Relaxed)
 }
@@ -19,7 +19,7 @@ extern "C" fn note_copy() {
     IS_COPY.store(true, Ordering::Relaxed);
 }
 
-/// Lets copies of this process know that they are. Not real-time.
+/// Registers the detection of forked copies. Not real-time.
 pub(crate) fn notice_copies() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -28,7 +28,7 @@ pub(crate) fn notice_copies() {
     });
 }
 
-/// Calls `end` when the process ends by `exit` or by the end of `main`. Not real-time.
+/// Registers a callback for the end of the process by `exit` or by the end of `main`. Not real-time.
 pub(crate) fn at_end(end: extern "C" fn()) {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -37,8 +37,8 @@ pub(crate) fn at_end(end: extern "C" fn()) {
     });
 }
 
-/// Whether this is the first drop-in of the process that prepares a run: a second one has a run of its own, and must not write
-/// into the first one's files. Not real-time.
+/// Returns whether this is the first drop-in of the process that prepares a run: a second one has a run of its own, and must not
+/// write into the first one's files. Not real-time.
 pub(crate) fn is_first() -> bool {
     static CLAIM: OnceLock<Option<UnixDatagram>> = OnceLock::new();
     let claim = || {
@@ -46,12 +46,12 @@ pub(crate) fn is_first() -> bool {
         let name = format!("flotor-drop-in {} {}", space.display(), std::process::id());
         UnixDatagram::bind_addr(&SocketAddr::from_abstract_name(name).ok()?).ok()
     };
-    // A name that nobody else in this process has; the system takes it back at its end.
+    // A name that is unique within this process; the system releases it at the process's end.
     CLAIM.get_or_init(claim).is_some()
 }
 
-/// Runs `body`, and lets no signal of the program be taken by threads that it starts: they belong to the program's own. What an
-/// instruction raises is taken as ever. Not real-time.
+/// Runs `body` with the program's signals blocked in threads that `body` starts: signals belong to the program's own threads.
+/// Signals raised by an instruction stay unblocked. Not real-time.
 pub fn quietly<T>(body: impl FnOnce() -> T) -> T {
     const RAISED: [i32; 7] =
         [libc::SIGSEGV, libc::SIGBUS, libc::SIGFPE, libc::SIGILL, libc::SIGABRT, libc::SIGSYS, libc::SIGTRAP];
@@ -73,17 +73,17 @@ pub fn quietly<T>(body: impl FnOnce() -> T) -> T {
     value
 }
 
-/// Runs what a program called; a panic stays inside, and the program gets `fallback`.
+/// Runs the body of an entry point; on a panic returns `fallback`.
 pub fn guarded<T>(fallback: T, body: impl FnOnce() -> T) -> T {
     catch_unwind(AssertUnwindSafe(body)).unwrap_or(fallback)
 }
 
-/// Language of the program.
+/// Language of the program, by the interpreter in the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Language {
-    /// Python: its interpreter is in the process.
+    /// Python, whose interpreter is in the process.
     Python,
-    /// Any other.
+    /// Any other language.
     Other,
 }
 
@@ -95,7 +95,7 @@ pub fn language() -> Language {
     if interpreter.is_null() { Language::Other } else { Language::Python }
 }
 
-/// The file this library was loaded from, links followed. Not real-time.
+/// Returns the file of this library, with links resolved. Not real-time.
 #[must_use]
 pub fn library() -> Option<PathBuf> {
     let here = library as fn() -> Option<PathBuf> as usize;

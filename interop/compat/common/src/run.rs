@@ -1,4 +1,4 @@
-//! The run behind a program: recorded, shown to observers, reported when it is over.
+//! Run behind a program: recorded, published to clients, reported at its end.
 
 use crate::host::{note_emergency_stop, stations_so_far};
 use crate::settings::{Pace, Settings};
@@ -20,7 +20,7 @@ use flotor_session::{
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// A prepared run with all it takes to report it.
+/// Prepared run with the data of its report.
 pub(crate) struct Prepared {
     pub(crate) session: Session,
     pub(crate) scene: Scene,
@@ -28,7 +28,7 @@ pub(crate) struct Prepared {
     pub(crate) settings: Settings,
 }
 
-/// What is looked at in every tick.
+/// Observers of each tick.
 struct Watchers {
     tally: Tally,
     digest: TraceDigest,
@@ -37,19 +37,19 @@ struct Watchers {
     draft: Option<Draft>,
 }
 
-/// The summary so far: what is left of it if the program is killed.
+/// Intermediate summary, which stays if the program is killed.
 struct Draft {
     facts: Facts,
-    /// When it was written last.
+    /// Time of the last write.
     written: Option<Instant>,
 }
 
-/// How often the summary so far is written, and how often it is looked whether it is time, ticks.
+/// Interval of the intermediate summary, and of the check for it, ticks.
 const DRAFT_PERIOD: Duration = Duration::from_millis(500);
 const DRAFT_LOOK: u64 = 64;
 
 impl Draft {
-    /// Writes it, whole or not at all, if it is time.
+    /// Writes the intermediate summary atomically once per interval.
     fn update(&mut self, record: &TickRecord, asked: &[Asked], run: Measured<'_>) {
         let is_fresh = |written: Instant| written.elapsed() < DRAFT_PERIOD;
         if !record.tick.is_multiple_of(DRAFT_LOOK) || self.written.is_some_and(is_fresh) {
@@ -75,13 +75,13 @@ impl Draft {
     }
 }
 
-/// Replaces a file, whole or not at all. Without room for it the run goes on without.
+/// Replaces a file atomically; errors such as a full disk are ignored.
 fn replace(path: &Path, text: &str) {
     let new = path.with_extension("new");
     let _ = std::fs::write(&new, text).and_then(|()| std::fs::rename(&new, path));
 }
 
-/// What a program asked for at a device, at most.
+/// Largest requested and applied wrench of a device, N and N·m.
 #[derive(Clone, Copy, Default)]
 struct Asked {
     force_n: f64,
@@ -120,25 +120,25 @@ impl Observer for Watchers {
     }
 }
 
-/// Returns force and torque, which the program asks for, and the outputs that a recording stores.
+/// Returns the outputs to compute: force and torque, which the program requests, and those that a recording stores.
 fn demand(recording: &RunRecording) -> Demand {
     Demand::WRENCH.with(recording.demand())
 }
 
-/// Numbers of a run so far, of which a summary is made.
+/// Measurements of a run so far, for a summary.
 struct Measured<'a> {
     tally: &'a Tally,
     digest: &'a TraceDigest,
     demand: Demand,
 }
 
-/// Length of a vector, also of one that is too long to be squared.
+/// Returns the length of a vector, without overflow of its square.
 fn length(vector: DVec3) -> f64 {
     let largest = vector.abs().max_element();
     if largest > 0.0 && largest.is_finite() { (vector / largest).length() * largest } else { largest }
 }
 
-/// What is known of a run beside its ticks.
+/// Facts of a run apart from its ticks.
 #[derive(Clone)]
 struct Facts {
     scene: Scene,
@@ -148,7 +148,7 @@ struct Facts {
 }
 
 impl Prepared {
-    /// Everything that looks at the run, and what its report needs.
+    /// Creates the observers of the run and the facts for its report.
     fn watched(&self, stop: &StopSwitch) -> Result<(Watched<Watchers>, Facts), String> {
         let Self { session, scene, options, settings } = self;
         let plugins = session.plugins().to_vec();
@@ -169,7 +169,7 @@ impl Prepared {
         Ok((Watched { observer: watchers, publication: publication.ok() }, facts))
     }
 
-    /// The whole run on this thread, until somebody stops it or the device faults. Not real-time.
+    /// Executes the run on this thread, until it is stopped or the device faults. Not real-time.
     pub(crate) fn run(self, stop: &StopSwitch, stations: &[Station]) {
         let (mut watched, facts) = match self.watched(stop) {
             Ok(watched) => watched,
@@ -189,7 +189,7 @@ impl Prepared {
         }
     }
 
-    /// The run, to be advanced by the program. Not real-time.
+    /// Converts to a run that the program advances. Not real-time.
     pub(crate) fn in_lockstep(self, stop: &StopSwitch) -> Result<LockstepRun, String> {
         let (watched, facts) = self.watched(stop)?;
         let lockstep = self.session.into_lockstep().map_err(|error: RunError| error.to_string())?;
@@ -197,7 +197,7 @@ impl Prepared {
     }
 }
 
-/// A run that the program's calls advance.
+/// Run that the program's calls advance.
 pub(crate) struct LockstepRun {
     lockstep: Lockstep,
     watched: Watched<Watchers>,
@@ -206,12 +206,12 @@ pub(crate) struct LockstepRun {
 }
 
 impl LockstepRun {
-    /// One tick; whether there was one. Not real-time.
+    /// Makes one tick; returns whether there was one. Not real-time.
     pub(crate) fn advance(&mut self) -> bool {
         self.lockstep.advance(&mut self.watched, &self.stop).is_none()
     }
 
-    /// Ends and reports it. Not real-time.
+    /// Ends and reports the run. Not real-time.
     pub(crate) fn finish(self, stations: &[Station]) {
         let Self { lockstep, watched, facts, .. } = self;
         let outcome = lockstep.finish();
@@ -220,7 +220,7 @@ impl LockstepRun {
 }
 
 impl Facts {
-    /// Returns the summary of a run that ended so, or has come so far.
+    /// Returns the summary of a run with an outcome, also of one in progress.
     fn summary(&self, outcome: &Outcome, run: &Measured<'_>) -> RunSummary {
         let facts = RunFacts {
             title: &self.scene.title,
@@ -236,7 +236,7 @@ impl Facts {
         RunSummary::new(facts, outcome, run.tally)
     }
 
-    /// Finishes the recording and writes the summary where it is wanted.
+    /// Finishes the recording and writes the requested summaries.
     fn report(self, watched: Watched<Watchers>, outcome: Outcome, stations: &[Station]) {
         let Watched { observer: Watchers { tally, digest, mut recording, asked, .. }, publication } = watched;
         let run = Measured { tally: &tally, digest: &digest, demand: demand(&recording) };
@@ -270,19 +270,19 @@ impl Facts {
             write(path, serde_json::to_string_pretty(&summary).unwrap_or_default() + "\n");
             let _ = std::fs::remove_file(so_far(path));
         }
-        // Last of all: the code of a plugin may hang, or end the process.
+        // Last: the code of a plugin may hang, or end the process.
         if let Err(hung) = outcome.remains.free() {
             tell(&hung.to_string());
         }
     }
 }
 
-/// Returns a quantity with its unit and so many decimals; one that no hand was meant to feel as a power of ten.
+/// Formats a quantity with its unit and a number of decimals; in scientific notation from a million.
 fn quantity(value: f64, decimals: usize, unit: &str) -> String {
     if value < 1.0e6 { format!("{value:.decimals$} {unit}") } else { format!("{value:.1e} {unit}") }
 }
 
-/// What a program asked of a station and what the hand got.
+/// Formats the line of a station: requested and applied wrench, and counts.
 fn line(station: &Station, asked: Asked) -> String {
     let counts = station.counts();
     let mut line = format!(
@@ -307,7 +307,7 @@ fn line(station: &Station, asked: Asked) -> String {
     line
 }
 
-/// Why the run ended before the program did, if so.
+/// Formats the cause if the run ended before the program.
 fn end_of(outcome: &Outcome) -> Option<String> {
     (!outcome.end.is_in_order())
         .then(|| format!("the run ended before the program: {}", end_cause(&outcome.end)))
@@ -326,19 +326,19 @@ fn write(path: &Path, text: String) -> bool {
     written.is_ok()
 }
 
-/// Where the summary so far is, for when the program is killed.
+/// Returns the path of the intermediate summary, for a program that is killed.
 fn so_far(report: &Path) -> PathBuf {
     let mut name = report.as_os_str().to_owned();
     name.push(".so-far");
     PathBuf::from(name)
 }
 
-/// A line for the person at the program.
+/// Writes a message to the user of the program.
 pub(crate) fn tell(problem: &str) {
     tell_plainly(&format!("flotor: {problem}"));
 }
 
-/// To standard error, which may be closed: a library does not panic for want of it.
+/// Writes a text to standard error; ignores a closed one.
 fn tell_plainly(text: &str) {
     use std::io::Write;
     let _ = writeln!(std::io::stderr(), "{}", escaped(text));

@@ -1,4 +1,4 @@
-//! What the environment says: a program that is not changed by a line has no other way to be told.
+//! Settings from environment variables, the only channel to an unmodified program.
 
 use flotor_servo::guest::Signals;
 use std::ffi::OsStr;
@@ -9,34 +9,34 @@ use std::path::{Path, PathBuf};
 /// Variable of [`Settings::shared_control_group`].
 const CONSENT: &str = "FLOTOR_SHARED_CONTROL_GROUP";
 
-/// Who makes time go on.
+/// Clock of the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// The machine's clock: the program runs at its own rate.
     Real,
-    /// The program's calls: a tick for each, without waiting, repeatable.
+    /// The program's calls: one tick each, without waiting, repeatable.
     Lockstep,
 }
 
-/// How a program is to be served.
+/// Settings of a program's run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// `FLOTOR_SCENE`: the scene; without it a simulated flotor with a hand.
+    /// `FLOTOR_SCENE`: the scene; `None` for a simulated flotor with a hand.
     pub scene: Option<PathBuf>,
     /// Folders to search for plugins before those of the scene.
     pub plugin_folders: Vec<PathBuf>,
     /// `FLOTOR_RECORD`: the recording (MCAP).
     pub record: Option<PathBuf>,
-    /// `FLOTOR_REPORT`: where the summary goes, for people; `-` is standard error. While the program runs there is one so far
+    /// `FLOTOR_REPORT`: file of the summary as text; `-` is standard error. While the program runs, an intermediate summary lies
     /// beside it.
     pub report: Option<PathBuf>,
-    /// `FLOTOR_JSON`: where the summary goes as JSON.
+    /// `FLOTOR_JSON`: file of the summary as JSON.
     pub json: Option<PathBuf>,
     /// `FLOTOR_PACE`: `real` or `lockstep`.
     pub pace: Pace,
     /// `FLOTOR_SEED`: seed of all random numbers.
     pub seed: u64,
-    /// `FLOTOR_SIGNALS`: `stop` to stop the devices when the program dies of a signal.
+    /// `FLOTOR_SIGNALS`: `stop` to stop the devices when a signal ends the program.
     pub signals: Signals,
     /// `FLOTOR_SHARED_CONTROL_GROUP`: `accept` adds the consent of `--accept-shared-control-group`.
     pub shared_control_group: SharedControlGroup,
@@ -45,35 +45,35 @@ pub struct Settings {
 /// Consent to a watchdog process in the control group of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SharedControlGroup {
-    /// As the scene says.
+    /// Consent as given by the scene.
     ByScene,
-    /// Accepted.
+    /// Consent given.
     Accepted,
 }
 
-/// The value of a variable, if it is set and not empty. Not real-time.
+/// Returns the value of a variable; `None` if it is unset or empty. Not real-time.
 #[must_use]
 pub fn said(variable: &str) -> Option<String> {
     std::env::var(variable).ok().filter(|value| !value.is_empty())
 }
 
 impl Settings {
-    /// As the environment of this process says. Not real-time.
+    /// Reads the settings from the environment of this process. Not real-time.
     ///
     /// # Errors
-    /// The variable, what it says and what it may say.
+    /// The variable, its value and the permitted values.
     pub fn from_environment() -> Result<Self, String> {
         Self::read(said)
     }
 
-    /// The same for a program of Flotor's own: a deadly signal stops the devices first.
+    /// Adapts the settings to a program of Flotor's own: a deadly signal stops the devices first.
     #[must_use]
     pub fn of_own_process(self) -> Self {
         Self { signals: Signals::StopFirst, ..self }
     }
 
-    /// Puts a word into the names of all files, the name of a library or the number of a process: another drop-in writes to the
-    /// others.
+    /// Adds a suffix, the name of a library or the number of a process, to the names of all files, so that drop-ins do not overwrite each
+    /// other's files.
     pub(crate) fn keep_apart(&mut self, word: &OsStr) {
         for file in [&mut self.record, &mut self.report, &mut self.json].into_iter().flatten() {
             if file.as_os_str() == "-" {
@@ -90,14 +90,14 @@ impl Settings {
         }
     }
 
-    /// Puts the number of this process among those of one `flotor lend` into the names of all files, from the second on. Each claims
-    /// its number by a file in `folder`.
+    /// Adds the number of this process among those of one `flotor lend` to the names of all files, from the second process on. Each
+    /// process reserves its number by a file in `folder`.
     pub(crate) fn keep_processes_apart(&mut self, folder: &Path) {
         let stem = self.report.as_deref().and_then(Path::file_stem).unwrap_or_default().to_owned();
         let is_free = |number: &u32| {
             let mut name = stem.clone();
             name.push(format!("-process-{number}"));
-            // Where no file can be made, nothing is kept apart.
+            // Where no file can be created, the names stay.
             !File::create_new(folder.join(name)).is_err_and(|error| error.kind() == ErrorKind::AlreadyExists)
         };
         match (1..).find(is_free) {

@@ -1,4 +1,4 @@
-//! A device as a program sees it: where the handle is, what the hand feels, and the next tick.
+//! Device as seen by a program: pose of the handle, wrench on the hand, and the next tick.
 
 use flotor_core::mapping::Mapping;
 use flotor_core::trace::TickRecord;
@@ -13,32 +13,32 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Longest wait for a tick, ns.
 const LONGEST_WAIT_NS: u64 = 10_000_000;
-/// Pause between two looks at a tick that is due, ns.
+/// Poll interval for an overdue tick, ns.
 const LOOK_NS: u64 = 20_000;
-/// How long after its deadline a tick is over, usually, ns.
+/// Usual time from a tick's deadline to its end, ns.
 const TICK_NS: u64 = 30_000;
 /// Time over which the rate of commands is measured, ns.
 const RATE_WINDOW_NS: u64 = 500_000_000;
 
-/// Which axes a device has.
+/// Sensed and driven axes of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axes {
     /// Translations only.
     Three,
-    /// Translations and rotations that are sensed, without torque.
+    /// Driven translations, and sensed rotations without torque.
     ThreeAndWrist,
-    /// All, driven.
+    /// Driven translations and rotations.
     Six,
 }
 
-/// A device of the scene, in the frame of its program model.
+/// Device of the scene, in the frame of its program model.
 pub struct Station {
     name: String,
     plugin: String,
     port: Port,
     mapping: Mapping,
     capabilities: Capabilities,
-    /// The most that may reach the hand: N, N·m.
+    /// Limits of the wrench on the hand: N, N·m.
     most: [f64; 2],
     tap: Tap,
     period_ns: u64,
@@ -46,21 +46,21 @@ pub struct Station {
     opened: AtomicU64,
     is_open: AtomicBool,
     turn: Turn,
-    /// When the loop began, as near as was seen, ns of the machine's clock.
+    /// Estimated start of the loop, ns of the machine's clock; the smallest estimate so far.
     begun_ns: AtomicU64,
     rate: Mutex<Rate>,
 }
 
-/// The ticks that a caller has waited for: its place in the pace of the loop.
+/// Ticks that a caller has waited for: its position relative to the loop.
 #[derive(Debug, Default)]
 pub struct Turn {
-    /// The tick it has waited for last.
+    /// Last tick that was waited for.
     waited: AtomicU64,
-    /// When a wait returned last, ns of the machine's clock.
+    /// Time of the last return of a wait, ns of the machine's clock.
     returned_ns: AtomicU64,
 }
 
-/// Commands per time.
+/// Measured rate of commands.
 #[derive(Clone, Copy, Debug, Default)]
 struct Rate {
     since_ns: u64,
@@ -68,22 +68,22 @@ struct Rate {
     hz: f64,
 }
 
-/// A device at the end of a tick.
+/// State of a device at the end of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     /// Number of ticks so far.
     pub ticks: u64,
     /// Position of the handle, m, Flotor's axes.
     pub position_m: DVec3,
-    /// Its orientation.
+    /// Orientation of the handle, Flotor's axes.
     pub orientation: DQuat,
-    /// Its velocity, m/s.
+    /// Velocity of the handle, m/s.
     pub velocity_m_per_s: DVec3,
-    /// Its angular velocity, rad/s.
+    /// Angular velocity of the handle, rad/s.
     pub angular_velocity_rad_per_s: DVec3,
     /// Buttons, one bit each.
     pub buttons: u32,
-    /// What was sent to the device, after all limits.
+    /// Wrench sent to the device, after all limits, N and N·m.
     pub applied: Wrench,
 }
 
@@ -125,19 +125,19 @@ impl Station {
         }
     }
 
-    /// Its name in the scene.
+    /// Returns the name of the device in the scene.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Id of its plugin.
+    /// Returns the id of the device's plugin.
     #[must_use]
     pub fn plugin(&self) -> &str {
         &self.plugin
     }
 
-    /// Which axes it has.
+    /// Returns the axes of the device.
     #[must_use]
     pub fn axes(&self) -> Axes {
         let Capabilities { sensed, actuated, .. } = self.capabilities;
@@ -148,40 +148,40 @@ impl Station {
         }
     }
 
-    /// Largest displacement of the handle from the centre along x, y, z, m.
+    /// Returns the largest displacement of the handle from the centre along x, y, z, m; a default for devices without a range.
     #[must_use]
     pub fn range_m(&self) -> DVec3 {
         let [x, y, z] = self.capabilities.range_m;
         let range_m = DVec3::new(x, y, z) / self.mapping.length_to_device(1.0);
-        // Of a device that says none: what a desktop device has.
+        // Default: the range of a desktop device.
         if range_m.max_element() > 0.0 { range_m } else { DVec3::splat(0.05) }
     }
 
-    /// The most that reaches the hand: force, N, and torque, N·m.
+    /// Returns the limits of the wrench on the hand: force, N, and torque, N·m.
     #[must_use]
     pub fn most(&self) -> [f64; 2] {
         self.most
     }
 
-    /// Largest stiffness it renders, N/m; 0: it says none.
+    /// Returns the largest stiffness that the device renders, N/m; 0: unknown.
     #[must_use]
     pub fn max_stiffness_n_per_m(&self) -> f64 {
         self.capabilities.max_stiffness_n_per_m
     }
 
-    /// What was counted of the program's commands.
+    /// Returns the counts of the program's commands.
     #[must_use]
     pub fn counts(&self) -> ProgramCounts {
         self.port.counts()
     }
 
-    /// How often it was opened.
+    /// Returns the number of times that the device was opened.
     #[must_use]
     pub fn opened(&self) -> u64 {
         self.opened.load(Ordering::Relaxed)
     }
 
-    /// Whether it is open.
+    /// Returns whether the device is open.
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.is_open.load(Ordering::Acquire)
@@ -193,46 +193,46 @@ impl Station {
         }
     }
 
-    /// Closes it: no force from the next tick on. Whether it was open.
+    /// Closes the device, whose force ends with the next tick; returns whether it was open.
     pub fn close(&self) -> bool {
         self.disable();
         self.port.keep_valid_for(0);
         self.is_open.swap(false, Ordering::AcqRel)
     }
 
-    /// Lets force through: it fades in.
+    /// Enables force, which fades in.
     pub fn enable(&self) {
         if !self.port.is_enabled() {
             self.port.enable();
         }
     }
 
-    /// No force from the next tick on.
+    /// Disables force from the next tick on.
     pub fn disable(&self) {
         self.port.disable();
     }
 
-    /// Time in which force fades in once it is enabled, ns.
+    /// Returns the fade-in time of force, ns.
     #[must_use]
     pub fn ramp_ns(&self) -> u64 {
         self.ramp_ns
     }
 
-    /// Whether force is let through.
+    /// Returns whether force is enabled.
     #[must_use]
     pub fn is_enabled(&self) -> bool {
         self.port.is_enabled()
     }
 
-    /// For how long a wrench is valid, ns; 0: what the scene says.
+    /// Sets the validity of a wrench, ns; 0: as in the scene.
     pub fn keep_valid_for(&self, valid_ns: u64) {
         self.port.keep_valid_for(valid_ns);
     }
 
-    /// What the hand is to feel, Flotor's axes, from the next tick on.
+    /// Commands a wrench on the hand, Flotor's axes, from the next tick on.
     ///
     /// # Errors
-    /// [`NotFinite`]: the wrench before stays.
+    /// [`NotFinite`]: the previous wrench stays in force.
     pub fn command(&self, wrench: &Wrench, now_ns: u64) -> Result<(), NotFinite> {
         self.port.command(wrench)?;
         let mut rate = self.rate.lock().unwrap_or_else(PoisonError::into_inner);
@@ -245,19 +245,19 @@ impl Station {
         Ok(())
     }
 
-    /// Commands per second, lately.
+    /// Returns the recent rate of commands, Hz.
     #[must_use]
     pub fn command_rate_hz(&self) -> f64 {
         self.rate.lock().unwrap_or_else(PoisonError::into_inner).hz
     }
 
-    /// Ticks so far.
+    /// Returns the number of ticks so far.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.newest().0
     }
 
-    /// The device at the end of the newest tick.
+    /// Returns the state at the end of the newest tick.
     #[must_use]
     pub fn state(&self) -> State {
         let (ticks, record) = self.newest();
@@ -276,7 +276,7 @@ impl Station {
 
     fn newest(&self) -> (u64, TickRecord) {
         loop {
-            // A record takes tens of nanoseconds to be written.
+            // Retry: a record is written within tens of nanoseconds.
             if let Some(newest) = self.tap.read() {
                 return newest;
             }
@@ -284,19 +284,19 @@ impl Station {
         }
     }
 
-    /// The turn of a program that is the only caller.
+    /// Returns the wait record of a program that is the only caller.
     pub(crate) fn turn(&self) -> &Turn {
         &self.turn
     }
 
-    /// Whether there is a tick that the caller has not waited for; it counts as waited for then.
+    /// Returns whether there is a tick that the caller has not waited for, and marks it as waited for.
     pub(crate) fn has_unseen_tick(&self, turn: &Turn) -> bool {
         let ticks = self.ticks();
         turn.waited.fetch_max(ticks, Ordering::AcqRel) < ticks
     }
 
-    /// Waits for the next tick on the machine's clock. A caller in a loop that comes late by a few ticks does not wait until
-    /// it has made up for them: it keeps the rate of the loop, though it needs now more and now less than a period.
+    /// Waits for the next tick on the machine's clock. A caller in a loop that is late by a few ticks does not wait until
+    /// it has caught up: it runs at the rate of the loop, though single iterations may take more or less than a period.
     pub(crate) fn wait_for_tick(&self, turn: &Turn) -> bool {
         let entered_ns = monotonic_ns();
         let (entered, _) = self.newest();
@@ -326,7 +326,7 @@ impl Station {
 }
 
 impl Turn {
-    /// Takes one of the ticks that a caller in a loop was too late for.
+    /// Consumes one of the ticks that a caller in a loop was too late for; returns false if there is none.
     fn takes_late_tick(&self, ticks: u64, now_ns: u64) -> bool {
         if now_ns.saturating_sub(self.returned_ns.load(Ordering::Relaxed)) > LONGEST_WAIT_NS {
             self.waited.store(ticks, Ordering::Relaxed); // it is not in a loop

@@ -1,14 +1,14 @@
-//! What a Flotor device does not have: motors, encoders beyond those of the base, joints of a wrist, the memory of a controller. Each answers that it is not
-//! implemented, whatever it is asked.
+//! Entry points without a counterpart in a Flotor device: motors, encoders beyond those of the base, joints of a wrist, the memory of
+//! a controller. Each returns "not implemented" for any arguments.
 
 use crate::error::{Code, failed};
 use std::ffi::c_int;
 
-/// Exports entry points that are there, because programs look for them, and do nothing.
+/// Exports entry points that must exist, because programs look them up, and do nothing.
 macro_rules! absent {
     ($($name:ident)*) => {
         $(
-            /// Not implemented: -1. What it is called with is not looked at.
+            /// Returns -1, not implemented; ignores the arguments.
             #[unsafe(no_mangle)]
             pub(crate) extern "C" fn $name() -> c_int {
                 failed(Code::NotImplemented)

@@ -1,4 +1,4 @@
-//! Opening, identity, pose, velocity, buttons: what is read of a device.
+//! Entry points to open, identify and read a device: pose, velocity, buttons.
 
 use crate::device::{
     FRAME, Open, any, close, count, default, expert, kind, open, open_first, open_number, sampled,
@@ -15,7 +15,7 @@ use std::time::Duration;
 
 /// Version of the interface: major, minor, release, revision.
 const VERSION: [c_int; 4] = [3, 17, 6, 0];
-/// Digits of an angle in degrees.
+/// Degrees per radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 fn number(index: i8) -> Result<usize, Code> {
@@ -40,87 +40,87 @@ fn whole(count: usize) -> c_int {
 }
 
 export! {
-    /// Devices there are, open or not.
+    /// Returns the number of devices, open or not.
     fn dhdGetDeviceCount() -> c_int [0] { whole(count()) }
-    /// Devices that no other program has.
+    /// Returns the number of devices that no other program uses.
     fn dhdGetAvailableCount() -> c_int [0] { whole(count()) }
-    /// Opens the first device that is free; its id.
+    /// Opens the first free device; returns its id.
     fn dhdOpen() -> c_int [-1] { result(open_first(|_| true)) }
-    /// The same.
+    /// Opens the first free device, as [`dhdOpen`].
     fn drdOpen() -> c_int [-1] { result(open_first(|_| true)) }
-    /// Opens a device; one that is open stays so.
+    /// Opens a device by number; an open device stays open.
     fn dhdOpenID(index: i8) -> c_int [-1] { opened(index) }
-    /// The same.
+    /// Opens a device by number, as [`dhdOpenID`].
     fn drdOpenID(index: i8) -> c_int [-1] { opened(index) }
-    /// Opens the device of a serial number.
+    /// Opens the device with a serial number.
     fn dhdOpenSerial(serial: c_int) -> c_int [-1] { result(open_first(|open| whole(open.number) + 1 == serial)) }
     /// Opens the first device of a type.
     fn dhdOpenType(wanted: c_int) -> c_int [-1] { result(open_first(|open| kind(open.station) == wanted)) }
-    /// Closes a device: no force from the next tick on.
+    /// Closes a device, whose force ends with the next tick.
     fn dhdClose(id: i8) -> c_int [-1] { result(close(id)) }
-    /// The same.
+    /// Closes a device, as [`dhdClose`].
     fn drdClose(id: i8) -> c_int [-1] { result(close(id)) }
-    /// Makes a device the one that an id of -1 means.
+    /// Makes a device the default one, with id -1.
     fn dhdSetDevice(id: i8) -> c_int [-1] { result(set_default(id)) }
-    /// The same.
+    /// Sets the default device, as [`dhdSetDevice`].
     fn drdSetDevice(id: i8) -> c_int [-1] { result(set_default(id)) }
-    /// The device that an id of -1 means.
+    /// Returns the id of the default device.
     fn dhdGetDeviceID() -> c_int [-1] { result(default()) }
-    /// The same.
+    /// Returns the id of the default device, as [`dhdGetDeviceID`].
     fn drdGetDeviceID() -> c_int [-1] { result(default()) }
 
-    /// Version of the interface.
+    /// Reads the version of the interface.
     fn dhdGetSDKVersion(major: Out<c_int>, minor: Out<c_int>, release: Out<c_int>, revision: Out<c_int>) -> () [()] {
         [major, minor, release, revision].into_iter().zip(VERSION).for_each(|(place, value)| place.put(value));
     }
-    /// The same as text, never null.
+    /// Returns the version of the interface as text, never null.
     fn dhdGetSDKVersionStr() -> *const c_char [c"".as_ptr()] { c"3.17.6".as_ptr() }
-    /// Version of the controller as text, never null.
+    /// Returns the version of the controller as text, never null.
     fn dhdGetVersionStr(_id: i8) -> *const c_char [c"".as_ptr()] { c"3.17".as_ptr() }
-    /// Version of a part as text, never null.
+    /// Returns the version of a component as text, never null.
     fn dhdGetComponentVersionStr(_component: c_uint, _id: i8) -> *const c_char [c"".as_ptr()] { c"3.17".as_ptr() }
-    /// Version of the controller.
+    /// Reads the version of the controller.
     fn dhdGetVersion(version: Out<f64>, id: i8) -> c_int [-1] { read(id, |_| version.put(3.17)) }
-    /// Revision of the device.
+    /// Returns the revision of the device.
     fn dhdGetSystemRev(id: i8) -> c_int [-1] { result(open(id).map(|_| 1)) }
-    /// Type of the device; 0 for none.
+    /// Returns the type of the device; 0 without one.
     fn dhdGetSystemType(id: i8) -> c_int [0] { any(id).map_or(0, |open| kind(open.station)) }
-    /// Name of the device, never null.
+    /// Returns the name of the device, never null.
     fn dhdGetSystemName(id: i8) -> *const c_char [c"".as_ptr()] { name(any(id).ok().as_ref()).as_ptr() }
-    /// Serial number.
+    /// Reads the serial number.
     fn dhdGetSerialNumber(serial: Out<u16>, id: i8) -> c_int [-1] {
         read(id, |open| serial.put(u16::try_from(open.number + 1).unwrap_or(1)))
     }
-    /// 3: simulated; 1: asynchronous.
+    /// Returns the communication mode, 3: simulated; 1: asynchronous.
     fn dhdGetComMode(id: i8) -> c_int [-1] {
         result(open(id).map(|open| if open.station.plugin() == "simulated" { 3 } else { 1 }))
     }
-    /// Nothing is wrong with memory.
+    /// Reports an intact memory of the controller.
     fn dhdCheckControllerMemory(id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// Whether it has translations.
+    /// Returns whether the device has translations.
     fn dhdHasBase(id: i8) -> bool [false] { any(id).is_ok() }
-    /// Whether its rotations are sensed.
+    /// Returns whether the device senses rotations.
     fn dhdHasWrist(id: i8) -> bool [false] { any(id).is_ok_and(|open| open.has_wrist()) }
-    /// Whether they are driven.
+    /// Returns whether the device drives its rotations.
     fn dhdHasActiveWrist(id: i8) -> bool [false] { any(id).is_ok_and(|open| open.has_active_wrist()) }
-    /// No device of Flotor has a gripper.
+    /// Returns false: no device of Flotor has a gripper.
     fn dhdHasGripper(_id: i8) -> bool [false] { false }
-    /// The same.
+    /// Returns false: no device of Flotor has a gripper.
     fn dhdHasActiveGripper(_id: i8) -> bool [false] { false }
-    /// Whether it is for the left hand: by its type.
+    /// Returns whether the device is for the left hand, by its type.
     fn dhdIsLeftHanded(id: i8) -> bool [false] {
         any(id).is_ok_and(|open| [36, 37, 105, 109, 132].contains(&kind(open.station)))
     }
 
-    /// Position, m.
+    /// Reads the position, m.
     fn dhdGetPosition(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put3([x, y, z], open.pose().0))
     }
-    /// Rows of the rotation matrix; the identity without a wrist.
+    /// Reads the rotation matrix, by rows; the identity without a wrist.
     fn dhdGetOrientationFrame(matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| matrix.put_all(open.pose().1.as_flattened()))
     }
-    /// Position, m, and rows of the rotation matrix.
+    /// Reads the position, m, and the rotation matrix, by rows.
     fn dhdGetPositionAndOrientationFrame(x: Out<f64>, y: Out<f64>, z: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
@@ -128,15 +128,15 @@ export! {
             matrix.put_all(rows.as_flattened());
         })
     }
-    /// Angles about x, then y, then z, rad.
+    /// Reads the angles about x, then y, then z, rad.
     fn dhdGetOrientationRad(a: Out<f64>, b: Out<f64>, g: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put3([a, b, g], angles(&open.pose().1)))
     }
-    /// The same in degrees.
+    /// Reads the angles about x, then y, then z, degrees.
     fn dhdGetOrientationDeg(a: Out<f64>, b: Out<f64>, g: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put3([a, b, g], angles(&open.pose().1) * DEGREES))
     }
-    /// Position, m, and angles, rad.
+    /// Reads the position, m, and the angles, rad.
     fn dhdGetPositionAndOrientationRad(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
@@ -144,7 +144,7 @@ export! {
             put3([a, b, g], angles(&rows));
         })
     }
-    /// Position, m, and angles, degrees.
+    /// Reads the position, m, and the angles, degrees.
     fn dhdGetPositionAndOrientationDeg(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
@@ -152,66 +152,66 @@ export! {
             put3([a, b, g], angles(&rows) * DEGREES);
         })
     }
-    /// Velocity, m/s.
+    /// Reads the velocity, m/s.
     fn dhdGetLinearVelocity(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put3([x, y, z], FRAME.of_flotor(open.station.state().velocity_m_per_s)))
     }
-    /// Angular velocity about the axes of the base, rad/s.
+    /// Reads the angular velocity about the axes of the base, rad/s.
     fn dhdGetAngularVelocityRad(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put3([x, y, z], turning(open)))
     }
-    /// The same in degrees.
+    /// Reads the angular velocity about the axes of the base, degrees/s.
     fn dhdGetAngularVelocityDeg(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put3([x, y, z], turning(open) * DEGREES))
     }
-    /// 1 if a button is pressed.
+    /// Returns 1 if a button is pressed.
     fn dhdGetButton(index: c_int, id: i8) -> c_int [-1] {
         let bit = u32::try_from(index).ok().filter(|index| *index < 32).ok_or(Code::InvalidIndex);
         result(bit.and_then(|bit| sampled(id).map(|open| c_int::from(open.station.state().buttons >> bit & 1 == 1))))
     }
-    /// Buttons, one bit each; 0 on error.
+    /// Returns the buttons, one bit each; 0 on error.
     fn dhdGetButtonMask(id: i8) -> c_uint [0] { sampled(id).map_or(0, |open| open.station.state().buttons) }
 
-    /// There is no gripper.
+    /// Reads 0 and returns an error: there is no gripper.
     fn dhdGetGripperAngleRad(angle: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([angle]) }
-    /// There is no gripper.
+    /// Reads 0 and returns an error: there is no gripper.
     fn dhdGetGripperAngleDeg(angle: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([angle]) }
-    /// There is no gripper.
+    /// Reads 0 and returns an error: there is no gripper.
     fn dhdGetGripperGap(gap: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([gap]) }
-    /// There is no gripper.
+    /// Reads 0 and returns an error: there is no gripper.
     fn dhdGetGripperAngularVelocityRad(velocity: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([velocity]) }
-    /// There is no gripper.
+    /// Reads 0 and returns an error: there is no gripper.
     fn dhdGetGripperAngularVelocityDeg(velocity: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([velocity]) }
-    /// There is no gripper.
+    /// Reads 0 and returns an error: there is no gripper.
     fn dhdGetGripperLinearVelocity(velocity: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([velocity]) }
-    /// There is no gripper.
+    /// Reads 0 and returns an error: there is no gripper.
     fn dhdGetGripperThumbPos(x: Out<f64>, y: Out<f64>, z: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([x, y, z]) }
-    /// There is no gripper.
+    /// Reads 0 and returns an error: there is no gripper.
     fn dhdGetGripperFingerPos(x: Out<f64>, y: Out<f64>, z: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([x, y, z]) }
 
-    /// Seconds of a clock that never goes back; in lockstep those of the run.
+    /// Returns the time of a monotonic clock, s; in lockstep that of the run.
     fn dhdGetTime() -> f64 [0.0] { now_s() }
-    /// The same.
+    /// Returns the time, as [`dhdGetTime`].
     fn drdGetTime() -> f64 [0.0] { now_s() }
-    /// Waits for so many seconds; in lockstep the run goes on for as long.
+    /// Sleeps for a time, s; in lockstep advances the run by the same time.
     fn dhdSleep(seconds: f64) -> () [()] { sleep(seconds) }
-    /// The same.
+    /// Sleeps for a time, as [`dhdSleep`].
     fn drdSleep(seconds: f64) -> () [()] { sleep(seconds) }
-    /// Microseconds of the same clock.
+    /// Returns the time of [`dhdGetTime`] in microseconds.
     fn dhdGetSystemCounter() -> std::ffi::c_ulong [0] {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a time since the machine started
         let microseconds = (now_s() * 1.0e6) as u64;
         microseconds
     }
-    /// The scene decides what is simulated.
+    /// Does nothing: the scene decides whether devices are simulated.
     fn dhdEnableSimulator(_on: bool) -> () [()] {}
-    /// Allows calls for experts, in the whole process.
+    /// Permits expert calls in the whole process.
     fn dhdEnableExpertMode() -> c_int [-1] { crate::device::set_expert(true); DONE }
-    /// Forbids them.
+    /// Forbids expert calls in the whole process.
     fn dhdDisableExpertMode() -> c_int [-1] { crate::device::set_expert(false); DONE }
 }
 
-/// Reads something of an open device.
+/// Runs `body` on an open device.
 pub(crate) fn read(id: i8, body: impl FnOnce(&Open)) -> c_int {
     result(open(id).map(|open| {
         body(&open);
@@ -219,7 +219,7 @@ pub(crate) fn read(id: i8, body: impl FnOnce(&Open)) -> c_int {
     }))
 }
 
-/// Reads the sample of a device that is not lost.
+/// Runs `body` on an open device that is not lost, and counts a read of its sample.
 pub(crate) fn read_live(id: i8, body: impl FnOnce(&Open)) -> c_int {
     result(sampled(id).map(|open| {
         body(&open);
@@ -227,7 +227,7 @@ pub(crate) fn read_live(id: i8, body: impl FnOnce(&Open)) -> c_int {
     }))
 }
 
-/// The same, in expert mode.
+/// Runs `body` on an open device that is not lost, in expert mode.
 pub(crate) fn read_expert(id: i8, body: impl FnOnce(&Open)) -> c_int {
     result(expert(id).map(|open| {
         body(&open);
@@ -248,7 +248,7 @@ pub(crate) fn turning(open: &Open) -> DVec3 {
     FRAME.of_flotor(open.station.state().angular_velocity_rad_per_s)
 }
 
-/// Angles a, b, g with R = Rx(a) Ry(b) Rz(g), rad.
+/// Returns the angles a, b, g of R = Rx(a) Ry(b) Rz(g), rad.
 pub(crate) fn angles(rows: &[[f64; 3]; 3]) -> DVec3 {
     DVec3::new(
         math::atan2(-rows[1][2], rows[2][2]),
@@ -257,7 +257,7 @@ pub(crate) fn angles(rows: &[[f64; 3]; 3]) -> DVec3 {
     )
 }
 
-/// The name of a device, or that there is none: kept for as long as the process lives.
+/// Returns the name of a device, or "no device"; valid for the life of the process.
 fn name(open: Option<&Open>) -> &'static CStr {
     static NAMES: [OnceLock<CString>; crate::device::MOST] = [const { OnceLock::new() }; crate::device::MOST];
     let none = c"no device";

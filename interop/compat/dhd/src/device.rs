@@ -1,4 +1,4 @@
-//! A device between the program and its station: what the program set and may ask back, and what it commanded.
+//! Device between the program and its station: settings of the program, and last command.
 
 use crate::error::Code;
 use crate::regulation::Regulation;
@@ -8,44 +8,44 @@ use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 pub(crate) const FRAME: Frame = Frame::TowardsRightUp;
-/// Devices that are served at most; an id is the number of the device.
+/// Limit on the number of devices; an id is the number of the device.
 pub(crate) const MOST: usize = 16;
 
-/// The device that an id of -1 means; -1: none.
+/// Default device, with id -1; -1: none.
 static DEFAULT: AtomicI32 = AtomicI32::new(-1);
-/// Whether calls for experts are allowed, in the whole process.
+/// Expert mode of the process.
 static EXPERT: AtomicBool = AtomicBool::new(false);
 static DEVICES: [Mutex<Device>; MOST] = [const { Mutex::new(Device::NEW) }; MOST];
 
-/// Whether the program lets force through.
+/// Force switch of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Switch {
-    /// It has not said: its first command does.
+    /// Not set: the first command enables force.
     Unsaid,
     On,
     Off,
 }
 
-/// What the program set.
+/// Settings and last command of the program.
 pub(crate) struct Device {
     pub(crate) switch: Switch,
-    /// Commanded last, in the axes of the interface: N and N·m.
+    /// Last command, in the axes of the interface: N and N·m.
     pub(crate) force_n: DVec3,
     pub(crate) torque_nm: DVec3,
-    /// Limits of the program's own; negative: none.
+    /// Limits of the program: N, N·m, gripper N; negative: none.
     pub(crate) most: [f64; 3],
     pub(crate) vibration: [f64; 2],
     pub(crate) mass_kg: f64,
     pub(crate) gravity: bool,
     pub(crate) brakes: bool,
     pub(crate) watchdog: u8,
-    /// Wrenches that had expired when force was enabled last.
+    /// Count of expired wrenches when force was last enabled.
     pub(crate) lapses: u64,
     pub(crate) has_been_stopped: bool,
-    /// Time at which force is fully on, ns.
+    /// Time at which the fade-in ends, ns.
     pub(crate) faded_in_ns: u64,
     pub(crate) velocity_threshold: u32,
-    /// About x, about z, of the device, rad.
+    /// Angles of the device about x, about z, and of the device itself, rad.
     pub(crate) angles_rad: [f64; 3],
     pub(crate) parameters: [[f64; 3]; 8],
     pub(crate) gains: [f64; 4],
@@ -78,7 +78,7 @@ impl Device {
     };
 }
 
-/// An open device.
+/// Device selected by an id, with its station.
 pub(crate) struct Open {
     pub(crate) host: &'static Host,
     pub(crate) station: &'static Station,
@@ -86,19 +86,19 @@ pub(crate) struct Open {
 }
 
 impl Open {
-    /// What the program set.
+    /// Locks the settings of the program.
     pub(crate) fn device(&self) -> MutexGuard<'static, Device> {
         device(self.number)
     }
 }
 
 fn device(number: usize) -> MutexGuard<'static, Device> {
-    // A number is checked before it gets here; the first device stands in for none.
+    // The number was checked before; the first device is an unreachable fallback.
     let device = DEVICES.get(number).unwrap_or(&DEVICES[0]);
     device.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The device of an id, open or not; -1 is the default one.
+/// Returns the device of an id, open or not; -1 is the default one.
 pub(crate) fn any(id: i8) -> Result<Open, Code> {
     let number = if id < 0 { DEFAULT.load(Ordering::Acquire) } else { i32::from(id) };
     let number = usize::try_from(number).ok().filter(|number| *number < MOST).ok_or(Code::NoDevice)?;
@@ -107,22 +107,22 @@ pub(crate) fn any(id: i8) -> Result<Open, Code> {
     Ok(Open { host, station, number })
 }
 
-/// The device of an id, if it is open.
+/// Returns the device of an id, if open.
 pub(crate) fn open(id: i8) -> Result<Open, Code> {
     any(id).and_then(|open| if open.station.is_open() { Ok(open) } else { Err(Code::NoDevice) })
 }
 
-/// The same, if it is not lost.
+/// Returns the device of an id, if open and not lost.
 pub(crate) fn live(id: i8) -> Result<Open, Code> {
     open(id).and_then(|open| if open.host.is_running() { Ok(open) } else { Err(Code::Com) })
 }
 
-/// The device of an id for a read of its sample, unless the device is lost.
+/// Returns the device of an id for a read of its sample, which is counted, if open and not lost.
 pub(crate) fn sampled(id: i8) -> Result<Open, Code> {
     live(id).inspect(|open| open.host.note_read(crate::force::follow_all))
 }
 
-/// The same, in expert mode.
+/// Returns the device of an id, if open and not lost, in expert mode.
 pub(crate) fn expert(id: i8) -> Result<Open, Code> {
     if EXPERT.load(Ordering::Acquire) { live(id) } else { Err(Code::ExpertModeDisabled) }
 }
@@ -131,12 +131,12 @@ pub(crate) fn set_expert(on: bool) {
     EXPERT.store(on, Ordering::Release);
 }
 
-/// Devices there are.
+/// Returns the number of devices.
 pub(crate) fn count() -> usize {
     host().map_or(0, |host| host.stations().len().min(MOST))
 }
 
-/// Opens a device, which becomes the default one; its id.
+/// Opens a device and makes it the default one; returns its id.
 pub(crate) fn open_number(number: usize) -> Result<i32, Code> {
     let host = host().filter(|_| number < count()).ok_or(Code::NoDevice)?;
     let id = i32::try_from(number).map_err(|_| Code::NoDevice)?;
@@ -151,7 +151,7 @@ pub(crate) fn open_number(number: usize) -> Result<i32, Code> {
     Ok(id)
 }
 
-/// Opens the first device that is not open and fits.
+/// Opens the first device that is not open and satisfies `fits`.
 pub(crate) fn open_first(fits: impl Fn(&Open) -> bool) -> Result<i32, Code> {
     let free = (0..count()).find(|number| {
         let open = i8::try_from(*number).map_err(|_| Code::NoDevice).and_then(any);
@@ -160,7 +160,7 @@ pub(crate) fn open_first(fits: impl Fn(&Open) -> bool) -> Result<i32, Code> {
     open_number(free.ok_or(Code::NoDevice)?)
 }
 
-/// Closes a device; another open one becomes the default.
+/// Closes a device; if it was the default, another open one becomes the default.
 pub(crate) fn close(id: i8) -> Result<i32, Code> {
     let closing = open(id)?;
     closing.device().regulation = Regulation::OFF;
@@ -172,7 +172,7 @@ pub(crate) fn close(id: i8) -> Result<i32, Code> {
     Ok(0)
 }
 
-/// The default device.
+/// Returns the id of the default device.
 pub(crate) fn default() -> Result<i32, Code> {
     let id = DEFAULT.load(Ordering::Acquire);
     if id < 0 { Err(Code::NoDevice) } else { Ok(id) }
@@ -185,8 +185,8 @@ pub(crate) fn set_default(id: i8) -> Result<i32, Code> {
     Ok(0)
 }
 
-/// Returns the type of device that a program sees, unless `FLOTOR_DHD_TYPE` sets one. Of the types with six driven axes, bindings of
-/// Python know 104, and an unknown one stops them; CHAI3D, in C++, shifts the position of a 104 by a centimetre.
+/// Returns the type of device that a program sees, unless `FLOTOR_DHD_TYPE` sets one. Of the types with six driven axes, Python
+/// bindings accept 104 only, and an unknown type stops them; CHAI3D, in C++, shifts the position of a 104 by a centimetre.
 pub(crate) fn kind(station: &Station) -> i32 {
     let set = said("FLOTOR_DHD_TYPE").and_then(|text| text.parse().ok());
     set.unwrap_or_else(|| match (station.axes(), language()) {
@@ -206,13 +206,13 @@ impl Open {
         self.station.axes() == Axes::Six
     }
 
-    /// Position, m, and rows of the rotation matrix.
+    /// Returns the position, m, and the rotation matrix, by rows.
     pub(crate) fn pose(&self) -> (DVec3, [[f64; 3]; 3]) {
         let state = self.station.state();
         (FRAME.of_flotor(state.position_m), FRAME.rotation(state.orientation))
     }
 
-    /// Lets force through or not.
+    /// Enables or disables force.
     pub(crate) fn set_switch(&self, device: &mut Device, switch: Switch) {
         if switch == Switch::On {
             self.enable(device);
@@ -225,7 +225,7 @@ impl Open {
         }
     }
 
-    /// Lets force through, which fades in unless it is on already.
+    /// Enables force, which fades in unless enabled already.
     fn enable(&self, device: &mut Device) {
         device.switch = Switch::On;
         device.lapses = self.station.counts().lapses;
@@ -235,11 +235,11 @@ impl Open {
         }
     }
 
-    /// Sends force and torque of the program, in its own limits, together with those of the regulation. Whether they were scaled
-    /// down, now or by the envelope later.
+    /// Limits the program's force and torque, and sends them together with those of the regulation. Returns whether they are scaled
+    /// down, here or later by the envelope.
     pub(crate) fn send(&self, device: &mut Device, force_n: DVec3, torque_nm: DVec3) -> Result<bool, Code> {
         if !(force_n.is_finite() && torque_nm.is_finite()) {
-            // The port counts and refuses it.
+            // The port counts and rejects the command.
             let wrench = Wrench::new(FRAME.to_flotor(force_n), FRAME.to_flotor(torque_nm));
             let _ = self.station.command(&wrench, self.host.now_ns());
             return Err(Code::Invalid);
@@ -258,7 +258,7 @@ impl Open {
         Ok(is_cut || is_limited)
     }
 
-    /// Sends what the program commanded last, with what the regulation and a vibration add now.
+    /// Sends the last command of the program, with the current wrench of regulation and vibration.
     pub(crate) fn send_again(&self, device: &mut Device) {
         let now_ns = self.host.now_ns();
         let [frequency_hz, amplitude_n] = device.vibration;
@@ -268,18 +268,18 @@ impl Open {
         let (held_n, held_nm) = device.regulation.wrench(&state, now_ns);
         let force_n = FRAME.to_flotor(device.force_n + DVec3::Z * shake_n) + held_n;
         let torque_nm = FRAME.to_flotor(device.torque_nm) + held_nm;
-        // What is not finite was refused before; a sum of huge numbers is cut off by the port in the same way.
+        // Non-finite parts were rejected before; the port rejects an overflowing sum in the same way.
         let _ = self.station.command(&Wrench::new(force_n, torque_nm), now_ns);
     }
 }
 
-/// Length of a vector that may be too large to be squared.
+/// Returns the length of a vector, without overflow of its square.
 fn length(vector: DVec3) -> f64 {
     let largest = vector.abs().max_element();
     if largest > 0.0 { (vector / largest).length() * largest } else { 0.0 }
 }
 
-/// The same direction, no longer than this.
+/// Limits the length of a vector.
 fn shortened(vector: DVec3, most: f64) -> DVec3 {
     let length = length(vector);
     if length <= most || length == 0.0 { vector } else { vector / length * most }

@@ -1,9 +1,9 @@
-//! The last error of each thread, and what its number means.
+//! Last error of each thread, and texts of the error numbers.
 
 use std::cell::Cell;
 use std::ffi::{CStr, c_char, c_int};
 
-/// What went wrong. The numbers are the interface's.
+/// Error of a call. The numbers are the interface's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 pub(crate) enum Code {
@@ -24,12 +24,12 @@ thread_local! {
     static LAST: Cell<c_int> = const { Cell::new(0) };
 }
 
-/// Success.
+/// Return value of success.
 pub(crate) const DONE: c_int = 0;
-/// Success of a setter that scaled the command down.
+/// Return value of a setter that scaled the command down.
 pub(crate) const SATURATED: c_int = 2;
 
-/// The result of a call whose error, if there is one, the thread may ask for.
+/// Converts a result to a return value, and stores an error for the thread.
 pub(crate) fn result(result: Result<c_int, Code>) -> c_int {
     match result {
         Ok(done) => done,
@@ -37,13 +37,13 @@ pub(crate) fn result(result: Result<c_int, Code>) -> c_int {
     }
 }
 
-/// The result of a call that failed.
+/// Stores an error for the thread, and returns -1.
 pub(crate) fn failed(code: Code) -> c_int {
     let _ = LAST.try_with(|last| last.set(code as c_int));
     -1
 }
 
-/// For people.
+/// Returns the text of an error number.
 fn words(code: c_int) -> &'static CStr {
     match code {
         0 => c"no error",
@@ -74,10 +74,10 @@ fn words(code: c_int) -> &'static CStr {
 }
 
 export! {
-    /// Number of the last error of this thread.
+    /// Returns the number of the last error of this thread.
     fn dhdErrorGetLast() -> c_int [0] { LAST.try_with(Cell::get).unwrap_or(0) }
-    /// What it means, never null.
+    /// Returns the text of the last error of this thread, never null.
     fn dhdErrorGetLastStr() -> *const c_char [c"".as_ptr()] { words(LAST.try_with(Cell::get).unwrap_or(0)).as_ptr() }
-    /// What a number of an error means, never null.
+    /// Returns the text of an error number, never null.
     fn dhdErrorGetStr(code: c_int) -> *const c_char [c"".as_ptr()] { words(code).as_ptr() }
 }

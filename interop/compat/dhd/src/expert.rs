@@ -1,4 +1,4 @@
-//! Calls for experts: watchdog, thresholds, inertia.
+//! Entry points of expert mode: watchdog, thresholds, inertia.
 
 use crate::basic::read_expert;
 use crate::device::expert;
@@ -6,13 +6,13 @@ use crate::error::{Code, DONE, failed, result};
 use flotor_compat::pointer::{In, Out};
 use std::ffi::{c_int, c_uchar, c_uint};
 
-/// Effective mass and moment of inertia at the handle that a program may reckon with, kg and kg·m².
+/// Nominal effective mass and moment of inertia at the handle, kg and kg·m².
 const INERTIA: [f64; 6] = [0.6, 0.6, 0.6, 0.004, 0.004, 0.004];
-/// A unit of the watchdog, ns.
+/// Unit of the watchdog, ns.
 const WATCHDOG_NS: u64 = 125_000;
 
 export! {
-    /// Effective mass at the handle: a diagonal matrix of 6 by 6, kg and kg·m².
+    /// Returns the nominal mass matrix at the handle: diagonal, 6 by 6, kg and kg·m².
     fn dhdJointAnglesToInertiaMatrix(_joints: In<f64>, inertia: Out<f64>, id: i8) -> c_int [-1] {
         read_expert(id, |_| {
             let mut matrix = [0.0; 36];
@@ -20,28 +20,28 @@ export! {
             inertia.put_all(&matrix);
         })
     }
-    /// Gravity loads no joint of a device that compensates it: 8 zeros.
+    /// Returns 8 zeros: gravity loads no joint of a device that compensates it.
     fn dhdJointAnglesToGravityJointTorques(_joints: In<f64>, torques: Out<f64>, _mask: c_uchar, id: i8) -> c_int [-1] {
         read_expert(id, |_| torques.put_all(&[0.0; 8]))
     }
-    /// How long a force is valid, in 125 µs; 0: as long as the scene says.
+    /// Sets the validity of a force, in 125 µs; 0: as in the scene.
     fn dhdSetWatchdog(units: c_uchar, id: i8) -> c_int [-1] {
         read_expert(id, |open| {
             open.station.keep_valid_for(u64::from(units) * WATCHDOG_NS);
             open.device().watchdog = units;
         })
     }
-    /// What was set.
+    /// Returns the setting of [`dhdSetWatchdog`].
     fn dhdGetWatchdog(units: Out<c_uchar>, id: i8) -> c_int [-1] { read_expert(id, |open| units.put(open.device().watchdog)) }
-    /// Kept: the envelope limits velocity.
+    /// Stores the threshold without effect: the envelope limits velocity.
     fn dhdSetVelocityThreshold(threshold: c_uint, id: i8) -> c_int [-1] {
         read_expert(id, |open| open.device().velocity_threshold = threshold)
     }
-    /// What was set.
+    /// Returns the stored threshold.
     fn dhdGetVelocityThreshold(threshold: Out<c_uint>, id: i8) -> c_int [-1] {
         read_expert(id, |open| threshold.put(open.device().velocity_threshold))
     }
-    /// What is read is always that of the last tick.
+    /// Checks the argument without effect: samples are always those of the last tick.
     fn dhdSetTimeGuard(microseconds: c_int, id: i8) -> c_int [-1] {
         if microseconds < -1 {
             return failed(Code::Invalid);

@@ -1,4 +1,4 @@
-//! Force: switching, commanding, limits, and what the status says of it.
+//! Entry points of force: switch, commands, limits, and status.
 
 use crate::basic::{put3, read, read_live};
 use crate::device::{self, Device, FRAME, Open, Switch, live, open};
@@ -8,10 +8,10 @@ use flotor_compat::pointer::Out;
 use flotor_hal::DVec3;
 use std::ffi::{c_int, c_uchar, c_uint};
 
-/// How many numbers a status has.
+/// Length of a status.
 const STATUS: usize = 17;
 
-/// Sends a command, and waits for the tick that sees it if it is to.
+/// Sends a command; with `waits`, waits for the next tick.
 fn command(id: i8, force_n: DVec3, torque_nm: Option<DVec3>, waits: bool) -> c_int {
     let open = match live(id) {
         Ok(open) => open,
@@ -21,14 +21,14 @@ fn command(id: i8, force_n: DVec3, torque_nm: Option<DVec3>, waits: bool) -> c_i
         let mut device = open.device();
         open.send(&mut device, force_n, torque_nm.unwrap_or(DVec3::ZERO))
     };
-    // One that is refused waits too: a program that goes on asking is not to go round faster for it.
+    // A rejected command waits too: a program that retries must not loop faster for it.
     if waits {
         open.host.wait(open.station);
     }
     result(sent.map(|is_scaled| if is_scaled { SATURATED } else { DONE }))
 }
 
-/// In lockstep, what regulation adds to the next tick.
+/// Updates the regulation of all devices, for the next tick in lockstep.
 pub(crate) fn follow_all() {
     for id in (0..).take(device::count()) {
         if let Ok(open) = live(id) {
@@ -37,7 +37,7 @@ pub(crate) fn follow_all() {
     }
 }
 
-/// What is applied, after all limits: N and N·m.
+/// Returns the applied force and torque, after all limits: N and N·m.
 fn applied(open: &Open) -> [DVec3; 2] {
     let applied = open.station.state().applied;
     [applied.force(), applied.torque()].map(|part| FRAME.of_flotor(part))
@@ -50,7 +50,7 @@ fn switched(id: i8, on: bool) -> c_int {
     }))
 }
 
-/// Changes what is kept of an open device.
+/// Changes the stored settings of an open device.
 pub(crate) fn keep(id: i8, change: impl FnOnce(&mut Device)) -> c_int {
     read(id, |open| change(&mut open.device()))
 }
@@ -76,29 +76,29 @@ fn vector(x: f64, y: f64, z: f64) -> DVec3 {
 }
 
 export! {
-    /// Force, N; waits for the next tick.
+    /// Sets the force, N; waits for the next tick.
     fn dhdSetForce(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { command(id, vector(x, y, z), None, true) }
-    /// Force, N, and torque, N·m; waits for the next tick.
+    /// Sets force, N, and torque, N·m; waits for the next tick.
     fn dhdSetForceAndTorque(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, id: i8) -> c_int [-1] {
         command(id, vector(x, y, z), Some(vector(tx, ty, tz)), true)
     }
-    /// Force, N; there is no gripper.
+    /// Sets the force, N; ignores the gripper.
     fn dhdSetForceAndGripperForce(x: f64, y: f64, z: f64, _gripper: f64, id: i8) -> c_int [-1] {
         command(id, vector(x, y, z), None, true)
     }
-    /// Force, N, and torque, N·m; there is no gripper.
+    /// Sets force, N, and torque, N·m; ignores the gripper.
     fn dhdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, _gripper: f64, id: i8) -> c_int [-1] {
         command(id, vector(x, y, z), Some(vector(tx, ty, tz)), true)
     }
-    /// Force, N, and torque, N·m, on top of the regulation; returns at once.
+    /// Sets force, N, and torque, N·m, in addition to the regulation; returns at once.
     fn drdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, _gripper: f64, id: i8) -> c_int [-1] {
         command(id, vector(x, y, z), Some(vector(tx, ty, tz)), false)
     }
-    /// Force that is applied, after all limits, N.
+    /// Reads the applied force, after all limits, N.
     fn dhdGetForce(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put3([x, y, z], applied(open)[0]))
     }
-    /// Force, N, and torque, N·m, that are applied.
+    /// Reads the applied force, N, and torque, N·m.
     fn dhdGetForceAndTorque(x: Out<f64>, y: Out<f64>, z: Out<f64>, tx: Out<f64>, ty: Out<f64>, tz: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let [force_n, torque_nm] = applied(open);
@@ -106,7 +106,7 @@ export! {
             put3([tx, ty, tz], torque_nm);
         })
     }
-    /// Force, N, and torque, N·m, that are applied, and 0 of a gripper.
+    /// Reads the applied force, N, and torque, N·m, and 0 for a gripper.
     fn dhdGetForceAndTorqueAndGripperForce(x: Out<f64>, y: Out<f64>, z: Out<f64>, tx: Out<f64>, ty: Out<f64>, tz: Out<f64>, gripper: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let [force_n, torque_nm] = applied(open);
@@ -115,11 +115,11 @@ export! {
             gripper.put(0.0);
         })
     }
-    /// Lets force through, or not.
+    /// Enables or disables force.
     fn dhdEnableForce(on: c_uchar, id: i8) -> c_int [-1] { switched(id, on != 0) }
-    /// There is no gripper.
+    /// Does nothing: there is no gripper.
     fn dhdEnableGripperForce(_on: c_uchar, id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// No force. 0 also where nothing is open: programs call it until it is.
+    /// Disables force. Returns 0 even without an open device: programs call it until it succeeds.
     fn dhdStop(id: i8) -> c_int [0] {
         if let Ok(open) = open(id) {
             let mut device = open.device();
@@ -128,51 +128,51 @@ export! {
         }
         DONE
     }
-    /// Damping where there is no force: kept.
+    /// Stores the brake setting without effect.
     fn dhdSetBrakes(on: c_int, id: i8) -> c_int [-1] { keep(id, |device| device.brakes = on != 0) }
-    /// The device\'s own: kept.
+    /// Stores the setting without effect: the device compensates gravity itself.
     fn dhdSetGravityCompensation(on: c_int, id: i8) -> c_int [-1] { keep(id, |device| device.gravity = on != 0) }
-    /// Kept.
+    /// Stores the mass, kg, without effect.
     fn dhdSetEffectorMass(mass_kg: f64, id: i8) -> c_int [-1] { keep(id, |device| device.mass_kg = mass_kg) }
-    /// What was set, kg.
+    /// Returns the stored mass, kg.
     fn dhdGetEffectorMass(mass_kg: Out<f64>, id: i8) -> c_int [-1] { read(id, |open| mass_kg.put(open.device().mass_kg)) }
-    /// Kept nowhere: the device knows where it stands.
+    /// Does nothing: the device has its own value of gravity.
     fn dhdSetStandardGravity(_gravity: f64, id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// Largest force, N, within the envelope; negative: no limit of the program\'s own.
+    /// Sets the limit of force, N, within the envelope; negative: none.
     fn dhdSetMaxForce(force_n: f64, id: i8) -> c_int [-1] { set_most(id, 0, force_n) }
-    /// The same of torque, N·m.
+    /// Sets the limit of torque, N·m, within the envelope; negative: none.
     fn dhdSetMaxTorque(torque_nm: f64, id: i8) -> c_int [-1] { set_most(id, 1, torque_nm) }
-    /// The same of a gripper, N.
+    /// Stores the limit of gripper force, N, without effect.
     fn dhdSetMaxGripperForce(force_n: f64, id: i8) -> c_int [-1] { set_most(id, 2, force_n) }
-    /// What was set; -1: nothing.
+    /// Returns the limit of force, N; -1: none.
     fn dhdGetMaxForce(id: i8) -> f64 [-1.0] { most(id, 0) }
-    /// What was set; -1: nothing.
+    /// Returns the limit of torque, N·m; -1: none.
     fn dhdGetMaxTorque(id: i8) -> f64 [-1.0] { most(id, 1) }
-    /// What was set; -1: nothing.
+    /// Returns the limit of gripper force, N; -1: none.
     fn dhdGetMaxGripperForce(id: i8) -> f64 [-1.0] { most(id, 2) }
-    /// Status, 17 numbers.
+    /// Reads the status, 17 numbers.
     fn dhdGetStatus(status: Out<c_int>, id: i8) -> c_int [-1] { read(id, |open| status.put_all(&status_of(open))) }
-    /// Commands of force, kHz.
+    /// Returns the rate of force commands, kHz.
     fn dhdGetComFreq(id: i8) -> f64 [0.0] { open(id).map_or(0.0, |open| open.station.command_rate_hz() * 1.0e-3) }
-    /// A vibration along z that is added to the force: Hz and N.
+    /// Sets a vibration along z, Hz and N, which is added to the force.
     fn dhdSetVibration(frequency_hz: f64, amplitude_n: f64, _profile: c_int, id: i8) -> c_int [-1] {
         if !(frequency_hz.is_finite() && amplitude_n.is_finite()) {
             return failed(Code::Invalid);
         }
         keep(id, |device| device.vibration = [frequency_hz, amplitude_n])
     }
-    /// There is no gripper whose closing could be a button.
+    /// Returns an error: there is no gripper whose closing could be a button.
     fn dhdEmulateButton(_on: c_uchar, _id: i8) -> c_int [-1] { failed(Code::NotAvailable) }
-    /// There is nothing to calibrate.
+    /// Does nothing: the device needs no calibration.
     fn dhdReset(id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// It is calibrated.
+    /// Returns at once: the device is calibrated.
     fn dhdWaitForReset(_timeout_ms: c_int, id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// Outputs of the device: there are none.
+    /// Does nothing: the device has no outputs.
     fn dhdSetOutput(_outputs: c_uint, id: i8) -> c_int [-1] { read(id, |_| ()) }
 }
 
-/// Power, connected, started, calibrated, idle, force, brake, torque, wrist, error, gravity, time guard, wrist calibrated,
-/// redundancy, why force is off, locks, axes checked.
+/// Returns the status: power, connected, started, calibrated, idle, force, brake, torque, wrist, error, gravity, time guard, wrist
+/// calibrated, redundancy, cause of disabled force, locks, axes checked.
 fn status_of(open: &Open) -> [c_int; STATUS] {
     let device = open.device();
     let is_alive = open.host.is_running();

@@ -1,4 +1,4 @@
-//! Encoders and joints of a nominal base. A Flotor device has joints of its own or none; a program that reads them gets those of a
+//! Encoders and joints of a nominal base. A Flotor device has other joints or none; programs receive those of a
 //! Cartesian base: one joint along each axis, whose angle is the displacement over the length of an arm. Encoders, joints, positions
 //! and the Jacobian agree with each other to one count.
 //!
@@ -13,7 +13,7 @@ use std::ffi::c_int;
 
 /// Length of a nominal arm, m.
 const ARM_M: f64 = 0.2;
-/// Displacement for a count of an encoder, m.
+/// Displacement per count of an encoder, m.
 const COUNT_M: f64 = 1.0e-7;
 
 /// Returns the position of encoder counts, m.
@@ -86,9 +86,9 @@ export! {
     fn dhdGetDeltaJacobian(jacobian: Out<f64>, id: i8) -> c_int [-1] { read_expert(id, |_| jacobian.put_all(&JACOBIAN)) }
     /// Returns the identity: the angles of the handle are the joints of the wrist.
     fn dhdGetWristJacobian(jacobian: Out<f64>, id: i8) -> c_int [-1] { read_expert(id, |_| jacobian.put_all(&WRIST_JACOBIAN)) }
-    /// Sets no torque: there are no joints to drive.
+    /// Returns an error: there are no joints to drive.
     fn dhdSetJointTorques(_torques: In<f64>, id: i8) -> c_int [-1] { result(expert(id).and(Err(Code::NotAvailable))) }
-    /// Joint angles of a nominal arm, 8 numbers, rad.
+    /// Reads the joint angles of a nominal arm, 8 numbers, rad.
     fn dhdGetJointAngles(joints: Out<f64>, id: i8) -> c_int [-1] {
         read_expert(id, |open| {
             let (position_m, rows) = open.pose();
@@ -97,7 +97,7 @@ export! {
             joints.put_all(&[x, y, z, a, b, g, 0.0, 0.0]);
         })
     }
-    /// 8 velocities of the same joints, rad/s.
+    /// Reads the velocities of the nominal joints, 8 numbers, rad/s.
     fn dhdGetJointVelocities(joints: Out<f64>, id: i8) -> c_int [-1] {
         read_expert(id, |open| {
             let state = open.station.state();
@@ -106,7 +106,7 @@ export! {
             joints.put_all(&[x, y, z, a, b, g, 0.0, 0.0]);
         })
     }
-    /// 8 smallest and 8 largest angles of those joints, rad.
+    /// Reads the smallest and the largest angles of the nominal joints, 8 numbers each, rad.
     fn dhdGetJointAngleRange(least: Out<f64>, most: Out<f64>, id: i8) -> c_int [-1] {
         read_expert(id, |open| {
             let DVec3 { x, y, z } = FRAME.of_flotor(open.station.range_m()).abs() / ARM_M;

@@ -1,4 +1,4 @@
-//! What is set, kept and given back, and changes nothing here.
+//! Entry points of settings that are stored and returned, mostly without effect.
 
 use crate::basic::read;
 use crate::error::{Code, failed};
@@ -20,35 +20,35 @@ fn angle(id: i8, index: usize, factor: f64, place: Out<f64>) -> c_int {
 }
 
 export! {
-    /// The loop has an estimate of its own.
+    /// Does nothing: the loop has its own velocity estimate.
     fn dhdConfigLinearVelocity(_window_ms: c_int, _mode: c_int, id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// The loop has an estimate of its own.
+    /// Does nothing: the loop has its own velocity estimate.
     fn dhdConfigAngularVelocity(_window_ms: c_int, _mode: c_int, id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// There is no gripper.
+    /// Does nothing: there is no gripper.
     fn dhdConfigGripperVelocity(_window_ms: c_int, _mode: c_int, id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// Kept, rad.
+    /// Stores the angle of the base about x, rad, without effect.
     fn dhdSetBaseAngleXRad(angle_rad: f64, id: i8) -> c_int [-1] { set_angle(id, 0, angle_rad) }
-    /// Kept, degrees.
+    /// Stores the angle of the base about x, degrees, without effect.
     fn dhdSetBaseAngleXDeg(angle_deg: f64, id: i8) -> c_int [-1] { set_angle(id, 0, angle_deg / DEGREES) }
-    /// What was set, rad.
+    /// Reads the stored angle of the base about x, rad.
     fn dhdGetBaseAngleXRad(angle_rad: Out<f64>, id: i8) -> c_int [-1] { angle(id, 0, 1.0, angle_rad) }
-    /// What was set, degrees.
+    /// Reads the stored angle of the base about x, degrees.
     fn dhdGetBaseAngleXDeg(angle_deg: Out<f64>, id: i8) -> c_int [-1] { angle(id, 0, DEGREES, angle_deg) }
-    /// Kept, rad.
+    /// Stores the angle of the base about z, rad, without effect.
     fn dhdSetBaseAngleZRad(angle_rad: f64, id: i8) -> c_int [-1] { set_angle(id, 1, angle_rad) }
-    /// Kept, degrees.
+    /// Stores the angle of the base about z, degrees, without effect.
     fn dhdSetBaseAngleZDeg(angle_deg: f64, id: i8) -> c_int [-1] { set_angle(id, 1, angle_deg / DEGREES) }
-    /// What was set, rad.
+    /// Reads the stored angle of the base about z, rad.
     fn dhdGetBaseAngleZRad(angle_rad: Out<f64>, id: i8) -> c_int [-1] { angle(id, 1, 1.0, angle_rad) }
-    /// What was set, degrees.
+    /// Reads the stored angle of the base about z, degrees.
     fn dhdGetBaseAngleZDeg(angle_deg: Out<f64>, id: i8) -> c_int [-1] { angle(id, 1, DEGREES, angle_deg) }
-    /// Kept, rad.
+    /// Stores the angle of the device, rad, without effect.
     fn dhdSetDeviceAngleRad(angle_rad: f64, id: i8) -> c_int [-1] { set_angle(id, 2, angle_rad) }
-    /// Kept, degrees.
+    /// Stores the angle of the device, degrees, without effect.
     fn dhdSetDeviceAngleDeg(angle_deg: f64, id: i8) -> c_int [-1] { set_angle(id, 2, angle_deg / DEGREES) }
-    /// What was set, rad.
+    /// Reads the stored angle of the device, rad.
     fn dhdGetDeviceAngleRad(angle_rad: Out<f64>, id: i8) -> c_int [-1] { angle(id, 2, 1.0, angle_rad) }
-    /// What was set, degrees.
+    /// Reads the stored angle of the device, degrees.
     fn dhdGetDeviceAngleDeg(angle_deg: Out<f64>, id: i8) -> c_int [-1] { angle(id, 2, DEGREES, angle_deg) }
 }
 
@@ -66,42 +66,42 @@ fn parameters(id: i8, index: usize, places: [Out<f64>; 3]) -> c_int {
     })
 }
 
-/// Where the speed of a motion of the position and of the rotation is kept: acceleration, speed, jerk.
+/// Indices of the motion limits of position and rotation: acceleration, speed, jerk. The regulation uses the speed.
 pub(crate) const POSITION_MOVE: usize = 2;
 pub(crate) const ROTATION_MOVE: usize = 4;
 
 export! {
-    /// Largest acceleration, speed and jerk of a motion.
+    /// Stores the limits of acceleration, speed and jerk for encoder motions, without effect.
     fn drdSetEncMoveParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 0, [amax, vmax, jerk]) }
-    /// The same while following.
+    /// Stores the limits for following encoders, without effect.
     fn drdSetEncTrackParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 1, [amax, vmax, jerk]) }
-    /// Of the position: m and s.
+    /// Sets the limits for motions of the position, m and s; only the speed has an effect.
     fn drdSetPosMoveParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, POSITION_MOVE, [amax, vmax, jerk]) }
-    /// The same while following.
+    /// Stores the limits for following a position, m and s, without effect.
     fn drdSetPosTrackParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 3, [amax, vmax, jerk]) }
-    /// Of the rotation: rad and s.
+    /// Sets the limits for motions of the rotation, rad and s; only the speed has an effect.
     fn drdSetRotMoveParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, ROTATION_MOVE, [amax, vmax, jerk]) }
-    /// The same while following.
+    /// Stores the limits for following a rotation, rad and s, without effect.
     fn drdSetRotTrackParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 5, [amax, vmax, jerk]) }
-    /// Of a gripper.
+    /// Stores the limits for motions of a gripper, without effect.
     fn drdSetGripMoveParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 6, [amax, vmax, jerk]) }
-    /// The same while following.
+    /// Stores the limits for following a gripper, without effect.
     fn drdSetGripTrackParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 7, [amax, vmax, jerk]) }
-    /// What was set.
+    /// Reads the limits for encoder motions.
     fn drdGetEncMoveParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 0, [amax, vmax, jerk]) }
-    /// What was set.
+    /// Reads the limits for following encoders.
     fn drdGetEncTrackParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 1, [amax, vmax, jerk]) }
-    /// What was set.
+    /// Reads the limits for motions of the position.
     fn drdGetPosMoveParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, POSITION_MOVE, [amax, vmax, jerk]) }
-    /// What was set.
+    /// Reads the limits for following a position.
     fn drdGetPosTrackParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 3, [amax, vmax, jerk]) }
-    /// What was set.
+    /// Reads the limits for motions of the rotation.
     fn drdGetRotMoveParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, ROTATION_MOVE, [amax, vmax, jerk]) }
-    /// What was set.
+    /// Reads the limits for following a rotation.
     fn drdGetRotTrackParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 5, [amax, vmax, jerk]) }
-    /// What was set.
+    /// Reads the limits for motions of a gripper.
     fn drdGetGripMoveParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 6, [amax, vmax, jerk]) }
-    /// What was set.
+    /// Reads the limits for following a gripper.
     fn drdGetGripTrackParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 7, [amax, vmax, jerk]) }
 }
 
@@ -120,34 +120,34 @@ fn gain(id: i8, index: usize) -> f64 {
 }
 
 export! {
-    /// Kept: the spring here has gains of its own.
+    /// Stores the gain without effect: the regulation has its own gains.
     fn drdSetEncPGain(value: f64, id: i8) -> c_int [-1] { set_gain(id, 0, value) }
-    /// Kept.
+    /// Stores the integral gain without effect.
     fn drdSetEncIGain(value: f64, id: i8) -> c_int [-1] { set_gain(id, 1, value) }
-    /// Kept.
+    /// Stores the derivative gain without effect.
     fn drdSetEncDGain(value: f64, id: i8) -> c_int [-1] { set_gain(id, 2, value) }
-    /// Kept: the envelope limits.
+    /// Stores the motor limit without effect: the envelope limits the force.
     fn drdSetMotRatioMax(value: f64, id: i8) -> c_int [-1] { set_gain(id, 3, value) }
-    /// What was set.
+    /// Returns the stored proportional gain.
     fn drdGetEncPGain(id: i8) -> f64 [-1.0] { gain(id, 0) }
-    /// What was set.
+    /// Returns the stored integral gain.
     fn drdGetEncIGain(id: i8) -> f64 [-1.0] { gain(id, 1) }
-    /// What was set.
+    /// Returns the stored derivative gain.
     fn drdGetEncDGain(id: i8) -> f64 [-1.0] { gain(id, 2) }
-    /// What was set.
+    /// Returns the stored motor limit.
     fn drdGetMotRatioMax(id: i8) -> f64 [-1.0] { gain(id, 3) }
-    /// Kept: the loop has a priority of its own.
+    /// Stores the priorities without effect: the loop has its own.
     fn drdSetPriorities(program: c_int, control: c_int, id: i8) -> c_int [-1] {
         keep(id, |device| device.priorities = [program, control])
     }
-    /// What was set.
+    /// Reads the stored priorities.
     fn drdGetPriorities(program: Out<c_int>, control: Out<c_int>, id: i8) -> c_int [-1] {
         read(id, |open| [program, control].into_iter().zip(open.device().priorities).for_each(|(place, value)| place.put(value)))
     }
-    /// Kept.
+    /// Stores the filter switch without effect.
     fn drdEnableFilter(on: bool, id: i8) -> c_int [-1] { keep(id, |device| device.filters = on) }
-    /// What was set.
+    /// Returns the stored filter switch.
     fn drdIsFiltering(id: i8) -> bool [false] { crate::device::open(id).is_ok_and(|open| open.device().filters) }
-    /// There are no locks.
+    /// Does nothing: there are no locks.
     fn drdLock(_mask: std::ffi::c_uchar, _init: bool, id: i8) -> c_int [-1] { read(id, |_| ()) }
 }

@@ -1,16 +1,16 @@
-//! Keys of the terminal, for programs that ask the SDK for them, and threads for those that ask it for one.
+//! Entry points for keys of the terminal, and for threads of the program.
 
 use crate::error::{Code, DONE, failed};
 use std::ffi::{c_char, c_int, c_void};
 use std::mem::MaybeUninit;
 use std::sync::{Mutex, Once, PoisonError};
 
-/// Standard input.
+/// Descriptor of standard input.
 const INPUT: c_int = 0;
-/// The terminal as it was before it gave single keys.
+/// Settings of the terminal before single-key input.
 static BEFORE: Mutex<Option<libc::termios>> = Mutex::new(None);
 
-/// Lets the terminal give keys as they are pressed, until the program ends.
+/// Switches the terminal to single-key input, until the program ends.
 fn take_keys() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -38,23 +38,23 @@ extern "C" fn give_keys_back() {
     }
 }
 
-/// Bytes that wait to be read.
+/// Returns the number of unread bytes of standard input.
 fn waiting() -> c_int {
     let mut bytes: c_int = 0;
     // SAFETY: the system writes one number that is there for the call.
     if unsafe { libc::ioctl(INPUT, libc::FIONREAD, &raw mut bytes) } == 0 { bytes } else { 0 }
 }
 
-/// What a thread of the program is.
+/// Entry point of a thread of the program.
 type Body = extern "C" fn(*mut c_void) -> *mut c_void;
 
 export! {
-    /// Whether a key was pressed.
+    /// Returns whether a key was pressed.
     fn dhdKbHit() -> bool [false] {
         take_keys();
         waiting() > 0
     }
-    /// The key, or 0.
+    /// Returns the next key; 0 without one.
     fn dhdKbGet() -> c_char [0] {
         take_keys();
         let mut key: u8 = 0;
@@ -65,7 +65,7 @@ export! {
         let read = unsafe { libc::read(INPUT, (&raw mut key).cast(), 1) };
         if read == 1 { c_char::from_ne_bytes([key]) } else { 0 }
     }
-    /// Starts a thread of the program; its priority stays that of the others.
+    /// Starts a thread of the program, with the default priority.
     fn dhdStartThread(body: Option<Body>, data: *mut c_void, _priority: c_int) -> c_int [-1] {
         let Some(body) = body else { return failed(Code::NullArgument) };
         let mut thread = MaybeUninit::<libc::pthread_t>::uninit();

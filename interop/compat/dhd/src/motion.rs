@@ -1,4 +1,4 @@
-//! Regulation and motion: holding the handle, moving it, following the program.
+//! Entry points of regulation and motion: hold the handle, move it, follow the program.
 
 use crate::basic::{angles, put3, read, read_live, turning};
 use crate::device::{FRAME, Open, Switch, live, open, sampled};
@@ -17,28 +17,28 @@ fn begin(id: i8) -> c_int {
     }))
 }
 
-/// Orientation of angles about x, then y, then z, as a rotation vector in Flotor's axes.
+/// Converts angles about x, then y, then z, to a rotation vector in Flotor's axes.
 fn turned(angles_rad: DVec3) -> DVec3 {
     let DVec3 { x, y, z } = angles_rad;
     let turn = DQuat::from_rotation_x(x) * DQuat::from_rotation_y(y) * DQuat::from_rotation_z(z);
     FRAME.to_flotor(rotation_vector(turn))
 }
 
-/// Where a motion goes.
+/// Goal of a motion.
 #[derive(Clone, Copy)]
 struct Goal {
     position_m: Option<DVec3>,
     angles_rad: Option<DVec3>,
 }
 
-/// How a program wants to get there.
+/// Kind of motion to a goal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Way {
-    /// Along a line, and the call waits until the handle has arrived.
+    /// Along a line; the call waits until the handle has arrived.
     Blocking,
     /// Along a line.
     Line,
-    /// At once.
+    /// At once, without a plan.
     Follow,
 }
 
@@ -60,7 +60,7 @@ fn go(id: i8, goal: Goal, way: Way) -> c_int {
         if !device.regulation.is_running {
             return failed(Code::NoRegulation);
         }
-        // A plan that runs while force fades in would be over before the handle moves.
+        // A plan that started during the fade-in would end before the handle moves.
         let since_ns = open.host.now_ns().max(device.faded_in_ns);
         let fastest = [POSITION_MOVE, ROTATION_MOVE]
             .map(|index| device.parameters.get(index).map_or(0.1, |[_, speed, _]| *speed));
@@ -88,7 +88,7 @@ fn go(id: i8, goal: Goal, way: Way) -> c_int {
 /// Waits until the handle has arrived at a goal.
 ///
 /// # Errors
-/// [`Code::Timeout`] of a handle that does not arrive, [`Code::Com`] when the run ends before.
+/// [`Code::Timeout`] if the handle does not arrive, [`Code::Com`] if the run ends before.
 fn wait_for_arrival(open: &Open, goal: Goal) -> Result<c_int, Code> {
     let is_awaited = [goal.position_m.is_some(), goal.angles_rad.is_some()];
     loop {
@@ -115,7 +115,7 @@ fn regulate(id: i8, axis: usize, on: bool) -> c_int {
         let state = open.station.state();
         let mut device = open.device();
         device.regulation.axes.get_mut(axis).into_iter().for_each(|kept| *kept = on);
-        // What is regulated from now on stays where it is.
+        // Regulated axes hold their current position.
         device.regulation.hold(&state);
     })
 }
@@ -134,25 +134,25 @@ fn rotation(a: f64, b: f64, g: f64) -> Goal {
 }
 
 export! {
-    /// Always: then nobody moves a device to find out where it is.
+    /// Returns true for an open device: no program then moves the device to initialise it.
     fn drdIsInitialized(id: i8) -> bool [false] { open(id).is_ok() }
-    /// Whether it can be regulated.
+    /// Returns whether the device can be regulated.
     fn drdIsSupported(id: i8) -> bool [false] { open(id).is_ok() }
-    /// Whether it is regulated.
+    /// Returns whether the device is regulated.
     fn drdIsRunning(id: i8) -> bool [false] { open(id).is_ok_and(|open| open.device().regulation.is_running) }
-    /// Whether a motion goes on: until the handle has arrived, or 2 s after the plan.
+    /// Returns whether a motion is in progress: until the handle has arrived, or 2 s after the plan.
     fn drdIsMoving(id: i8) -> bool [false] {
         sampled(id).is_ok_and(|open| progress(&open).contains(&Progress::Moving))
     }
-    /// Nothing is to be found out: holds the device.
+    /// Holds the device: it needs no initialisation.
     fn drdAutoInit(id: i8) -> c_int [-1] { begin(id) }
-    /// Nothing is to be found out: holds the device.
+    /// Holds the device: it needs no initialisation.
     fn drdCheckInit(id: i8) -> c_int [-1] { begin(id) }
-    /// Nothing is to be found out: holds the device.
+    /// Holds the device: it needs no initialisation.
     fn drdPrecisionInit(id: i8) -> c_int [-1] { begin(id) }
-    /// Holds the device where it is.
+    /// Starts the regulation and holds the device at its position.
     fn drdStart(id: i8) -> c_int [-1] { begin(id) }
-    /// Does not hold it any more; force stays on if it is to.
+    /// Ends the regulation, and disables force unless `keeps_force`.
     fn drdStop(keeps_force: bool, id: i8) -> c_int [-1] {
         read(id, |open| {
             let mut device = open.device();
@@ -166,7 +166,7 @@ export! {
             }
         })
     }
-    /// Holds it where it is.
+    /// Holds the device at its position, if regulated.
     fn drdHold(id: i8) -> c_int [-1] {
         result(live(id).and_then(|open| {
             let state = open.station.state();
@@ -178,17 +178,17 @@ export! {
             Ok(DONE)
         }))
     }
-    /// Whether the position is regulated.
+    /// Enables or disables the regulation of the position.
     fn drdRegulatePos(on: bool, id: i8) -> c_int [-1] { regulate(id, 0, on) }
-    /// Whether the orientation is regulated.
+    /// Enables or disables the regulation of the orientation.
     fn drdRegulateRot(on: bool, id: i8) -> c_int [-1] { regulate(id, 1, on) }
-    /// Whether a gripper is regulated.
+    /// Stores the switch for a gripper without effect.
     fn drdRegulateGrip(on: bool, id: i8) -> c_int [-1] { regulate(id, 2, on) }
     /// Moves to a position, m.
     fn drdMoveToPos(x: f64, y: f64, z: f64, block: bool, id: i8) -> c_int [-1] { go(id, position(x, y, z), way(block)) }
     /// Turns to angles, rad.
     fn drdMoveToRot(a: f64, b: f64, g: f64, block: bool, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), way(block)) }
-    /// There is no gripper to move.
+    /// Checks the regulation and moves nothing: there is no gripper.
     fn drdMoveToGrip(_gap: f64, _block: bool, id: i8) -> c_int [-1] {
         go(id, Goal { position_m: None, angles_rad: None }, Way::Follow)
     }
@@ -200,11 +200,11 @@ export! {
     fn drdTrackPos(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { go(id, position(x, y, z), Way::Follow) }
     /// Follows angles, rad.
     fn drdTrackRot(a: f64, b: f64, g: f64, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), Way::Follow) }
-    /// There is no gripper to follow.
+    /// Checks the regulation and moves nothing: there is no gripper.
     fn drdTrackGrip(_gap: f64, id: i8) -> c_int [-1] {
         go(id, Goal { position_m: None, angles_rad: None }, Way::Follow)
     }
-    /// Position, m, angles, rad, 0 of a gripper, and rows of the rotation matrix.
+    /// Reads position, m, angles, rad, 0 for a gripper, and rotation matrix, by rows.
     fn drdGetPositionAndOrientation(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
@@ -214,7 +214,7 @@ export! {
             matrix.put_all(rows.as_flattened());
         })
     }
-    /// Velocity, m/s, angular velocity, rad/s, and 0 of a gripper.
+    /// Reads velocity, m/s, angular velocity, rad/s, and 0 for a gripper.
     fn drdGetVelocity(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             put3([x, y, z], FRAME.of_flotor(open.station.state().velocity_m_per_s));
@@ -222,18 +222,18 @@ export! {
             gap.put(0.0);
         })
     }
-    /// Rate of the loop, kHz.
+    /// Returns the rate of the loop, kHz.
     fn drdGetCtrlFreq(id: i8) -> f64 [0.0] {
         open(id).map_or(0.0, |open| 1.0e6 / open.host.period_ns().max(1) as f64)
     }
-    /// Sleeps to the next tick.
+    /// Waits for the next tick.
     fn drdWaitForTick(id: i8) -> () [()] {
         match live(id) {
             Ok(open) => {
                 regulation::follow(&open);
                 open.host.wait(open.station);
             }
-            // A loop without a device does not go round for nothing.
+            // Throttles a loop without a device.
             Err(_) => std::thread::sleep(Duration::from_millis(1)),
         }
     }

@@ -1,51 +1,51 @@
 //! Regulation: a virtual spring that holds the handle, moves it along a straight line, or follows the program.
 //!
-//! The original regulates encoders with motors of its own. Here a spring and a damper at the handle do, inside the envelope:
-//! soft enough for any device, so a hand that holds against it wins.
+//! The original regulates encoders by motors. Here a spring and a damper at the handle replace them, inside the envelope:
+//! soft enough for any device, so that a resisting hand wins.
 
 use crate::device::{self, Open};
 use flotor_compat::{Axes, Pace, State, quietly};
 use flotor_hal::{DQuat, DVec3, orientation_from_rotation_vector, rotation_vector};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Spring and damper of the position, N/m and N·s/m.
+/// Stiffness and damping of the position, N/m and N·s/m.
 const STIFFNESS: [f64; 2] = [400.0, 4.0];
-/// Spring and damper of the orientation, N·m/rad and N·m·s/rad.
+/// Stiffness and damping of the orientation, N·m/rad and N·m·s/rad.
 const TURNING: [f64; 2] = [0.5, 0.005];
 /// Shortest motion, s.
 const SHORTEST_S: f64 = 0.1;
-/// Peak over mean speed of a motion with a smooth start and end.
+/// Ratio of peak to mean speed of a minimum-jerk motion.
 const PEAK: f64 = 1.875;
-/// Distance from its place and speed below which a handle has arrived, m and m/s: a handle of half a kilogram overshoots on the spring
-/// by v sqrt(m / k), 1 mm.
+/// Tolerances of arrival, distance and speed, m and m/s: a handle of half a kilogram overshoots on the spring by
+/// `v sqrt(m / k)`, 1 mm.
 const ARRIVED: [f64; 2] = [1.0e-3, 25.0e-3];
-/// Angle and angular velocity below which a handle has turned, rad and rad/s.
+/// Tolerances of arrival, angle and angular velocity, rad and rad/s.
 const TURNED: [f64; 2] = [0.02, 0.5];
-/// Time for which a handle may be away from its place after the plan of a motion, ns: a hand may hold it.
+/// Timeout of arrival after the plan of a motion, ns: a hand may hold the handle.
 const PATIENCE_NS: u64 = 2_000_000_000;
 
-/// Progress of a motion; of several, the last one in this order is that of all.
+/// Progress of a motion, ordered: the largest of several is that of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Progress {
     /// The handle has arrived.
     Arrived,
     /// The handle did not arrive in time.
     TimedOut,
-    /// The plan goes on, or the handle is on its way.
+    /// The plan is in progress, or the handle has not arrived yet.
     Moving,
 }
 
-/// Whether the handle is regulated, and where to.
+/// State and goals of the regulation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Regulation {
     pub(crate) is_running: bool,
-    /// Position, rotation, gripper.
+    /// Regulated axes: position, rotation, gripper.
     pub(crate) axes: [bool; 3],
     position: Motion,
     rotation: Motion,
 }
 
-/// A straight line from one place to another, or one place.
+/// Motion along a straight line, or a constant position.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     from: DVec3,
@@ -70,7 +70,7 @@ impl Motion {
         Self { from, to, since_ns, until_ns: since_ns + time_ns, progress: Progress::Moving }
     }
 
-    /// Updates the progress, given whether the handle is where the motion ends.
+    /// Updates the progress; `is_at_end` is true while the handle is at the end of the motion.
     fn update(&mut self, is_at_end: bool, now_ns: u64) -> Progress {
         if self.progress == Progress::Moving && now_ns >= self.until_ns {
             if is_at_end {
@@ -98,23 +98,23 @@ impl Regulation {
     pub(crate) const OFF: Self =
         Self { is_running: false, axes: [true; 3], position: Motion::NONE, rotation: Motion::NONE };
 
-    /// Holds the handle where it is.
+    /// Holds the handle at its current pose.
     pub(crate) fn hold(&mut self, state: &State) {
         self.position = Motion::at(state.position_m);
         self.rotation = Motion::at(rotation_vector(state.orientation));
     }
 
-    /// Moves the handle along a line to a place in Flotor's axes, from a time on and with a speed, m/s, at most.
+    /// Plans a motion along a line to a position in Flotor's axes, m, from a time on, with a speed limit, m/s.
     pub(crate) fn move_to(&mut self, place_m: DVec3, fastest: f64, since_ns: u64) {
         self.position = Motion::new(self.position.place(since_ns), place_m, fastest, since_ns);
     }
 
-    /// Turns the handle to a rotation vector in Flotor's axes, from a time on and with a speed, rad/s, at most.
+    /// Plans a rotation to a rotation vector in Flotor's axes, from a time on, with a speed limit, rad/s.
     pub(crate) fn turn_to(&mut self, turned_rad: DVec3, fastest: f64, since_ns: u64) {
         self.rotation = Motion::new(self.rotation.place(since_ns), turned_rad, fastest, since_ns);
     }
 
-    /// Holds the handle at a place from now on.
+    /// Holds the handle at a position from now on, m.
     pub(crate) fn follow_place(&mut self, place_m: DVec3) {
         self.position = Motion::at(place_m);
     }
@@ -138,7 +138,7 @@ impl Regulation {
         [self.position.update(has_arrived, now_ns), self.rotation.update(has_turned, now_ns)]
     }
 
-    /// Force and torque that hold the handle, Flotor's axes, N and N·m.
+    /// Returns force and torque of the regulation, Flotor's axes, N and N·m.
     pub(crate) fn wrench(&self, state: &State, now_ns: u64) -> (DVec3, DVec3) {
         let [position, rotation, _] = self.axes.map(|is_on| is_on && self.is_running);
         let mut wrench = (DVec3::ZERO, DVec3::ZERO);
@@ -156,17 +156,17 @@ impl Regulation {
     }
 }
 
-/// Rotation from the orientation of the handle to a rotation vector, itself a rotation vector.
+/// Returns the rotation vector from the handle's orientation to a goal, given as a rotation vector.
 fn turn_from(state: &State, to_rad: DVec3) -> DVec3 {
     let target: DQuat = orientation_from_rotation_vector(to_rad);
     rotation_vector(target * state.orientation.conjugate())
 }
 
-/// Whether there is a thread that regulates.
+/// True while the regulation thread runs.
 static HAS_THREAD: AtomicBool = AtomicBool::new(false);
 
-/// Begins to hold a device: in real time a thread of its own sends anew each tick; in lockstep every call that makes a tick
-/// does.
+/// Starts the regulation of a device: in real time a thread sends a command per tick; in lockstep every call that makes a
+/// tick does.
 pub(crate) fn start(open: &Open) {
     let state = open.station.state();
     {
@@ -185,7 +185,7 @@ pub(crate) fn start(open: &Open) {
     }
 }
 
-/// Holds all devices that are regulated, as long as there are any.
+/// Sends the commands of all regulated devices, while there are any.
 fn regulate() {
     loop {
         let mut first = None;
@@ -199,13 +199,13 @@ fn regulate() {
             }
         }
         let Some(open) = first else { break };
-        // Not the tick of the program: that one waits for its own.
+        // Sleeps a period instead of waiting for a tick, which would consume the program's.
         std::thread::sleep(std::time::Duration::from_nanos(open.host.period_ns()));
     }
     HAS_THREAD.store(false, Ordering::Release);
 }
 
-/// In lockstep, what the thread would have done for this tick.
+/// Sends the command of a regulated device, in lockstep, where no thread does.
 pub(crate) fn follow(open: &Open) {
     if open.host.pace() == Pace::Lockstep {
         let mut device = open.device();

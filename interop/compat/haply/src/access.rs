@@ -1,11 +1,11 @@
-//! Access to the service's ports: connections that a web page opened are refused, and so is a foreign name of this machine.
+//! Access control of the service's ports: refuses connections opened by web pages, and foreign names of this machine.
 //!
-//! A page of any site can open a WebSocket to a local port; the browser then sends the page's `Origin`. A site that resolves its own
+//! A page of any site can open a WebSocket to a local port; the browser then sends the page's `Origin`. A site that resolves its
 //! name to this machine (DNS rebinding) shows in `Host`. Programs send no `Origin` and connect to an address or to `localhost`.
 
 use std::net::{IpAddr, SocketAddr};
 
-/// Conditions for an answer to a connection.
+/// Access rules of a port.
 #[derive(Clone, Debug)]
 pub(crate) struct Access {
     /// Origins of permitted web pages.
@@ -13,12 +13,12 @@ pub(crate) struct Access {
     hosts: Hosts,
 }
 
-/// Names in `Host` under which a client may have reached the service.
+/// Permitted names in `Host`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hosts {
-    /// Those of this machine alone.
+    /// Names of this machine alone.
     Loopback,
-    /// Any: the service listens to other machines, which know this one by names of their own.
+    /// Any name: the service listens to other machines, which may have other names for this one.
     Any,
 }
 
@@ -32,7 +32,7 @@ pub(crate) enum Forbidden {
 }
 
 impl Access {
-    /// Access for pages of these origins, and for clients on this machine or, on an address beyond loopback, on others.
+    /// Permits pages of these origins, and clients on this machine or, on an address beyond loopback, on others.
     pub(crate) fn new(origins: Vec<String>, listening_at: SocketAddr) -> Self {
         let hosts = if listening_at.ip().is_loopback() { Hosts::Loopback } else { Hosts::Any };
         Self { origins, hosts }
@@ -41,7 +41,7 @@ impl Access {
     /// Checks the headers `Origin` and `Host` of a connection.
     ///
     /// # Errors
-    /// [`Forbidden`].
+    /// [`Forbidden`] with the offending header.
     pub(crate) fn check(&self, origin: Option<&str>, host: Option<&str>) -> Result<(), Forbidden> {
         match (origin, host) {
             (Some(origin), _) if !self.origins.iter().any(|permitted| permitted == origin) => {

@@ -1,4 +1,4 @@
-//! One port for two protocols: a connection says in its first lines whether it wants a WebSocket or an answer by HTTP.
+//! Connections of a port with two protocols: the first lines of a connection request a WebSocket, or are an HTTP request.
 
 use crate::access::Access;
 use crate::http;
@@ -11,17 +11,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
 
-/// Time-out of a whole request, and of each write of an answer.
+/// Timeout of a whole request, and of each write of a reply.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(5);
-/// Connections of a port served at the same time; more are closed at once. Each has a thread.
+/// Limit on the connections of a port; further ones are closed at once. Each has a thread.
 const MOST_CONNECTIONS: usize = 30;
-/// Longest head and body of a request, bytes.
+/// Limits on head and body of a request, bytes.
 const LONGEST_HEAD: usize = 16 << 10;
 const LONGEST_BODY: usize = 64 << 10;
-/// Pause after a connection could not be accepted: there may be no descriptor left.
+/// Pause after a failed accept: there may be no descriptor left.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// A request by HTTP.
+/// HTTP request.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Request {
     pub(crate) method: String,
@@ -30,39 +30,39 @@ pub(crate) struct Request {
     pub(crate) body: String,
 }
 
-/// The head of a request, and what was sent after it.
+/// Parsed head of a request, and the bytes received after it.
 #[derive(Debug, Default)]
 pub(crate) struct Head {
     request: Request,
-    /// Key of a client that wants a WebSocket.
+    /// Key of a WebSocket request.
     key: Option<String>,
-    /// Site of the web page that opened the connection.
+    /// Origin of the web page that opened the connection.
     origin: Option<String>,
-    /// Name under which the client reached the service.
+    /// Host name used by the client.
     host: Option<String>,
     length: usize,
     rest: Vec<u8>,
 }
 
-/// Serves each connection in a thread of its own.
+/// Accepts and serves connections in threads.
 ///
 /// # Errors
-/// If there is no thread that accepts them.
+/// If the accepting thread cannot be created.
 pub(crate) fn serve(service: &'static Service, port: Port) -> io::Result<()> {
     accept(port, "flotor-accept", move |stream| serve_one(service, stream))
 }
 
-/// Accepts connections in a thread, and lets each be served in one of its own.
+/// Accepts connections in a thread, and serves each in a thread of its own.
 ///
 /// # Errors
-/// If there is no thread that accepts them.
+/// If the accepting thread cannot be created.
 pub(crate) fn accept(
     port: Port,
     name: &str,
     serve: impl Fn(TcpStream) -> io::Result<()> + Copy + Send + 'static,
 ) -> io::Result<()> {
     let accept = move || {
-        // Each connection's thread has a copy.
+        // Reference count of the connections.
         let served = Arc::new(());
         loop {
             let Ok(stream) = port.accept() else {
@@ -98,7 +98,7 @@ fn serve_one(service: &Service, mut stream: TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-/// Reads the first lines of a connection, and refuses one without access; `None` where there is nothing to serve.
+/// Reads the head of a connection, and refuses one without access; `None` without a request to serve.
 pub(crate) fn prepared(
     stream: &mut TcpStream,
     access: &Access,
@@ -129,7 +129,7 @@ pub(crate) fn prepared(
     Ok(None)
 }
 
-/// Reads what is there before a deadline.
+/// Reads available bytes before a deadline.
 fn read_before(stream: &mut TcpStream, deadline: Instant, buffer: &mut [u8]) -> io::Result<usize> {
     let remaining = deadline.saturating_duration_since(Instant::now());
     if remaining.is_zero() {
@@ -139,7 +139,7 @@ fn read_before(stream: &mut TcpStream, deadline: Instant, buffer: &mut [u8]) -> 
     stream.read(buffer)
 }
 
-/// Lets a client that wants a WebSocket go on; whether it does.
+/// Completes a WebSocket upgrade; returns whether the client requested one.
 pub(crate) fn upgraded(stream: &mut TcpStream, head: &Head) -> io::Result<bool> {
     let Some(key) = &head.key else { return Ok(false) };
     let accept = derive_accept_key(key.as_bytes());
@@ -151,7 +151,7 @@ pub(crate) fn upgraded(stream: &mut TcpStream, head: &Head) -> io::Result<bool> 
     Ok(true)
 }
 
-/// What a client sent after the lines that asked for a WebSocket.
+/// Returns the bytes received after a WebSocket request.
 pub(crate) fn rest(head: Head) -> Vec<u8> {
     head.rest
 }

@@ -1,4 +1,4 @@
-//! The events channel: a WebSocket that sends each event to all its clients and reads nothing.
+//! Events channel: a WebSocket that sends each event to all clients and reads nothing.
 
 use crate::connection::{PATIENCE, accept, prepared, rest, upgraded};
 use crate::service::{Service, inverse_id};
@@ -12,22 +12,22 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 use tungstenite::Message;
 
-/// Events that wait for a slow client at most; more are lost for it.
+/// Limit on the events queued for a slow client; further ones are lost for that client.
 const MOST_WAITING: usize = 256;
 
-/// How much an event matters.
+/// Severity of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Level {
     Info,
     Warning,
 }
 
-/// Who listens.
+/// Clients of the events channel.
 #[derive(Default)]
 pub(crate) struct Events(Mutex<Vec<SyncSender<String>>>);
 
 impl Events {
-    /// Tells all who listen. Never waits.
+    /// Sends an event to all clients. Never waits.
     pub(crate) fn emit(&self, name: &str, category: &str, level: Level, data: Value, message: &str) {
         let text = event(name, category, level, data, message);
         let is_there = |listener: &SyncSender<String>| {
@@ -49,10 +49,10 @@ fn event(name: &str, category: &str, level: Level, data: Value, message: &str) -
         .to_string()
 }
 
-/// Serves the channel.
+/// Serves the events channel.
 ///
 /// # Errors
-/// If there is no thread that accepts connections.
+/// If the accepting thread cannot be created.
 pub(crate) fn serve(service: &'static Service, port: Port) -> io::Result<()> {
     accept(port, "flotor-events", move |stream| tell(service, stream))
 }
@@ -65,7 +65,7 @@ fn tell(service: &Service, mut stream: TcpStream) -> io::Result<()> {
     }
     let (reading, closing) = (stream.try_clone()?, stream.try_clone()?);
     let events = service.events.listen();
-    // Whoever closes is noticed at once: nothing else is read.
+    // Notices a closed connection at once; messages are ignored.
     let mut reader = socket(reading, rest(head));
     let thread = std::thread::Builder::new().name("flotor-listener".to_owned());
     thread.spawn(move || {

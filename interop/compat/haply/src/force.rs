@@ -1,71 +1,71 @@
-//! The wrench that a device receives: the sum of the requests of all sessions, in Flotor's axes.
+//! Force on a device: the sum of the commands of all sessions, in Flotor's axes.
 
 use flotor_compat::State;
 use flotor_hal::DVec3;
 
-/// How long a command is valid without another one of its session, and how long it fades then, ns.
+/// Validity of a command without renewal, and fade-out time after it, ns.
 const VALID_NS: u64 = 50_000_000;
 const FADE_NS: u64 = 50_000_000;
-/// Spring and damper that move the handle to a commanded position, N/m and N·s/m: soft enough for any device.
+/// Stiffness and damping towards a commanded position, N/m and N·s/m: soft enough for any device.
 const STIFFNESS_N_PER_M: f64 = 400.0;
 const DAMPING_NS_PER_M: f64 = 4.0;
-/// Largest component of a force that is added up, N: a sum stays finite.
+/// Limit on the components of a summed force, N, so that a sum stays finite.
 const LARGEST_N: f64 = 1.0e300;
-/// Largest damping that a session may add, N·s/m.
+/// Limit on the damping of a session, N·s/m.
 const LARGEST_DAMPING_NS_PER_M: f64 = 50.0;
 
-/// What a session commands a device by.
+/// Domain of a session's commands to a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Domain {
     Cartesian,
     Angular,
 }
 
-/// What a session wants of a device.
+/// Command of a session to a device.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted {
     pub(crate) domain: Domain,
     pub(crate) force_n: Option<DVec3>,
     pub(crate) target_m: Option<DVec3>,
-    /// N·s/m along each axis.
+    /// Damping along each axis, N·s/m.
     pub(crate) damping: DVec3,
 }
 
-/// A device's commands.
+/// Commands to a device, by session and time, ns.
 #[derive(Debug, Default)]
 pub(crate) struct Forces(Vec<(u64, u64, Wanted)>);
 
 impl Forces {
-    /// A session's newest command, in place of its last.
+    /// Replaces the command of a session.
     pub(crate) fn want(&mut self, session: u64, now_ns: u64, wanted: Wanted) {
         self.leave(session);
         self.0.push((session, now_ns, wanted));
     }
 
-    /// A session wants nothing any more.
+    /// Removes the command of a session.
     pub(crate) fn leave(&mut self, session: u64) {
         self.0.retain(|(of, ..)| *of != session);
     }
 
-    /// Forgets what has faded; whether nobody wants anything.
+    /// Removes fully faded commands; returns true if there are none left.
     pub(crate) fn forget(&mut self, now_ns: u64) -> bool {
         self.0.retain(|(_, since_ns, _)| now_ns.saturating_sub(*since_ns) < VALID_NS + FADE_NS);
         self.0.is_empty()
     }
 
-    /// Whether the sum changes between two commands of a session: it follows the handle, or another session's fades.
+    /// Returns whether the sum changes between two commands of a session, as it depends on the handle or another session fades.
     pub(crate) fn follow_the_handle(&self) -> bool {
         let follows = |wanted: &Wanted| wanted.target_m.is_some() || wanted.damping != DVec3::ZERO;
         self.0.len() > 1 || self.0.iter().any(|(.., wanted)| follows(wanted))
     }
 
-    /// The newest command that is valid, for who asks how the device is controlled.
+    /// Returns the newest valid command, which defines the control mode of the device.
     pub(crate) fn newest(&self, now_ns: u64) -> Option<&Wanted> {
         let valid = self.0.iter().filter(|(_, since_ns, _)| now_ns.saturating_sub(*since_ns) <= VALID_NS);
         valid.max_by_key(|(_, since_ns, _)| *since_ns).map(|(.., wanted)| wanted)
     }
 
-    /// Force on the hand, N.
+    /// Returns the force on the hand, N.
     pub(crate) fn sum(&self, state: &State, now_ns: u64) -> DVec3 {
         let largest = DVec3::splat(LARGEST_N);
         let force = |(_, since_ns, wanted): &(u64, u64, Wanted)| {

@@ -1,4 +1,4 @@
-//! HTTP requests: version, devices, sessions, and the settings of a device.
+//! HTTP interface: version, devices, sessions, and the settings of a device.
 
 use crate::access::Forbidden;
 use crate::connection::Request;
@@ -9,13 +9,13 @@ use crate::view::View;
 use serde_json::{Value, json};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Version of the service whose interface this is.
+/// Emulated version of the service.
 const VERSION: &str = "3.5.0";
 
-/// What is answered: a status and JSON.
+/// Reply: status and JSON.
 type Answer = (u16, Value);
 
-/// The whole answer to a request.
+/// Returns the complete response to a request.
 pub(crate) fn answer(service: &Service, request: &Request) -> String {
     let (path, query) = request.target.split_once('?').unwrap_or((&request.target, ""));
     let parts: Vec<&str> = path.split('/').filter(|part| !part.is_empty()).collect();
@@ -23,7 +23,7 @@ pub(crate) fn answer(service: &Service, request: &Request) -> String {
     written(route(service, &request.method, &parts, query, &body))
 }
 
-/// The whole answer to a connection without access.
+/// Returns the complete response to a connection without access.
 pub(crate) fn refusal(forbidden: &Forbidden) -> String {
     written(failed(403, &forbidden.to_string()))
 }
@@ -95,7 +95,7 @@ fn version() -> Value {
     })
 }
 
-/// The inventory, as a new session sees it.
+/// Returns the inventory, as a new session sees it.
 fn devices(service: &Service) -> Value {
     let mut text = String::new();
     write(&mut text, service, 0, Extent::Inventory);
@@ -146,7 +146,7 @@ fn setting(service: &Service, method: &str, key: &str, body: &Value) -> Answer {
     }
 }
 
-/// The devices that a path means, and whether they are grips.
+/// Returns the numbers of the devices that a path selects, and the kind: 0 for arms, 1 for grips.
 fn selected(service: &Service, [kind, device]: [&str; 2]) -> Option<(Vec<usize>, usize)> {
     let count = service.host.stations().len();
     let (part, name): (usize, fn(usize) -> String) = match kind {
@@ -162,7 +162,7 @@ fn selected(service: &Service, [kind, device]: [&str; 2]) -> Option<(Vec<usize>,
     (!numbers.is_empty()).then_some((numbers, part))
 }
 
-/// The sessions that a query means, by their ids.
+/// Returns the ids of the sessions that a query selects.
 fn of_query(shared: &Shared, query: &str) -> Vec<u64> {
     let expression = query.split('&').find_map(|pair| pair.strip_prefix("session=")).map(decoded);
     let ids = |sessions: Vec<&Session>| sessions.into_iter().map(|session| session.id).collect();
@@ -177,7 +177,7 @@ fn of_query(shared: &Shared, query: &str) -> Vec<u64> {
         },
         |(profile, index)| (profile.to_owned(), index.to_owned()),
     );
-    // A profile that has colons of its own, without an index.
+    // A profile with colons of its own, without an index.
     let (profile, index) = match index.parse::<i64>() {
         Ok(index) => (profile, index),
         Err(_) => (expression.trim_start_matches(':').to_owned(), 0),
@@ -191,7 +191,7 @@ fn of_query(shared: &Shared, query: &str) -> Vec<u64> {
     ids(place.and_then(|place| found.get(place).copied()).into_iter().collect())
 }
 
-/// Whether a name fits a pattern with `*` and `?`.
+/// Returns whether a name matches a pattern with `*` and `?`.
 fn is_like(name: &str, pattern: &str) -> bool {
     let (name, pattern): (Vec<char>, Vec<char>) = (name.chars().collect(), pattern.chars().collect());
     let (mut at, mut of, mut star) = (0, 0, None);
@@ -202,7 +202,7 @@ fn is_like(name: &str, pattern: &str) -> bool {
                 of += 1;
             }
             Some(wanted) if *wanted == '?' || wanted == letter => (at, of) = (at + 1, of + 1),
-            // The last `*` takes one letter more.
+            // Backtrack: the last `*` matches one character more.
             _ => match star {
                 Some((from, place)) => {
                     star = Some((from + 1, place));
@@ -215,7 +215,7 @@ fn is_like(name: &str, pattern: &str) -> bool {
     pattern.get(of..).unwrap_or_default().iter().all(|rest| *rest == '*')
 }
 
-/// A query without its `%` escapes.
+/// Decodes the `%` escapes of a query.
 fn decoded(text: &str) -> String {
     let mut bytes = Vec::new();
     let mut rest = text.as_bytes();
@@ -278,7 +278,7 @@ fn configured(
     done(last)
 }
 
-/// Reads or changes one thing of a view; what it is then.
+/// Reads or changes a setting of a view; returns its value after the change.
 fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Value, Answer> {
     let plain = View::default();
     let short = name.strip_prefix("filters/").unwrap_or(name);
@@ -315,11 +315,11 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
     }
 }
 
-/// Now, as the service writes it: date and time in UTC.
+/// Returns the current time as the service writes it: date and time in UTC.
 pub(crate) fn now_text() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
     let (days, second) = (seconds / 86_400, seconds % 86_400);
-    // Years of 400 begin in March: a day of the year is a month and a day without leap days in between.
+    // Years begin in March, in eras of 400 years, so that leap days come last.
     let shifted = days + 719_468;
     let (era, day) = (shifted / 146_097, shifted % 146_097);
     let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;

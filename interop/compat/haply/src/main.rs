@@ -1,15 +1,15 @@
-//! Haply's Inverse Service, answered by the devices of a Flotor scene. `flotor emulate haply-service` starts it.
+//! Program `flotor emulate haply-service`: Haply's Inverse Service, served by the devices of a Flotor scene.
 //!
 //! ```text
 //!  program -> WebSocket 10001 -> session: view, commands -> sum of all sessions -> force model `program` -> envelope -> device
 //!          <- one state for each message                 <- newest tick <---------------------------------------------+
 //! ```
 //!
-//! - [`access`]: which connections are answered: no web page's, no foreign name.
+//! - [`access`]: access control: no web pages, no foreign names.
 //! - [`connection`]: one port for the simulation channel and for HTTP; a thread for each connection.
-//! - [`session`]: a client of the simulation channel, its pace and its answers.
-//! - [`message`]: what a client's message says. [`state`]: what is answered.
-//! - [`view`]: axes, mount and workspace of a session. [`force`]: the sum of what all sessions want.
+//! - [`session`]: a client of the simulation channel, with its pace and replies.
+//! - [`message`]: parser of a client's messages. [`state`]: encoder of the replies.
+//! - [`view`]: axes, mount and workspace of a session. [`force`]: the sum of all sessions' commands.
 //! - [`http`]: version, devices, sessions, settings. [`events`]: port 10020.
 //!
 //! Source: the public documentation of the service, version 3.5, and its open clients: names, shapes and units only. Positions in
@@ -62,7 +62,7 @@ struct Arguments {
     /// Let web pages of this origin connect, for example http://localhost:3000 (repeatable; default: no page)
     #[arg(long, value_name = "ORIGIN")]
     allow_origin: Vec<String>,
-    /// Who makes time go on
+    /// Clock of the run
     #[arg(long, value_enum, value_name = "WHO")]
     pace: Option<PaceOption>,
     /// Seed of all random numbers
@@ -78,12 +78,12 @@ struct Arguments {
     plugin_path: PluginPathOption,
     #[command(flatten)]
     control_group: ControlGroupOption,
-    /// End with the process that started this one, however that ends
+    /// End with the parent process
     #[arg(long, hide = true)]
     lent: bool,
 }
 
-/// Who makes time go on.
+/// Clock of the run.
 #[derive(Clone, Copy, ValueEnum)]
 enum PaceOption {
     /// The machine's clock
@@ -92,20 +92,20 @@ enum PaceOption {
     Lockstep,
 }
 
-/// Pause between two looks whether the run is to end.
+/// Poll interval for the end of the run.
 const LOOK: Duration = Duration::from_millis(20);
 
 fn main() -> ExitCode {
     let arguments = arguments::<Arguments>();
     if arguments.lent {
-        // Without it, this one would only go on for longer.
+        // On failure this process may outlive its parent.
         let _ = set_parent_process_death_signal(Some(Signal::TERM));
     }
     supervised(|| run(arguments))
 }
 
 fn run(arguments: Arguments) -> Result<(), CommandError> {
-    // First of all: a signal while the scene is prepared ends the run, too.
+    // First: a signal during the preparation also ends the run.
     let stop = stop_on_signals()?;
     let mut settings = Settings::from_environment().map_err(CommandError::Usage)?.of_own_process();
     settings.scene = arguments.scene.or(settings.scene);

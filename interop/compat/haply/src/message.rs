@@ -1,4 +1,4 @@
-//! Messages of clients: reads them, and applies what they request.
+//! Parser of clients' messages, which applies their settings and commands.
 
 use crate::force::{Domain, Wanted};
 use crate::service::{ARM_M, Service, Session, Shared, grip_id, inverse_id};
@@ -6,16 +6,16 @@ use crate::view::{Basis, Transform, View, numbers, vector};
 use flotor_hal::DVec3;
 use serde_json::Value;
 
-/// What a message was.
+/// Result of a message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Carried {
-    /// The number of the first device it commands.
+    /// Number of the first device with a command.
     pub(crate) commanded: Option<usize>,
-    /// It wants to be told everything.
+    /// True if the message requests the full state.
     pub(crate) wants_all: bool,
 }
 
-/// Carries out a message of a session. What is not legal is left out and reported as an event; the rest is carried out.
+/// Carries out a message of a session. Illegal parts are skipped and reported as events.
 pub(crate) fn carry_out(service: &Service, session: u64, text: &str) -> Carried {
     let message: Value = match serde_json::from_str(text) {
         Ok(message @ Value::Object(_)) => message,
@@ -68,7 +68,7 @@ fn entries<'a>(message: &'a Value, kind: &str) -> &'a [Value] {
     message.get(kind).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
-/// The number of the device an entry is for.
+/// Returns the number of an entry's device.
 fn number(service: &Service, entry: &Value, name: fn(usize) -> String) -> Option<usize> {
     let id = entry.get("device_id").and_then(Value::as_str).unwrap_or_default();
     let number = (0..service.host.stations().len()).find(|number| name(*number).eq_ignore_ascii_case(id));
@@ -104,7 +104,7 @@ pub(crate) fn read_basis(basis: &Value) -> Option<Basis> {
     basis.get("permutation").and_then(Value::as_str).and_then(Basis::parse)
 }
 
-/// What a session sets of a device: the names are those of a message and, below `filters`, of a path.
+/// Applies the settings of a session for a device, by their names in a message and, below `filters`, in a path.
 fn configure_device(service: &Service, view: &mut View, configure: &Value) {
     if configure.get("mount").is_some() && configure.get("preset").is_some() {
         return service.refuse("configure", "either a preset or a mount", &configure.to_string());
@@ -116,10 +116,10 @@ fn configure_device(service: &Service, view: &mut View, configure: &Value) {
     }
 }
 
-/// Sets one thing of a view.
+/// Applies one setting to a view.
 ///
 /// # Errors
-/// What would be legal.
+/// The legal values, as text.
 pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), String> {
     match name {
         "basis" => view.basis = read_basis(value).ok_or(NO_BASIS)?,
@@ -165,12 +165,12 @@ fn set_workspace(service: &Service, view: &mut View, command: &Value) {
     }
 }
 
-/// Whether a command is to be carried out: a program may send one only to see whether it is legal.
+/// Returns whether a command takes effect: a program may send one only for validation.
 fn is_executed(command: &Value) -> bool {
     command.get("execute").and_then(Value::as_bool).unwrap_or(true)
 }
 
-/// Carries out the commands of a device; whether one of them commands it.
+/// Carries out the commands to a device; returns true if any was a motion or force command.
 fn command(service: &Service, shared: &mut Shared, session: u64, device: usize, commands: &Value) -> bool {
     let Some(view) = view(shared, session, device, 0) else { return false };
     if let Some(transform) = commands.get("set_transform") {

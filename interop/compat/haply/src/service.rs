@@ -1,4 +1,4 @@
-//! State that all connections share: the run, its devices, the sessions and their settings.
+//! State shared by all connections: the run, its devices, the sessions and their settings.
 
 use crate::access::Access;
 use crate::events::{Events, Level};
@@ -13,44 +13,44 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// The service.
+/// Service with its run and shared state.
 pub(crate) struct Service {
     pub(crate) host: &'static Host,
     pub(crate) events: Events,
     pub(crate) access: Access,
     shared: Mutex<Shared>,
-    /// Something is to be followed.
+    /// Wakes the thread of `follow`.
     following: Condvar,
     next_session: AtomicU64,
 }
 
-/// A client of the simulation channel, as all see it.
+/// Session: a client of the simulation channel, visible to all connections.
 #[derive(Debug)]
 pub(crate) struct Session {
     pub(crate) id: u64,
     pub(crate) profile: String,
     pub(crate) started: String,
-    /// How it sees each device, and each grip: one at a device.
+    /// Views of each device: of the arm, and of the grip.
     pub(crate) views: Vec<[View; 2]>,
 }
 
-/// What changes.
+/// Mutable state of the service.
 #[derive(Default)]
 pub(crate) struct Shared {
     pub(crate) sessions: Vec<Session>,
-    /// Of each device.
+    /// Commands to each device.
     pub(crate) forces: Vec<Forces>,
-    /// Settings of each device by their names in a path, kept and told.
+    /// Stored settings of each device, by their names in a path.
     pub(crate) kept: Vec<BTreeMap<&'static str, Value>>,
-    /// Settings of the service, kept and told.
+    /// Stored settings of the service.
     pub(crate) settings: BTreeMap<String, Value>,
 }
 
-/// Bytes of all settings of the service together, keys and values as JSON.
+/// Limit on the settings of the service, bytes of keys and values as JSON.
 const MOST_SETTINGS_BYTES: usize = 1 << 20;
 
 impl Shared {
-    /// Keeps a setting of the service; returns whether there was room for it.
+    /// Stores a setting of the service; returns whether there was room for it.
     pub(crate) fn keep_setting(&mut self, key: &str, value: &Value) -> bool {
         let size = |key: &str, value: &Value| key.len() + value.to_string().len();
         let others = self.settings.iter().filter(|(other, _)| *other != key);
@@ -63,7 +63,7 @@ impl Shared {
     }
 }
 
-/// Settings of a device that belong to no session, and what they are at first.
+/// Returns the initial settings of a device that belong to no session.
 pub(crate) fn kept_at_first() -> BTreeMap<&'static str, Value> {
     BTreeMap::from([
         ("gravity_compensation", json!({ "enabled": true, "scaling_factor": 1.0 })),
@@ -74,7 +74,7 @@ pub(crate) fn kept_at_first() -> BTreeMap<&'static str, Value> {
 }
 
 impl Service {
-    /// The service of this process, for as long as that lives.
+    /// Creates the service, which lives as long as the process.
     pub(crate) fn leak(host: &'static Host, access: Access) -> &'static Self {
         let devices = host.stations().len();
         let shared = Shared {
@@ -96,7 +96,7 @@ impl Service {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Begins a session.
+    /// Starts a session; returns its id.
     pub(crate) fn enter(&self) -> u64 {
         let mut shared = self.shared();
         let id = self.next_session.fetch_add(1, Ordering::Relaxed);
@@ -106,7 +106,7 @@ impl Service {
         id
     }
 
-    /// A session ends: it wants nothing any more.
+    /// Ends a session and removes its commands.
     pub(crate) fn leave(&self, session: u64) {
         let mut shared = self.shared();
         shared.sessions.retain(|there| there.id != session);
@@ -116,7 +116,7 @@ impl Service {
         }
     }
 
-    /// A session commands a device, in Flotor's axes. Force begins with the first one, and fades in.
+    /// Sets the command of a session to a device, in Flotor's axes. The first command enables force, which fades in.
     pub(crate) fn want(&self, shared: &mut Shared, session: u64, device: usize, wanted: Wanted) {
         let (Some(forces), Some(station)) = (shared.forces.get_mut(device), self.host.station(device)) else {
             return;
@@ -128,7 +128,7 @@ impl Service {
         }
     }
 
-    /// Sends the sum of what is wanted of a device.
+    /// Sends the sum of all commands to a device.
     fn command(&self, forces: &mut Forces, station: &Station, state: &State) {
         let now_ns = self.host.now_ns();
         if forces.forget(now_ns) {
@@ -136,15 +136,15 @@ impl Service {
             return;
         }
         let sum_n = forces.sum(state, now_ns);
-        // A sum is finite: its parts are, and they are limited.
+        // The sum is finite: its parts are finite and limited.
         let _ = station.command(&Wrench::from_force(sum_n), now_ns);
         station.enable();
     }
 
-    /// Follows the handle with what depends on it, and fades what is not renewed: a thread of its own in real time.
+    /// Starts a thread that updates sums that depend on the handle, and fades expired commands; for real time.
     ///
     /// # Errors
-    /// If there is no thread.
+    /// If the thread cannot be created.
     pub(crate) fn follow(&'static self) -> io::Result<()> {
         let thread = std::thread::Builder::new().name("flotor-sum".to_owned());
         thread.spawn(move || {
@@ -166,7 +166,7 @@ impl Service {
         Ok(())
     }
 
-    /// How a device is controlled: the words of `mode`, `control_domain` and `control_mode`.
+    /// Returns the values of `mode`, `control_domain` and `control_mode` for a device.
     pub(crate) fn control(&self, shared: &Shared, device: usize) -> [&'static str; 3] {
         let newest = shared.forces.get(device).and_then(|forces| forces.newest(self.host.now_ns()));
         let Some(wanted) = newest else { return ["idle", "cartesian", "idle"] };
@@ -178,7 +178,7 @@ impl Service {
         }
     }
 
-    /// Says once that the devices are gone.
+    /// Emits an event per device: the devices are gone.
     pub(crate) fn device_lost(&self) {
         for number in 0..self.host.stations().len() {
             let data = json!({ "device_family": "inverse", "device_id": inverse_id(number) });
@@ -186,7 +186,7 @@ impl Service {
         }
     }
 
-    /// Says that a client sent what is not legal.
+    /// Emits an event: a client sent an illegal value.
     pub(crate) fn refuse(&self, field: &str, reason: &str, context: &str) {
         let context: String = context.chars().take(200).collect();
         let data = json!({ "field": field, "reason": reason, "context": context });
@@ -204,7 +204,7 @@ impl Shared {
     }
 }
 
-/// Id of the arm of a device, and of its grip: four digits, as on the label of the original.
+/// Returns the id of the arm of a device: four digits, as on the label of the original.
 pub(crate) fn inverse_id(number: usize) -> String {
     format!("F{:03X}", number + 1)
 }
@@ -213,10 +213,10 @@ pub(crate) fn grip_id(number: usize) -> String {
     format!("A{:03X}", number + 1)
 }
 
-/// A nominal arm, m: joint angles are displacements over its length, and a torque is a force along it.
+/// Length of a nominal arm, m: joint angles are displacements over this length, and a torque is a force along it.
 pub(crate) const ARM_M: f64 = 0.2;
 
-/// Joint angles of the nominal arm for a displacement, degrees.
+/// Returns the joint angles of the nominal arm for a displacement, degrees.
 pub(crate) fn joint_angles(displacement_m: DVec3) -> DVec3 {
     displacement_m / ARM_M * (180.0 / std::f64::consts::PI)
 }

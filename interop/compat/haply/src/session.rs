@@ -1,5 +1,5 @@
-//! A client of the simulation channel: one state for each of its messages. A message that commands a device waits for the next
-//! tick before it is answered, unless the next message is there already; one that only reads is answered at once.
+//! Client of the simulation channel: one state per message. The reply to a message with a command waits for the next
+//! tick, unless the next message has arrived already; a message that only reads is answered at once.
 
 use crate::message::carry_out;
 use crate::service::Service;
@@ -12,18 +12,18 @@ use std::time::Duration;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message, WebSocket};
 
-/// Longest message of a client, bytes.
+/// Limit on a message of a client, bytes.
 const LONGEST: usize = 1 << 20;
-/// Room for what a client sends in one go, bytes.
+/// Size of the read buffer, bytes.
 const ROOM: usize = 16 << 10;
 
-/// Silence after which a session of a service in real time ends, so that clients that never speak lock nobody out.
+/// Silence after which a session ends in real time, so that silent clients do not use up the connections.
 const LONGEST_SILENCE: Duration = Duration::from_secs(20);
 
-/// A connection that may be asked whether something is there.
+/// Connection that can be polled.
 pub(crate) struct Link {
     pub(crate) stream: TcpStream,
-    /// A read does not wait.
+    /// True while reads do not block.
     is_asking: bool,
 }
 
@@ -47,7 +47,7 @@ impl Write for Link {
     }
 }
 
-/// The WebSocket of a connection whose client has been answered that it may go on; `read` is what it has sent since.
+/// Creates the WebSocket of an upgraded connection; `read` contains the bytes received since the upgrade request.
 pub(crate) fn socket(stream: TcpStream, read: Vec<u8>) -> WebSocket<Link> {
     let config = WebSocketConfig::default()
         .read_buffer_size(ROOM)
@@ -57,7 +57,7 @@ pub(crate) fn socket(stream: TcpStream, read: Vec<u8>) -> WebSocket<Link> {
     WebSocket::from_partially_read(Link { stream, is_asking: false }, read, Role::Server, Some(config))
 }
 
-/// Serves a client until it is gone.
+/// Serves a client until the connection ends.
 pub(crate) fn serve(service: &Service, mut socket: WebSocket<Link>) {
     let session = service.enter();
     if service.host.pace() == Pace::Real {
@@ -71,7 +71,7 @@ pub(crate) fn serve(service: &Service, mut socket: WebSocket<Link>) {
     let _ = socket.flush();
 }
 
-/// Answers each message of a session; comes back with the reason why there are no more.
+/// Replies to each message of a session; returns the error that ends the connection.
 fn answer(service: &Service, session: u64, socket: &mut WebSocket<Link>) -> Result<(), Error> {
     let turn = Turn::default();
     let mut text = String::new();
@@ -111,7 +111,7 @@ fn answer(service: &Service, session: u64, socket: &mut WebSocket<Link>) -> Resu
     }
 }
 
-/// The next message.
+/// Waits for the next message.
 fn read(socket: &mut WebSocket<Link>) -> Result<Message, Error> {
     loop {
         match socket.read() {
@@ -121,7 +121,7 @@ fn read(socket: &mut WebSocket<Link>) -> Result<Message, Error> {
     }
 }
 
-/// The next message, if it is there.
+/// Returns the next message if it has arrived.
 fn waiting(socket: &mut WebSocket<Link>) -> Result<Option<Message>, Error> {
     socket.get_mut().is_asking = true;
     let read = socket.read();

@@ -1,4 +1,4 @@
-//! Messages to clients: the state of all devices; the first one, and on request, has the configuration too.
+//! Encoder of messages to clients: the state of all devices; the first message, and any on request, includes the configuration.
 
 use crate::service::{Service, Session, Shared, grip_id, inverse_id, joint_angles};
 use crate::view::{Transform, View};
@@ -9,18 +9,18 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::io;
 
-/// How much is told.
+/// Parts of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extent {
     /// State and status, after each message.
     State,
-    /// Configuration as well.
+    /// State, status and configuration.
     Inventory,
-    /// And the session itself.
+    /// State, status, configuration and session.
     All,
 }
 
-/// Writes a message for a session, in place of what was in `text`.
+/// Encodes a message for a session, replacing the contents of `text`.
 pub(crate) fn write(text: &mut String, service: &Service, session: u64, extent: Extent) {
     text.clear();
     let shared = service.shared();
@@ -37,7 +37,7 @@ pub(crate) fn write(text: &mut String, service: &Service, session: u64, extent: 
     text.push_str("],\"custom_verse_grip\":[]}");
 }
 
-/// A session, as it is told.
+/// Encodes a session.
 pub(crate) fn told_session(session: &Session) -> Value {
     json!({
         "session_id": session.id,
@@ -45,7 +45,7 @@ pub(crate) fn told_session(session: &Session) -> Value {
     })
 }
 
-/// A device as a session sees it.
+/// Device with its state, for the encoder.
 struct Seen<'a> {
     service: &'a Service,
     shared: &'a Shared,
@@ -174,7 +174,7 @@ pub(crate) fn damping(view: &View) -> Value {
     }
 }
 
-/// A text that numbers are written to.
+/// Adapter that writes bytes to a string.
 struct Sink<'a>(&'a mut String);
 
 impl io::Write for Sink<'_> {
@@ -188,9 +188,9 @@ impl io::Write for Sink<'_> {
     }
 }
 
-/// The shortest digits that are this number, several times faster than those of a format: a state has dozens.
+/// Writes the shortest digits of a number, several times faster than `format!`: a state has dozens.
 fn number(text: &mut String, number: f64) {
-    // What is no number never gets here: the loop replaces it.
+    // Non-finite numbers are unreachable: the loop replaces them.
     let number = if number.is_finite() { number } else { 0.0 };
     let _ = CompactFormatter.write_f64(&mut Sink(text), number);
 }

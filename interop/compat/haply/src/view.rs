@@ -1,15 +1,15 @@
-//! How a session sees a device: axes, origin, mount and workspace. Flotor's axes are the service's own: x right, y away from the
+//! View of a device by a session: axes, origin, mount and workspace. Flotor's axes are the service's own: x right, y away from the
 //! user, z up.
 
 use flotor_hal::{DQuat, DVec3};
 use serde_json::{Value, json};
 
-/// Where the centre of the device's range is for a session whose origin is the base of the device, m.
+/// Centre of the device's range for a session whose origin is the base of the device, m.
 const CENTRE_M: DVec3 = DVec3::new(0.0, -0.12, 0.15);
-/// Smallest scale and length of a quaternion that can be undone.
+/// Smallest invertible scale, and smallest norm of a quaternion.
 const SMALLEST: f64 = 1.0e-6;
 
-/// A permutation of the axes, each with a sign.
+/// Permutation of the axes, each with a sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Basis {
     axes: [usize; 3],
@@ -21,7 +21,7 @@ const AXES: [char; 3] = ['X', 'Y', 'Z'];
 impl Basis {
     const PLAIN: Self = Self { axes: [0, 1, 2], signs: [1.0; 3] };
 
-    /// Reads `XZY`, `X-YZ` or `+X+Y+Z`: the session's x, y, z in terms of the device's.
+    /// Parses `XZY`, `X-YZ` or `+X+Y+Z`: the session's x, y, z in terms of the device's.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let (mut axes, mut signs, mut length, mut sign) = ([3; 3], [1.0; 3], 0, None);
         for letter in text.chars() {
@@ -64,7 +64,7 @@ impl Basis {
         DVec3::from_array(device)
     }
 
-    /// The same rotation in these axes: its axis turns round where they are left-handed.
+    /// Converts a rotation to these axes; its axis is reversed where they are left-handed.
     fn orientation(&self, turn: DQuat) -> DQuat {
         let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| self.of_device(axis));
         let handed = x.cross(y).dot(z);
@@ -73,7 +73,7 @@ impl Basis {
     }
 }
 
-/// A place, a rotation about it and a scale along the axes before both.
+/// Transform: a scale along the axes, then a rotation, then a translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Transform {
     position_m: DVec3,
@@ -85,7 +85,7 @@ impl Transform {
     pub(crate) const NONE: Self =
         Self { position_m: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
 
-    /// The parts that a patch has, on top of this one; nothing if one of them is no number or cannot be undone.
+    /// Returns this transform with the parts of a patch replaced; `None` if a part is malformed or not invertible.
     pub(crate) fn patched(&self, patch: &Value) -> Option<Self> {
         let part = |name: &str, before: DVec3| match patch.get(name) {
             None => Some(before),
@@ -106,7 +106,7 @@ impl Transform {
         (scale.abs().min_element() >= SMALLEST).then_some(Self { position_m, rotation, scale })
     }
 
-    /// As the service tells it: what is plain is left out.
+    /// Encodes the transform like the service, without parts at their defaults.
     pub(crate) fn told(&self) -> Value {
         let mut told = json!({});
         if let Value::Object(parts) = &mut told {
@@ -133,12 +133,12 @@ impl Transform {
     }
 }
 
-/// Three finite numbers.
+/// Parses a vector of three finite numbers x, y, z.
 pub(crate) fn vector(value: &Value) -> Option<DVec3> {
     numbers(value, ["x", "y", "z"])
 }
 
-/// Three finite numbers of these names.
+/// Parses three finite numbers by their names.
 pub(crate) fn numbers(value: &Value, names: [&str; 3]) -> Option<DVec3> {
     let [x, y, z] = names.map(|name| value.get(name).and_then(Value::as_f64));
     Some(DVec3::new(x?, y?, z?)).filter(|vector| vector.is_finite())
@@ -148,7 +148,7 @@ pub(crate) fn of_vector(vector: DVec3) -> Value {
     json!({ "x": vector.x, "y": vector.y, "z": vector.z })
 }
 
-/// Where a session's origin is and which way the arm looks.
+/// Presets by name; true for an origin at the centre of the range.
 const PRESETS: [(&str, bool); 6] = [
     ("defaults", false),
     ("arm_front", false),
@@ -158,7 +158,7 @@ const PRESETS: [(&str, bool); 6] = [
     ("custom", false),
 ];
 
-/// How a session sees a device, and what it set of it.
+/// View of a device by a session, with the session's settings.
 #[derive(Clone, Debug)]
 pub(crate) struct View {
     pub(crate) basis: Basis,
@@ -166,9 +166,9 @@ pub(crate) struct View {
     pub(crate) workspace: Transform,
     pub(crate) preset: &'static str,
     origin_m: DVec3,
-    /// Damping that the session adds while it commands the device, N·s/m along the device's axes.
+    /// Damping added while the session commands the device, N·s/m along the device's axes.
     pub(crate) damping: DVec3,
-    /// Kept and told: what it does to a force is not known.
+    /// Stored gain of the force gate, without effect: its effect on a force is not known.
     pub(crate) force_gate: f64,
 }
 
@@ -187,7 +187,7 @@ impl Default for View {
 }
 
 impl View {
-    /// Takes a preset of the service; whether there is one of this name.
+    /// Selects a preset of the service; returns false for an unknown name.
     pub(crate) fn set_preset(&mut self, name: &str) -> bool {
         let Some((name, is_centred)) = PRESETS.iter().find(|(preset, _)| *preset == name) else {
             return false;
@@ -200,7 +200,7 @@ impl View {
         true
     }
 
-    /// Takes a mount of the session's own.
+    /// Replaces the mount by a custom one.
     pub(crate) fn set_mount(&mut self, mount: Transform) {
         (self.mount, self.preset) = (mount, "custom");
     }
@@ -218,7 +218,7 @@ impl View {
         self.workspace.rotation * (self.workspace.scale * mounted)
     }
 
-    /// A force, N: turned, never scaled.
+    /// Rotates a force, N, to the session's axes, without scale.
     pub(crate) fn force(&self, force_n: DVec3) -> DVec3 {
         self.workspace.rotation * (self.mount.rotation * self.basis.of_device(force_n))
     }

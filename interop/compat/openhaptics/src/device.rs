@@ -1,4 +1,4 @@
-//! A device between the program and its station: what a frame saw and set, and which capabilities are on.
+//! Device between the program and its station: snapshot and settings of a frame, and capabilities.
 
 use crate::NO_DEVICE;
 use crate::error::Code;
@@ -22,18 +22,18 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 const FRAME: Frame = Frame::RightUpTowards;
 /// Millimetres in a metre, and mN·m in a N·m.
 const MILLI: f64 = 1.0e3;
-/// Devices that are served at most; a handle is the number of the device.
+/// Limit on the number of devices; a handle is the number of the device.
 const MOST: usize = 16;
-/// Names that mean the first device.
+/// Names of the first device.
 const FIRST: [&str; 4] = ["", "Default Device", "Default PHANToM", "Default PHANTOM"];
-/// Capabilities from this number on, one bit each; all but the first are on when a device is initialised.
+/// Capabilities, one bit each from this number on; all but the first are enabled when a device is initialised.
 const FIRST_CAPABILITY: c_uint = FORCE_OUTPUT;
 const CAPABILITIES: c_uint = 5;
 const AT_FIRST: u32 = 0b1_1110;
-/// Nominal length of an arm, m: a device that has none is given joint angles of one that would reach there.
+/// Nominal length of an arm, m: devices without one report joint angles of an arm that reaches the handle.
 const ARM_M: f64 = 0.2;
 
-/// The current device of the process.
+/// Current device of the process.
 pub(crate) struct Current(AtomicU32);
 
 pub(crate) static CURRENT: Current = Current(AtomicU32::new(NO_DEVICE));
@@ -43,7 +43,7 @@ impl Current {
         self.0.load(Ordering::Acquire)
     }
 
-    /// Whether that is an initialised device.
+    /// Selects an initialised device; returns false for any other.
     pub(crate) fn set(&self, handle: c_uint) -> bool {
         let is_there = Devices::lock(handle).is_some_and(|device| device.is_initialised);
         if is_there {
@@ -53,12 +53,12 @@ impl Current {
     }
 }
 
-/// All devices.
+/// Access to all devices.
 pub(crate) struct Devices;
 
 static DEVICES: [Mutex<Device>; MOST] = [const { Mutex::new(Device::NONE) }; MOST];
 
-/// What a frame sees of a device.
+/// Snapshot of a device in a frame.
 #[derive(Clone, Copy)]
 struct Snapshot {
     position_mm: DVec3,
@@ -66,7 +66,7 @@ struct Snapshot {
     angular_velocity_rad_per_s: DVec3,
     rows: [[f64; 3]; 3],
     buttons: u32,
-    /// Applied to the hand, N and N·m, axes of the interface.
+    /// Applied force and torque, N and N·m, axes of the interface.
     applied: [DVec3; 2],
 }
 
@@ -79,14 +79,14 @@ const AT_HOME: Snapshot = Snapshot {
     applied: [DVec3::ZERO; 2],
 };
 
-/// When a frame began: in which tick of the scheduler, or of the loop outside of it.
+/// Start of a frame: tick of the scheduler, or of the loop outside of the scheduler.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum When {
     Scheduled(u64),
     Outside(u64),
 }
 
-/// A device of the program.
+/// Device of the program.
 pub(crate) struct Device {
     is_initialised: bool,
     number: usize,
@@ -95,10 +95,10 @@ pub(crate) struct Device {
     begun: Option<When>,
     now: Snapshot,
     last: Snapshot,
-    /// What was set in this frame, N and mN·m.
+    /// Values set in this frame, N and mN·m.
     force_n: Option<DVec3>,
     torque_mnm: Option<DVec3>,
-    /// What was sent last, Flotor's axes.
+    /// Last sent wrench, Flotor's axes.
     sent: Wrench,
     light: u32,
     velocity_limit_mm_per_s: f64,
@@ -112,7 +112,7 @@ impl Devices {
         Some(device.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Something with the current device.
+    /// Runs `body` on the current device.
     pub(crate) fn with_current<T>(body: impl FnOnce(&mut Device) -> T) -> Result<T, Code> {
         match Self::lock(CURRENT.get()) {
             Some(mut device) if device.is_initialised => Ok(body(&mut device)),
@@ -120,7 +120,7 @@ impl Devices {
         }
     }
 
-    /// The first device that is initialised, for who needs the tick of any.
+    /// Returns the first initialised device, to wait for a tick.
     pub(crate) fn any() -> Option<(&'static Host, &'static Station)> {
         let number = (0..)
             .take(MOST)
@@ -129,13 +129,13 @@ impl Devices {
         Some((host, host.station(usize::try_from(number).ok()?)?))
     }
 
-    /// Force of all devices comes on or goes, as scheduler and capabilities say.
+    /// Enables or disables the force of all devices, by scheduler and capabilities.
     pub(crate) fn follow_scheduler() {
         (0..).take(MOST).filter_map(Self::lock).for_each(|device| device.follow_switches());
     }
 }
 
-/// Opens the device of this name and makes it current.
+/// Opens the device with a name and makes it current.
 pub(crate) fn init(name: Option<&str>) -> Result<c_uint, Code> {
     let host = host().ok_or(Code::DeviceFault)?;
     let name = name.unwrap_or_default();
@@ -159,7 +159,7 @@ pub(crate) fn init(name: Option<&str>) -> Result<c_uint, Code> {
     Ok(handle)
 }
 
-/// Closes a device; whether it was open.
+/// Closes a device; returns whether it was open.
 pub(crate) fn disable(handle: c_uint) -> bool {
     let Some(mut device) = Devices::lock(handle).filter(|device| device.is_initialised) else { return false };
     device.station().into_iter().for_each(|(_, station)| {
@@ -174,7 +174,7 @@ pub(crate) fn disable(handle: c_uint) -> bool {
     true
 }
 
-/// Begins a frame; outside of the scheduler it waits for a tick that had none yet.
+/// Begins a frame; outside of the scheduler waits for a tick without a frame.
 pub(crate) fn begin_frame(handle: c_uint) -> Result<(), Code> {
     let mut device = Devices::lock(handle).filter(|device| device.is_initialised).ok_or(Code::BadHandle)?;
     CURRENT.0.store(handle, Ordering::Release);
@@ -185,7 +185,7 @@ pub(crate) fn begin_frame(handle: c_uint) -> Result<(), Code> {
             device.depth += 1;
             return Ok(());
         }
-        // The last one was never ended.
+        // The previous frame was never ended.
         device.depth = 0;
         device.send(host, station)?;
     }
@@ -205,7 +205,7 @@ pub(crate) fn begin_frame(handle: c_uint) -> Result<(), Code> {
     alive(host)
 }
 
-/// Whether the run goes on; if not, whether the device is lost, which ends a program's loop, or stopped for safety.
+/// Checks that the run is in progress; otherwise the device is lost, which ends a program's loop, or stopped for safety.
 fn alive(host: &Host) -> Result<(), Code> {
     match (host.is_running(), host.is_stopped_for_safety()) {
         (true, _) => Ok(()),
@@ -214,7 +214,7 @@ fn alive(host: &Host) -> Result<(), Code> {
     }
 }
 
-/// Ends a frame; one outside of the scheduler that sets a force waits for the tick that sees it.
+/// Ends a frame; outside of the scheduler, after setting a force, waits for the next tick.
 pub(crate) fn end_frame(handle: c_uint) -> Result<(), Code> {
     let mut device = Devices::lock(handle).filter(|device| device.is_initialised).ok_or(Code::BadHandle)?;
     if device.depth == 0 {
@@ -234,7 +234,7 @@ pub(crate) fn end_frame(handle: c_uint) -> Result<(), Code> {
     sent
 }
 
-/// A text of the interface or of the current device.
+/// Returns a text of the interface or of the current device.
 pub(crate) fn text(parameter: c_uint) -> Result<&'static CStr, Code> {
     match parameter {
         VERSION | DRIVER_VERSION => Ok(c"3.4.0"),
@@ -254,7 +254,7 @@ pub(crate) fn text(parameter: c_uint) -> Result<&'static CStr, Code> {
     }
 }
 
-/// The same text at the same place for as long as the process lives.
+/// Interns a text, so that its pointer stays valid for the life of the process.
 fn kept(text: String) -> &'static CStr {
     static TEXTS: Mutex<BTreeMap<String, &'static CStr>> = Mutex::new(BTreeMap::new());
     let mut texts = TEXTS.lock().unwrap_or_else(PoisonError::into_inner);
@@ -300,7 +300,7 @@ impl Device {
         if Scheduler::is_here() { When::Scheduled(Scheduler::tick()) } else { When::Outside(station.ticks()) }
     }
 
-    /// Takes a snapshot.
+    /// Updates the snapshot.
     fn look(&mut self) {
         let Some((_, station)) = self.station() else { return };
         let state = station.state();
@@ -318,7 +318,7 @@ impl Device {
         self.force_n.is_some() || self.torque_mnm.is_some()
     }
 
-    /// Sends what was set in the frame; without that what was sent before stays until it expires.
+    /// Sends the values set in the frame; without any, the previous wrench stays until it expires.
     fn send(&mut self, host: &Host, station: &Station) -> Result<(), Code> {
         if !self.has_set() {
             return Ok(());
@@ -340,7 +340,7 @@ impl Device {
 
     fn bit(capability: c_uint) -> Option<u32> {
         match capability {
-            // Limits that are capabilities too.
+            // Limits that are also capabilities.
             VELOCITY_LIMIT | IMPULSE_LIMIT => Some(1 << (capability - VELOCITY_LIMIT + CAPABILITIES)),
             _ => {
                 capability.checked_sub(FIRST_CAPABILITY).filter(|bit| *bit < CAPABILITIES).map(|bit| 1 << bit)
@@ -370,7 +370,7 @@ impl Device {
         Ok(())
     }
 
-    /// Force comes on with the scheduler and the capability, and goes with either.
+    /// Enables force while the scheduler runs and the capability is enabled, and disables it otherwise.
     fn follow_switches(&self) {
         if !self.is_initialised {
             return;
@@ -396,13 +396,13 @@ impl Device {
             _ if self.depth == 0 => return Err(Code::FrameError),
             _ if parameter == FORCE[0] => self.force_n = Some(DVec3::new(x, y, z)),
             _ if parameter == TORQUE[0] => self.torque_mnm = Some(DVec3::new(x, y, z)),
-            // Torques of joints that the device does not have.
+            // Joint torques: the device has no such joints.
             _ => {}
         }
         Ok(())
     }
 
-    /// The values of a parameter in this frame, or in the last one.
+    /// Returns the values of a parameter in this frame, or in the last one.
     pub(crate) fn value(&self, parameter: c_uint) -> Result<Values, Code> {
         let (_, station) = self.station().ok_or(Code::CommError)?;
         let seen = [&self.now, &self.last];
@@ -434,7 +434,7 @@ impl Device {
         if let Some(seen) = of(GIMBAL_ANGLES) {
             return Ok(vector(gimbal_angles(&seen.rows)));
         }
-        // Current force reads 0 until it is set in this frame: programs add to it.
+        // The current force reads 0 until set in this frame, because programs add to it.
         let [force_n, torque_nm] = self.now.applied;
         match frames(FORCE) {
             Some(0) => return Ok(vector(self.force_n.unwrap_or_default())),
@@ -455,7 +455,7 @@ impl Device {
         if PINCH.contains(&parameter) {
             return Ok(Values::real([0.0]));
         }
-        // In the well means without force, and the safety switch is closed by whoever holds the device.
+        // "In the inkwell" would mean without force; the safety switch is closed while the device is held.
         if SAFETY_SWITCH.contains(&parameter) {
             return Ok(Values::boolean(false));
         }
@@ -465,7 +465,7 @@ impl Device {
         self.constant(parameter, station)
     }
 
-    /// What does not depend on a frame.
+    /// Returns the value of a parameter that does not depend on a frame.
     fn constant(&self, parameter: c_uint, station: &Station) -> Result<Values, Code> {
         let six = station.axes() != Axes::Three;
         let [force_n, torque_nm] = station.most();
@@ -500,7 +500,7 @@ impl Device {
     }
 }
 
-/// Column by column, the translation in the last one.
+/// Returns the transform by columns, the translation in the last one.
 fn transform(seen: &Snapshot) -> [f64; 16] {
     let at_mm = seen.position_mm.to_array();
     std::array::from_fn(|index| match (index / 4, index % 4) {
@@ -511,12 +511,12 @@ fn transform(seen: &Snapshot) -> [f64; 16] {
     })
 }
 
-/// Turret, thigh and shin of a nominal arm that reaches there, rad: left, up and up are positive.
+/// Returns turret, thigh and shin of a nominal arm that reaches a position, rad: left, up and up are positive.
 fn joint_angles(DVec3 { x, y, z }: DVec3) -> DVec3 {
     DVec3::new(math::atan2(-x, ARM_M), math::atan2(y, ARM_M), math::atan2(y - z, ARM_M))
 }
 
-/// Angles of a nominal gimbal, rad: about y, then x, then z; right is positive, up negative, clockwise positive.
+/// Returns the angles of a nominal gimbal, rad: about y, then x, then z; right is positive, up negative, clockwise positive.
 fn gimbal_angles(rows: &[[f64; 3]; 3]) -> DVec3 {
     let pitch = math::asin((-rows[1][2]).clamp(-1.0, 1.0));
     let yaw = math::atan2(rows[0][2], rows[2][2]);
@@ -524,7 +524,7 @@ fn gimbal_angles(rows: &[[f64; 3]; 3]) -> DVec3 {
     DVec3::new(-yaw, -pitch, -roll)
 }
 
-/// Counts of nominal encoders: 0.01 mm, and 0.1 mrad.
+/// Returns the counts of nominal encoders: 0.01 mm, and 0.1 mrad.
 fn encoders(seen: &Snapshot) -> [f64; 6] {
     let DVec3 { x, y, z } = seen.position_mm * 100.0;
     let DVec3 { x: yaw, y: pitch, z: roll } = gimbal_angles(&seen.rows) * 1.0e4;

@@ -1,12 +1,12 @@
-//! The stack of errors, one for each thread: the newest comes first, and whoever takes one takes it away.
+//! Stack of errors of each thread, the newest on top.
 
 use std::cell::RefCell;
 use std::ffi::{CStr, c_int, c_uint};
 
-/// Errors that are kept for a thread; older ones are forgotten.
+/// Limit on the stored errors of a thread; older ones are dropped.
 const MOST: usize = 64;
 
-/// What went wrong. The numbers are the interface's.
+/// Error of a call. The numbers are the interface's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub(crate) enum Code {
@@ -42,7 +42,7 @@ thread_local! {
     static ERRORS: RefCell<Vec<ErrorInfo>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Puts an error on the stack of this thread.
+/// Pushes an error on the stack of this thread.
 pub(crate) fn raise(code: Code, device: c_uint) {
     let _ = ERRORS.try_with(|errors| {
         let mut errors = errors.borrow_mut();
@@ -53,17 +53,17 @@ pub(crate) fn raise(code: Code, device: c_uint) {
     });
 }
 
-/// Takes the newest error away.
+/// Pops the newest error of this thread.
 pub(crate) fn take() -> ErrorInfo {
     ERRORS.try_with(|errors| errors.borrow_mut().pop()).ok().flatten().unwrap_or(NONE)
 }
 
-/// Forgets all of this thread.
+/// Clears the stack of this thread.
 pub(crate) fn clear() {
     let _ = ERRORS.try_with(|errors| errors.borrow_mut().clear());
 }
 
-/// For people.
+/// Returns the text of an error number.
 pub(crate) fn words(code: c_uint) -> &'static CStr {
     match code {
         0x0000 => c"no error",

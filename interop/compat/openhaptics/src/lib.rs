@@ -1,11 +1,10 @@
-//! `libHD.so`: the 36 functions of HDAPI, answered by the devices of a Flotor scene.
+//! Drop-in `libHD.so`: the 36 functions of HDAPI, served by the devices of a Flotor scene.
 //!
-//! Lengths in mm, forces in N, torques in mN·m; x right, y up, z towards the user. The scheduler is one thread for all devices;
-//! it calls the program once a tick. A frame takes a snapshot of the device at its begin and sends force at its end. Force is
-//! limited by the scene's envelope before anything else; errors of force come up only where a program has switched the limit
-//! off itself.
+//! Lengths in mm, forces in N, torques in mN·m; x right, y up, z towards the user. The scheduler is one thread for all devices
+//! and calls the program once a tick. A frame takes a snapshot of the device at its begin and sends force at its end. The
+//! scene's envelope limits force first; a program gets errors of force only if it has disabled the limit itself.
 //!
-//! Source: public headers of the interface, versions 3.0 to 3.5, and how a dozen open programs use it: names, numbers and
+//! Source: public headers of the interface, versions 3.0 to 3.5, and a dozen open programs that use it: names, numbers and
 //! behaviour only.
 #![allow(unsafe_code)] // C entry points; listed in tests/tests/system/architecture.rs
 #![allow(non_snake_case)] // the names are another maker's
@@ -23,12 +22,12 @@ use parameter::{Kind, Reading, Values};
 use scheduler::{Callback, Scheduler};
 use std::ffi::{c_char, c_double, c_float, c_int, c_long, c_uchar, c_uint, c_ulong, c_ushort, c_void};
 
-/// What stands for no device.
+/// Handle of no device.
 const NO_DEVICE: c_uint = 0xFFFF_FFFF;
-/// `HD_CALIBRATION_OK`.
+/// State of calibration, `HD_CALIBRATION_OK`.
 const CALIBRATED: c_uint = 0x5000;
 
-/// The mark of a drop-in.
+/// Returns the marker of a drop-in library.
 #[unsafe(no_mangle)]
 pub extern "C" fn flotor_dropin() -> *const c_char {
     MARKER.as_ptr().cast()
@@ -36,7 +35,7 @@ pub extern "C" fn flotor_dropin() -> *const c_char {
 
 // ---------------------------------------------------------------- devices
 
-/// Opens a device and makes it current.
+/// Opens a device by name and makes it current; returns its handle.
 ///
 /// # Safety
 /// `name` is null or a terminated text.
@@ -58,7 +57,7 @@ pub unsafe extern "C" fn hdInitDevice(name: *const c_char) -> c_uint {
     })
 }
 
-/// Closes a device: no force from the next tick on.
+/// Closes a device, whose force ends with the next tick.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdDisableDevice(handle: c_uint) {
     guarded((), || {
@@ -78,7 +77,7 @@ pub extern "C" fn hdMakeCurrentDevice(handle: c_uint) {
     });
 }
 
-/// The current device.
+/// Returns the current device.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdGetCurrentDevice() -> c_uint {
     guarded(NO_DEVICE, || {
@@ -90,13 +89,13 @@ pub extern "C" fn hdGetCurrentDevice() -> c_uint {
     })
 }
 
-/// Begins a frame: a snapshot of the device.
+/// Begins a frame with a snapshot of the device.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdBeginFrame(handle: c_uint) {
     guarded((), || device::begin_frame(handle).unwrap_or_else(|code| raise(code, handle)));
 }
 
-/// Ends a frame: sends what was set in it.
+/// Ends a frame and sends the values set in it.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdEndFrame(handle: c_uint) {
     guarded((), || device::end_frame(handle).unwrap_or_else(|code| raise(code, handle)));
@@ -104,7 +103,7 @@ pub extern "C" fn hdEndFrame(handle: c_uint) {
 
 // ---------------------------------------------------------------- values
 
-/// Writes a parameter of the current device, converted to the type the program asks for.
+/// Reads a parameter of the current device, converted to the type that the program requests.
 ///
 /// # Safety
 /// `place` is null or as many values may be written as the parameter has.
@@ -115,7 +114,7 @@ unsafe fn read<T>(parameter: c_uint, place: *mut T, convert: impl Fn(&Values, us
             Ok(values) => values,
             Err(code) => return raise(code, CURRENT.get()),
         };
-        // All or nothing: the buffer stays as it is if the type is wrong.
+        // All or nothing: a wrong type leaves the buffer unchanged.
         if (0..values.len()).any(|index| convert(&values, index).is_none()) {
             return raise(Code::InvalidInputType, CURRENT.get());
         }
@@ -130,7 +129,7 @@ unsafe fn read<T>(parameter: c_uint, place: *mut T, convert: impl Fn(&Values, us
     });
 }
 
-/// Truth values of a parameter of the current device.
+/// Reads the boolean values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -142,7 +141,7 @@ pub unsafe extern "C" fn hdGetBooleanv(parameter: c_uint, place: *mut c_uchar) {
     }
 }
 
-/// Whole numbers of a parameter of the current device.
+/// Reads the integer values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -154,7 +153,7 @@ pub unsafe extern "C" fn hdGetIntegerv(parameter: c_uint, place: *mut c_int) {
     }
 }
 
-/// Long whole numbers of a parameter of the current device.
+/// Reads the long integer values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -164,7 +163,7 @@ pub unsafe extern "C" fn hdGetLongv(parameter: c_uint, place: *mut c_long) {
     unsafe { read(parameter, place, |values, index| values.read(Kind::Long, index).map(Reading::as_long)) }
 }
 
-/// Numbers of single precision of a parameter of the current device.
+/// Reads the single-precision values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -178,7 +177,7 @@ pub unsafe extern "C" fn hdGetFloatv(parameter: c_uint, place: *mut c_float) {
     unsafe { read(parameter, place, convert) }
 }
 
-/// Numbers of a parameter of the current device.
+/// Reads the double-precision values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -188,7 +187,7 @@ pub unsafe extern "C" fn hdGetDoublev(parameter: c_uint, place: *mut c_double) {
     unsafe { read(parameter, place, |values, index| values.read(Kind::Real, index).map(Reading::as_real)) }
 }
 
-/// A text, never null: that of the interface is there before any device.
+/// Returns a text, never null; texts of the interface are valid before any device is open.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdGetString(parameter: c_uint) -> *const c_char {
     let nothing = c"".as_ptr();
@@ -201,7 +200,7 @@ pub extern "C" fn hdGetString(parameter: c_uint) -> *const c_char {
     })
 }
 
-/// Sets a parameter of the current device.
+/// Sets a parameter of the current device from values of the program.
 ///
 /// # Safety
 /// `place` is null or as many values may be read as the parameter has.
@@ -221,7 +220,7 @@ unsafe fn write<T: Copy>(parameter: c_uint, kind: Kind, place: *const T, convert
     });
 }
 
-/// Truth values for a parameter of the current device.
+/// Sets the boolean values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -231,7 +230,7 @@ pub unsafe extern "C" fn hdSetBooleanv(parameter: c_uint, place: *const c_uchar)
     unsafe { write(parameter, Kind::Boolean, place, f64::from) }
 }
 
-/// Whole numbers for a parameter of the current device.
+/// Sets the integer values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -241,7 +240,7 @@ pub unsafe extern "C" fn hdSetIntegerv(parameter: c_uint, place: *const c_int) {
     unsafe { write(parameter, Kind::Integer, place, f64::from) }
 }
 
-/// Long whole numbers for a parameter of the current device.
+/// Sets the long integer values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -251,7 +250,7 @@ pub unsafe extern "C" fn hdSetLongv(parameter: c_uint, place: *const c_long) {
     unsafe { write(parameter, Kind::Long, place, |value| value as f64) }
 }
 
-/// Numbers of single precision for a parameter of the current device.
+/// Sets the single-precision values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -261,7 +260,7 @@ pub unsafe extern "C" fn hdSetFloatv(parameter: c_uint, place: *const c_float) {
     unsafe { write(parameter, Kind::Real, place, f64::from) }
 }
 
-/// Numbers for a parameter of the current device.
+/// Sets the double-precision values of a parameter of the current device.
 ///
 /// # Safety
 /// The pointer is null or leads to as many values as the parameter has.
@@ -271,13 +270,13 @@ pub unsafe extern "C" fn hdSetDoublev(parameter: c_uint, place: *const c_double)
     unsafe { write(parameter, Kind::Real, place, |value| value) }
 }
 
-/// Switches a capability of the current device on.
+/// Enables a capability of the current device.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdEnable(capability: c_uint) {
     guarded((), || switch(capability, true));
 }
 
-/// Switches a capability of the current device off.
+/// Disables a capability of the current device.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdDisable(capability: c_uint) {
     guarded((), || switch(capability, false));
@@ -288,7 +287,7 @@ fn switch(capability: c_uint, on: bool) {
     switched.unwrap_or_else(|code| raise(code, CURRENT.get()));
 }
 
-/// Whether a capability of the current device is on.
+/// Returns whether a capability of the current device is enabled.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdIsEnabled(capability: c_uint) -> c_uchar {
     guarded(0, || {
@@ -305,13 +304,13 @@ pub extern "C" fn hdIsEnabled(capability: c_uint) -> c_uchar {
 
 // ---------------------------------------------------------------- errors
 
-/// The newest error of the calling thread, which it takes away.
+/// Pops the newest error of the calling thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdGetError() -> ErrorInfo {
     error::take()
 }
 
-/// What an error means, never null.
+/// Returns the text of an error number, never null.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdGetErrorString(code: c_uint) -> *const c_char {
     error::words(code).as_ptr()
@@ -319,29 +318,29 @@ pub extern "C" fn hdGetErrorString(code: c_uint) -> *const c_char {
 
 // ---------------------------------------------------------------- calibration
 
-/// Always calibrated: programs wait until it is.
+/// Returns "calibrated" always, because programs wait for it.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdCheckCalibration() -> c_uint {
     CALIBRATED
 }
 
-/// The same.
+/// Returns "calibrated" always, as [`hdCheckCalibration`].
 #[unsafe(no_mangle)]
 pub extern "C" fn hdCheckCalibrationStyle() -> c_uint {
     CALIBRATED
 }
 
-/// There is nothing to calibrate.
+/// Does nothing: there is nothing to calibrate.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdUpdateCalibration(_style: c_uint) {}
 
-/// There is nothing to calibrate.
+/// Does nothing: there is nothing to calibrate.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdUpdateCalibrationMessage(_style: c_uint) {}
 
 // ---------------------------------------------------------------- scheduler
 
-/// Starts the scheduler: from now on force that is enabled comes on.
+/// Starts the scheduler, and with it the enabled force.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdStartScheduler() {
     guarded((), || {
@@ -351,13 +350,13 @@ pub extern "C" fn hdStartScheduler() {
     });
 }
 
-/// Stops it and waits for it: nothing of the program is called afterwards.
+/// Stops the scheduler and waits for its end: no callback is called afterwards.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdStopScheduler() {
     guarded((), Scheduler::stop);
 }
 
-/// 1000 or 500 calls a second.
+/// Sets the rate of the scheduler, 1000 or 500 Hz.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdSetSchedulerRate(rate_hz: c_ulong) {
     guarded((), || {
@@ -367,7 +366,7 @@ pub extern "C" fn hdSetSchedulerRate(rate_hz: c_ulong) {
     });
 }
 
-/// Calls the program in every tick until it returns 0; higher priority first.
+/// Schedules a callback, called in every tick until it returns 0; higher priority first.
 ///
 /// # Safety
 /// `callback` may be called with `data` from another thread until it returned 0 or was taken out.
@@ -393,8 +392,8 @@ pub unsafe extern "C" fn hdScheduleAsynchronous(
     })
 }
 
-/// Calls the program in the scheduler and returns when it returned 0; without a running scheduler, or on its thread, here and
-/// now.
+/// Schedules a callback and returns once it has returned 0; without a running scheduler, or on its thread, calls it
+/// directly.
 ///
 /// # Safety
 /// `callback` may be called with `data` from another thread until this returns.
@@ -411,7 +410,7 @@ pub unsafe extern "C" fn hdScheduleSynchronous(
     });
 }
 
-/// Takes a callback out.
+/// Unschedules a callback.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdUnschedule(handle: c_ulong) {
     guarded((), || {
@@ -421,13 +420,13 @@ pub extern "C" fn hdUnschedule(handle: c_ulong) {
     });
 }
 
-/// Whether a callback is still scheduled; with `how` = 1, waits until it is not.
+/// Returns whether a callback is still scheduled; with `how` = 1, waits for its end first.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdWaitForCompletion(handle: c_ulong, how: c_uint) -> c_uchar {
     guarded(0, || c_uchar::from(Scheduler::is_scheduled(handle, how != 0)))
 }
 
-/// Seconds since this tick began.
+/// Returns the time since this tick began, s.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdGetSchedulerTimeStamp() -> c_double {
     guarded(0.0, Scheduler::since_tick_s)
@@ -435,11 +434,11 @@ pub extern "C" fn hdGetSchedulerTimeStamp() -> c_double {
 
 // ---------------------------------------------------------------- the rest
 
-/// Nothing is scaled.
+/// Does nothing: angles are not scaled.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdScaleGimbalAngles(_x: c_double, _y: c_double, _z: c_double, _matrix: *mut c_double) {}
 
-/// No licence is asked for.
+/// Returns success: no licence is required.
 #[unsafe(no_mangle)]
 pub extern "C" fn hdDeploymentLicense(
     _vendor: *const c_char,

@@ -1,4 +1,4 @@
-//! Which numbers name what, how many values it has and of which type.
+//! Parameters by number, with the number and type of their values.
 
 use crate::error::Code;
 use std::ffi::{c_int, c_long, c_uchar, c_uint};
@@ -58,7 +58,7 @@ pub(crate) enum Kind {
     Real,
 }
 
-/// The values of a parameter.
+/// Values of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Values {
     kind: Kind,
@@ -66,7 +66,7 @@ pub(crate) struct Values {
     numbers: [f64; 16],
 }
 
-/// One of them.
+/// One value of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reading(f64);
 
@@ -94,7 +94,7 @@ impl Values {
         self.count
     }
 
-    /// The value, if it is of this type.
+    /// Returns a value if it is of this type.
     pub(crate) fn read(&self, kind: Kind, index: usize) -> Option<Reading> {
         (kind == self.kind).then(|| self.numbers.get(index).copied().map(Reading)).flatten()
     }
@@ -119,7 +119,7 @@ impl Reading {
     }
 }
 
-/// How many values of this type a parameter takes.
+/// Returns the number of values of this type that a parameter accepts.
 pub(crate) fn settable(parameter: c_uint, kind: Kind) -> Result<usize, Code> {
     let (legal, count) = match parameter {
         0x2700..=0x2704 => (Kind::Real, 3),

@@ -1,4 +1,4 @@
-//! The scheduler: one thread for all devices, which calls the program once a tick, higher priority first.
+//! Scheduler: one thread for all devices, which calls the program once a tick, higher priority first.
 
 use crate::device::Devices;
 use flotor_compat::{guarded, quietly};
@@ -8,14 +8,14 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// What the program schedules: 0 is done, anything else goes on. It may end its thread: an interpreter that is shut down does.
+/// Callback of the program: returns 0 to end, else to be called again. It may end its thread, as an interpreter does at shutdown.
 pub(crate) type Callback = unsafe extern "C-unwind" fn(*mut c_void) -> c_uint;
 
-/// Callbacks that are called in a tick at most.
+/// Limit on the number of callbacks.
 const MOST: usize = 64;
 
 unsafe extern "C" {
-    /// As the C library has it, for a body that may be unwound by the end of its thread.
+    /// Declared as in the C library, for a body that the end of its thread may unwind.
     fn pthread_create(
         thread: *mut c_ulong,
         attributes: *const c_void,
@@ -25,7 +25,7 @@ unsafe extern "C" {
     fn pthread_join(thread: c_ulong, result: *mut *mut c_void) -> c_int;
 }
 
-/// A thread of the system, without the frames of the standard library's: those would catch what ends a thread, and abort.
+/// Thread of the system, without frames of the standard library, which would catch the unwinding at a thread's end, and abort.
 struct Thread(c_ulong);
 
 impl Thread {
@@ -42,12 +42,12 @@ impl Thread {
     }
 }
 
-/// How long an unscheduling waits for a call that is under way.
+/// Timeout for a running call while unscheduling.
 const LONGEST_CALL: Duration = Duration::from_secs(1);
-/// Pause where there is no tick to wait for.
+/// Pause without a tick to wait for.
 const NO_TICK: Duration = Duration::from_millis(1);
 
-/// A callback in the list.
+/// Scheduled callback.
 #[derive(Clone, Copy)]
 struct Entry {
     handle: u64,
@@ -56,7 +56,7 @@ struct Entry {
     data: Data,
 }
 
-/// What the program wants to get back.
+/// Data pointer of the program, passed to the callback.
 #[derive(Clone, Copy)]
 struct Data(*mut c_void);
 
@@ -64,19 +64,19 @@ struct Data(*mut c_void);
 unsafe impl Send for Data {}
 
 struct List {
-    /// By priority, then in the order of scheduling.
+    /// Callbacks by priority, then in the order of scheduling.
     entries: Vec<Entry>,
     next: u64,
     thread: Option<Thread>,
 }
 
 static LIST: Mutex<List> = Mutex::new(List { entries: Vec::new(), next: 1, thread: None });
-/// Somebody was taken out, or came in.
+/// Signals a change of the list.
 static CHANGED: Condvar = Condvar::new();
 static IS_RUNNING: AtomicBool = AtomicBool::new(false);
 static RATE_HZ: AtomicU32 = AtomicU32::new(1000);
 static TICK: AtomicU64 = AtomicU64::new(0);
-/// The callback that is being called; 0: none.
+/// Handle of the running callback; 0: none.
 static UNDER_WAY: AtomicU64 = AtomicU64::new(0);
 static TICK_BEGAN: Mutex<Option<Instant>> = Mutex::new(None);
 
@@ -89,14 +89,14 @@ fn list() -> MutexGuard<'static, List> {
 }
 
 impl Entry {
-    /// Calls the program; whether it wants to be called again.
+    /// Calls the callback; returns whether to call it again.
     fn call(&self) -> bool {
         // SAFETY: whoever scheduled it guarantees that it may be called with these data until it is taken out.
         unsafe { (self.callback)(self.data.0) != 0 }
     }
 }
 
-/// The body of the thread. While the program is called, nothing here would have to be dropped, and nothing catches: the program may
+/// Runs the scheduler. During a callback, this frame contains nothing to drop, and nothing catches an unwinding: the program may
 /// end the thread.
 extern "C-unwind" fn run(_data: *mut c_void) -> *mut c_void {
     IS_SCHEDULER.with(|here| here.set(true));
@@ -117,7 +117,7 @@ extern "C-unwind" fn run(_data: *mut c_void) -> *mut c_void {
 pub(crate) struct Scheduler;
 
 impl Scheduler {
-    /// Whether the calling thread is the scheduler's.
+    /// Returns whether the calling thread is the scheduler's.
     pub(crate) fn is_here() -> bool {
         IS_SCHEDULER.try_with(Cell::get).unwrap_or(false)
     }
@@ -126,7 +126,7 @@ impl Scheduler {
         IS_RUNNING.load(Ordering::Acquire)
     }
 
-    /// Number of its ticks so far.
+    /// Returns the number of ticks so far.
     pub(crate) fn tick() -> u64 {
         TICK.load(Ordering::Acquire)
     }
@@ -135,19 +135,19 @@ impl Scheduler {
         RATE_HZ.load(Ordering::Relaxed)
     }
 
-    /// Whether the rate is one of those there are.
+    /// Sets the rate; returns false for an unsupported rate.
     pub(crate) fn set_rate(rate_hz: c_ulong) -> bool {
         let rate_hz = u32::try_from(rate_hz).ok().filter(|rate_hz| [500, 1000].contains(rate_hz));
         rate_hz.inspect(|rate_hz| RATE_HZ.store(*rate_hz, Ordering::Relaxed)).is_some()
     }
 
-    /// Starts it, if it does not run; whether it runs.
+    /// Starts the scheduler unless it runs; returns whether it runs.
     pub(crate) fn start() -> bool {
         let mut list = list();
         if Self::is_running() {
             return true;
         }
-        // One that was stopped by a callback of its own is about to end.
+        // A scheduler stopped by its own callback is about to end.
         if let Some(thread) = list.thread.take() {
             drop(list);
             thread.join();
@@ -162,7 +162,7 @@ impl Scheduler {
         is_started
     }
 
-    /// Stops it: no force, and nothing of the program is called any more when this returns.
+    /// Stops the scheduler: no force, and no callback is called after the return.
     pub(crate) fn stop() {
         IS_RUNNING.store(false, Ordering::Release);
         Devices::follow_scheduler();
@@ -176,7 +176,7 @@ impl Scheduler {
         }
     }
 
-    /// What is to be called in the next tick, in order; nothing if there is no tick.
+    /// Waits for a tick and returns the callbacks to call, in order; none without a tick.
     fn next_calls() -> [Option<Entry>; MOST] {
         let mut calls = [None; MOST];
         if !Self::wait_for_tick() {
@@ -188,7 +188,7 @@ impl Scheduler {
         calls
     }
 
-    /// Whether an entry is still to be called; it counts as under way then.
+    /// Returns whether a callback is still scheduled, and marks it as running.
     fn enter(entry: &Entry) -> bool {
         let list = list();
         let is_in = Self::is_running() && list.is_in(entry.handle);
@@ -198,7 +198,7 @@ impl Scheduler {
         is_in
     }
 
-    /// An entry was called; one that is done is taken out.
+    /// Clears the mark of a running callback, and unschedules one that has ended.
     fn leave(entry: &Entry, goes_on: bool) {
         UNDER_WAY.store(0, Ordering::Release);
         if !goes_on {
@@ -206,14 +206,14 @@ impl Scheduler {
         }
     }
 
-    /// Waits for the next tick of the program's rate; whether there is anything to call.
+    /// Waits for the next tick at the program's rate; returns whether there are callbacks.
     fn wait_for_tick() -> bool {
         let is_idle = list().entries.is_empty();
         let Some((host, station)) = Devices::any() else {
             std::thread::sleep(NO_TICK);
             return !is_idle;
         };
-        // Without anybody to call, time does not go on in lockstep: it is the calls that make it.
+        // In lockstep the callbacks advance time: without any, time stands still.
         if is_idle && host.pace() == flotor_compat::Pace::Lockstep {
             let list = list();
             let wait = |list: &mut List| list.entries.is_empty() && Self::is_running();
@@ -224,14 +224,14 @@ impl Scheduler {
         let ticks = (period_ns / host.period_ns().max(1)).max(1);
         for _ in 0..ticks {
             if !host.wait(station) {
-                std::thread::sleep(NO_TICK); // the device is lost: the program hears of it in its frame
+                std::thread::sleep(NO_TICK); // the device is lost: the program gets the error in its frame
                 break;
             }
         }
         !is_idle
     }
 
-    /// Schedules a callback, if there is room for it; at once on the scheduler's own thread.
+    /// Schedules a callback if there is room; on the scheduler's own thread also calls it at once.
     ///
     /// # Safety
     /// `callback` may be called with `data` from any thread until it is taken out.
@@ -260,7 +260,7 @@ impl Scheduler {
         Some(handle)
     }
 
-    /// Calls a callback until it is done, on the scheduler's thread if it runs and is another one.
+    /// Calls a callback until it has ended, on the scheduler's thread if that is running and another one.
     ///
     /// # Safety
     /// `callback` may be called with `data` from any thread until this returns.
@@ -281,7 +281,7 @@ impl Scheduler {
             return crate::error::raise(crate::error::Code::SchedulerFull, crate::NO_DEVICE);
         };
         Self::wait_until_out(handle);
-        // A scheduler that stopped meanwhile calls nobody any more.
+        // A scheduler that stopped meanwhile calls no callback any more.
         Self::unschedule(handle);
     }
 
@@ -294,7 +294,7 @@ impl Scheduler {
         }
     }
 
-    /// Takes a callback out, and waits for a call of it that is under way elsewhere; whether it was in.
+    /// Unschedules a callback, and waits for a running call on another thread; returns whether it was scheduled.
     pub(crate) fn unschedule(handle: c_ulong) -> bool {
         let was_in = Self::take_out(handle);
         let since = Instant::now();
@@ -307,7 +307,7 @@ impl Scheduler {
         was_in
     }
 
-    /// Forgets all callbacks, if it does not run: the program has closed its last device, and may have let go of what they use.
+    /// Removes all callbacks unless the scheduler runs: the last device is closed, and the program may have freed their data.
     pub(crate) fn forget() {
         if !Self::is_running() {
             list().entries.clear();
@@ -325,7 +325,7 @@ impl Scheduler {
         was_in
     }
 
-    /// Whether a callback is still scheduled, waiting for its end if that is wanted.
+    /// Returns whether a callback is still scheduled; with `waits`, waits for its end first.
     pub(crate) fn is_scheduled(handle: c_ulong, waits: bool) -> bool {
         if waits && !Self::is_here() {
             Self::wait_until_out(handle);
@@ -333,7 +333,7 @@ impl Scheduler {
         list().is_in(handle)
     }
 
-    /// Seconds since the tick began.
+    /// Returns the time since the tick began, s.
     pub(crate) fn since_tick_s() -> f64 {
         let began = *TICK_BEGAN.lock().unwrap_or_else(PoisonError::into_inner);
         began.map_or(0.0, |began| began.elapsed().as_secs_f64())
