@@ -1,5 +1,5 @@
-//! The 3D view as a texture of the interface: drawn by a GPU or software adapter, on the CPU where the interface has
-//! neither (tests).
+//! 3D view as a texture of the interface: drawn by a GPU or software adapter, or on the CPU for an interface without
+//! adapter (tests).
 
 use eframe::egui_wgpu::RenderState;
 use egui::{ColorImage, Context, TextureHandle, TextureId, TextureOptions};
@@ -8,33 +8,33 @@ use flotor_drawing::geometry::Mesh;
 use flotor_drawing::gpu::GpuScene;
 use flotor_drawing::raster::{Backdrop, Rasterizer};
 
-/// What draws the 3D view, and what it has drawn last.
+/// Renderer of the 3D view, with its last texture.
 pub enum Canvas {
-    /// On the device the interface is drawn on.
+    /// Rendering by the device of the interface.
     Gpu {
-        /// What draws.
+        /// Renderer.
         scene: Box<GpuScene>,
-        /// The device.
+        /// Device of the interface.
         state: RenderState,
-        /// The texture, and its size, pixels.
+        /// Texture of the last picture and its size, pixels.
         shown: Option<(TextureId, [usize; 2])>,
     },
-    /// On the processor.
+    /// Rendering by the processor.
     Cpu {
-        /// What draws.
+        /// Rasteriser.
         rasterizer: Rasterizer,
-        /// Samples a pixel and direction.
+        /// Samples per pixel and direction.
         samples: usize,
-        /// The texture.
+        /// Texture of the last picture.
         texture: Option<TextureHandle>,
     },
 }
 
 impl Canvas {
-    /// On the device of the interface, if it has one.
+    /// Creates a canvas on the device of the interface, or on the processor without a device.
     #[must_use]
     pub fn new(state: Option<&RenderState>) -> Self {
-        /// This is for interfaces that nobody waits for.
+        /// Samples per pixel and direction, for interfaces without a waiting user (tests).
         const SAMPLES: usize = 2;
         match state {
             Some(state) => Self::Gpu {
@@ -46,13 +46,13 @@ impl Canvas {
         }
     }
 
-    /// On the processor, with so many samples a pixel and direction.
+    /// Creates a canvas on the processor, with this many samples per pixel and direction.
     #[must_use]
     pub fn on_processor(samples: usize) -> Self {
         Self::Cpu { rasterizer: Rasterizer::default(), samples, texture: None }
     }
 
-    /// Draws a mesh.
+    /// Draws a mesh and returns the texture, of `size` pixels.
     pub fn draw(
         &mut self,
         context: &Context,

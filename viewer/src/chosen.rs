@@ -1,22 +1,22 @@
-//! What a command line chooses of what is shown: the same in a window, a picture and a file of traces.
+//! Display options of the command line, for a window, a picture or a file of traces.
 
 use flotor_history::quantity::Quantity;
 
-/// The choices; what is not chosen is as it is without them.
+/// Display options; each has a default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chosen {
-    /// Number of the device that numbers and traces are of.
+    /// Number of the device for numbers and traces, from 0.
     pub device: usize,
-    /// The traces, in the order of menus; empty: not chosen.
+    /// Traces in the order of menus; empty: the default.
     traces: Vec<Quantity>,
-    /// Axis of force over position; none: not shown.
+    /// Axis of force over position (0 to 2); `None`: not shown.
     pub force_position: Option<usize>,
-    /// Force that arrows are scaled for, N; none: the largest of the run.
+    /// Force of an arrow of full length, N; `None`: the largest force of the run.
     pub arrow_force_n: Option<f64>,
 }
 
 impl Chosen {
-    /// Of a device, its traces, and force over position along an axis; arrows fit.
+    /// Creates options for a device, traces, and force over position along an axis, with automatic scaling of arrows.
     #[must_use]
     pub fn new(device: usize, mut traces: Vec<Quantity>, force_position: Option<usize>) -> Self {
         traces.sort();
@@ -24,13 +24,13 @@ impl Chosen {
         Self { device, traces, force_position, arrow_force_n: None }
     }
 
-    /// With arrows scaled for this force, N.
+    /// Sets the force of an arrow of full length, N.
     #[must_use]
     pub fn with_arrow_force(self, arrow_force_n: Option<f64>) -> Self {
         Self { arrow_force_n, ..self }
     }
 
-    /// The traces, in the order of menus; none where none were chosen.
+    /// Returns the traces in the order of menus; `None` for the default.
     #[must_use]
     pub fn traces(&self) -> Option<&[Quantity]> {
         (!self.traces.is_empty()).then_some(&self.traces)

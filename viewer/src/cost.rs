@@ -1,4 +1,4 @@
-//! What an open window costs: pictures made, and processor time and memory of the whole process, the driver's threads included.
+//! Cost of an open window: pictures, and processor time and memory of the whole process, the driver's threads included.
 
 use crate::platform::{processor, resident_mib};
 use egui::{Context, ViewportCommand, ViewportId};
@@ -6,12 +6,12 @@ use std::fmt;
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
-/// What a window has cost over a time.
+/// Cost of a window over a time span.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
-    /// How long it was watched.
+    /// Duration of the measurement.
     pub elapsed: Duration,
-    /// Pictures made.
+    /// Number of pictures.
     pub pictures: u64,
     /// Processor time of all threads.
     pub processor: Duration,
@@ -32,10 +32,10 @@ impl fmt::Display for Cost {
     }
 }
 
-/// Watches a window for a time on a thread of its own, tells what it cost, and closes it. Without a thread nobody is told.
+/// Measures the cost of a window on a separate thread, sends the result, and closes the window. Sends nothing if no thread starts.
 pub fn watch(context: &Context, duration: Duration, tells: Sender<Cost>) {
     let context = context.clone();
-    // In its first picture, which this thread may be making.
+    // The window is in its first picture, possibly drawn by this thread.
     let mut opening = Opening::at(Instant::now(), context.cumulative_frame_nr_for(ViewportId::ROOT));
     let watching = move || {
         let pictures = || context.cumulative_frame_nr_for(ViewportId::ROOT);
@@ -50,41 +50,41 @@ pub fn watch(context: &Context, duration: Duration, tells: Sender<Cost>) {
             processor: processor().saturating_sub(used),
             resident_mib: resident_mib().unwrap_or(0),
         };
-        let _ = tells.send(cost); // nobody listens any more once the window was closed by hand
+        let _ = tells.send(cost); // the receiver is gone once the window was closed by hand
         context.send_viewport_cmd_to(ViewportId::ROOT, ViewportCommand::Close);
     };
     let _ = std::thread::Builder::new().name("flotor-cost".to_owned()).spawn(watching);
 }
 
-/// How often an opening window is looked at.
+/// Poll interval of an opening window.
 const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
-/// A window that has just opened: fonts, shaders, the first ticks. What it costs then is not what it costs.
+/// Start-up phase of a window (fonts, shaders, first ticks), left out of the measurement.
 struct Opening {
     opened: Instant,
     first: u64,
-    /// Pictures so far, and when the last was made.
+    /// Number of pictures so far, and time of the last picture.
     pictures: u64,
     last: Instant,
-    /// The longest that any of them took to come.
+    /// Longest interval between two pictures.
     longest: Duration,
 }
 
 impl Opening {
-    /// Pictures that no window makes while it opens; one that has, goes on making them.
+    /// Number of pictures after which the start-up is over: the window then draws continuously.
     const MOST_PICTURES: u64 = 60;
-    /// It is at rest when after the first there was none for so long, and for so many times as long as any of them took: on a
-    /// machine with much else to do that may be seconds.
+    /// Pause after a picture that ends the start-up, and its smallest multiple of the longest interval: on a busy machine this
+    /// may be seconds.
     const QUIET: Duration = Duration::from_secs(1);
     const QUIET_TIMES: u32 = 3;
-    /// It has opened after so long in any case.
+    /// Timeout of the start-up.
     const LONGEST: Duration = Duration::from_secs(30);
 
     fn at(now: Instant, pictures: u64) -> Self {
         Self { opened: now, first: pictures, pictures, last: now, longest: Duration::ZERO }
     }
 
-    /// True until it has opened.
+    /// True until the start-up is over.
     fn goes_on(&mut self, now: Instant, pictures: u64) -> bool {
         if pictures != self.pictures {
             self.longest = self.longest.max(now - self.last);

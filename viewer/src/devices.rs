@@ -1,11 +1,11 @@
-//! The devices of a run: what has been seen of each, and which one numbers and traces are of.
+//! Devices of a run: history of each device, and the device chosen for numbers and traces.
 
 use crate::scene::ArrowScale;
 use crate::tally::Tally;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_history::{History, Sample};
 
-/// What has been seen of the devices of a run, in the scene's order. There is always one.
+/// Histories of the devices of a run, in the scene's order; never empty.
 #[derive(Clone, Debug)]
 pub struct Devices {
     seen: Vec<Seen>,
@@ -20,7 +20,7 @@ struct Seen {
 }
 
 impl Devices {
-    /// Of a device each; without any, of one of which nothing has been seen.
+    /// Creates a device for each history; without any, one device without samples.
     #[must_use]
     pub fn new(histories: Vec<History>) -> Self {
         let seen = |history: History| {
@@ -35,24 +35,24 @@ impl Devices {
         Self { seen, chosen: 0 }
     }
 
-    /// How many there are.
+    /// Returns the number of devices.
     #[must_use]
     pub fn count(&self) -> usize {
         self.seen.len()
     }
 
-    /// Their names.
+    /// Returns the names of the devices.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.seen.iter().map(|seen| seen.name.as_str())
     }
 
-    /// Number of the chosen one.
+    /// Returns the number of the chosen device.
     #[must_use]
     pub fn chosen(&self) -> usize {
         self.chosen
     }
 
-    /// Chooses one; whether it is another than before.
+    /// Chooses a device; returns true if the choice has changed.
     pub fn choose(&mut self, number: usize) -> bool {
         let is_another = number < self.seen.len() && number != self.chosen;
         if is_another {
@@ -61,43 +61,43 @@ impl Devices {
         is_another
     }
 
-    /// Name of the chosen one, where there are several.
+    /// Returns the name of the chosen device; `None` for a single device.
     #[must_use]
     pub fn name(&self) -> Option<&str> {
         self.seen.get(self.chosen).filter(|_| self.seen.len() > 1).map(|seen| seen.name.as_str())
     }
 
-    /// What has been seen of the chosen one.
+    /// Returns the history of the chosen device.
     #[must_use]
     pub fn history(&self) -> &History {
         &self.seen[self.chosen.min(self.seen.len() - 1)].history
     }
 
-    /// What has happened to the chosen one.
+    /// Returns the tally of the chosen device.
     #[must_use]
     pub fn tally(&self) -> &Tally {
         &self.seen[self.chosen.min(self.seen.len() - 1)].tally
     }
 
-    /// What has been seen of each, with its name.
+    /// Returns name and history of each device.
     pub fn all(&self) -> impl Iterator<Item = (&str, &History)> {
         self.seen.iter().map(|seen| (seen.name.as_str(), &seen.history))
     }
 
-    /// The sample of each device at a time, in order; none before the first tick of all of them.
+    /// Returns the sample of each device at a time, s, in order; `None` before the first tick of every device.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Option<Vec<Sample>> {
         self.seen.iter().map(|seen| seen.history.at(time_s).copied()).collect()
     }
 
-    /// Lengths of arrows that fit everything seen of all.
+    /// Returns a scale of arrows that fits all samples of all devices.
     #[must_use]
     pub fn scale(&self) -> ArrowScale {
         let scales = self.seen.iter().map(|seen| seen.tally.scale());
         scales.reduce(ArrowScale::larger).unwrap_or_else(|| ArrowScale::fitting(std::iter::empty()))
     }
 
-    /// What happened in the newest tick of any.
+    /// Returns the events in the newest ticks of all devices.
     #[must_use]
     pub fn newest_events(&self) -> Events {
         let newest = self.seen.iter().filter_map(|seen| seen.history.at(f64::INFINITY));
@@ -107,7 +107,7 @@ impl Devices {
         })
     }
 
-    /// Takes a tick in.
+    /// Adds a tick to its device.
     pub fn push(&mut self, record: &TickRecord) {
         if let Some(seen) = self.seen.get_mut(usize::from(record.device)) {
             seen.history.push(record);
@@ -115,12 +115,12 @@ impl Devices {
         }
     }
 
-    /// Adds a change of a parameter at a time, ns, to what has been seen of each device.
+    /// Adds a change of a parameter at a time, ns, to the history of each device.
     pub fn push_change(&mut self, time_ns: u64, parameter: &str) {
         self.seen.iter_mut().for_each(|seen| seen.history.push_change(time_ns, parameter));
     }
 
-    /// So many ticks found no room on the way.
+    /// Sets the number of dropped ticks.
     pub fn set_dropped(&mut self, dropped: u64) {
         self.seen.iter_mut().for_each(|seen| seen.tally.dropped = dropped);
     }

@@ -1,4 +1,4 @@
-//! Traces as files: numbers, lines, pixels.
+//! Export of traces to files: numbers (CSV), lines (SVG), pixels (PNG).
 
 use crate::palette::{Look, Palette};
 use crate::picture::{PictureError, draw_without_window, write_png};
@@ -15,44 +15,44 @@ use flotor_plot::{Axis, Figure, Mark, Panel, Paper, Series, Spans};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Why there is no file.
+/// Error of an export.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// The system says no.
+    /// The file cannot be written.
     #[error("cannot write `{}`: {cause}; choose a folder you may write to", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         #[source]
         cause: std::io::Error,
     },
-    /// There is no room for the traces.
+    /// The picture is too low for the traces.
     #[error(transparent)]
     TooLow(#[from] TooLow),
 }
 
-/// How pictures of traces are made.
+/// Options for pictures of traces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExportOptions {
-    /// Light or dark.
+    /// Look of the picture.
     pub look: Look,
     /// Width and height, pixels.
     pub size_px: [f64; 2],
-    /// What stands above; empty: the title of the run.
+    /// Title; empty: the title of the run.
     pub title: String,
 }
 
 impl Default for ExportOptions {
-    /// Light, for paper, and as wide as a page at 300 dots an inch.
+    /// Returns the options for paper: light, and as wide as a page at 300 dots per inch.
     fn default() -> Self {
         Self { look: Look::Light, size_px: [1800.0, 1000.0], title: String::new() }
     }
 }
 
 impl ExportOptions {
-    /// Lets a person choose.
+    /// Shows controls for the options.
     pub fn choose(&mut self, ui: &mut egui::Ui) {
         ui.horizontal(|ui| {
             ui.selectable_value(&mut self.look, Look::Light, "Light");
@@ -77,12 +77,12 @@ impl ExportOptions {
     }
 }
 
-/// Pixels a point of a picture of pixels.
+/// Pixels per point of a picture.
 const SCALE: f32 = 2.0;
-/// Height of what is beside the traces: title and margins, points.
+/// Height of title and margins, points.
 const TITLE_PT: f32 = 66.0;
 
-/// Writes what is shown of a device, with its name where there are several, into the working folder, under a name that is not taken.
+/// Writes the shown traces of a device to an unused file name in the working folder. `device` is its name if there are several.
 ///
 /// # Errors
 /// [`ExportError`].
@@ -102,7 +102,7 @@ pub fn export(
     Ok(path)
 }
 
-/// Writes what is shown into a file.
+/// Writes the shown traces of a device to a file.
 ///
 /// # Errors
 /// [`ExportError`].
@@ -130,13 +130,13 @@ pub fn write(
     written.map_err(|cause| ExportError::Write { path: path.to_owned(), cause })
 }
 
-/// The height with which every trace of a picture can be read, pixels.
+/// Returns the smallest height for a picture with readable traces, pixels.
 #[must_use]
 pub fn least_height_px(plots: &PlotStack) -> f64 {
     f64::from((SCALE * (plots.least_height_pt() + TITLE_PT)).ceil())
 }
 
-/// Every sample of the time shown, a column for each component, with its unit.
+/// Returns every sample of the displayed time as CSV, with a column and its unit for each component.
 #[must_use]
 pub fn csv(history: &History, plots: &PlotStack) -> String {
     let [from_s, to_s] = plots.span_s(history);
@@ -160,7 +160,7 @@ pub fn csv(history: &History, plots: &PlotStack) -> String {
     text
 }
 
-/// The traces as lines, as many points as can be seen, and force over position where it is shown.
+/// Returns the traces as SVG lines, and force over position if shown.
 #[must_use]
 pub fn svg(history: &History, device: Option<&str>, plots: &PlotStack) -> String {
     let [from_s, to_s] = plots.span_s(history);
@@ -187,7 +187,7 @@ pub fn svg(history: &History, device: Option<&str>, plots: &PlotStack) -> String
     let curve =
         plots.force_position.axis.map(|axis| (axis, ForcePosition::of(history.between(from_s, to_s), axis)));
     let subtitle = match &curve {
-        // A heading of a panel is one line.
+        // The heading of a panel is a single line, too short for these numbers.
         Some((_, curve)) => format!("{run}. Force over position: {}", said(curve, plots.units)),
         None => run,
     };
@@ -205,7 +205,7 @@ pub fn svg(history: &History, device: Option<&str>, plots: &PlotStack) -> String
     .to_svg()
 }
 
-/// Adds faults and limits of the time shown to a panel.
+/// Marks faults and limits of the displayed time in a panel.
 fn with_events(history: &History, [from_s, to_s]: [f64; 2], panel: Panel) -> Panel {
     let (mut limited, mut faults) = (Spans::default(), Events::NONE);
     let mut panel = panel;
@@ -215,7 +215,7 @@ fn with_events(history: &History, [from_s, to_s]: [f64; 2], panel: Panel) -> Pan
                 panel = panel.mark(Mark::fault_at_x(sample.time_s(), name));
             }
         }
-        // A fault is marked where it begins.
+        // A fault is marked only at its start.
         faults = sample.events;
         match sample.events.intersects(Events::LIMITS) {
             true => limited.extend(sample.time_s()),

@@ -1,4 +1,4 @@
-//! A running host, as the window sees it: a thread that reads, and what it has read since the last picture.
+//! Data feed of a running host: a reading thread, and the data since the last picture.
 
 use flotor_core::trace::TickRecord;
 use flotor_live::{Answer, Ask, Asker, ChangeMessage, Client, End, EndKind, Event, Greeting, LiveError};
@@ -9,38 +9,38 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Ticks that wait for a picture at most: a window that is hidden takes none in, and memory stays what it is.
+/// Largest number of buffered ticks: a hidden window takes no ticks, and memory stays bounded.
 const MOST_WAITING: usize = 32_768;
-/// Everything else that waits at most.
+/// Largest number of buffered answers; above it, only the newest change of each parameter is buffered.
 const MOST_ARRIVALS: usize = 1024;
-/// How often the thread looks whether it is still needed.
+/// Timeout of a read, after which the thread checks for its end.
 const READ_WAIT: Duration = Duration::from_millis(200);
-/// Without a tick for this long, what is shown is old.
+/// Time without a tick after which the data is stale.
 pub const STALE_AFTER: Duration = Duration::from_millis(500);
 
-/// Reason of a connection that ends without a message.
+/// Error text for a connection that ends without a message.
 const GONE: &str = "The program that ran the loop has ended without a message: it was killed, or it crashed; its watchdog takes the \
                     force from the device. Look at its terminal, and start the run again";
 
-/// How the connection stands.
+/// State of the connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FeedState {
-    /// Ticks come.
+    /// The run continues.
     Running,
-    /// The run is over, and how.
+    /// The run has ended, with its reason and kind.
     Ended(String, EndKind),
-    /// The host went without a word, or is not understood.
+    /// The connection broke off, or the host sent invalid data, with the error.
     Lost(String),
 }
 
-/// What has come since the last look.
+/// Data received since the last picture.
 #[derive(Debug, Default)]
 pub struct Arrivals {
-    /// Ticks in order.
+    /// Tick records of all devices, in order.
     pub records: VecDeque<TickRecord>,
-    /// Parameters that changed.
+    /// Changes of parameters.
     pub changes: Vec<ChangeMessage>,
-    /// Requests that were answered.
+    /// Answers to requests.
     pub answers: Vec<Answer>,
 }
 
@@ -53,7 +53,7 @@ struct Waiting {
     state: FeedState,
 }
 
-/// A run being watched by a thread.
+/// Connection to a run, with its reading thread.
 #[derive(Debug)]
 pub struct Feed {
     waiting: Arc<Mutex<Waiting>>,
@@ -64,10 +64,10 @@ pub struct Feed {
 }
 
 impl Feed {
-    /// Reads from a client on a thread of its own; `wake` is called when there is something new.
+    /// Starts a thread that reads from a client and calls `wake` on new data.
     ///
     /// # Errors
-    /// [`LiveError::Connection`]: the host is gone, or there is no thread.
+    /// [`LiveError::Connection`] if the host is gone or the thread cannot be started.
     pub fn start(mut client: Client, wake: impl Fn() + Send + 'static) -> Result<Self, LiveError> {
         let waiting = Arc::new(Mutex::new(Waiting {
             arrivals: Arrivals::default(),
@@ -96,48 +96,48 @@ impl Feed {
         Ok(Self { waiting, is_over, asker, greeting, run })
     }
 
-    /// What the host said of itself when the connection was made.
+    /// Returns the greeting of the host at the start of the connection.
     #[must_use]
     pub fn greeting(&self) -> &Greeting {
         &self.greeting
     }
 
-    /// How the run was set up.
+    /// Returns the description of the run.
     #[must_use]
     pub fn run(&self) -> &RunDescription {
         &self.run
     }
 
-    /// Takes what has come.
+    /// Takes the data received since the last call.
     #[must_use]
     pub fn arrivals(&self) -> Arrivals {
         std::mem::take(&mut lock(&self.waiting).arrivals)
     }
 
-    /// How the connection stands.
+    /// Returns the state of the connection.
     #[must_use]
     pub fn state(&self) -> FeedState {
         lock(&self.waiting).state.clone()
     }
 
-    /// True if the run goes on and its ticks do not come.
+    /// True if the run continues but no tick came for [`STALE_AFTER`].
     #[must_use]
     pub fn is_stale(&self) -> bool {
         let waiting = lock(&self.waiting);
         waiting.state == FeedState::Running && waiting.last_tick.elapsed() > STALE_AFTER
     }
 
-    /// Ticks that found no room, on the way and here.
+    /// Returns the number of ticks dropped by the host and by this buffer.
     #[must_use]
     pub fn dropped(&self) -> u64 {
         let waiting = lock(&self.waiting);
         waiting.dropped_by_host + waiting.dropped_here
     }
 
-    /// Asks the host for something.
+    /// Sends a request to the host and returns its number.
     ///
     /// # Errors
-    /// [`LiveError::Connection`]: the host is gone.
+    /// [`LiveError::Connection`] if the host is gone.
     pub fn ask(&self, ask: Ask) -> Result<u64, LiveError> {
         self.asker.ask(ask)
     }
@@ -150,7 +150,7 @@ impl Drop for Feed {
 }
 
 impl Waiting {
-    /// True while there may be more.
+    /// Stores an event; returns true while more events may come.
     fn take_in(&mut self, next: Result<Option<Event>, LiveError>) -> bool {
         let Arrivals { records: ticks, changes, answers } = &mut self.arrivals;
         match next {
@@ -165,7 +165,7 @@ impl Waiting {
                 }
             }
             Ok(Some(Event::Change(change))) => {
-                // The newest of a parameter says what is in force: one of each is kept, however many there are.
+                // The newest change of a parameter has the value in force: at the limit, remove an earlier change of the same parameter.
                 if changes.len() >= MOST_ARRIVALS
                     && let Some(earliest) = changes.iter().position(|earlier| earlier.is_of_the_same(&change))
                 {
@@ -189,7 +189,7 @@ fn lock(waiting: &Mutex<Waiting>) -> MutexGuard<'_, Waiting> {
     waiting.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// One tick in so many is enough for pictures: at least a thousand a second.
+/// Returns the decimation of ticks for pictures: at least a thousand ticks per second are read.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
 fn every(rate_hz: f64) -> u32 {
     (rate_hz / 1000.0).floor().max(1.0) as u32

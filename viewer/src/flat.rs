@@ -1,4 +1,4 @@
-//! The interface on the CPU: egui's triangles, textured, blended, the same bits on every machine.
+//! CPU rasteriser of the interface: egui's triangles, textured and blended, with the same bits on every machine.
 
 use egui::epaint::{ImageDelta, Primitive, Vertex};
 use egui::{
@@ -6,16 +6,16 @@ use egui::{
 };
 use std::collections::BTreeMap;
 
-/// Textures of an interface, and the picture they end up in.
+/// Rasteriser of an interface, with its textures.
 #[derive(Default)]
 pub struct FlatRasterizer {
     textures: BTreeMap<TextureId, (ColorImage, TextureOptions)>,
 }
 
 impl FlatRasterizer {
-    /// Takes over what a frame says about textures, and leaves nothing of it.
+    /// Applies the texture changes of a frame and clears them.
     pub fn update(&mut self, delta: &mut TexturesDelta) {
-        // Whole images, each with an id of its own: the order makes no difference.
+        // Each image has its own id, so the order makes no difference.
         #[allow(clippy::iter_over_hash_type)]
         for (id, images) in &delta.set {
             for image in images {
@@ -50,7 +50,7 @@ impl FlatRasterizer {
         }
     }
 
-    /// Draws a frame over a background.
+    /// Draws the triangles of a frame over a background; returns a picture of `size_px`.
     #[must_use]
     pub fn draw(
         &self,
@@ -61,7 +61,7 @@ impl FlatRasterizer {
     ) -> ColorImage {
         let mut image = ColorImage::filled(size_px, background);
         for ClippedPrimitive { clip_rect, primitive } in primitives {
-            // A callback draws on a GPU; nothing here makes one.
+            // A callback draws on a GPU; this interface has none.
             let Primitive::Mesh(mesh) = primitive else { continue };
             let Some((texture, options)) = self.textures.get(&mesh.texture_id) else { continue };
             let smooth = options.magnification == egui::TextureFilter::Linear;
@@ -79,7 +79,7 @@ impl FlatRasterizer {
     }
 }
 
-/// Fills the pixels whose middles are inside; of two triangles with a common edge, one gets its pixels.
+/// Fills the pixels whose centres are inside a triangle; pixels on a common edge belong to one of its two triangles.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
 fn fill(image: &mut ColorImage, clip: Rect, corners: [Vertex; 3], texel: impl Fn(Pos2) -> [f32; 4]) {
     let edge = |a: Pos2, b: Pos2, p: Pos2| {
@@ -101,7 +101,7 @@ fn fill(image: &mut ColorImage, clip: Rect, corners: [Vertex; 3], texel: impl Fn
         let end = ((high + 0.5).floor().max(0.0) as usize).min(limit);
         start..end
     };
-    // A pixel on an edge belongs to the triangle on whose top or left the edge is.
+    // Top-left rule: a pixel on an edge belongs to the triangle with this edge at its top or left.
     let owns = |from: Pos2, to: Pos2| to.y < from.y || (to.y == from.y && to.x > from.x);
     let (own_a, own_b, own_c) = (owns(b.pos, c.pos), owns(c.pos, a.pos), owns(a.pos, b.pos));
     let same_color = a.color == b.color && b.color == c.color;
@@ -138,13 +138,13 @@ fn fill(image: &mut ColorImage, clip: Rect, corners: [Vertex; 3], texel: impl Fn
     }
 }
 
-/// True if the middle of a pixel lies in a range.
+/// True if the centre of a pixel lies in a range.
 fn clip_contains(low: f32, high: f32, pixel: usize) -> bool {
     let middle = pixel as f32 + 0.5;
     middle >= low && middle < high
 }
 
-/// Colour of a texture at a place, premultiplied, 0 to 255.
+/// Returns the colour of a texture at `uv`, premultiplied, 0 to 255.
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 fn sample(texture: &ColorImage, uv: Pos2, smooth: bool) -> [f32; 4] {
     let [width, height] = texture.size;

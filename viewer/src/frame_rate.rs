@@ -1,4 +1,4 @@
-//! The graphic rate: pictures of the window a second.
+//! Frame rate of the window.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 /// Time over which pictures are counted.
 const OVER: Duration = Duration::from_secs(1);
 
-/// Times of the pictures of the last second.
+/// Counter of the pictures in the last second.
 #[derive(Clone, Debug, Default)]
 pub struct FrameRate(VecDeque<Instant>);
 
@@ -19,7 +19,7 @@ impl FrameRate {
         }
     }
 
-    /// Returns the pictures a second, Hz; none before the second picture.
+    /// Returns the frame rate, Hz; `None` before the second picture.
     #[must_use]
     pub fn hz(&self) -> Option<f64> {
         let span = self.0.back()?.duration_since(*self.0.front()?).as_secs_f64();

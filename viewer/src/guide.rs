@@ -1,7 +1,7 @@
-//! Guidance of a simulated hand: which devices have one, where it is to go, and the requests for it.
+//! Guidance of a simulated hand: devices with a hand, the target, and the requests.
 //!
-//! The device declares four live parameters: the number of the client that guides, and the target. It releases the hand when a
-//! client has been silent for a second, so a target is repeated while it stays.
+//! The device declares four live parameters: the number of the guiding client, and the target. It releases the hand when the
+//! client has been silent for a second, so an unchanged target is repeated.
 
 use flotor_core::guidance::{GUIDE, TARGET_MM, is_guidance};
 use flotor_hal::DVec3;
@@ -11,14 +11,14 @@ use std::time::{Duration, Instant};
 
 /// Largest coordinate of a target, mm.
 const FARTHEST_MM: f64 = 50.0;
-/// Time after which a target that stays is repeated.
+/// Repetition interval of an unchanged target.
 const REPEATED_AFTER: Duration = Duration::from_millis(200);
 
-/// The hands of a run that this client may guide, and the one that it does.
+/// Hands of a run that this client may guide, and the guided hand.
 #[derive(Clone, Debug)]
 pub struct Guide {
     number: u32,
-    /// Name of each device with such a hand, in the scene's order.
+    /// Names of the devices in the scene's order; `None` for a device without a hand.
     hands: Vec<Option<String>>,
     held: Option<Held>,
 }
@@ -31,34 +31,34 @@ struct Held {
 }
 
 impl Guide {
-    /// Of the plugins of a running host, whose devices come first; of none in a recording.
+    /// Finds the hands among the plugins of a running host, devices first; a recording has none.
     #[must_use]
     pub fn new(plugins: &[PanelPlugin]) -> Self {
         let hand = |plugin: &PanelPlugin| has_hand(plugin).then(|| plugin.name.clone());
-        // A number that no other client has, but for one in four thousand million.
+        // Random, so that two clients have the same number with a probability of 2^-32.
         let random = RandomState::new().build_hasher().finish().to_le_bytes();
         let number = u32::from_le_bytes([random[0], random[1], random[2], random[3]]).max(1);
         Self { number, hands: plugins.iter().map(hand).collect(), held: None }
     }
 
-    /// Whether the hand of a device can be guided.
+    /// Returns whether the hand of a device can be guided.
     #[must_use]
     pub fn has_hand(&self, device: usize) -> bool {
         self.hands.get(device).is_some_and(Option::is_some)
     }
 
-    /// The device whose hand is guided.
+    /// Returns the device whose hand is guided.
     #[must_use]
     pub fn held(&self) -> Option<usize> {
         self.held.as_ref().map(|held| held.device)
     }
 
-    /// Takes the hand of a device, whose handle is at a place, m.
+    /// Starts to guide the hand of a device, with the position of its handle, m, as the target.
     pub fn take(&mut self, device: usize, handle_m: DVec3) {
         self.held = self.has_hand(device).then(|| Held { device, target_mm: handle_m * 1.0e3, sent: None });
     }
 
-    /// Moves the target, m.
+    /// Moves the target by a vector, m, within the largest coordinates.
     pub fn move_by(&mut self, by_m: DVec3) {
         if let Some(held) = &mut self.held {
             let target_mm = held.target_mm + by_m * 1.0e3;
@@ -66,13 +66,13 @@ impl Guide {
         }
     }
 
-    /// Releases the hand; the request for it, if one was held.
+    /// Releases the hand and returns the request; `None` if no hand was held.
     pub fn release(&mut self) -> Option<Ask> {
         let device = self.held.take()?.device;
         Some(Ask::Set { values: vec![self.value(device, GUIDE, "0".to_owned())] })
     }
 
-    /// The request that is due at a time: the coordinates that have changed, or that the target stays.
+    /// Returns the request that is due at a time: changed coordinates, or the repetition of an unchanged target.
     pub fn due(&mut self, now: Instant) -> Option<Ask> {
         let held = self.held.as_mut()?;
         let (device, target_mm, sent) = (held.device, held.target_mm, held.sent);
@@ -90,7 +90,7 @@ impl Guide {
         Some(Ask::Set { values })
     }
 
-    /// Hears of a change; true if the device has refused this client, because another one guides the hand: it is not held then.
+    /// Processes a change; if the device refused this client because another client guides the hand, releases the hand and returns true.
     pub fn take_in(&mut self, change: &ChangeMessage) -> bool {
         let is_ours = change.parameter == GUIDE && change.number == f64::from(self.number);
         let is_refused = is_ours && change.outcome != Outcome::Applied && self.held.is_some();
@@ -106,14 +106,14 @@ impl Guide {
     }
 }
 
-/// Whether a plugin is a simulated device with a hand that a client may guide. What could push a person is none, whatever it
-/// declares.
+/// Returns whether a plugin is a simulated device with a hand that a client may guide. A real device, which could push a person, is
+/// excluded.
 fn has_hand(plugin: &PanelPlugin) -> bool {
     let has = |id: &str| plugin.parameters.iter().any(|parameter| parameter.live && parameter.id == id);
     plugin.is_simulated && has(GUIDE) && TARGET_MM.iter().all(|id| has(id))
 }
 
-/// Whether a parameter of a plugin is one with which its hand is guided, and not for a panel.
+/// Returns whether a parameter of a plugin guides its hand and is left out of panels.
 #[must_use]
 pub fn is_for_guides(plugin: &PanelPlugin, parameter: &str) -> bool {
     plugin.is_simulated && is_guidance(parameter)

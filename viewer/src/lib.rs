@@ -1,20 +1,20 @@
-//! The viewer: what the hand feels, for the eye.
+//! Viewer of running hosts and recordings.
 //!
-//! A program of its own, so that no graphics driver can delay a servo (docs/src/adr/0008-viewer-process.md). It
-//! shows a running host or a recording: the bodies of its models in 3D, what was felt as traces, and panels to change it.
+//! A separate program, so that no graphics driver can delay a servo (docs/src/adr/0008-viewer-process.md). It
+//! shows the bodies of the models in 3D, forces and motions as traces, and panels for the parameters.
 //!
-//! - [`feed`] reads the history of a running host (`flotor-history`), [`tally`] counts events, [`panel`] is what can be set.
-//! - [`devices`]: the devices of a run, one of which is looked at.
-//! - [`trace`]: the points of a plot from picture to picture; [`export`] of traces as files, [`chosen`] on a command line.
-//! - [`shape`]: where the bodies of the models are; [`scene`] makes triangles of them with `flotor-drawing`.
-//! - [`canvas`]: the 3D view in the interface, drawn on a GPU or the processor; [`picture`] a whole picture without a window, whose
-//!   interface [`flat`] draws.
-//! - [`ui`], [`palette`]: the parts of the interface; [`app`] puts them together. [`sound`] warns the ear.
-//! - [`window`]: opens it, or says why there is none; [`cost`] is what it takes of the machine, [`frame_rate`] its pictures a second.
-//! - [`remembered`]: what a person has chosen about the window, from one time to the next.
+//! - [`feed`]: data of a running host, for a history (`flotor-history`); [`tally`]: counts of events; [`panel`]: parameters.
+//! - [`devices`]: devices of a run, one of them chosen.
+//! - [`trace`]: points of a plot from picture to picture; [`export`]: traces as files; [`chosen`]: options of a command line.
+//! - [`shape`]: bodies of the models; [`scene`]: triangles of the bodies, made with `flotor-drawing`.
+//! - [`canvas`]: 3D view in the interface, drawn on a GPU or the processor; [`picture`]: a whole picture without a window, drawn
+//!   by [`flat`].
+//! - [`ui`], [`palette`]: parts of the interface; [`app`]: window with all parts; [`sound`]: acoustic warning.
+//! - [`window`]: opening of the window; [`cost`]: processor time and memory; [`frame_rate`]: pictures per second.
+//! - [`remembered`]: settings of the window, saved for the next time.
 //! - [`experiment`]: a sitting of a perception experiment, and its screens.
 //!
-//! Nothing here is real-time.
+//! Not real-time.
 
 pub mod app;
 pub mod canvas;

@@ -1,5 +1,5 @@
-//! `flotor-viewer`: a running host or a recording in a window, or a picture. Started by `flotor view`, which knows where the
-//! plugins are.
+//! `flotor-viewer`: shows a running host or a recording in a window, or writes a picture. Started by `flotor view`, which finds
+//! the plugins.
 
 use clap::Parser;
 use flotor_drawing::camera::View;
@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::mpsc::channel;
 
-/// Shows what the hand feels: the model in 3D, and plots over time.
+/// Shows a run as felt by the hand: the model in 3D, and plots over time.
 #[derive(Parser)]
 #[command(name = "flotor-viewer", version, about, max_term_width = 110)]
 struct Arguments {
@@ -45,16 +45,16 @@ struct Arguments {
     /// Watch the run of this process (default: the newest)
     #[arg(long, value_name = "PID", conflicts_with = "recording")]
     run: Option<u32>,
-    /// Show the screens of an experiment, told and answered by lines of JSON on standard input and output
+    /// Show the screens of an experiment, controlled by lines of JSON on standard input and output
     #[arg(long, requires = "run", conflicts_with = "recording")]
     sitting: bool,
-    /// The key that is the emergency stop in a sitting
+    /// Key of the emergency stop in a sitting
     #[arg(long, value_enum, default_value_t, requires = "sitting")]
     stop_key: StopKey,
-    /// The picture is that of the whole window, with panels
+    /// Draw the whole window, with panels
     #[arg(long, requires = "screenshot")]
     window: bool,
-    /// From where the picture is seen, degrees: to the right of the front, above the horizon, and a zoom (default: 31.5,13.8)
+    /// Direction of the view, degrees: to the right of the front, above the horizon, and a zoom (default: 31.5,13.8)
     #[arg(
         long,
         value_name = "AZIMUTH,INCLINATION[,ZOOM]",
@@ -63,10 +63,10 @@ struct Arguments {
         allow_hyphen_values = true
     )]
     view: Option<View>,
-    /// Device that numbers and traces are of, where there are several (default: the first)
+    /// Device for numbers and traces, if there are several (default: the first)
     #[arg(long, value_name = "NAME", requires = "recording")]
     device: Option<String>,
-    /// The moment to show, s (default: that of the largest force)
+    /// Time to show, s (default: of the largest force)
     #[arg(long, value_name = "SECONDS", requires = "recording", conflicts_with = "export")]
     at: Option<f64>,
     /// Write the traces of the recording instead of opening a window: numbers (.csv), lines (.svg) or pixels (.png); --look light
@@ -88,10 +88,10 @@ struct Arguments {
     /// Force that an arrow of full length stands for, N, so that pictures can be compared (default: the largest of the run)
     #[arg(long, value_name = "NEWTONS", value_parser = arrow_force, conflicts_with_all = ["sitting", "export"])]
     arrow_force: Option<f64>,
-    /// Title of the file of traces (default: that of the run)
+    /// Title of the file of traces (default: the title of the run)
     #[arg(long, value_name = "TEXT", requires = "export")]
     title: Option<String>,
-    /// The picture is what a person in a sitting sees on a screen, as `flotor study --screen json` writes it
+    /// Draw a screen of a sitting instead, from a line written by `flotor study --screen json`
     #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"], value_parser = screen)]
     screen: Option<Screen>,
     /// File with the texts of the screens in the language of the person (default: English)
@@ -101,29 +101,29 @@ struct Arguments {
     request: WindowOptions,
 }
 
-/// `20`
+/// Parses a force of an arrow in N, such as `20`.
 fn arrow_force(text: &str) -> Result<f64, String> {
     let force_n = text.parse().ok().filter(|force_n| (0.001..=10_000.0).contains(force_n));
     force_n.ok_or_else(|| format!("`{text}` is no force of an arrow; it must be 0.001 to 10000 N"))
 }
 
-/// `z`
+/// Parses an axis, such as `z`.
 fn axis(text: &str) -> Result<usize, String> {
     let known = ["x", "y", "z"].into_iter().position(|name| name == text);
     known.ok_or_else(|| format!("`{text}` is no axis; write x, y or z"))
 }
 
-/// A line of an experiment.
+/// Parses a screen from a line of JSON.
 fn screen(text: &str) -> Result<Screen, String> {
     serde_json::from_str(text).map_err(|error| format!("no screen: {error}"))
 }
 
-/// `german.toml`
+/// Reads the texts from a file, such as `german.toml`.
 fn texts(file: &str) -> Result<Texts, String> {
     Texts::read(Path::new(file)).map_err(|error| format!("{file}: {error}"))
 }
 
-/// Why there is nothing to see, with an exit code: 2 where the recording or an option is wrong, else 1.
+/// Error message with an exit code: 2 if the recording or an option is wrong, else 1.
 struct Failure(String, u8);
 
 impl Failure {
@@ -199,7 +199,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Whether a file of traces can be written, and has what its options are about.
+/// Checks that the format of the file of traces is known and supports the options.
 fn fits_file(arguments: &Arguments) -> Result<(), String> {
     let Some(out) = &arguments.export else { return Ok(()) };
     let of_picture = [
@@ -218,7 +218,7 @@ fn fits_file(arguments: &Arguments) -> Result<(), String> {
     }
 }
 
-/// What is shown, as far as the command line says; the recording has to have it.
+/// Returns the display options of the command line, checked against the recording.
 fn chosen(arguments: &Arguments, histories: &[History]) -> Result<Chosen, PictureError> {
     if let Some(at_s) = arguments.at {
         has_moment(histories, at_s)?;
@@ -228,7 +228,7 @@ fn chosen(arguments: &Arguments, histories: &[History]) -> Result<Chosen, Pictur
     Ok(chosen.with_arrow_force(arguments.arrow_force))
 }
 
-/// Returns the recording of the command line at its moment, with the second one.
+/// Returns the recording of the command line at the requested time, with the second recording.
 fn recorded(arguments: &Arguments, histories: Vec<History>) -> Result<Recorded, Failure> {
     let (file, at_s) = (arguments.recording.first().cloned(), arguments.at);
     let second = arguments.recording.get(1).map(|file| Compared::read(file));
@@ -236,7 +236,7 @@ fn recorded(arguments: &Arguments, histories: Vec<History>) -> Result<Recorded, 
     Ok(Recorded { file, at_s, compared, ..Recorded::new(histories, arguments.plugins.clone()) })
 }
 
-/// A running host: for an experimenter, or in front of a person in a sitting.
+/// Selects a running host, for an experimenter or for a person in a sitting.
 fn live(arguments: &Arguments) -> Result<Start, Failure> {
     let (directory, process) = (Directory::of_this_user(), arguments.run);
     let wanted = Wanted { directory, process, plugins: arguments.plugins.clone() };
@@ -249,7 +249,7 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
     Ok(Start::Sitting(wanted, Box::new(prompt)))
 }
 
-/// The window as it would open on the recording, drawn on the processor.
+/// Writes a picture of the window as it would open on the recording, drawn by the processor.
 fn whole_window(
     arguments: &Arguments,
     history: Vec<History>,
@@ -260,19 +260,19 @@ fn whole_window(
     let start = Start::Recording(recorded(arguments, history)?);
     let mut viewer = Viewer::new(&egui::Context::default(), None, start, look);
     viewer.choose(chosen);
-    // The experiment's end of the way to the screen stays open while it is drawn.
+    // Keep the experiment's ends of the channels open while the screen is drawn.
     let ((teller, told), (said, _hears)) = (channel(), channel());
     if let Some(screen) = &arguments.screen {
         let mut prompt = Prompt::new(told, said);
         prompt.texts = arguments.texts.clone().unwrap_or_else(Texts::english);
         viewer.rehearse(prompt);
-        let _ = teller.send(Told::Screen(screen.clone())); // its other end is above
+        let _ = teller.send(Told::Screen(screen.clone())); // the receiver is above
     }
     let image = draw_without_window(size, scale, look, |ui| viewer.show(ui));
     write_png(out, &image).map_err(Failure::file)
 }
 
-/// A file of the traces.
+/// Writes a file of the traces.
 fn traces(arguments: &Arguments, histories: Vec<History>, chosen: &Chosen) -> Result<(), Failure> {
     let Some(out) = &arguments.export else { return Ok(()) };
     let mut devices = Devices::new(histories);
@@ -293,7 +293,7 @@ fn traces(arguments: &Arguments, histories: Vec<History>, chosen: &Chosen) -> Re
     })
 }
 
-/// Look, size and scale of a picture: the same for everybody.
+/// Returns look, size and scale of a picture, independent of the user's settings.
 fn of_picture(request: WindowOptions) -> (Look, [usize; 2], f32) {
     (request.look.unwrap_or_default(), request.size.unwrap_or([1280, 800]), request.scale.unwrap_or(1.0))
 }

@@ -1,7 +1,7 @@
-//! Colours, light and dark, that people with any kind of colour vision can tell apart.
+//! Colours, light and dark, distinguishable with any kind of colour vision.
 //!
-//! Lines and plates: after Okabe and Ito, "Color Universal Design" (2008), green darker and blue lighter (on white: darker) than
-//! theirs, which alike in lightness are one colour to who sees no blue. Strain: viridis (van der Walt and Smith, 2015),
+//! Lines and plates: after Okabe and Ito, "Color Universal Design" (2008), with a darker green and a lighter blue (on white: darker);
+//! the originals, equal in lightness, look alike without blue cones. Strain: viridis (van der Walt and Smith, 2015),
 //! whose lightness rises all the way, so that it reads in grey as well.
 
 use clap::builder::Resettable;
@@ -10,13 +10,13 @@ use flotor_drawing::geometry::Color;
 use flotor_drawing::raster::Backdrop;
 use serde::{Deserialize, Serialize};
 
-/// Light or dark.
+/// Colour scheme, light or dark.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Look {
     /// Dark background.
     #[default]
-    #[value(help = Resettable::Reset)] // a word says it, and help stays a line for each option
+    #[value(help = Resettable::Reset)] // the name is enough, and help has one line per option
     Dark,
     /// Light background.
     #[value(help = Resettable::Reset)]
@@ -26,44 +26,44 @@ pub enum Look {
 /// All colours of a look.
 #[derive(Clone, Copy, Debug)]
 pub struct Palette {
-    /// Behind the 3D view.
+    /// Background of the 3D view.
     pub backdrop: Backdrop,
-    /// Behind plots and panels.
+    /// Background of plots and panels.
     pub panel: Color32,
-    /// Text.
+    /// Normal text.
     pub text: Color32,
     /// Less important text.
     pub faint: Color32,
     /// Grid lines of plots.
     pub grid: Color32,
-    /// Components x, y, z of a trace.
+    /// Traces of the components x, y, z.
     pub components: [Color32; 3],
-    /// Where the time is.
+    /// Cursor at the displayed time.
     pub cursor: Color32,
-    /// Ground and its lines.
+    /// Ground and grid lines.
     pub ground: [Color; 2],
     /// Plate at the handle, plate at the fixed end.
     pub plates: [Color; 2],
-    /// A body that is no spring.
+    /// Bodies other than springs.
     pub body: Color,
-    /// Force and torque arrows.
+    /// Force arrows.
     pub force: Color,
     /// Torque arrows.
     pub torque: Color,
-    /// Where turns of a coil touch.
+    /// Touching turns of a coil.
     pub contact: Color,
     /// Warnings, and limits on the time axis.
     pub warning: Color32,
-    /// A fault, or an emergency stop.
+    /// Faults and emergency stops.
     pub fault: Color32,
-    /// All is well.
+    /// Normal operation.
     pub well: Color32,
-    /// How dark shadows are, 0 to 1.
+    /// Darkness of shadows, 0 to 1.
     pub shadow: f64,
 }
 
 impl Look {
-    /// The other one.
+    /// Returns the other look.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {
@@ -74,7 +74,7 @@ impl Look {
 }
 
 impl Palette {
-    /// The colours of a look.
+    /// Returns the colours of a look.
     #[must_use]
     pub const fn of(look: Look) -> Self {
         match look {
@@ -128,7 +128,7 @@ impl Palette {
     }
 }
 
-/// Nine colours of viridis between its parts 0.12 and 1, below which it is too dark to see a shape in.
+/// Nine colours of viridis from 0.12 to 1 of its scale; below, shapes would be too dark to see.
 const VIRIDIS: [[f64; 3]; 9] = [
     [72.0, 33.0, 115.0],
     [67.0, 61.0, 132.0],
@@ -141,7 +141,7 @@ const VIRIDIS: [[f64; 3]; 9] = [
     [253.0, 231.0, 37.0],
 ];
 
-/// Colour of a part of the scale of strain, 0 to 1; what lies outside has the colour of the end.
+/// Returns the colour of a strain as a fraction of the scale, clamped to 0 to 1.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // nine colours
 pub fn strain_color(part: f64) -> Color {

@@ -1,81 +1,81 @@
-//! The parameters of a plugin, as a panel shows them: generated from its schema, so that any plugin has one.
+//! Panel for the parameters of a plugin, generated from the schema, so that any plugin has a panel.
 //!
-//! Which parameter rules and which follows is the plugin's business (the spring's rigidity follows from its physical
-//! parameters, or the other way round, by its `mode`). The panel asks an instance of its own: a parameter that refuses
-//! the very value it has follows from others, or has no effect. It is shown, moves along, and cannot be pulled.
+//! The plugin decides which parameters follow from others (the spring's rigidity follows from its physical
+//! parameters, or the other way round, by its `mode`). The panel tests a separate instance: a parameter that refuses
+//! its own value follows from others, or has no effect. Such a parameter is shown and updated, but is not editable.
 
 use crate::guide::is_for_guides;
 use crate::shape::Shape;
 use flotor_live::{ChangeMessage, Outcome, PanelParameter, PanelPlugin, ParameterShape, SetValue, Subject};
 
-/// What stands in a panel.
+/// Value of a parameter in a panel.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// A number in the parameter's unit.
     Number(f64),
     /// Index of a choice.
     Choice(usize),
-    /// Text, or what cannot be read as the others.
+    /// Text, or a value that cannot be parsed as a number or choice.
     Words(String),
 }
 
-/// Whether a parameter can be pulled.
+/// Editability of a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Standing {
-    /// It can.
+    /// Editable.
     Free,
-    /// It follows from others, or has no effect with them; the plugin's words for it.
+    /// Not editable: follows from other parameters, or has no effect with them; with the plugin's message.
     Follows(String),
-    /// Only when the plugin is created, or: this is a recording.
+    /// Not editable: set only when the plugin is created, or part of a recording.
     Fixed,
 }
 
-/// A parameter in a panel.
+/// Parameter in a panel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Knob {
-    /// Its entry in the schema.
+    /// Entry in the schema.
     pub parameter: PanelParameter,
-    /// What people call it: the id without its unit, in words; with the unit where another of the panel is called the same.
+    /// Display name: the id without its unit, in words; with the unit if another parameter of the panel has the same name.
     pub name: String,
-    /// What is shown.
+    /// Displayed value.
     pub value: Value,
-    /// Whether it can be pulled.
+    /// Editability.
     pub standing: Standing,
-    /// The value the loop has.
+    /// Current value in the loop.
     in_force: Value,
-    /// What was requested and is not in force yet: the loop moves a number there in a while.
+    /// Requested value that is not in force yet: the loop moves a number gradually.
     wanted: Option<Value>,
 }
 
-/// Whether the panel is for a run that can still be changed.
+/// Use of a panel: for changing values, or only for reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
-    /// A running host.
+    /// Changing values of a running host.
     Change,
-    /// A recording, or a run that is over.
+    /// Reading values of a recording, or of a run that is over.
     Read,
 }
 
-/// The panel of one plugin.
+/// Panel of one plugin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
-    /// What the scene calls the plugin.
+    /// Name of the plugin in the scene.
     pub name: String,
     /// Id of the plugin.
     pub id: String,
-    /// Its parameters in the order of its schema.
+    /// Parameters in the order of the schema.
     pub knobs: Vec<Knob>,
-    /// Why the last change was not taken.
+    /// Reason for the rejection of the last change.
     pub refusal: Option<String>,
-    /// What was there before each change of a person, with the index of its parameter.
+    /// Undo history: index of the parameter and its value before each change of the user.
     earlier: Vec<(usize, Value)>,
 }
 
 impl Panel {
-    /// From what a host says of a plugin, or what a recording's plugin says of itself.
+    /// Creates a panel from the description of a plugin, by a running host or for a recording.
     #[must_use]
     pub fn new(plugin: &PanelPlugin, purpose: Use) -> Self {
-        // A hand is guided in the 3D view.
+        // Guidance parameters are left out: a hand is guided in the 3D view.
         let shown = || plugin.parameters.iter().filter(|parameter| !is_for_guides(plugin, &parameter.id));
         let plain: Vec<String> = shown().map(plain_name).collect();
         let knob = |(parameter, name): (&PanelParameter, &String)| Knob {
@@ -99,7 +99,7 @@ impl Panel {
         }
     }
 
-    /// Takes in what became of a change.
+    /// Applies the outcome of a change.
     pub fn take_in(&mut self, change: &ChangeMessage) {
         if change.plugin != self.name || change.subject != Subject::Parameter {
             return;
@@ -122,7 +122,7 @@ impl Panel {
         }
     }
 
-    /// Reads the numbers that follow from others, and which do, from an instance with the same settings.
+    /// Updates editability and dependent numbers from an instance with the same settings.
     pub fn follow(&mut self, shape: &mut Shape) {
         for (index, knob) in self.knobs.iter_mut().enumerate() {
             if knob.standing == Standing::Fixed
@@ -142,17 +142,17 @@ impl Panel {
         }
     }
 
-    /// The run is over: nothing can be pulled any more.
+    /// Makes all parameters read-only, at the end of the run.
     pub fn freeze(&mut self) {
         self.knobs.iter_mut().for_each(|knob| knob.standing = Standing::Fixed);
     }
 
-    /// The host did not pass a change on: what is in force is shown again.
+    /// Discards changes that the host has not passed on, and displays the values in force.
     pub fn take_back(&mut self) {
         self.knobs.iter_mut().filter(|knob| knob.wanted.is_some()).for_each(Knob::give_up);
     }
 
-    /// A user starts to change a parameter: the value before the change can be restored.
+    /// Stores the value of a parameter before a change of the user, for undo.
     pub fn begin(&mut self, index: usize, before: Value) {
         const MOST: usize = 100;
         if self.earlier.len() == MOST {
@@ -161,13 +161,13 @@ impl Panel {
         self.earlier.push((index, before));
     }
 
-    /// Whether there is a change to undo.
+    /// Returns whether there is a change to undo.
     #[must_use]
     pub fn can_undo(&self) -> bool {
         !self.earlier.is_empty()
     }
 
-    /// Shows again what was there before the last change; the index of its parameter, to be sent.
+    /// Restores the displayed value before the last change; returns the index of its parameter, to be sent.
     pub fn undo(&mut self) -> Option<usize> {
         let (index, before) = self.earlier.pop()?;
         let knob = self.knobs.get_mut(index).filter(|knob| knob.standing == Standing::Free)?;
@@ -175,7 +175,7 @@ impl Panel {
         Some(index)
     }
 
-    /// Shows the value of a parameter that the run began with; true if that is another one, to be sent.
+    /// Displays the initial value of a parameter; returns true if that is a change, to be sent.
     pub fn reset(&mut self, index: usize) -> bool {
         let Some(knob) = self.knobs.get(index).filter(|knob| knob.is_moved()) else { return false };
         let (before, first) = (knob.value.clone(), Value::read(&knob.parameter, &knob.parameter.first));
@@ -184,7 +184,7 @@ impl Panel {
         true
     }
 
-    /// A change to send, with the value shown.
+    /// Returns the change to send, with the displayed value.
     pub fn change(&mut self, index: usize) -> Option<SetValue> {
         let knob = self.knobs.get_mut(index)?;
         knob.wanted = Some(knob.value.clone());
@@ -197,7 +197,7 @@ impl Panel {
 }
 
 impl Knob {
-    /// A value is in force. What was requested stays in sight while the loop is on the way there, and not if it goes elsewhere.
+    /// Sets the value in force. A requested value stays displayed while the loop approaches it, and not if the loop moves away.
     fn settle(&mut self, now: Value) {
         if let Some(wanted) = &self.wanted
             && (wanted.is_about(&now) || wanted.distance(&now) > wanted.distance(&self.in_force))
@@ -208,13 +208,13 @@ impl Knob {
         self.value = self.wanted.clone().unwrap_or_else(|| self.in_force.clone());
     }
 
-    /// What was requested does not come: what is in force is shown.
+    /// Discards the requested value and displays the value in force.
     fn give_up(&mut self) {
         self.wanted = None;
         self.value = self.in_force.clone();
     }
 
-    /// Whether it is free and shows another value than the run began with.
+    /// Returns whether the parameter is editable and its displayed value differs from its initial value.
     #[must_use]
     pub fn is_moved(&self) -> bool {
         let first = &self.parameter.first;
@@ -223,13 +223,13 @@ impl Knob {
             && !Value::read(&self.parameter, first).is_about(&self.value)
     }
 
-    /// Its unit for people; empty for numbers that have none.
+    /// Returns the unit for display; empty for a dimensionless number.
     #[must_use]
     pub fn unit(&self) -> &str {
         if self.parameter.unit == "1" { "" } else { &self.parameter.unit }
     }
 
-    /// The value as a person would type it.
+    /// Returns the displayed value as a user would type it.
     #[must_use]
     pub fn typed(&self) -> String {
         match (&self.value, &self.parameter.shape) {
@@ -243,7 +243,7 @@ impl Knob {
     }
 }
 
-/// The id of a parameter without its unit, in words.
+/// Returns the id of a parameter without its unit, in words.
 fn plain_name(parameter: &PanelParameter) -> String {
     let plain = |text: &str| {
         let text = text.replace('²', "2").replace('³', "3").to_lowercase();
@@ -259,7 +259,7 @@ fn plain_name(parameter: &PanelParameter) -> String {
 }
 
 impl Value {
-    /// Whether it is the same but for the digits that a text leaves out.
+    /// Returns whether both values are equal up to the rounding of a text.
     fn is_about(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Number(one), Self::Number(two)) => (one - two).abs() <= 1.0e-9 * one.abs().max(two.abs()),
@@ -267,7 +267,7 @@ impl Value {
         }
     }
 
-    /// How far two numbers are apart, in their unit; 0 where they are none.
+    /// Returns the distance of two numbers, in their unit; 0 for other values.
     fn distance(&self, other: &Self) -> f64 {
         match (self, other) {
             (Self::Number(one), Self::Number(two)) => (one - two).abs(),

@@ -1,4 +1,4 @@
-//! A picture of a moment of a run, without a window, a display or a GPU.
+//! Picture of a run at one time, without a window, a display or a GPU.
 
 use crate::canvas::Canvas;
 use crate::chosen::Chosen;
@@ -17,71 +17,71 @@ use flotor_history::History;
 use flotor_history::quantity::Units;
 use std::path::{Path, PathBuf};
 
-/// How a picture is to be made.
+/// Options of a picture.
 #[derive(Clone, Debug)]
 pub struct PictureOptions {
     /// Width and height, pixels.
     pub size_px: [usize; 2],
-    /// Pixels a point: 2 draws everything twice as large as 1.
+    /// Pixels per point: 2 draws everything twice as large as 1.
     pub scale: f32,
-    /// Light or dark.
+    /// Look of the picture.
     pub look: Look,
-    /// From where; without one, the experimenter's view.
+    /// Direction and zoom; `None`: the default view.
     pub view: Option<View>,
-    /// Device and traces.
+    /// Display options.
     pub chosen: Chosen,
-    /// The moment, s; without one, that of the largest force.
+    /// Time, s; `None`: the time of the largest force.
     pub at_s: Option<f64>,
 }
 
-/// Why there is no picture.
+/// Error of a picture.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PictureError {
-    /// There is nothing to show.
+    /// The recording has no ticks.
     #[error("the recording holds no ticks, there is nothing to show; record a longer run")]
     Empty,
-    /// There is no such device.
+    /// The run has no device of this name.
     #[error("no device is called `{name}`; this run has {}", known.join(", "))]
     Device {
-        /// What was requested.
+        /// Requested name.
         name: String,
-        /// Names of those there are.
+        /// Names of the devices of the run.
         known: Vec<String>,
     },
-    /// There is no such moment.
+    /// The time is outside the recording.
     #[error("{at_s} s is outside the recording, which is from {:.3} to {:.3} s", span_s[0], span_s[1])]
     Moment {
-        /// What was requested, s.
+        /// Requested time, s.
         at_s: f64,
-        /// First and last time there are, s.
+        /// First and last time of the recording, s.
         span_s: [f64; 2],
     },
-    /// There is no room for the traces.
+    /// The picture is too low for the traces.
     #[error(transparent)]
     TooLow(#[from] TooLow),
-    /// The file could not be written.
+    /// The file cannot be written.
     #[error("cannot write the picture `{}`: {cause}; name a file in a folder you may write to", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         #[source]
         cause: std::io::Error,
     },
 }
 
-/// Part of the height that the 3D view gets.
+/// Fraction of the height for the 3D view.
 const VIEW_PART: f32 = 0.60;
-/// Above and below the traces, points.
+/// Margins above and below the traces, points.
 const BESIDE_PLOTS_PT: f32 = 12.0;
-/// Samples a pixel and direction of the 3D view.
+/// Samples per pixel and direction of the 3D view.
 const SAMPLES: usize = 3;
 
-/// Number of the device of this name among those of a recording.
+/// Returns the number of the device of this name in a recording.
 ///
 /// # Errors
-/// [`PictureError::Device`].
+/// [`PictureError::Device`] if there is no such device.
 pub fn number_of(histories: &[History], name: &str) -> Result<usize, PictureError> {
     let known = || histories.iter().map(History::device_name);
     let number = known().position(|known| known == name);
@@ -91,20 +91,20 @@ pub fn number_of(histories: &[History], name: &str) -> Result<usize, PictureErro
     })
 }
 
-/// Whether a recording has this moment, s.
+/// Checks that a time, s, is inside a recording; a recording without ticks passes.
 ///
 /// # Errors
-/// [`PictureError::Moment`].
+/// [`PictureError::Moment`] if the time is outside.
 pub fn has_moment(histories: &[History], at_s: f64) -> Result<(), PictureError> {
     let Some(first) = histories.first().filter(|first| !first.is_empty()) else { return Ok(()) };
     let span_s = first.span_s();
-    // A run of ten seconds has no tick at its end, and is asked for it.
+    // A run of ten seconds has no tick at 10 s, but users request this time.
     let period_s = 1.0 / first.run().rate_hz.max(1.0);
     let is_inside = at_s >= span_s[0] - period_s && at_s <= span_s[1] + 1.5 * period_s;
     if is_inside { Ok(()) } else { Err(PictureError::Moment { at_s, span_s }) }
 }
 
-/// The height with which every trace of a picture can be read, pixels, at a scale.
+/// Returns the smallest height of a picture with readable traces at a scale, pixels.
 #[must_use]
 pub fn least_height_px(chosen: &Chosen, scale: f32) -> usize {
     let mut plots = PlotStack::new(Window::Whole);
@@ -118,7 +118,7 @@ fn least_height_of_px(plots: &PlotStack, scale: f32) -> usize {
     (least_pt * scale).ceil() as usize
 }
 
-/// Draws a moment of a run: 3D view, numbers, traces.
+/// Draws a run at one time: 3D view, numbers, traces.
 ///
 /// # Errors
 /// [`PictureError::Empty`], [`PictureError::TooLow`].
@@ -131,7 +131,7 @@ pub fn picture(
     Ok(draw_without_window(options.size_px, options.scale, options.look, interface))
 }
 
-/// Returns the interface that shows a moment of a run, for [`draw_without_window`].
+/// Returns the interface that shows a run at one time, for [`draw_without_window`].
 ///
 /// # Errors
 /// [`PictureError::Empty`], [`PictureError::TooLow`].
@@ -163,7 +163,7 @@ pub fn interface(
         let view = Rect::from_min_size(area.min, vec2(area.width(), (area.height() * VIEW_PART).round()));
         let events = devices.names().zip(&samples).map(|(name, sample)| (name, sample.events));
         let warnings = readout::warnings(&events.collect::<Vec<_>>(), &facts);
-        // Warnings do not stand before the body they are about.
+        // Warnings must not cover the body.
         let (heading, below_heading) =
             view.split_top_bottom_at_y(view.top() + readout::heading_pt(warnings.len()));
         let body = if warnings.is_empty() { view } else { below_heading };
@@ -189,16 +189,16 @@ pub fn interface(
     })
 }
 
-/// Runs an interface for the few passes it takes to settle, and draws it on the CPU.
+/// Lays out an interface in a few passes until its layout is final, and draws it on the CPU.
 pub fn draw_without_window(
     size_px: [usize; 2],
     scale: f32,
     look: Look,
     mut interface: impl FnMut(&mut Ui),
 ) -> ColorImage {
-    /// Plots know their bounds in the second pass; the third draws what the second laid out.
+    /// Number of passes: plots have their bounds in the second pass, and the third pass draws the final layout.
     const PASSES: usize = 3;
-    /// Width and height of a texture, pixels, at most: those of the largest picture.
+    /// Largest width and height of a texture, pixels: the same as of the largest picture.
     const MOST_TEXTURE_PX: usize = 8192;
     let context = Context::default();
     style::apply(&context, look);

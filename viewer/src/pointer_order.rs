@@ -1,27 +1,27 @@
-//! The order of clicks and keys, kept when a picture comes late.
+//! Ordering of clicks and keys for late pictures.
 //!
-//! A window that was busy gets all that happened meanwhile with one picture, and a widget is then told the last position of the
-//! pointer only: a slider that was let go, and a pointer that moved on after that, would leave the slider where the pointer is.
-//! Here a picture gets the events up to the next press or release, and the pictures after it get the rest: what was typed after a
-//! click goes to the field that was clicked. Only the keys of an emergency stop do not wait.
+//! A window that was busy gets all events since the last picture at once, and a widget then sees only the last position of the
+//! pointer: if the pointer moves on after the release of a slider, the slider would follow the pointer.
+//! This module passes each picture the events up to the next press or release, and the rest to later pictures: text typed after a
+//! click goes to the clicked field. Only the keys of an emergency stop are passed at once.
 
 use crate::experiment::StopKey;
 use egui::{Event, Key, RawInput};
 use std::collections::VecDeque;
 
-/// Every key that may be the emergency stop.
+/// Keys that may be the emergency stop.
 const STOP_KEYS: [Key; 3] = [StopKey::Escape.key(), StopKey::Space.key(), StopKey::F12.key()];
 
-/// Splits the input of a late picture at presses and releases.
+/// Splitter for the input of a late picture, at presses and releases.
 #[derive(Debug, Default)]
 pub struct PointerOrder {
-    /// What the pictures to come will be told, in order.
+    /// Events for later pictures, in order.
     waiting: VecDeque<Event>,
 }
 
 impl PointerOrder {
-    /// Keeps in the input of a picture the events up to the next press or release; true if more wait, for which another picture
-    /// should be made at once.
+    /// Limits the input of a picture to the events up to the next press or release; returns true if more events are pending and another
+    /// picture should be made at once.
     pub fn split(&mut self, input: &mut RawInput) -> bool {
         let arrived = std::mem::take(&mut input.events);
         let (ordered, others): (Vec<_>, Vec<_>) = arrived.into_iter().partition(is_in_order);
@@ -38,7 +38,7 @@ impl PointerOrder {
     }
 }
 
-/// Whether an event keeps its place among the clicks.
+/// Returns whether an event must keep its order relative to clicks.
 fn is_in_order(event: &Event) -> bool {
     match event {
         Event::Key { key, .. } => !STOP_KEYS.contains(key),

@@ -1,8 +1,8 @@
-//! What a person has chosen about the window, from one time to the next: a small file of their own.
+//! Saved settings of the window, in a small file of the user.
 //!
-//! It lies where programs keep such things (`$XDG_CONFIG_HOME/flotor/viewer.toml`, else `~/.config/flotor/viewer.toml`; `%APPDATA%` on Windows). A file
-//! that is missing, damaged or of another version costs the choices in it and nothing else. Pictures without a window and
-//! sittings do not read it: they look the same for everybody.
+//! Path: `$XDG_CONFIG_HOME/flotor/viewer.toml`, else `~/.config/flotor/viewer.toml`; below `%APPDATA%` on Windows. If the file
+//! is missing, damaged or of another version, the defaults apply. Pictures without a window and
+//! sittings do not read the file: they look the same for all users.
 
 use crate::palette::Look;
 use crate::platform::settings_folder;
@@ -11,27 +11,27 @@ use flotor_history::quantity::{Quantity, Units};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The choices.
+/// Settings of the window that a user can change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Remembered {
-    /// Light or dark.
+    /// Colour scheme.
     pub look: Look,
     /// Units of all numbers.
     pub units: Units,
-    /// Traces shown.
+    /// Shown traces.
     pub traces: Vec<Quantity>,
-    /// Whether the panel is to be in sight; not chosen: where there is room for it.
+    /// True to show the panel; `None`: depends on the width of the window.
     pub shows_panel: Option<bool>,
-    /// Its width, points.
+    /// Width of the panel, points.
     pub side_pt: f32,
-    /// Part of the height that the 3D view gets; not chosen: as the window is high.
+    /// Fraction of the height for the 3D view; `None`: depends on the height of the window.
     pub view_part: Option<f32>,
     /// Width and height of the window, points without the zoom.
     pub size_pt: [f32; 2],
-    /// Size of text and lines: pixels per point over those of the display.
+    /// Size of text and lines, as a factor on the pixels per point of the display.
     pub zoom: f32,
-    /// The recordings opened last, the newest first.
+    /// Recordings opened last, the newest first.
     pub latest: Vec<PathBuf>,
 }
 
@@ -52,18 +52,18 @@ impl Default for Remembered {
 }
 
 impl Remembered {
-    /// Where it is kept; none where there is no home.
+    /// Returns the path of the settings file; `None` without a settings folder.
     #[must_use]
     pub fn file() -> Option<PathBuf> {
         settings_folder().map(|folder| folder.join("flotor").join("viewer.toml"))
     }
 
-    /// What was chosen the last time; what cannot be read is as if nothing was chosen.
+    /// Reads the settings; returns the defaults if the file is missing or invalid.
     #[must_use]
     pub fn load(file: &Path) -> Self {
         let text = std::fs::read_to_string(file).unwrap_or_default();
         let mut found: Self = toml::from_str(&text).unwrap_or_default();
-        // No window smaller than it can be used, none that is all text.
+        // The window must have a usable size, and the text must fit into it.
         found.size_pt =
             found.size_pt.map(|length| if length.is_finite() { length.clamp(480.0, 8192.0) } else { 800.0 });
         found.view_part = found.view_part.filter(|part| part.is_finite());
@@ -71,14 +71,14 @@ impl Remembered {
         found
     }
 
-    /// Keeps it for the next time.
+    /// Saves the settings.
     ///
     /// # Errors
-    /// What the system said.
+    /// If the folder or the file cannot be written.
     pub fn save(&self, file: &Path) -> std::io::Result<()> {
         let text = toml::to_string(self).map_err(std::io::Error::other)?;
         file.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-        // As a whole or not at all: another window may read it just now.
+        // Replace the file atomically: another window may be reading it.
         let new = file.with_extension("new");
         std::fs::write(&new, text)?;
         std::fs::rename(&new, file)

@@ -1,4 +1,4 @@
-//! The 3D scene: bodies at the pose of the handle, on a ground, with what the hand feels as arrows.
+//! 3D scene: bodies at the pose of the handle, on a ground, with force and torque on the hand as arrows.
 
 use crate::palette::{Palette, strain_color};
 use crate::shape::{Posed, Rest, Shape};
@@ -13,25 +13,25 @@ use flotor_drawing::placing::{Placing, round_below};
 use flotor_hal::{DVec3, Part, Pose, Primitive, ScalarField, Wrench};
 use flotor_history::Sample;
 
-/// Lengths of arrows.
+/// Scale of force and torque arrows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArrowScale {
-    /// Force whose arrow is as long as the body, N.
+    /// Force with an arrow as long as the body, N.
     pub force_n: f64,
-    /// Torque whose arrow goes three quarters around, N·m.
+    /// Torque with an arrow of a 3/4 turn, N·m.
     pub torque_nm: f64,
 }
 
 impl ArrowScale {
-    /// So that the largest of some samples fill their arrows.
+    /// Returns the scale at which the largest force and torque of the samples have full arrows.
     #[must_use]
     pub fn fitting<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
-        /// What is smaller than this is shown small.
+        /// Smallest scale: smaller forces and torques have short arrows.
         const LEAST: ArrowScale = ArrowScale { force_n: FULL_FORCE * 1.0e-3, torque_nm: 1.0e-5 };
         samples.fold(LEAST, |scale, sample| scale.with(sample))
     }
 
-    /// So that one more sample fits.
+    /// Returns the scale enlarged to fit one more sample.
     #[must_use]
     pub fn with(self, sample: &Sample) -> Self {
         Self {
@@ -40,125 +40,125 @@ impl ArrowScale {
         }
     }
 
-    /// Scaled for this largest force, N, if it is chosen: arrows of several pictures can then be compared.
+    /// Returns the scale for a chosen largest force, N, if any: the arrows of several pictures are then comparable.
     #[must_use]
     pub fn with_chosen(self, force_n: Option<f64>) -> Self {
         Self { force_n: force_n.map_or(self.force_n, |force_n| FULL_FORCE * force_n), ..self }
     }
 
-    /// So that both fit.
+    /// Returns the larger of both scales.
     #[must_use]
     pub fn larger(self, other: Self) -> Self {
         Self { force_n: self.force_n.max(other.force_n), torque_nm: self.torque_nm.max(other.torque_nm) }
     }
 }
 
-/// The largest force has an arrow so much shorter than the body: at rest, too, its tip is in sight of the experimenter's view.
+/// Ratio of the body height to the arrow of the largest force: the tip is visible in the default view, also at rest.
 const FULL_FORCE: f64 = 3.6;
 
-/// What a scene shows of a moment.
+/// Data of a scene at one time.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
-    /// The sample of each device.
+    /// Sample of each device.
     pub samples: &'a [Sample],
-    /// The pose of each handle of a second recording in its device frame, drawn as a ball, seen through.
+    /// Pose of each handle of a second recording in its device frame, drawn as a translucent ball.
     pub compared: &'a [Option<Pose>],
 }
 
 impl<'a> Moment<'a> {
-    /// Shows samples without a second recording.
+    /// Creates the data from samples, without a second recording.
     #[must_use]
     pub const fn of(samples: &'a [Sample]) -> Self {
         Self { samples, compared: &[] }
     }
 }
 
-/// A scene being put together; keeps its memory from frame to frame.
+/// Builder of a scene; its buffers are reused from frame to frame.
 #[derive(Default)]
 pub struct SceneBuilder {
     mesh: Mesh,
-    /// What the mesh begins with, made once: it stands still.
+    /// Static ground at the start of the mesh, built once.
     ground: Option<Ground>,
-    /// The mesh with the ground and nothing else: so many corners, so many indices.
+    /// Number of corners and of indices of the ground in the mesh.
     bare: [usize; 2],
     corners_made: u64,
-    /// Largest number of a surface so far: the end of its scale.
+    /// Largest value of a surface so far: the end of the colour scale.
     largest: f64,
 }
 
-/// What a scene shows beside the picture.
+/// Facts about a scene, for legends and warnings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SceneFacts {
-    /// What colours mean; nothing without.
+    /// Meaning of the colours; `None` without a scale.
     pub scale: Option<ColorScale>,
-    /// Largest number shown, as part of the scale.
+    /// Largest value shown, as a fraction of the scale.
     pub peak_part: f64,
-    /// True where turns of a coil touch.
+    /// True if turns of a coil touch.
     pub touching: bool,
     /// True if a body is off its seat.
     pub lifted: bool,
     /// True if a model had no shape at this pose.
     pub no_shape: bool,
-    /// Where the devices stand.
+    /// Places of the devices.
     pub placing: Placing,
-    /// Distance of the lines of the ground, m, and its height.
+    /// Distance between the grid lines of the ground, m.
     pub grid_m: f64,
     /// Height of the lower end of the bodies, m.
     pub foot_m: f64,
     /// Axes of the device frame in the frame of the picture.
     pub axes: [DVec3; 3],
-    /// How long arrows are; none where none are drawn.
+    /// Scale of the arrows; `None` without arrows.
     pub arrows: Option<ArrowKey>,
-    /// The deepest contact of a handle with a body of simple form, m; none without a contact, and where no arrows are drawn.
+    /// Depth of the deepest contact of a handle with a primitive body, m; `None` without a contact or without arrows.
     pub contact_depth_m: Option<f64>,
 }
 
-/// How long arrows are.
+/// Scale of the arrows, for the legend.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArrowKey {
-    /// Length of the arrow of a newton, mm.
+    /// Length of an arrow per force, mm/N.
     pub mm_per_n: f64,
-    /// The largest force so far, N.
+    /// Largest force so far, or the chosen force, N.
     pub full_force_n: f64,
-    /// Torque whose arrow goes three quarters around, N·m.
+    /// Torque with an arrow of a 3/4 turn, N·m.
     pub torque_nm: f64,
 }
 
-/// What the colours of a body mean.
+/// Meaning of the colours of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColorScale {
     /// Strain of a slender body.
     Strain,
-    /// Numbers of a surface, from 0 to the largest so far.
+    /// Values of a surface, from 0 to the largest so far.
     Field(ScalarField, f64),
 }
 
-/// Strain at the end of the scale for a body whose turns cannot touch.
+/// Strain at the end of the scale, for a body without turns that can touch.
 const FULL_STRAIN: f64 = 0.5;
-/// Thickness of plates, part of their radius.
+/// Thickness of plates, as a fraction of the radius.
 const PLATE_THICKNESS: f64 = 0.16;
-/// How far plates reach beyond the outer edge of the coil.
+/// Ratio of the drawn to the specified radius of plates, so that plates reach beyond the outer edge of the coil.
 const PLATE_OVERHANG: f64 = 1.18;
-/// Depth of a handle without a body below its home, part of the height of the scene.
+/// Depth below home of the lower end of a handle without a body, as a fraction of the scene height.
 const BARE_DEPTH: f64 = 0.3;
-/// Height of a scene without any body, m: a hand's breadth.
+/// Height of a scene without any body, m.
 const EMPTY_HEIGHT_M: f64 = 0.025;
 
 impl SceneBuilder {
-    /// Height of what is drawn, mm: the tallest body, or a stand-in.
+    /// Returns the height of the scene, mm: of the tallest body, or a default.
     #[must_use]
     pub fn height_mm(shapes: &[Shape]) -> f64 {
         let tallest = shapes.iter().map(Shape::height_m).fold(0.0, f64::max);
         MM_PER_M * if tallest > 0.0 { tallest } else { EMPTY_HEIGHT_M }
     }
 
-    /// Corners of triangles put together so far.
+    /// Returns the number of corners built so far, without the ground.
     #[must_use]
     pub fn corners_made(&self) -> u64 {
         self.corners_made
     }
 
-    /// Returns the extent of the bodies of so many devices.
+    /// Returns the extent of the bodies side by side, for this number of devices.
     #[must_use]
     pub fn extent(shapes: &[Shape], devices: usize) -> Extent {
         let height_mm = Self::height_mm(shapes);
@@ -167,8 +167,8 @@ impl SceneBuilder {
         Extent { height_mm, width_mm: MM_PER_M * placing.width_m() }
     }
 
-    /// Puts together the scene at a moment, seen at a height of so many pixels.
-    #[allow(clippy::too_many_arguments)] // one call site for each, and no two belong together
+    /// Builds the scene at one time, for a picture of this height in pixels.
+    #[allow(clippy::too_many_arguments)] // independent arguments with a single call site
     pub fn build(
         &mut self,
         shapes: &mut [Shape],
@@ -211,7 +211,7 @@ impl SceneBuilder {
                     .map(|shadow| Shadow { center_m: shadow.center_m + place_m.truncate(), ..shadow }),
             );
             let start = self.mesh.vertices.len();
-            // Before the bodies that are seen through.
+            // Before the translucent bodies.
             compared.iter().for_each(|pose| self.compared_handle(*pose, palette, height_m));
             self.bodies(shapes, (device, sample), palette, pixels_per_mm, &mut facts);
             if shows_arrows {
@@ -224,7 +224,7 @@ impl SceneBuilder {
         (&self.mesh, facts)
     }
 
-    /// Adds the bodies at a device.
+    /// Adds the bodies, tools and contacts of one device.
     fn bodies(
         &mut self,
         shapes: &mut [Shape],
@@ -268,7 +268,7 @@ impl SceneBuilder {
         if posed.is_empty() {
             self.bare_handle(&sample.pose, palette, 0.25 * height_m);
         }
-        // What is seen through comes after what is behind it: tools after surfaces, bodies that a handle enters after tools.
+        // Translucent parts come after the parts behind them: tools after surfaces, bodies that a handle enters after tools.
         let solids = || {
             drawn().filter_map(|(_, posed)| if let Posed::Solid(solid) = posed { Some(solid) } else { None })
         };
@@ -287,7 +287,7 @@ impl SceneBuilder {
                 facts.contact_depth_m = Some(deepest_m);
             }
         }
-        // Where a lifted body stood: its lower plate, seen through.
+        // Mark the seat of a lifted body by a translucent lower plate.
         for (shape, posed) in drawn() {
             if let (Rest::Slender(body), Posed::Slender { curve, .. }) = (shape.rest(), posed)
                 && is_lifted(body, curve)
@@ -302,7 +302,7 @@ impl SceneBuilder {
         }
     }
 
-    /// Moves what was added from a corner on.
+    /// Moves all corners from an index on.
     fn shift(&mut self, from: usize, by_m: DVec3) {
         if by_m == DVec3::ZERO {
             return;
@@ -313,7 +313,7 @@ impl SceneBuilder {
         }
     }
 
-    /// Leaves nothing in the mesh but the ground.
+    /// Resets the mesh to the ground.
     fn begin(&mut self, ground: Ground) {
         if self.ground != Some(ground) {
             self.mesh.clear();
@@ -330,7 +330,7 @@ impl SceneBuilder {
         of_part.for_each(|primitive| append_primitive(&mut self.mesh, primitive, color));
     }
 
-    /// Adds a surface; gives the largest part of its scale in it.
+    /// Adds a surface; returns its largest value as a fraction of the scale.
     fn surface(&mut self, solid: &flotor_hal::Shape, palette: &Palette) -> f64 {
         let most = solid.surface.vertices.iter().map(|vertex| vertex.value.abs()).fold(0.0, f64::max);
         self.largest = self.largest.max(most);
@@ -339,15 +339,15 @@ impl SceneBuilder {
         most / largest
     }
 
-    /// Without a body to draw, the handle is a disc.
+    /// Adds the handle of a device without a body, as a disc.
     fn bare_handle(&mut self, pose: &Pose, palette: &Palette, radius_m: f64) {
         let section = Section { center_m: pose.position(), orientation: pose.orientation() };
         plate(&mut self.mesh, &section, radius_m, PLATE_THICKNESS * radius_m, 1.0, palette.plates[0]);
     }
 
-    /// Adds the handle of a second recording: a ball, seen through.
+    /// Adds the handle of a second recording as a translucent ball.
     fn compared_handle(&mut self, pose: Pose, palette: &Palette, height_m: f64) {
-        /// Radius, part of the height of the scene.
+        /// Radius, as a fraction of the scene height.
         const RADIUS: f64 = 0.06;
         let ball = Primitive::sphere(Part::Tool, pose, RADIUS * height_m);
         append_primitive(&mut self.mesh, &ball, with_opacity(palette.plates[1], SEEN_THROUGH));
@@ -379,14 +379,14 @@ impl SceneBuilder {
     }
 }
 
-/// How much of what is behind it a body hides that is seen through, of 255.
+/// Opacity of translucent bodies, of 255.
 const SEEN_THROUGH: u8 = 130;
 
 fn with_opacity([r, g, b, _]: Color, opacity: u8) -> Color {
     [r, g, b, opacity]
 }
 
-/// Colour of a part of the scale of a surface: that of the body at 0, that of the scale from a tenth on.
+/// Returns the colour of a surface at a fraction of the scale: the body's colour at 0, blended into the scale's colour at 0.1.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between two bytes
 pub fn field_color(part: f64, palette: &Palette) -> Color {
@@ -398,7 +398,7 @@ pub fn field_color(part: f64, palette: &Palette) -> Color {
     })
 }
 
-/// The ground so far beneath home, of a scene so high.
+/// Returns the ground for a scene of this height and depth beneath home.
 fn ground(palette: &Palette, height_m: f64, depth_m: f64) -> Ground {
     Ground {
         height_m: -depth_m,
@@ -409,7 +409,7 @@ fn ground(palette: &Palette, height_m: f64, depth_m: f64) -> Ground {
     }
 }
 
-/// The shadows of the fixed plate, of the one at the handle, and of what is between them.
+/// Returns the shadows of the fixed plate, of the plate at the handle, and of the body between them.
 fn shadows(ground: &Ground, palette: &Palette, plate_radius_m: f64, handle_m: DVec3) -> [Shadow; 3] {
     let fall = light::KEY / light::KEY.z;
     let of_plate = handle_m - fall * (handle_m.z - ground.height_m);
@@ -421,35 +421,35 @@ fn shadows(ground: &Ground, palette: &Palette, plate_radius_m: f64, handle_m: DV
     [shadow(DVec3::ZERO, 1.3, 0.8), shadow(of_plate, 1.1, 0.7), shadow(0.5 * of_plate, 1.3, 0.4)]
 }
 
-/// Handle and wrench in the frame in which the scene is drawn: that of the first model, else the device's.
+/// Returns handle and wrench in the frame of the scene: the frame of the first model, else of the device.
 fn in_scene_frame(first: Option<&Shape>, sample: &Sample) -> (Pose, Wrench) {
     let (force_n, torque_nm) = (sample.force_n(), sample.torque_nm());
     let Some(mapping) = first.map(Shape::mapping) else {
         return (sample.pose, Wrench::new(force_n, torque_nm));
     };
-    // Only the direction turns: an arrow shows what the hand feels, not what the model says.
+    // Only the direction turns: an arrow shows the wrench on the hand, not the wrench of the model.
     let turn = mapping.rotation();
     (mapping.pose_to_model(&sample.pose), Wrench::new(turn * force_n, turn * torque_nm))
 }
 
-/// Where the handle of a device with this first shape is in the scene, before the device is placed, m.
+/// Returns the position of a device's handle in the frame of the scene, before the device is placed, m.
 #[must_use]
 pub fn handle_m(first: Option<&Shape>, sample: &Sample) -> DVec3 {
     in_scene_frame(first, sample).0.position()
 }
 
-/// The largest radius of what bodies stand on, m.
+/// Returns the largest footprint radius of the bodies, m.
 fn plates_m(shapes: &[Shape], height_m: f64) -> f64 {
     shapes.iter().map(|shape| footprint_m(shape.rest())).fold(0.25 * height_m, f64::max)
 }
 
-/// Axes of the device frame in the frame in which the scene is drawn.
+/// Returns the axes of the device frame in the frame of the scene.
 fn axes(first: Option<&Shape>) -> [DVec3; 3] {
     let turn = first.map(|shape| shape.mapping().rotation());
     [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| turn.map_or(axis, |turn| turn * axis))
 }
 
-/// Radius of what a body stands on, m.
+/// Returns the footprint radius of a body, m.
 fn footprint_m(rest: &Rest) -> f64 {
     match rest {
         Rest::Slender(body) => plate_radius_m(body),
@@ -461,9 +461,9 @@ fn plate_radius_m(body: &Body) -> f64 {
     PLATE_OVERHANG * body.info.plate_radius_m
 }
 
-/// Whether the lower plate of a body hangs above where it stands at rest: no point of its rim reaches down to there.
+/// Returns whether the lower plate of a body is off its seat: no point of the rim reaches down to the seat.
 fn is_lifted(body: &Body, curve: &Curve) -> bool {
-    /// What is less is not seen, in radii.
+    /// Smallest visible distance, in radii.
     const LEAST: f64 = 0.02;
     let radius_m = body.info.plate_radius_m;
     let (now, rest) = (curve.section(0.0), body.rest.section(0.0));
@@ -473,7 +473,7 @@ fn is_lifted(body: &Body, curve: &Curve) -> bool {
     radius_m > 0.0 && lowest_m > LEAST * radius_m
 }
 
-/// Adds a body with its plates; gives the largest part of the scale of strain in it.
+/// Adds a body with its plates; returns the largest strain as a fraction of the scale.
 fn body_of(
     mesh: &mut Mesh,
     body: &Body,
@@ -506,7 +506,7 @@ fn body_of(
     peak
 }
 
-/// Places along a body where its strain is looked at for the readout.
+/// Number of intervals along a body at which the strain is evaluated for the legend.
 const SCALE_PROBES: i32 = 32;
 
 #[cfg(test)]

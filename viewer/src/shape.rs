@@ -1,8 +1,8 @@
-//! Shapes of the models of a run, from instances of the viewer's own.
+//! Shapes of the models of a run, computed by the viewer's own model instances.
 //!
-//! The viewer loads the plugins a run names and asks them where their bodies are (extensions
-//! `flotor.centerline/1` and `flotor.shape/1`). The servo never computes a shape, and a recording holds none: 65 sections at 60 Hz would
-//! double it, and nothing but the recorded parameters could be shown (docs/src/adr/0008-viewer-process.md).
+//! The viewer loads the plugins of a run and queries their shapes (extensions
+//! `flotor.centerline/1` and `flotor.shape/1`). The servo never computes a shape, and a recording contains none: 65 sections at 60 Hz would
+//! double its size, and only the recorded parameters could be shown (docs/src/adr/0008-viewer-process.md).
 
 use flotor_core::mapping::Mapping;
 use flotor_drawing::geometry::{Body, Curve, Strain};
@@ -12,7 +12,7 @@ use flotor_hal::{DVec3, Form, Input, Pose};
 use flotor_record::{PluginDescription, Role, RunDescription};
 use std::path::{Path, PathBuf};
 
-/// A model that can be drawn.
+/// Drawable model, with the viewer's own instance.
 pub struct Shape {
     name: String,
     device: usize,
@@ -21,26 +21,26 @@ pub struct Shape {
     rest: Rest,
 }
 
-/// What is known of a model's body at rest.
+/// Body of a model at rest.
 #[derive(Clone, Debug)]
 pub enum Rest {
-    /// A centreline.
+    /// Slender body with a centreline.
     Slender(Body),
-    /// Anything else.
+    /// Any other body, with its extent.
     Solid(Extent),
 }
 
-/// How much room a body at rest takes, m.
+/// Extent of a body at rest, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extent {
-    /// How far it reaches below home.
+    /// Extent below home.
     pub below_m: f64,
-    /// How far it reaches from the vertical axis through home.
+    /// Radius about the vertical axis through home.
     pub beside_m: f64,
 }
 
 impl Extent {
-    /// Of a shape.
+    /// Returns the extent of a shape.
     #[must_use]
     pub fn of(shape: &flotor_hal::Shape) -> Self {
         let corners = shape.surface.vertices.iter().map(|vertex| DVec3::from_array(vertex.position_m));
@@ -60,46 +60,46 @@ impl Extent {
     }
 }
 
-/// A body at one pose of the handle.
+/// Body at one pose of the handle.
 #[derive(Clone, Debug)]
 pub enum Posed {
-    /// A slender one.
+    /// Slender body.
     Slender {
-        /// Its centreline.
+        /// Centreline.
         curve: Curve,
-        /// How it is strained against rest.
+        /// Strain relative to the body at rest.
         strain: Strain,
     },
-    /// Any other.
+    /// Any other body.
     Solid(flotor_hal::Shape),
 }
 
-/// Why a model is not drawn.
+/// Reason why a model is not drawn.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShapeError {
-    /// Nobody told where its plugin is.
+    /// The plugin file of the model is unknown.
     #[error("the plugin `{id}` of model `{name}` is not here; FLOTOR_PLUGIN_PATH adds folders")]
     NoPlugin {
-        /// What the scene calls the model.
+        /// Name of the model in the scene.
         name: String,
         /// Id of the plugin.
         id: String,
     },
-    /// The plugin was refused, or says no.
+    /// The plugin cannot be loaded, or refuses the settings.
     #[error(transparent)]
     Refused(#[from] LoadError),
-    /// A recorded setting is none of this plugin's.
+    /// A recorded setting does not fit the plugin.
     #[error("model `{name}`: {problem}; the recording was made with another version of the plugin")]
     Setting {
-        /// What the scene calls the model.
+        /// Name of the model in the scene.
         name: String,
-        /// What is wrong.
+        /// Description of the problem.
         problem: String,
     },
 }
 
-/// Makes everything of a run that has a shape; the rest is reported as text. Not real-time.
+/// Creates the shapes of a run's models, with an error for each model that cannot be drawn. Not real-time.
 #[must_use]
 pub fn shapes_of(run: &RunDescription, plugin_files: &[PathBuf]) -> (Vec<Shape>, Vec<ShapeError>) {
     let (mut shapes, mut errors) = (Vec::new(), Vec::new());
@@ -113,13 +113,13 @@ pub fn shapes_of(run: &RunDescription, plugin_files: &[PathBuf]) -> (Vec<Shape>,
     (shapes, errors)
 }
 
-/// The one of some plugin files that has an id; runs no code.
+/// Returns the plugin file with this id; runs no plugin code.
 #[must_use]
 pub fn file_of<'a>(plugin_files: &'a [PathBuf], id: &str) -> Option<&'a PathBuf> {
     plugin_files.iter().find(|file| read_metadata(file).is_ok_and(|metadata| metadata.id == id))
 }
 
-/// Loads a plugin file; runs its code.
+/// Loads a plugin file; runs plugin code.
 ///
 /// # Errors
 /// [`LoadError`], with file, cause and remedy.
@@ -131,7 +131,7 @@ pub fn load_file(file: &Path) -> Result<Plugin, LoadError> {
 }
 
 impl Shape {
-    /// The shape of a model of a run; none if it has none.
+    /// Loads the shape of a model of a run; `None` if the model has no shape.
     fn load(
         description: &PluginDescription,
         mapping: Mapping,
@@ -150,28 +150,28 @@ impl Shape {
         Ok(Some(Self { name: name.clone(), device: usize::from(description.device), model, mapping, rest }))
     }
 
-    /// What the scene calls the model.
+    /// Returns the name of the model in the scene.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Number of the device it is on.
+    /// Returns the number of the model's device.
     #[must_use]
     pub fn device(&self) -> usize {
         self.device
     }
 
-    /// The body at rest.
+    /// Returns the body at rest.
     #[must_use]
     pub fn rest(&self) -> &Rest {
         &self.rest
     }
 
-    /// How far beneath home the ground of this body is, m.
+    /// Returns the depth of the ground beneath home for this body, m.
     #[must_use]
     pub fn ground_m(&self) -> f64 {
-        /// A flat body stands so high above the ground, in radii.
+        /// Height of a flat body above the ground, in radii.
         const FLAT: f64 = 0.8;
         match &self.rest {
             Rest::Slender(body) => body.rest_length_m,
@@ -179,10 +179,10 @@ impl Shape {
         }
     }
 
-    /// Height of a slender body that fills a picture as this one does, m.
+    /// Returns the height for framing the body in a picture, m; for a wide body more than its own height.
     #[must_use]
     pub fn height_m(&self) -> f64 {
-        /// A wide body needs more room.
+        /// Ratio of the framing height to the depth of the ground, for a wide body.
         const WIDE: f64 = 1.3;
         match &self.rest {
             Rest::Slender(body) => body.rest_length_m,
@@ -190,13 +190,13 @@ impl Shape {
         }
     }
 
-    /// Way from the device's frame to the model's.
+    /// Returns the mapping from the device frame to the model frame.
     #[must_use]
     pub fn mapping(&self) -> &Mapping {
         &self.mapping
     }
 
-    /// Changes a live parameter of the viewer's instance; the drawn shape follows.
+    /// Sets a live parameter of the viewer's instance and updates the body at rest.
     pub fn set_parameter(&mut self, key: &str, number: f64) {
         if let Ok(setting) = Setting::number(self.model.parameters(), key, number) {
             self.model.set_parameter(setting.index(), setting.value());
@@ -206,17 +206,17 @@ impl Shape {
         }
     }
 
-    /// The value in force of a parameter of the viewer's instance; `None` for what is no number.
+    /// Returns the value of a parameter of the viewer's instance; `None` if not a number.
     #[must_use]
     pub fn parameter(&mut self, index: usize) -> Option<f64> {
         let number = self.model.parameter(index);
         number.is_finite().then_some(number)
     }
 
-    /// Whether a parameter may be set: one that refuses the value it has follows from others, or has no effect.
+    /// Checks that a parameter can be set: a parameter that refuses its own value follows from others, or has no effect.
     ///
     /// # Errors
-    /// What the plugin says.
+    /// The plugin's message, if the parameter cannot be set.
     pub fn accepts_its_own(&mut self, index: usize) -> Result<(), String> {
         let Some(number) = self.parameter(index) else { return Err("it is no number".to_owned()) };
         match self.model.set_parameter(index, number) {
@@ -225,7 +225,7 @@ impl Shape {
         }
     }
 
-    /// The body with the handle at a pose in the device frame; `None` where the model has no shape.
+    /// Computes the body with the handle at a pose in the device frame; `None` if the model has no shape there.
     #[must_use]
     pub fn at(&mut self, handle: &Pose) -> Option<Posed> {
         let input = Input::at_rest(self.mapping.pose_to_model(handle));
@@ -241,13 +241,13 @@ impl Shape {
     }
 }
 
-/// The body of a model at rest, if it has a shape.
+/// Computes the body of a model at rest; `None` if the model has no shape.
 fn rest(model: &mut Model) -> Option<Rest> {
     let home = Input::at_rest(Pose::HOME);
     if model.has_shape() {
         return model.shape(&home).ok().map(|shape| Rest::Solid(Extent::of(&shape)));
     }
-    /// Sections asked for: as many as the model suggests, within what can be drawn well.
+    /// Range for the number of sections: the model's suggestion, within limits for good pictures.
     const SECTIONS: std::ops::RangeInclusive<u32> = 17..=1025;
     let mut shape = model.centerline()?;
     let mut info = shape.info()?;

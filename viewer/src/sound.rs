@@ -1,22 +1,22 @@
-//! A warning for the ear, where there is one.
+//! Acoustic warning.
 //!
-//! Programs that play sound are part of every desktop, and a library for it would bring C and packages of the system into
-//! the build: a short tone goes to the first such program there is, else a bell to the terminal. The tone has three
-//! partials far apart, which are heard through white noise in headphones, and it is never louder than once a second.
+//! Programs that play sound are part of every desktop, and a sound library would bring C and packages of the system into
+//! the build. A short tone goes to the first such program found, else a bell to the terminal. The tone has three
+//! partials far apart, audible through white noise in headphones, and sounds at most once a second.
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Programs that play a WAV file from standard input, and how to ask them to.
+/// Programs that play a WAV file from standard input, with their arguments.
 const PLAYERS: [(&str, &[&str]); 3] = [("pw-play", &["-"]), ("paplay", &[]), ("aplay", &["-q", "-"])];
-/// Between two tones.
+/// Smallest interval between two tones.
 const QUIET: Duration = Duration::from_secs(1);
 const RATE_HZ: u32 = 48_000;
 const LENGTH_S: f64 = 0.18;
 
-/// Rings at most once a second.
+/// Bell that rings at most once a second.
 #[derive(Debug, Default)]
 pub struct Bell {
     last: Option<Instant>,
@@ -24,7 +24,7 @@ pub struct Bell {
 }
 
 impl Bell {
-    /// Rings, unless it has just rung.
+    /// Plays the tone, unless the last tone was less than a second ago.
     pub fn ring(&mut self) {
         if self.last.is_some_and(|last| last.elapsed() < QUIET) {
             return;
@@ -58,12 +58,12 @@ fn play(sound: &[u8]) -> Option<Child> {
     let mut command = Command::new(name);
     command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = command.spawn().ok()?;
-    // A pipe takes 64 KiB without a reader: nobody waits here.
+    // A pipe takes 64 KiB without a reader, so this write does not block.
     let _ = child.stdin.take()?.write_all(sound);
     Some(child)
 }
 
-/// A tone as a WAV file: 16-bit, one channel, 17 KB.
+/// Returns the tone as a WAV file: 16-bit, one channel, 17 KB.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // amplitudes below one, a fifth of a second
 fn tone() -> Vec<u8> {
     const PARTIALS_HZ: [f64; 3] = [880.0, 1760.0, 3520.0];
@@ -82,7 +82,7 @@ fn tone() -> Vec<u8> {
     wav.extend(16_u32.to_le_bytes());
     wav.extend([1_u16, 1].map(u16::to_le_bytes).concat()); // PCM, one channel
     wav.extend([RATE_HZ, 2 * RATE_HZ].map(u32::to_le_bytes).concat());
-    wav.extend([2_u16, 16].map(u16::to_le_bytes).concat()); // bytes of a sample, bits of it
+    wav.extend([2_u16, 16].map(u16::to_le_bytes).concat()); // bytes and bits per sample
     wav.extend(b"data");
     wav.extend(bytes.to_le_bytes());
     wav.extend((0..count).flat_map(|index| sample(index).to_le_bytes()));

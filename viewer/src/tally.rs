@@ -1,16 +1,16 @@
-//! What has happened in a run so far: counts of events, and the largest wrench.
+//! Tally of a run so far: counts of events, and the largest wrench.
 
 use crate::scene::ArrowScale;
 use flotor_core::trace::Events;
 use flotor_history::Sample;
 
-/// Counts since the beginning of what was seen.
+/// Counts of events since the first sample, and a scale of arrows for the largest wrench.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tally {
     counts: [u64; Events::NAMES.len()],
     scale: ArrowScale,
     since_s: Option<f64>,
-    /// Ticks that found no room on the way.
+    /// Number of dropped ticks.
     pub dropped: u64,
 }
 
@@ -22,7 +22,7 @@ impl Default for Tally {
 }
 
 impl Tally {
-    /// Of everything in a recording.
+    /// Counts all samples of a recording.
     #[must_use]
     pub fn of<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
         let mut tally = Self::default();
@@ -30,7 +30,7 @@ impl Tally {
         tally
     }
 
-    /// Takes a sample in.
+    /// Adds a sample.
     pub fn add(&mut self, sample: &Sample) {
         self.since_s.get_or_insert(sample.time_s());
         let bits = sample.events.bits();
@@ -40,19 +40,19 @@ impl Tally {
         self.scale = self.scale.with(sample);
     }
 
-    /// Ticks in which an event happened, by its bit.
+    /// Returns the number of ticks with each event, indexed by the event's bit.
     #[must_use]
     pub fn counts(&self) -> &[u64] {
         &self.counts
     }
 
-    /// Returns the time of the first sample, s: a window that opens during a run has not seen what was before.
+    /// Returns the time of the first sample, s: a window that opens during a run has no earlier samples.
     #[must_use]
     pub fn since_s(&self) -> f64 {
         self.since_s.unwrap_or(0.0)
     }
 
-    /// Lengths of arrows that fit everything seen.
+    /// Returns a scale of arrows that fits all samples.
     #[must_use]
     pub fn scale(&self) -> ArrowScale {
         self.scale

@@ -1,5 +1,5 @@
-//! A quantity over time in as few points as can be seen, kept from picture to picture: of a run that goes on, a picture looks
-//! at the samples that are new, and at no other.
+//! Trace of a quantity over time, decimated to visible points and kept from picture to picture: for a running host, each
+//! picture processes only the new samples.
 
 use egui_plot::PlotPoint;
 use flotor_history::History;
@@ -7,20 +7,20 @@ use flotor_history::decimate::{Buckets, bucket_width_s};
 use flotor_history::quantity::Quantity;
 use std::ops::Range;
 
-/// The traces of a quantity's components.
+/// Decimated traces of a quantity's components.
 #[derive(Clone, Debug)]
 pub struct Trace {
     quantity: Quantity,
     components: Vec<Buckets>,
     points: Vec<Vec<Vec<PlotPoint>>>,
-    /// Time of the last sample looked at, s.
+    /// Time of the last processed sample, s.
     last_s: Option<f64>,
     covered: Range<u64>,
     visited: u64,
 }
 
 impl Trace {
-    /// Of a quantity of which nothing has been seen.
+    /// Creates an empty trace of a quantity.
     #[must_use]
     pub fn of(quantity: Quantity) -> Self {
         let count = quantity.components().len();
@@ -34,20 +34,20 @@ impl Trace {
         }
     }
 
-    /// What is traced.
+    /// Returns the quantity of the trace.
     #[must_use]
     pub fn quantity(&self) -> Quantity {
         self.quantity
     }
 
-    /// Samples looked at so far.
+    /// Returns the number of samples processed so far.
     #[must_use]
     pub fn visited(&self) -> u64 {
         self.visited
     }
 
-    /// Points of each component between two times, at most two for each of so many `buckets`; values times `per_si`. A
-    /// component has a list for each stretch without a gap.
+    /// Returns the points of each component between two times, at most two for each of `buckets` buckets, with values times
+    /// `per_si`. A component has a list for each stretch without a gap.
     pub fn points(
         &mut self,
         history: &History,

@@ -1,4 +1,4 @@
-//! A real window: display, device, and what is said where there is none.
+//! Window on a display, and errors without a display or adapter.
 
 use crate::app::{Start, Viewer};
 use crate::chosen::Chosen;
@@ -15,33 +15,33 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
-/// Least width and height of a window, points: emergency stop, state, warnings and clock have room.
+/// Smallest width and height of a window, points: room for emergency stop, state, warnings and clock.
 const LEAST_SIZE_PT: [f32; 2] = [320.0, 200.0];
 
-/// Why there is no window.
+/// Error of a window.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WindowError {
-    /// Nowhere to open it.
+    /// There is no display.
     #[error(
         "no window: {0}; without a display, `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
     )]
     NoDisplay(String),
-    /// Nothing to draw it with.
+    /// There is no adapter for drawing.
     #[error(
         "no window: {0}; install a driver for your GPU, or `libegl1 libgl1-mesa-dri` for drawing on the processor; without \
          either, `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
     )]
     NoAdapter(String),
-    /// The window was there, and the display or the adapter is not any more.
+    /// The display or the adapter of an open window was lost.
     #[error("the window was lost: {0}; are the display and its driver still there?")]
     Lost(String),
-    /// A mistake of the program; its place in the source has been told.
+    /// The program panicked in an open window; the panic hook has printed the place in the source.
     #[error("the window broke: {0}; that should not happen: please report it, with what was done last")]
     Broken(String),
 }
 
-/// What a command line says about a window; what it does not say is as it was the last time.
+/// Options of a window; an option that is not given keeps its saved setting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, clap::Args)]
 pub struct WindowOptions {
     /// Light or dark (default: dark; a window: as the last time)
@@ -53,13 +53,13 @@ pub struct WindowOptions {
     /// Size of text and lines, 1 to 3 (default: 1; a window: as the last time)
     #[arg(long, value_parser = scale, value_name = "FACTOR", conflicts_with = "export")]
     pub scale: Option<f32>,
-    /// Say what the window costs over so many seconds, 1 to 3600, once it has opened, which may take up to half a minute more, and
-    /// close it then
+    /// Measure processor time and memory of the opened window over 1 to 3600 seconds, then close it; opening may take up to half
+    /// a minute more
     #[arg(long, value_parser = seconds, value_name = "SECONDS", conflicts_with_all = ["screenshot", "export", "sitting"])]
     pub measure: Option<Duration>,
 }
 
-/// `1280x800`
+/// Parses a size in pixels, such as `1280x800`.
 fn size(text: &str) -> Result<[usize; 2], String> {
     let wrong = || format!("`{text}` is no size; write 1280x800, each side 64 to 8192 pixels");
     let (width, height) = text.split_once('x').ok_or_else(wrong)?;
@@ -68,7 +68,7 @@ fn size(text: &str) -> Result<[usize; 2], String> {
     Ok([length(width)?, length(height)?])
 }
 
-/// `10`
+/// Parses a duration in seconds, such as `10`.
 fn seconds(text: &str) -> Result<Duration, String> {
     let wrong = || format!("`{text}` is no time to watch a window; it must be 1 to 3600 seconds");
     let seconds: f64 =
@@ -76,13 +76,13 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Ok(Duration::from_secs_f64(seconds))
 }
 
-/// `1.5`
+/// Parses a scale of text, such as `1.5`.
 fn scale(text: &str) -> Result<f32, String> {
     let wrong = || format!("`{text}` is no size of text; it must be 1 to 3");
     text.parse().ok().filter(|scale| (1.0..=3.0).contains(scale)).ok_or_else(wrong)
 }
 
-/// What is kept of a window: its choices, but those that a command line made and nobody has changed since.
+/// Returns the settings to save: the current settings, except options of the command line that the user has not changed since.
 fn for_the_next_time(
     mut now: Remembered,
     before: &Remembered,
@@ -107,12 +107,12 @@ fn for_the_next_time(
     now
 }
 
-/// Opens a window that shows what is chosen, and stays until it is closed; gives what it cost, if that was requested.
+/// Opens a window and blocks until it is closed; returns its cost, if `request` has a duration to measure.
 ///
 /// # Errors
 /// [`WindowError`].
 pub fn open(start: Start, chosen: Chosen, request: WindowOptions) -> Result<Option<Cost>, WindowError> {
-    // A sitting looks the same for everybody.
+    // A sitting looks the same for all users.
     let file = if matches!(start, Start::Sitting(..)) { None } else { Remembered::file() };
     let mut remembered = file.as_deref().map(Remembered::load).unwrap_or_default();
     let before = remembered.clone();
@@ -124,7 +124,7 @@ pub fn open(start: Start, chosen: Chosen, request: WindowOptions) -> Result<Opti
         .with_app_id("flotor-viewer")
         .with_inner_size(size)
         .with_min_inner_size(LEAST_SIZE_PT)
-        // In front of a subject there is nothing but the screen of the sitting.
+        // A subject sees only the screen of the sitting.
         .with_fullscreen(matches!(start, Start::Sitting(..)));
     let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
     let (tells, watched) = channel();
@@ -156,9 +156,9 @@ pub fn open(start: Start, chosen: Chosen, request: WindowOptions) -> Result<Opti
     Ok(watched.try_recv().ok())
 }
 
-/// Runs a window that says when it has opened, and tells how it ended. Libraries of the display that are missing are a panic of those
-/// who load them: until the window is open a panic means that there is none, and is one line; afterwards it is a mistake, told with
-/// its place as everywhere, whether it can be caught or not.
+/// Runs a window, which sets the flag when open, and converts its end to a result. Missing libraries of the display cause a panic in the
+/// crates that load them: until the window is open, a panic means that there is no display, and becomes one line; afterwards it is a bug,
+/// printed with its place by the previous hook, whether it can be caught or not.
 fn watched_over(run: impl FnOnce(&Arc<AtomicBool>) -> eframe::Result) -> Result<(), WindowError> {
     let opened = Arc::new(AtomicBool::new(false));
     let before = Arc::new(panic::take_hook());
@@ -184,23 +184,23 @@ fn watched_over(run: impl FnOnce(&Arc<AtomicBool>) -> eframe::Result) -> Result<
     }
 }
 
-/// What a panic said.
+/// Returns the message of a panic in one line.
 fn words_of(panic: &(dyn Any + Send), otherwise: &str) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     one_line(text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or(otherwise))
 }
 
-/// A window whose choices are kept whenever they change.
+/// Window that saves its settings whenever they change.
 struct Kept {
     viewer: Viewer,
     file: Option<PathBuf>,
     kept: Remembered,
-    /// What was chosen the last time, and what the command line said instead, for this time only.
+    /// Settings before this start, and the options of the command line, for this time only.
     before: Remembered,
     request: WindowOptions,
     chosen: Chosen,
     pointer: PointerOrder,
-    /// What is still to be watched, and who wants to know.
+    /// Pending measurement: its duration, and the channel for the result.
     measure: Option<(Duration, Sender<Cost>)>,
 }
 
@@ -212,14 +212,14 @@ impl eframe::App for Kept {
         self.viewer.show(ui);
         let Some(file) = &self.file else { return };
         let zoom = ui.ctx().zoom_factor();
-        // Larger text makes fewer points of the same window; it opens the next time before it has its zoom.
+        // In points without the zoom, because the next window opens before its zoom is set.
         let size_pt = ui.input(|input| input.viewport().inner_rect.map(|rect| (rect.size() * zoom).into()));
         let now =
             Remembered { size_pt: size_pt.unwrap_or(self.kept.size_pt), zoom, ..self.viewer.remembered() };
         let now = for_the_next_time(now, &self.before, self.request, &self.chosen);
-        // Not with every picture while something is pulled.
+        // Not with every picture during a drag.
         if now != self.kept && !ui.input(|input| input.pointer.any_down()) {
-            let _ = now.save(file); // a full disk costs the choices of the next time, and nothing now
+            let _ = now.save(file); // a full disk only loses the settings
             self.kept = now;
         }
     }
@@ -235,8 +235,8 @@ impl eframe::App for Kept {
     }
 }
 
-/// The first line of what a library says, without its full stop and without the place in its source: that helps nobody who has
-/// no display.
+/// Returns the first line of a library's message, without the full stop and without the place in the source, which is no help to users
+/// without a display.
 fn one_line(text: &str) -> String {
     let line = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("nothing can be opened");
     let words = match line.split_once(".rs:") {

@@ -1,4 +1,4 @@
-//! The board without hardware: the other end of a pseudo terminal, where the device finds an ordinary port.
+//! Simulated board: the other end of a pseudo terminal, which the device opens as an ordinary port.
 
 use crate::TIMEOUT;
 use crate::frame::{Decoder, FORCE, POSITION, encode};
@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// A board that rests at one position. Dropped, its cable is pulled.
+/// Simulated board at a constant position. Dropping it disconnects the cable.
 pub struct Board {
     force_mn: Arc<AtomicI64>,
     is_ending: Arc<AtomicBool>,
@@ -17,7 +17,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts it, and returns the port for the device.
+    /// Starts the board and returns it with the port for the device.
     pub fn start(position_um: i16) -> (Self, TTYPort) {
         let (mut ours, mut theirs) = TTYPort::pair().expect("the system has pseudo terminals");
         theirs.set_timeout(TIMEOUT).expect("a timeout");
@@ -28,7 +28,7 @@ impl Board {
             let (mut decoder, mut bytes) = (Decoder::new(FORCE), [0; 64]);
             while !ending.load(Ordering::Acquire) {
                 let _ = ours.write_all(&encode(POSITION, position_um));
-                // A read waits for a millisecond where there is nothing: the period of the board.
+                // A read without data times out after a millisecond: the period of the board.
                 let count = ours.read(&mut bytes).unwrap_or(0);
                 for force in bytes[..count].iter().filter_map(|byte| decoder.push(*byte)) {
                     heard.store(force.into(), Ordering::Release);
@@ -38,7 +38,7 @@ impl Board {
         (Self { force_mn, is_ending, thread: Some(thread) }, theirs)
     }
 
-    /// Waits until the last force that has come is this one.
+    /// Waits until the last received force equals `force_mn`.
     pub fn wait_for_force_mn(&self, force_mn: i64) {
         let started = Instant::now();
         while self.force_mn.load(Ordering::Acquire) != force_mn {

@@ -1,8 +1,8 @@
-//! What goes over the cable: frames of four bytes, each a letter, a number of 16 bits, and the sum of the three bytes before.
+//! Frames on the cable, four bytes each: type, 16-bit number (little-endian), and the sum of the three bytes before.
 
-/// From the board, a thousand times a second: position, µm.
+/// Type of a frame from the board, a thousand times a second: position, µm.
 pub const POSITION: u8 = b'P';
-/// To the board: force on the hand, mN.
+/// Type of a frame to the board: force on the hand, mN.
 pub const FORCE: u8 = b'F';
 pub const BYTES: usize = 4;
 
@@ -15,7 +15,7 @@ fn sum(bytes: [u8; 3]) -> u8 {
     bytes.into_iter().fold(0, u8::wrapping_add)
 }
 
-/// Finds frames of one kind in a stream of bytes, also after some were lost.
+/// Decoder of frames of one type in a stream of bytes, also after a loss of bytes.
 pub struct Decoder {
     kind: u8,
     last: [u8; BYTES],
@@ -26,7 +26,7 @@ impl Decoder {
         Self { kind, last: [0; BYTES] }
     }
 
-    /// The number of the frame that this byte completes.
+    /// Adds a byte and returns the number of the frame that it completes.
     pub fn push(&mut self, byte: u8) -> Option<i16> {
         let [_, kind, low, high] = self.last;
         self.last = [kind, low, high, byte];

@@ -1,4 +1,4 @@
-//! A knob behind a serial cable: it moves up and down and exerts a force. Its board sets the pace of the loop.
+//! Knob on a serial port that moves up and down and exerts a force. Its board sets the pace of the loop.
 
 #[cfg(test)]
 mod board;
@@ -19,12 +19,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 const BAUD: u32 = 1_000_000;
-/// How long a read or a write may wait. The reader looks this often whether it has to end.
+/// Timeout of a read or a write, after which the reader checks for its end.
 const TIMEOUT: Duration = Duration::from_millis(20);
-/// The board removes its force when it has heard nothing for this time, ns.
+/// Watchdog timeout of the board, ns: without frames the board removes its force.
 const BOARD_WATCHDOG_NS: u64 = 20_000_000;
 
-/// The knob, open: known, not energised.
+/// Open knob, not energised.
 struct Knob {
     port: TTYPort,
     is_stopped: Arc<AtomicBool>,
@@ -82,18 +82,18 @@ impl Knob {
     }
 }
 
-/// What stops the force if the host's process is killed: the board itself.
+/// Independent stop if the host's process is killed: the watchdog of the board.
 impl IndependentStopDevice for Knob {
     fn independent_stop(&self) -> IndependentStop {
         IndependentStop::by_itself(StoppedState::Zero, BOARD_WATCHDOG_NS)
     }
 }
 
-/// The knob, energised.
+/// Energised knob.
 struct ActiveKnob {
     knob: Knob,
     reader: Reader,
-    /// Number of the sample that the last `read` gave, and of the last one that a wait has told of.
+    /// Number of the last sample returned by `read`, and of the last sample reported by a wait.
     seen: u64,
     told: u64,
     z_m: Option<f64>,
@@ -132,7 +132,7 @@ impl ActiveDevice for ActiveKnob {
     }
 
     fn deactivate(mut self) -> Knob {
-        // If it cannot be sent, the board removes its force by itself.
+        // If this write fails, the board removes its force by itself.
         let _ = self.knob.port.write_all(&frame::encode(frame::FORCE, 0));
         self.knob
     }
@@ -151,7 +151,7 @@ impl PacingDevice for ActiveKnob {
     }
 }
 
-/// Takes the force away: every frame from now on says zero, and a board without frames removes its force.
+/// Safe stop: every later frame has zero force, and a board without frames removes its force.
 struct Stop(Arc<AtomicBool>);
 
 impl SafeStop for Stop {

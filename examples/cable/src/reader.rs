@@ -1,4 +1,4 @@
-//! A thread that waits for the port, so that the loop never does.
+//! Reader thread that waits for the port, so that the loop never waits.
 
 use crate::frame::{Decoder, POSITION};
 use serialport::TTYPort;
@@ -8,15 +8,15 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// The newest sample, in one word: 48 bits of its number, 16 of the position. Nobody can read half of it.
+/// Shift of the number in the word of the newest sample: 48 bits of number, 16 of position. One word is read and written atomically.
 const NUMBER_SHIFT: u32 = 16;
 
-/// What the reader knows.
+/// State of the reader.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Newest {
-    /// The newest sample; number 0 before the first.
+    /// Newest sample; number 0 before the first sample.
     Sample { number: u64, position_um: i16 },
-    /// The board is gone.
+    /// The board is disconnected.
     Lost,
 }
 
@@ -25,7 +25,7 @@ struct Shared {
     newest: AtomicU64,
     is_lost: AtomicBool,
     is_ending: AtomicBool,
-    /// For those who wait. The loop holds it for no longer than it takes to look.
+    /// Mutex of the condition variable, held only for a check.
     waiting: Mutex<()>,
     arrived: Condvar,
 }
@@ -37,14 +37,14 @@ impl Shared {
     }
 }
 
-/// The thread, and what it has read. Dropped, it ends.
+/// Reader thread with its newest sample. Dropping it ends the thread.
 pub struct Reader {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Reader {
-    /// Starts to read a port. Not real-time.
+    /// Starts a thread that reads a port. Not real-time.
     pub fn start(port: TTYPort) -> io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let of_thread = Arc::clone(&shared);
@@ -53,7 +53,7 @@ impl Reader {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Real-time: bounded, no allocation, no lock.
+    /// Returns the newest sample. Real-time: bounded, no allocation, no lock.
     pub fn newest(&self) -> Newest {
         if self.shared.is_lost.load(Ordering::Acquire) {
             return Newest::Lost;
@@ -62,7 +62,7 @@ impl Reader {
         Newest::Sample { number: word >> NUMBER_SHIFT, position_um: (word & 0xffff) as u16 as i16 }
     }
 
-    /// Waits for a sample after the one with this number, and returns the number of the newest; `None` in vain.
+    /// Waits for a sample after this number, and returns the number of the newest; `None` after the timeout or a loss of the board.
     pub fn wait_beyond(&self, number: u64, timeout: Duration) -> Option<u64> {
         let is_nothing_new =
             || matches!(self.newest(), Newest::Sample { number: newest, .. } if newest == number);
@@ -79,7 +79,7 @@ impl Reader {
 impl Drop for Reader {
     fn drop(&mut self) {
         self.shared.is_ending.store(true, Ordering::Release);
-        // It looks after each read, and a read waits no longer than the port's timeout.
+        // The thread checks `is_ending` after each read, and a read waits no longer than the port's timeout.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }

@@ -9,19 +9,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Turns of the crank per second.
 const FREQUENCY_HZ: f64 = 1.0;
 
-/// A handle on a crank that turns once a second.
+/// Handle on a crank that turns once a second.
 struct Crank {
     amplitude_m: f64,
     stopped: Arc<AtomicBool>,
 }
 
-/// The crank, turning.
+/// Energised crank, turning.
 struct TurningCrank {
     crank: Crank,
     commanded: Wrench,
 }
 
-/// Takes the force away, from any thread.
+/// Safe stop that removes the force, from any thread.
 struct Clutch(Arc<AtomicBool>);
 
 impl Device for Crank {
@@ -32,8 +32,8 @@ impl Device for Crank {
     type Stop = Clutch;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        // Look for the hardware here. If it is missing, busy or forbidden, return a `Refusal::resource` that says what
-        // to do.
+        // Look for the hardware here. If it is missing, busy or forbidden, return a `Refusal::resource` whose text names
+        // the remedy.
         let amplitude_m = settings.number_or_default("amplitude_mm") * 1.0e-3;
         Ok(Crank { amplitude_m, stopped: Arc::new(AtomicBool::new(false)) })
     }
@@ -69,7 +69,7 @@ impl ActiveDevice for TurningCrank {
     type Opened = Crank;
 
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        // Scheduled time, not the wall clock: the same run gives the same numbers.
+        // Scheduled time, not the wall clock: equal runs give equal numbers.
         let phase = TAU * FREQUENCY_HZ * tick.time_ns as f64 * 1.0e-9;
         let (sin, cos) = phase.sin_cos();
         let speed_m_per_s = self.crank.amplitude_m * TAU * FREQUENCY_HZ * cos;

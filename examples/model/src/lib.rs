@@ -1,6 +1,6 @@
 use flotor_hal::{ForceModel, Input, ModelInfo, Output, Parameter, Refusal, Settings, StepStatus, Wrench};
 
-/// A jelly: gives way in every direction and pulls the handle back home.
+/// Jelly that yields in every direction and pulls the handle back home.
 struct Jelly {
     stiffness_n_per_m: f64,
 }

@@ -1,4 +1,4 @@
-//! A bar of gel. Its forces come from a solver in another language and another process, too slow for the loop.
+//! Bar of gel. Its forces come from a solver in another language and another process, too slow for the loop.
 
 use flotor_hal::{
     DVec3, ForceModel, Input, LinearField, LinearFieldModel, ModelInfo, OutOfRange, Output, Parameter,
@@ -10,15 +10,15 @@ use std::os::unix::net::UnixStream;
 use std::process::{Child, Command};
 use std::time::Duration;
 
-/// The solver, part of the plugin's file.
+/// Source of the solver, embedded in the plugin file.
 const SOLVER: &str = include_str!("solver.py");
-/// How long Python may take to start.
+/// Timeout for the start of Python.
 const START: Duration = Duration::from_secs(5);
-/// How long an answer may take. A process that hangs must not hang the thread that asks it.
+/// Timeout of a reply. A process that hangs must not block the calling thread.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// The deepest compression that the solver is asked for, m. Farther down the force stays as it is there.
+/// Largest compression passed to the solver, m. Below this depth the force is constant.
 const DEEPEST_M: f64 = 0.012;
-/// How far from its anchor a field holds, m: there the slope has changed by less than a tenth.
+/// Range of validity of a field around its anchor, m: within it the slope changes by less than a tenth.
 const VALID_M: f64 = 0.0005;
 
 struct Gel {
@@ -26,12 +26,12 @@ struct Gel {
     solver: Asking,
 }
 
-/// Where the model stands with its solver.
+/// State of the solver.
 enum Asking {
     NotYet,
     Running(Solver),
-    /// It did not start, gave no answer in time, or one that is none. It is not asked again: an answer could belong to an
-    /// earlier question.
+    /// The solver did not start, timed out, or sent an invalid reply. It gets no further requests: a reply could belong to an
+    /// earlier request.
     Failed,
 }
 
@@ -44,7 +44,7 @@ impl ForceModel for Gel {
         Ok(Self { shear_modulus_pa: settings.number_or_default("shear_modulus_pa"), solver: Asking::NotYet })
     }
 
-    /// In the loop there is no time for the solver: no force, and a status that says so.
+    /// Returns no force, with the status `OutOfDomain`: the solver is too slow for the loop.
     fn step(&mut self, input: &Input) -> Output {
         let is_finite = input.pose.is_finite();
         let status = if is_finite { StepStatus::OutOfDomain } else { StepStatus::InvalidInput };
@@ -76,7 +76,7 @@ impl LinearFieldModel for Gel {
                 let slope = [DVec3::ZERO, DVec3::ZERO, DVec3::Z * -stiffness_n_per_m];
                 LinearField::of_force(input, DVec3::Z * force_n, slope, VALID_M)
             }
-            // Not a number: the host takes the force away, and its report names this model.
+            // NaN: the host removes the force, and its summary names this model.
             None => LinearField { wrench: Wrench::from_force(DVec3::NAN), ..LinearField::NONE },
         }
     }
@@ -84,7 +84,7 @@ impl LinearFieldModel for Gel {
 flotor_hal::export_model!(Gel, linear_field);
 
 impl Gel {
-    /// Force, N, and stiffness, N/m, at a depth. The first call starts the solver and waits for it.
+    /// Returns force, N, and stiffness, N/m, at a depth. The first call starts the solver and waits for it.
     fn solve(&mut self, depth_m: f64) -> Option<[f64; 2]> {
         if let Asking::NotYet = self.solver {
             self.solver = Solver::start().map_or(Asking::Failed, Asking::Running);
@@ -98,7 +98,7 @@ impl Gel {
     }
 }
 
-/// A process that answers each line with a line.
+/// Solver process that replies to each line with a line.
 struct Solver {
     process: Child,
     answers: BufReader<UnixStream>,

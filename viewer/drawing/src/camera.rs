@@ -1,41 +1,41 @@
-//! Where the picture is seen from: an orbit around a point, z up.
+//! Camera of the 3D view: an orbit around a target point, z up.
 
 use flotor_hal::DVec3;
 use flotor_hal::glam::dcamera::rh::proj::directx::perspective;
 use flotor_hal::glam::dcamera::rh::view::look_at_mat4;
 use flotor_hal::glam::{DMat4, DVec4};
 
-/// An eye on a sphere around a point it looks at.
+/// Orbit camera: an eye on a sphere around its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Turn about the vertical, rad; 0 looks along +y, away from the user.
+    /// Rotation about the vertical, rad; 0 looks along +y, away from the user.
     pub azimuth_rad: f64,
-    /// Height above the horizon, rad.
+    /// Elevation above the horizon, rad.
     pub inclination_rad: f64,
-    /// Distance from the point, mm.
+    /// Distance of the eye from the target, mm.
     pub distance_mm: f64,
-    /// The point, mm.
+    /// Target in the middle of the picture, mm.
     pub target_mm: DVec3,
 }
 
-/// Size of bodies that stand side by side.
+/// Size of a row of bodies side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
-    /// Height of the tallest, mm.
+    /// Height of the tallest body, mm.
     pub height_mm: f64,
-    /// Distance of the first from the last, mm: 0 for one body.
+    /// Distance from the first body to the last, mm; 0 for one body.
     pub width_mm: f64,
 }
 
 impl Extent {
-    /// Returns the extent of one body of a height, mm.
+    /// Returns the extent of one body of this height, mm.
     #[must_use]
     pub const fn of_one(height_mm: f64) -> Self {
         Self { height_mm, width_mm: 0.0 }
     }
 }
 
-/// From where a picture is to be seen, as a person writes it: `AZIMUTH,INCLINATION` or `AZIMUTH,INCLINATION,ZOOM`, degrees.
+/// Direction and zoom of a view, parsed from `AZIMUTH,INCLINATION` or `AZIMUTH,INCLINATION,ZOOM` with angles in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     azimuth_rad: f64,
@@ -68,18 +68,18 @@ impl std::str::FromStr for View {
     }
 }
 
-/// Vertical angle of view, rad: that of a 70 mm lens on a full frame, which flatters small things.
+/// Vertical angle of view, rad: as of a 70 mm lens on a full frame, for a moderate perspective.
 const FIELD_OF_VIEW_RAD: f64 = 0.34;
-/// Half the width of a body with its plates, part of its height.
+/// Half the width of a body with its plates, as a fraction of its height.
 const HALF_BODY: f64 = 0.35;
 /// Legal inclinations, rad: a little below the ground to straight above.
 const INCLINATION_RAD: std::ops::RangeInclusive<f64> = -0.05..=1.55;
-/// Nearest and farthest distance relative to the size of what is shown.
+/// Nearest and farthest distance of the eye, as multiples of the height of the bodies.
 const NEAREST: f64 = 1.5;
 const FARTHEST: f64 = 30.0;
 
 impl Camera {
-    /// The view an experimenter gets: from the front, right and above, everything of a body of this height in sight.
+    /// Returns the default view: from the front, right and above, with all of a body of this height in sight.
     #[must_use]
     pub fn experimenter(height_mm: f64) -> Self {
         Self {
@@ -90,14 +90,14 @@ impl Camera {
         }
     }
 
-    /// The experimenter's view of bodies side by side, as near as all of them are in a picture of this width to height.
+    /// Returns the default view of bodies side by side, as near as all of them fit into a picture of this aspect ratio (width to height).
     #[must_use]
     pub fn fitting(extent: Extent, aspect: f64) -> Self {
-        /// Part of half the picture that the bodies fill.
+        /// Fraction of half the picture filled by the bodies.
         const FILLED: f64 = 0.92;
         let mut camera = Self::experimenter(extent.height_mm);
         let half_mm = 0.5 * extent.width_mm;
-        // The body at the right is nearer than the point looked at.
+        // The body at the right is nearer than the target.
         let nearer_mm = half_mm * camera.azimuth_rad.sin();
         let beside_mm = half_mm * camera.azimuth_rad.cos() + HALF_BODY * extent.height_mm;
         let seen = (0.5 * FIELD_OF_VIEW_RAD).tan() * FILLED * aspect.max(1.0e-3);
@@ -105,7 +105,7 @@ impl Camera {
         camera
     }
 
-    /// The view that was requested of bodies in a picture of this width to height; without a request the experimenter's.
+    /// Returns the requested view of bodies in a picture of this aspect ratio, or the default view without a request.
     #[must_use]
     pub fn of(view: Option<View>, extent: Extent, aspect: f64) -> Self {
         let mut camera = Self::fitting(extent, aspect);
@@ -116,7 +116,7 @@ impl Camera {
         camera
     }
 
-    /// Where the eye is, mm.
+    /// Returns the position of the eye, mm.
     #[must_use]
     pub fn eye_mm(&self) -> DVec3 {
         let (sine, cosine) = self.inclination_rad.sin_cos();
@@ -124,20 +124,20 @@ impl Camera {
         self.target_mm + out * self.distance_mm
     }
 
-    /// Turns the eye about the point.
+    /// Turns the eye about the target by two angles, within the legal inclinations.
     pub fn orbit(&mut self, azimuth_rad: f64, inclination_rad: f64) {
         self.azimuth_rad = (self.azimuth_rad + azimuth_rad) % std::f64::consts::TAU;
         let inclined = self.inclination_rad + inclination_rad;
         self.inclination_rad = inclined.clamp(*INCLINATION_RAD.start(), *INCLINATION_RAD.end());
     }
 
-    /// Comes nearer by a factor (above 1), within sense for a body of this height.
+    /// Divides the distance by a factor (above 1: nearer), within the limits for a body of this height.
     pub fn zoom(&mut self, factor: f64, height_mm: f64) {
         let distance_mm = self.distance_mm / factor.max(f64::MIN_POSITIVE);
         self.distance_mm = distance_mm.clamp(NEAREST * height_mm, FARTHEST * height_mm);
     }
 
-    /// From mm to clip coordinates with depth 0 to 1, for a picture of this width to height.
+    /// Returns the projection from mm to clip coordinates with depth 0 to 1, for a picture of this aspect ratio.
     #[must_use]
     pub fn projection(&self, aspect: f64) -> DMat4 {
         let (near_mm, far_mm) = (0.05 * self.distance_mm, 20.0 * self.distance_mm);
@@ -145,14 +145,14 @@ impl Camera {
             * look_at_mat4(self.eye_mm(), self.target_mm, DVec3::Z)
     }
 
-    /// Where a point (mm) appears, as parts of width and height from the upper left; `None` behind the eye.
+    /// Projects a point (mm) into the picture: fractions of width and height from the upper left; `None` behind the eye.
     #[must_use]
     pub fn on_screen(&self, point_mm: DVec3, aspect: f64) -> Option<[f64; 2]> {
         let DVec4 { x, y, w, .. } = self.projection(aspect) * point_mm.extend(1.0);
         (w > 0.0).then(|| [0.5 + 0.5 * x / w, 0.5 - 0.5 * y / w])
     }
 
-    /// Directions to the right of the picture and upwards in it.
+    /// Returns the unit vectors to the right and upwards in the picture.
     #[must_use]
     pub fn right_and_up(&self) -> (DVec3, DVec3) {
         let ahead = (self.target_mm - self.eye_mm()).normalize();
@@ -160,7 +160,7 @@ impl Camera {
         (right, right.cross(ahead))
     }
 
-    /// Pixels a millimetre at the point looked at covers in a picture so many pixels high.
+    /// Returns the pixels per millimetre at the target, for a picture of this height in pixels.
     #[must_use]
     pub fn pixels_per_mm(&self, height_px: f64) -> f64 {
         0.5 * height_px / (self.distance_mm * (0.5 * FIELD_OF_VIEW_RAD).tan())

@@ -4,18 +4,17 @@ use crate::geometry::{Color, Mesh, Section, SurfacePoint, closest_surface_point,
 use flotor_hal::glam::DQuat;
 use flotor_hal::{DVec3, Part, Shape};
 
-/// Radius and thickness of the disc, and radius and length of the arrow, parts of the height of the scene: the disc is seen around the
-/// arrow of the force and a proxy.
+/// Radius and thickness of the disc, and radius and length of the arrow, as fractions of the height of the scene: the disc is wide enough
+/// to be seen around the arrow of the force and a proxy.
 const DISC: f64 = 0.09;
 const THICKNESS: f64 = 0.004;
 const SHAFT: f64 = 0.009;
 const LENGTH: f64 = 0.3;
 
-/// Distance from the surface up to which a tool lies on it, m: far above rounding, far below what can be seen.
+/// Tolerance for a tool on the surface, m: far above rounding, far below any visible distance.
 const ON_SURFACE_M: f64 = 1.0e-9;
 
-/// Returns the contact of a handle inside a body of simple form; the depth is that of the handle. If the handle is inside several, the
-/// deepest contact counts.
+/// Returns the contact of a handle inside a primitive body, with the depth of the handle; inside several bodies, the deepest contact.
 ///
 /// The point of contact is the proxy, if the model draws one on the surface: with friction the proxy stays behind, and at a box it is
 /// on the face through which the handle came. Without a proxy it is the closest point of the surface.
@@ -33,7 +32,7 @@ pub fn contact(shape: &Shape, handle_m: DVec3) -> Option<SurfacePoint> {
     Some(on_surface.next().map_or(closest, |proxy| SurfacePoint { depth_m: depth_m(&proxy), ..proxy }))
 }
 
-/// Adds the mark of a contact to a scene of a height, m.
+/// Adds the mark of a contact to a scene of this height, m.
 pub fn append_contact(mesh: &mut Mesh, contact: &SurfacePoint, height_m: f64, color: Color) {
     let orientation = DQuat::from_rotation_arc(DVec3::Z, contact.normal);
     let section = Section { center_m: contact.position_m, orientation };

@@ -3,24 +3,24 @@
 use crate::camera::Camera;
 use flotor_hal::DVec3;
 
-/// Inclination from which on a point moves in a horizontal plane, rad: below, a vertical one is seen less at a slant.
+/// Inclination above which a point is dragged in a horizontal plane, rad; below, a vertical plane is seen less at a slant.
 const FROM_ABOVE_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Smallest angle between a ray and the plane, as a sine: nearer to grazing, a pixel would be many millimetres.
 const LEAST_SINE: f64 = 0.02;
 
-/// A half-line from the eye through a place of the picture.
+/// Half-line from the eye through a point of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// The eye, mm.
+    /// Position of the eye, mm.
     pub origin_mm: DVec3,
-    /// Unit vector.
+    /// Unit vector away from the eye.
     pub direction: DVec3,
 }
 
 impl Ray {
-    /// Through a place, as parts of width and height from the upper left, of a picture of this width to height: the points that
-    /// [`Camera::on_screen`] puts there.
+    /// Casts the ray through a place of the picture, in fractions of width and height from the upper left: the inverse of
+    /// [`Camera::on_screen`].
     #[must_use]
     pub fn through(camera: &Camera, [x, y]: [f64; 2], aspect: f64) -> Self {
         let origin_mm = camera.eye_mm();
@@ -32,8 +32,8 @@ impl Ray {
     }
 }
 
-/// The plane in which a point is dragged. It contains two axes of the device frame, or comes close to it: a pointer that goes down
-/// moves the point down and nowhere else.
+/// Plane in which a point is dragged, along two axes of the device frame or nearly so: a pointer that moves down moves the point
+/// straight down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DragPlane {
     point_mm: DVec3,
@@ -42,7 +42,7 @@ pub struct DragPlane {
 }
 
 impl DragPlane {
-    /// Through a point (mm): vertical and across the view; horizontal where the camera looks down steeply.
+    /// Returns the plane through a point (mm): vertical and across the view, or horizontal if the camera looks down steeply.
     #[must_use]
     pub fn facing(camera: &Camera, point_mm: DVec3) -> Self {
         let away = if camera.inclination_rad > FROM_ABOVE_RAD {
@@ -53,7 +53,7 @@ impl DragPlane {
         Self { point_mm, away }
     }
 
-    /// Where a ray meets the plane, mm; none for a ray that grazes it or leads away from it.
+    /// Intersects the plane with a ray, mm; `None` for a ray that grazes the plane or leads away from it.
     #[must_use]
     pub fn hit_mm(&self, ray: &Ray) -> Option<DVec3> {
         let sine = ray.direction.dot(self.away);
@@ -61,8 +61,8 @@ impl DragPlane {
         (sine.abs() > LEAST_SINE && distance_mm > 0.0).then(|| ray.origin_mm + ray.direction * distance_mm)
     }
 
-    /// How a point moves when the pointer goes from one place to another and by `depth_mm` away from the eye, mm. Nowhere in the
-    /// plane where one of the rays misses it.
+    /// Returns the displacement of a point when the pointer moves from one ray to another and by `depth_mm` away from the eye, mm.
+    /// The displacement within the plane is zero if one of the rays misses the plane.
     #[must_use]
     pub fn moved_mm(&self, [from, to]: [&Ray; 2], depth_mm: f64) -> DVec3 {
         let along = self.hit_mm(from).zip(self.hit_mm(to)).map_or(DVec3::ZERO, |(from, to)| to - from);

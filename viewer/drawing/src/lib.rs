@@ -1,15 +1,15 @@
-//! The 3D view: triangles of what a model describes, and pictures of them.
+//! 3D view: triangles for the description of a model, and pictures of them.
 //!
-//! - [`geometry`] makes the triangles: wires, primitives, surfaces, arrows, ground.
-//! - A [`camera`] sees them in a [`light`].
-//! - [`contact`]: where a handle touches a body.
-//! - [`placing`]: the places of several devices.
-//! - [`drag`] moves a point of the scene with a pointer.
-//! - [`gpu`] draws them on a GPU or a software adapter, into a texture; [`raster`] on the processor, without an adapter.
+//! - [`geometry`]: triangles of wires, primitives, surfaces, arrows, ground.
+//! - [`camera`] and [`light`]: projection and shading.
+//! - [`contact`]: contact of a handle with a body, and its mark.
+//! - [`placing`]: places of several devices.
+//! - [`drag`]: dragging a point of the scene with a pointer.
+//! - [`gpu`]: rendering by a GPU or a software adapter, into a texture; [`raster`]: rendering by the processor, without an adapter.
 //!
-//! Knows neither a window nor a run: the viewer says what is drawn, in which colours, and where the picture goes.
+//! Independent of windows and runs: the viewer passes bodies, colours and the target of the picture.
 //!
-//! Nothing here is real-time.
+//! Not real-time.
 
 pub mod camera;
 pub mod contact;

@@ -1,15 +1,15 @@
-//! How a surface looks: one key light, one fill light, a bright sky over a dark ground, and a highlight.
+//! Shading of surfaces: one key light, one fill light, a bright sky over a dark ground, and a highlight.
 //!
-//! The shader of the GPU is given these numbers; a test compares the two.
+//! The GPU shader gets the same constants; a test compares GPU and CPU.
 
 use crate::geometry::Vertex;
 use flotor_hal::DVec3;
 
-/// Towards the key light: from the left, the front and above. Not unit.
+/// Direction towards the key light: left, front and above. Not a unit vector.
 pub const KEY: DVec3 = DVec3::new(-0.45, -0.65, 0.9);
-/// Towards the fill light, opposite. Not unit.
+/// Direction towards the fill light, opposite the key light. Not a unit vector.
 pub const FILL: DVec3 = DVec3::new(0.8, 0.35, 0.25);
-/// Parts of the colour that each source gives.
+/// Weights of the light sources, as fractions of the colour.
 const KEY_PART: f64 = 0.62;
 const FILL_PART: f64 = 0.22;
 const SKY_PART: f64 = 0.42;
@@ -17,10 +17,10 @@ const GROUND_PART: f64 = 0.18;
 /// Strength and sharpness of the highlight.
 const SHINE: f64 = 0.42;
 const SHARPNESS: i32 = 48;
-/// A rim where a round thing turns away, which sets it off from what is behind it.
+/// Strength of the rim light, which separates the edge of a round body from its background.
 const RIM: f64 = 0.10;
 
-/// Colour of a corner seen from a place (mm), sRGB parts 0 to 1 and a little above.
+/// Returns the colour of a corner seen from `eye_mm`, sRGB components from 0 to slightly above 1.
 #[must_use]
 pub fn shade(vertex: &Vertex, eye_mm: DVec3) -> [f64; 3] {
     let [r, g, b, _] = vertex.color;
@@ -42,7 +42,7 @@ pub fn shade(vertex: &Vertex, eye_mm: DVec3) -> [f64; 3] {
     base.map(|part| part * diffuse + highlight + rim)
 }
 
-/// The numbers of this module in the language of the GPU, to be put in front of its shader.
+/// Returns the constants of this module in WGSL, to be prepended to the shader.
 #[must_use]
 pub fn wgsl_constants() -> String {
     let vector =

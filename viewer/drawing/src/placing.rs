@@ -1,24 +1,24 @@
-//! Where the devices of a run stand in the picture: side by side, each in its own frame, because nothing says where their bases are.
+//! Places of the devices of a run in the picture: side by side, each in its own frame, because the positions of their bases are unknown.
 
 use flotor_hal::DVec3;
 
 /// Places of devices along x.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Placing {
-    /// How many there are.
+    /// Number of devices.
     pub count: usize,
-    /// From one to the next, m.
+    /// Distance between neighbouring devices, m.
     pub spacing_m: f64,
 }
 
 impl Placing {
-    /// Of so many devices whose bodies are so high and reach so far from their middle.
+    /// Places `count` devices with bodies of this height and radius.
     #[must_use]
     pub fn of(count: usize, height_m: f64, radius_m: f64) -> Self {
         Self { count, spacing_m: (1.1 * height_m).max(2.6 * radius_m) }
     }
 
-    /// Where the home of a device is, m.
+    /// Returns the home position of a device in the picture, m.
     #[must_use]
     pub fn place_m(&self, device: usize) -> DVec3 {
         let middle = 0.5 * (self.count.max(1) - 1) as f64;
@@ -32,14 +32,14 @@ impl Placing {
     }
 }
 
-/// The largest of 1, 2 and 5 times a power of ten that is not above a number; 0 for what is not above 0.
+/// Returns the largest of 1, 2 and 5 times a power of ten that is not above a number; 0 unless the number is positive and finite.
 #[must_use]
 pub fn round_below(number: f64) -> f64 {
     if !(number > 0.0 && number.is_finite()) {
         return 0.0;
     }
     let power = 10.0_f64.powf(number.log10().floor());
-    // A hair above, for the rounding of the power.
+    // Slightly above the number, to allow for the rounding of the power.
     [5.0, 2.0, 1.0]
         .map(|k| k * power)
         .into_iter()

@@ -1,4 +1,4 @@
-//! The 3D view on the CPU: depth buffer, light at the corners, supersampling.
+//! CPU rasteriser of the 3D view: depth buffer, lighting per vertex, supersampling.
 
 use crate::camera::Camera;
 use crate::geometry::{Mesh, Vertex};
@@ -6,25 +6,25 @@ use crate::light;
 use flotor_hal::DVec3;
 use flotor_hal::glam::{DMat4, Vec2};
 
-/// A picture of 8-bit RGB, row by row from the top.
+/// Picture in 8-bit RGB, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     /// Width and height, pixels.
     pub size: [usize; 2],
-    /// Three bytes a pixel.
+    /// Three bytes per pixel.
     pub rgb: Vec<u8>,
 }
 
-/// Colours behind everything, at the top and at the bottom.
+/// Vertical colour gradient of the background, sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Backdrop {
-    /// At the top.
+    /// Colour at the top.
     pub top: [u8; 3],
-    /// At the bottom.
+    /// Colour at the bottom.
     pub bottom: [u8; 3],
 }
 
-/// Buffers of a rasteriser; keeps its memory from picture to picture.
+/// Rasteriser; its buffers are reused from picture to picture.
 #[derive(Debug, Default)]
 pub struct Rasterizer {
     color: Vec<[u8; 3]>,
@@ -32,10 +32,10 @@ pub struct Rasterizer {
     corners: Vec<Corner>,
 }
 
-/// A corner on the screen.
+/// Corner projected to the screen.
 #[derive(Clone, Copy, Debug)]
 struct Corner {
-    /// Samples from the upper left; NaN in front of the near plane.
+    /// Position in samples from the upper left; NaN in front of the near plane.
     at: Vec2,
     depth: f32,
     lit: [f32; 3],
@@ -88,10 +88,10 @@ impl Rasterizer {
         self.corners.extend(mesh.vertices.iter().map(|vertex| corner(vertex, &projection, eye_mm, w, h)));
     }
 
-    /// Fills the samples whose middles are inside; counter-clockwise corners face the eye.
+    /// Fills the samples whose centres are inside a triangle; counter-clockwise corners face the eye.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
     fn triangle(&mut self, [a, b, c]: [Corner; 3], [width, height]: [usize; 2]) {
-        // Twice the area; y runs down, so a triangle that faces the eye has a negative one. False for NaN.
+        // Twice the signed area; y runs down, so the area of a triangle that faces the eye is negative. The comparison is false for NaN.
         let area = (b.at - a.at).perp_dot(c.at - a.at);
         let faces_us = area < -1.0e-9;
         if !faces_us {

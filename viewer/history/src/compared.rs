@@ -1,12 +1,12 @@
-//! A second recording, laid over the run that is shown.
+//! Second recording, shown over another run for comparison.
 
 use crate::History;
 use flotor_hal::Pose;
 use flotor_record::ReadError;
 use std::path::Path;
 
-/// A recording whose traces and handles are shown with those of another run. The times of both count from the start of their runs, and
-/// devices belong together by their order in the scenes.
+/// Recording whose traces and handles are shown with the traces and handles of another run. Times count from the start of each run, and
+/// devices are matched by their order in the scenes.
 #[derive(Clone, Debug)]
 pub struct Compared {
     name: String,
@@ -17,26 +17,26 @@ impl Compared {
     /// Reads a recording.
     ///
     /// # Errors
-    /// [`ReadError`]: nothing of the file can be used.
+    /// [`ReadError`] if no part of the file is usable.
     pub fn read(file: &Path) -> Result<Self, ReadError> {
         let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
         Ok(Self { name, histories: History::read(file)? })
     }
 
-    /// Returns the samples of a device, counted from 0 in the order of the scene; none if the recording has fewer devices.
+    /// Returns the samples of a device, counted from 0 in the order of the scene; `None` if the recording has fewer devices.
     #[must_use]
     pub fn history(&self, device: usize) -> Option<&History> {
         self.histories.get(device)
     }
 
-    /// Returns the pose of each handle in its device frame at a time, s; none where the recording has no sample.
+    /// Returns the pose of each handle in its device frame at a time, s; `None` if the recording has no sample then.
     #[must_use]
     pub fn handles(&self, now_s: f64) -> Vec<Option<Pose>> {
         let pose = |history: &History| history.seen_at(now_s).map(|sample| sample.pose);
         self.histories.iter().map(pose).collect()
     }
 
-    /// Returns name, rate and length of the recording in a line.
+    /// Returns name, rate and length of the recording as one line of text.
     #[must_use]
     pub fn text(&self) -> String {
         let (rate_hz, [_, last_s]) =

@@ -1,21 +1,21 @@
-//! Fewer points, the same picture: smallest and largest value of each bucket of time.
+//! Decimation of traces without a visible change: smallest and largest value of each bucket of time.
 //!
 //! Buckets lie at whole multiples of their width from time zero, not from the edge of the picture: while a trace
 //! scrolls, a sample stays in its bucket and the trace does not shimmer.
 
 use std::collections::VecDeque;
 
-/// A point of a trace: time, s, and value.
+/// Point of a trace: time, s, and value.
 pub type Point = [f64; 2];
 
-/// Width of a bucket, s: a power of two, so that zooming by less does not move any edge.
+/// Returns the width of a bucket, s: a power of two, so that zooming by less does not move any edge.
 #[must_use]
 pub fn bucket_width_s(span_s: f64, buckets: usize) -> f64 {
     let wanted_s = (span_s / buckets.max(1) as f64).max(f64::MIN_POSITIVE);
     wanted_s.log2().ceil().exp2()
 }
 
-/// Buckets of a trace that grows at its end and is forgotten at its beginning. A point is looked at once.
+/// Decimated trace that grows at its end and is trimmed at its beginning. Each point is processed once.
 #[derive(Clone, Debug, Default)]
 pub struct Buckets {
     width_s: f64,
@@ -23,7 +23,7 @@ pub struct Buckets {
     segment: u32,
 }
 
-/// Smallest and largest point of a bucket, the number of which is its place in time.
+/// Smallest and largest point of a bucket; `number` is its start time in bucket widths.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
     number: f64,
@@ -33,24 +33,24 @@ struct Bucket {
 }
 
 impl Buckets {
-    /// Without any point yet.
+    /// Creates an empty trace with buckets of this width, s.
     #[must_use]
     pub fn of_width(width_s: f64) -> Self {
         Self { width_s, kept: VecDeque::new(), segment: 0 }
     }
 
-    /// Width of a bucket, s.
+    /// Returns the width of a bucket, s.
     #[must_use]
     pub fn width_s(&self) -> f64 {
         self.width_s
     }
 
-    /// What comes is not joined to what was: there is nothing between them.
+    /// Starts a new segment: later points are not joined to earlier points.
     pub fn interrupt(&mut self) {
         self.segment = self.segment.wrapping_add(1);
     }
 
-    /// Adds a point that is not earlier than those before it. One that is not finite is left out.
+    /// Adds a point that is not earlier than the last point; ignores a point that is not finite.
     pub fn push(&mut self, point: Point) {
         if !point.iter().all(|part| part.is_finite()) {
             return;
@@ -69,14 +69,14 @@ impl Buckets {
         }
     }
 
-    /// Forgets the buckets that end before a time.
+    /// Removes the buckets that end before a time, s.
     pub fn forget_before(&mut self, time_s: f64) {
         while self.kept.front().is_some_and(|bucket| (bucket.number + 1.0) * self.width_s < time_s) {
             self.kept.pop_front();
         }
     }
 
-    /// One point or two of each bucket, in order of time, each with the number of the stretch it belongs to.
+    /// Returns one or two points of each bucket, in order of time, each with the number of its segment.
     pub fn points(&self) -> impl Iterator<Item = (u32, Point)> {
         self.kept.iter().flat_map(|Bucket { low, high, segment, .. }| {
             let [first, second] = if low[0] <= high[0] { [*low, *high] } else { [*high, *low] };

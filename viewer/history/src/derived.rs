@@ -1,16 +1,16 @@
-//! What follows from several samples: the stiffness felt along the motion, and force over position with its hysteresis.
+//! Quantities derived from several samples: stiffness felt along the motion, and force over position with its hysteresis.
 
 use crate::Sample;
 use flotor_hal::DVec3;
 
-/// Least displacement of the handle from which a stiffness is computed, m: ten steps of a common position sensor.
+/// Smallest displacement of the handle for a stiffness, m: ten steps of a common position sensor.
 const LEAST_WAY_M: f64 = 50.0e-6;
 
-/// Part of the largest force from which a point has force: below it, the rounding of a recording is a force, too.
+/// Threshold of a point with force, as a fraction of the largest force: above the rounding of a recording.
 const LEAST_FORCE: f64 = 0.01;
 
-/// Stiffness felt along the motion, N/m: the secant `-dF/dx` from the newest of some earlier samples (the newest first) that is far
-/// enough away. Positive where the force grows against the motion; NaN where the handle rests.
+/// Returns the stiffness felt along the motion, N/m: the secant `-dF/dx` from the newest earlier sample that is far enough away
+/// (`earlier` has the newest first). Positive where the force grows against the motion; NaN where the handle rests.
 #[must_use]
 pub fn felt_stiffness_n_per_m<'a>(earlier: impl Iterator<Item = &'a Sample>, now: &Sample) -> f64 {
     for before in earlier {
@@ -23,22 +23,21 @@ pub fn felt_stiffness_n_per_m<'a>(earlier: impl Iterator<Item = &'a Sample>, now
     f64::NAN
 }
 
-/// Force over position along an axis of the device frame, over a time.
+/// Force over position along an axis of the device frame, during a time span.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForcePosition {
     /// Position, m, and force on the hand, N, in order of time.
     pub points: Vec<[f64; 2]>,
-    /// Stiffness, N/m, of the straight line closest to the points with force: contact without the air beside it. None where the handle
-    /// rests.
+    /// Stiffness fitted to the points with force (contact without free motion), N/m. None where the handle rests.
     pub stiffness_n_per_m: Option<f64>,
-    /// Stiffness, N/m, of the straight line closest to all points, with force and without. None where the handle rests.
+    /// Stiffness fitted to all points, with force and without, N/m. None where the handle rests.
     pub stiffness_of_all_n_per_m: Option<f64>,
-    /// Whole cycles, and the energy that each takes from the hand, J: the area of the loop. None without a whole cycle.
+    /// Number of whole cycles, and mean energy that a cycle takes from the hand, J: the area of the loop. None without a whole cycle.
     pub cycles: Option<(u32, f64)>,
 }
 
 impl ForcePosition {
-    /// Of samples in order of time, for the axis x, y or z.
+    /// Evaluates samples in order of time, for the axis 0, 1 or 2 (x, y, z).
     #[must_use]
     pub fn of<'a>(samples: impl Iterator<Item = &'a Sample>, axis: usize) -> Self {
         let axis = axis.min(2);
@@ -57,7 +56,7 @@ impl ForcePosition {
         }
     }
 
-    /// At most so many of the points, evenly taken.
+    /// Returns at most `most` of the points, evenly spaced by index.
     pub fn thinned(&self, most: usize) -> impl Iterator<Item = [f64; 2]> {
         self.points.iter().copied().step_by(self.points.len().div_ceil(most.max(1)).max(1))
     }
@@ -72,9 +71,9 @@ fn stiffness(points: &[[f64; 2]]) -> Option<f64> {
     (square > count * LEAST_WAY_M * LEAST_WAY_M).then(|| -product / square)
 }
 
-/// From the first to the last time the handle comes up through the middle of its way: the work of the hand a cycle.
+/// Counts the cycles between upward crossings of the middle of the range, and returns the mean work of the hand per cycle, J.
 fn cycles(points: &[[f64; 2]]) -> Option<(u32, f64)> {
-    /// The handle has left the middle when it is so much of the way from it.
+    /// Hysteresis of a crossing, as a fraction of the range.
     const AWAY: f64 = 0.1;
     let (low, high) =
         points.iter().fold((f64::MAX, f64::MIN), |(low, high), [x, _]| (low.min(*x), high.max(*x)));

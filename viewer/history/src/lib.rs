@@ -2,8 +2,8 @@
 //!
 //! - [`quantity`]: quantities of a sample that can be plotted.
 //! - [`derived`]: stiffness felt, force over position.
-//! - [`decimate`]: few points for many.
-//! - [`player`]: the moment that is shown; [`compared`]: a second recording over a run.
+//! - [`decimate`]: decimation of traces.
+//! - [`player`]: playback; [`compared`]: a second recording over a run.
 //!
 //! Not real-time.
 
@@ -22,7 +22,7 @@ use flotor_record::{Note, ReadError, Recording, RunDescription};
 use std::collections::VecDeque;
 use std::path::Path;
 
-/// A tick, for pictures. Less than half the size of the record: pictures need no more than `f32` of most of it.
+/// Tick for display. Less than half the size of a tick record: most values are `f32`, which is enough for pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Scheduled time since the loop started, ns.
@@ -33,42 +33,42 @@ pub struct Sample {
     pub pose: Pose,
     /// Velocity of the handle, m/s and rad/s.
     pub twist: [f32; 6],
-    /// What was sent to the device, N and N·m.
+    /// Wrench sent to the device, N and N·m.
     pub commanded: [f32; 6],
-    /// Energy stored in the models, J; NaN where it was not computed.
+    /// Energy stored in the models, J; NaN if not computed.
     pub energy_j: f32,
-    /// How late the tick started, s.
+    /// Start delay of the tick, s.
     pub lateness_s: f32,
-    /// Stiffness felt along the motion, N/m; NaN where the handle rests.
+    /// Stiffness felt along the motion, N/m; NaN while the handle rests.
     pub stiffness_n_per_m: f32,
-    /// How long the tick took, s.
+    /// Computing time of the tick, s.
     pub compute_s: f32,
-    /// What happened.
+    /// Events of the tick.
     pub events: Events,
 }
 
 impl Sample {
-    /// Time since the loop started, s.
+    /// Returns the time since the loop started, s.
     #[must_use]
     pub fn time_s(&self) -> f64 {
         seconds(self.time_ns)
     }
 
-    /// Force sent to the device, N.
+    /// Returns the force sent to the device, N.
     #[must_use]
     pub fn force_n(&self) -> DVec3 {
         let [x, y, z, ..] = self.commanded.map(f64::from);
         DVec3::new(x, y, z)
     }
 
-    /// Torque sent to the device, N·m.
+    /// Returns the torque sent to the device, N·m.
     #[must_use]
     pub fn torque_nm(&self) -> DVec3 {
         let [.., x, y, z] = self.commanded.map(f64::from);
         DVec3::new(x, y, z)
     }
 
-    /// Rotation of the handle as a rotation vector, rad.
+    /// Returns the rotation of the handle as a rotation vector, rad.
     #[must_use]
     pub fn rotation_rad(&self) -> DVec3 {
         rotation_vector(self.pose.orientation())
@@ -94,7 +94,7 @@ impl From<&TickRecord> for Sample {
     }
 }
 
-/// Stands in for a run of which nothing is known: a thousand ticks a second of nothing.
+/// Returns a placeholder for an unknown run: 1000 Hz, no plugins.
 #[must_use]
 pub fn unknown_run() -> RunDescription {
     RunDescription {
@@ -109,16 +109,16 @@ pub fn unknown_run() -> RunDescription {
     }
 }
 
-/// How much of the past is kept.
+/// Retention of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keep {
-    /// All of it: a recording.
+    /// All samples, for a recording.
     All,
-    /// The newest so many samples: a running host.
+    /// Number of newest samples, for a running host.
     Newest(usize),
 }
 
-/// Samples in order of time, and what is known about the run.
+/// Samples of a device in order of time, and the description of the run.
 #[derive(Clone, Debug)]
 pub struct History {
     run: RunDescription,
@@ -132,14 +132,14 @@ pub struct History {
 }
 
 impl Default for History {
-    /// Of nothing.
+    /// Returns the history of an unknown run, without samples.
     fn default() -> Self {
         Self::new(unknown_run(), Keep::Newest(1))
     }
 }
 
 impl History {
-    /// Of the first device of a run of which nothing has been seen.
+    /// Creates an empty history for the first device of a run.
     #[must_use]
     pub fn new(run: RunDescription, keep: Keep) -> Self {
         let capacity = if let Keep::Newest(count) = keep { count } else { 0 };
@@ -147,17 +147,17 @@ impl History {
         Self { run, samples, forgotten: 0, keep, notes: Vec::new(), changes_s: VecDeque::new(), device: 0 }
     }
 
-    /// Of each device of a run of which nothing has been seen.
+    /// Creates an empty history for each device of a run.
     #[must_use]
     pub fn of_each_device(run: &RunDescription, keep: Keep) -> Vec<Self> {
         let count = u16::try_from(run.devices().count()).unwrap_or(u16::MAX).max(1);
         (0..count).map(|device| Self { device, ..Self::new(run.clone(), keep) }).collect()
     }
 
-    /// All of a recording, of each device. Damage after the first tick costs only what follows it and becomes a note.
+    /// Reads the history of each device from a recording. Damage after the first tick loses only the ticks after it and becomes a note.
     ///
     /// # Errors
-    /// [`ReadError`]: nothing of the file can be used.
+    /// [`ReadError`] if no part of the file is usable.
     pub fn read(path: &Path) -> Result<Vec<Self>, ReadError> {
         let mut recording = Recording::open(path)?;
         let mut histories = Self::of_each_device(recording.run(), Keep::All);
@@ -189,19 +189,19 @@ impl History {
         Ok(histories)
     }
 
-    /// Number of the device it is of.
+    /// Returns the number of the device.
     #[must_use]
     pub fn device(&self) -> u16 {
         self.device
     }
 
-    /// The device's name in the scene; empty where the run has no such device.
+    /// Returns the name of the device in the scene; empty if the run has no such device.
     #[must_use]
     pub fn device_name(&self) -> &str {
         self.run.devices().nth(usize::from(self.device)).map_or("", |device| device.name.as_str())
     }
 
-    /// Adds a tick of its device, and of no other; the oldest makes room where only so many are kept.
+    /// Adds a tick, unless of another device; at the limit of retained samples, removes the oldest sample.
     pub fn push(&mut self, record: &TickRecord) {
         if record.device != self.device {
             return;
@@ -212,7 +212,7 @@ impl History {
                 self.forgotten += 1;
             }
         }
-        /// Samples looked at for the stiffness: those of some 0.1 s.
+        /// Number of earlier samples searched for the stiffness: about 0.1 s.
         const LOOKED_AT: usize = 100;
         let mut sample = Sample::from(record);
         let earlier = self.samples.iter().rev().take(LOOKED_AT);
@@ -222,8 +222,8 @@ impl History {
         self.samples.push_back(sample);
     }
 
-    /// Adds a change of a parameter, not earlier than those before it. Changes that guide a hand are left out: there is one with every
-    /// motion of a pointer.
+    /// Adds a change of a parameter, not earlier than the last change. Ignores changes that guide a hand: each motion of a pointer sends
+    /// one.
     pub fn push_change(&mut self, time_ns: u64, parameter: &str) {
         let [first_s, _] = self.span_s();
         while self.keep != Keep::All && self.changes_s.front().is_some_and(|time_s| *time_s < first_s) {
@@ -234,70 +234,70 @@ impl History {
         }
     }
 
-    /// Returns the times of the changes of parameters between two times, s, both included; those that guide a hand are left out.
+    /// Returns the times of the changes of parameters between two times, s, both included, without changes that guide a hand.
     pub fn changes_between_s(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = f64> {
         let start = self.changes_s.partition_point(|time_s| *time_s < from_s);
         let end = self.changes_s.partition_point(|time_s| *time_s <= to_s).max(start);
         self.changes_s.range(start..end).copied()
     }
 
-    /// How the run was set up.
+    /// Returns the description of the run.
     #[must_use]
     pub fn run(&self) -> &RunDescription {
         &self.run
     }
 
-    /// What happened, in words.
+    /// Returns the notes of the run.
     #[must_use]
     pub fn notes(&self) -> &[Note] {
         &self.notes
     }
 
-    /// How many samples there are.
+    /// Returns the number of retained samples.
     #[must_use]
     pub fn len(&self) -> usize {
         self.samples.len()
     }
 
-    /// True if nothing has been seen.
+    /// True if there are no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
 
-    /// First and last time, s; both 0 if there is nothing.
+    /// Returns the times of the first and last sample, s; both 0 without samples.
     #[must_use]
     pub fn span_s(&self) -> [f64; 2] {
         [self.samples.front(), self.samples.back()].map(|sample| sample.map_or(0.0, Sample::time_s))
     }
 
-    /// The sample in force at a time: the last one not after it, or the first.
+    /// Returns the sample valid at a time: the last sample not after it, or the first sample.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Option<&Sample> {
         let after = self.index_after(time_s);
         self.samples.get(after.saturating_sub(1))
     }
 
-    /// Longest time between two samples of a run that goes on, s; a longer one is a gap.
+    /// Returns the longest interval between two samples of a continuous run, s; a longer interval is a gap.
     #[must_use]
     pub fn gap_s(&self) -> f64 {
-        /// A few pictures: what is shorter cannot be seen.
+        /// Duration of a few pictures; a shorter gap is invisible.
         const LEAST_S: f64 = 0.05;
         (20.0 / self.run.rate_hz.max(1.0e-3)).max(LEAST_S)
     }
 
-    /// The sample that was seen at a time: none before the first one, and none in a gap.
+    /// Returns the sample valid at a time; `None` before the first sample and in a gap.
     #[must_use]
     pub fn seen_at(&self, time_s: f64) -> Option<&Sample> {
         let sample = self.at(time_s)?;
-        // The last one stands for what comes after it.
+        // The last sample is valid for all later times.
         let is_last = self.samples.back().is_some_and(|last| last.time_ns == sample.time_ns);
         let age_s = time_s - sample.time_s();
         (age_s >= 0.0 && (is_last || age_s <= self.gap_s())).then_some(sample)
     }
 
-    /// Returns the ticks a second that the loop made in the second up to a time, Hz: a missed tick does not count, a tick without a
-    /// sample does. None before the second tick.
+    /// Returns the tick rate of the loop in the second up to a time, Hz: a missed tick does not count, a tick without a sample does.
+    /// `None` before the second tick.
     #[must_use]
     pub fn tick_rate_hz(&self, now_s: f64) -> Option<f64> {
         const OVER_S: f64 = 1.0;
@@ -307,32 +307,32 @@ impl History {
         (span_s > 0.0).then(|| (last.tick - first.tick) as f64 / span_s)
     }
 
-    /// Samples between two times, both included.
+    /// Returns the samples between two times, both included.
     pub fn between(&self, from_s: f64, to_s: f64) -> impl DoubleEndedIterator<Item = &Sample> {
         let start = self.samples.partition_point(|sample| sample.time_s() < from_s);
         let end = self.index_after(to_s).max(start);
         self.samples.range(start..end)
     }
 
-    /// How many samples came before the first one at or after a time, those that are forgotten included: a number that a
-    /// sample keeps.
+    /// Returns the number of the first sample at or after a time, counted from the start and including removed samples: the number
+    /// of a sample is stable.
     #[must_use]
     pub fn number_at(&self, time_s: f64) -> u64 {
         self.forgotten + self.samples.partition_point(|sample| sample.time_s() < time_s) as u64
     }
 
-    /// The samples from a number on, as far as they are kept.
+    /// Returns the retained samples from a number on.
     pub fn from_number(&self, number: u64) -> impl Iterator<Item = &Sample> {
         let skipped = usize::try_from(number.saturating_sub(self.forgotten)).unwrap_or(usize::MAX);
         self.samples.range(skipped.min(self.samples.len())..)
     }
 
-    /// All samples.
+    /// Returns all retained samples.
     pub fn samples(&self) -> impl Iterator<Item = &Sample> {
         self.samples.iter()
     }
 
-    /// The sample with the largest force: the moment worth a picture.
+    /// Returns the sample with the largest force, for a picture.
     #[must_use]
     pub fn strongest(&self) -> Option<&Sample> {
         self.samples

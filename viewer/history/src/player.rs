@@ -1,46 +1,46 @@
-//! Which moment is shown: the newest of a running host, or any of what has been seen.
+//! Playback: the displayed time, the newest of a running host or any earlier one.
 
-/// How fast a recording plays, in times real time.
+/// Playback speeds of a recording, in multiples of real time.
 pub const SPEEDS: [f64; 6] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.0];
 
-/// What is done about time.
+/// Playback mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
-    /// Always the newest.
+    /// Follow the newest sample.
     Follow,
-    /// Goes on by itself.
+    /// Advance with the wall clock.
     Play,
-    /// Stands still.
+    /// Stay at the displayed time.
     Pause,
 }
 
-/// The moment shown, and how it moves.
+/// Displayed time and playback mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Player {
-    /// The moment, s.
+    /// Displayed time, s.
     pub now_s: f64,
-    /// How it moves.
+    /// Playback mode.
     pub motion: Motion,
-    /// How fast it plays, in times real time.
+    /// Playback speed, in multiples of real time.
     pub speed: f64,
-    /// Whether it begins again at the end.
+    /// True if playback restarts at the end.
     pub repeats: bool,
 }
 
 impl Player {
-    /// At the newest moment of a running host.
+    /// Creates a player that follows a running host.
     #[must_use]
     pub fn live() -> Self {
         Self { now_s: 0.0, motion: Motion::Follow, speed: 1.0, repeats: false }
     }
 
-    /// At a moment of a recording, standing still.
+    /// Creates a player that is paused at a time of a recording, s.
     #[must_use]
     pub fn at(now_s: f64) -> Self {
         Self { now_s, motion: Motion::Pause, speed: 1.0, repeats: true }
     }
 
-    /// Lets wall-clock time pass over what has been seen.
+    /// Advances the displayed time by elapsed wall-clock time, within the first and last time of the samples.
     pub fn advance(&mut self, elapsed_s: f64, [first_s, last_s]: [f64; 2]) {
         match self.motion {
             Motion::Follow => self.now_s = last_s,
@@ -59,7 +59,7 @@ impl Player {
         }
     }
 
-    /// Goes to a moment and stays there.
+    /// Moves to a time within the samples and no longer follows the newest; playback continues from there.
     pub fn seek(&mut self, now_s: f64, [first_s, last_s]: [f64; 2]) {
         self.now_s = now_s.clamp(first_s, last_s.max(first_s));
         if self.motion == Motion::Follow {
@@ -67,14 +67,14 @@ impl Player {
         }
     }
 
-    /// There is nothing newer to come: who followed stands at the end.
+    /// Pauses a following player at the last time, when no newer samples will come.
     pub fn stop_following(&mut self, [_, last_s]: [f64; 2]) {
         if self.motion == Motion::Follow {
             (self.now_s, self.motion) = (last_s, Motion::Pause);
         }
     }
 
-    /// Starts or stops; at the end of a recording it starts from the beginning, of a running host it follows again.
+    /// Starts or pauses playback: restarts a recording that is at its end, and follows a running host again.
     pub fn toggle(&mut self, is_live: bool, [first_s, last_s]: [f64; 2]) {
         self.motion = match self.motion {
             Motion::Follow | Motion::Play => Motion::Pause,

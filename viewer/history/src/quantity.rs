@@ -1,4 +1,4 @@
-//! What can be plotted, and in which units people read it.
+//! Quantities of plots, and their units.
 
 use crate::Sample;
 use flotor_hal::DVec3;
@@ -15,7 +15,7 @@ pub enum Units {
     Si,
 }
 
-/// A measured quantity with one component or three. They are in the order of menus.
+/// Measured quantity with one to three components, in the order of menus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
@@ -35,12 +35,12 @@ pub enum Quantity {
     Energy,
     /// Stiffness felt along the motion.
     Stiffness,
-    /// How late ticks started.
+    /// Start delay and computing time of ticks.
     Lateness,
 }
 
 impl Quantity {
-    /// All of them, in the order of menus.
+    /// All quantities, in the order of menus.
     pub const ALL: [Quantity; 9] = [
         Self::Force,
         Self::Torque,
@@ -53,19 +53,19 @@ impl Quantity {
         Self::Lateness,
     ];
 
-    /// What people call it.
+    /// Returns the name for menus and axes.
     #[must_use]
     pub const fn name(self) -> &'static str {
         self.entry().0
     }
 
-    /// Names of its components.
+    /// Returns the names of the components.
     #[must_use]
     pub const fn components(self) -> &'static [&'static str] {
         self.entry().1
     }
 
-    /// Unit, and how many of it one SI unit is.
+    /// Returns the unit, and the factor that converts an SI value to it.
     #[must_use]
     pub const fn unit(self, units: Units) -> (&'static str, f64) {
         let (_, _, si, handy) = self.entry();
@@ -75,7 +75,7 @@ impl Quantity {
         }
     }
 
-    /// The quantity as pictures know it: it has the least range of an axis.
+    /// Returns the corresponding quantity of `flotor_plot`, which defines the smallest range of an axis.
     #[must_use]
     pub const fn measured(self) -> flotor_plot::Quantity {
         use flotor_plot::Quantity as Measured;
@@ -92,13 +92,13 @@ impl Quantity {
         }
     }
 
-    /// The least range of an axis, in these units.
+    /// Returns the smallest range of an axis, in these units.
     #[must_use]
     pub fn least_range(self, units: Units) -> f64 {
         self.measured().least_range_si() * self.unit(units).1
     }
 
-    /// Name, names of components, SI unit, and the unit people read with how many of it one SI unit is.
+    /// Returns name, names of components, SI unit, and the handy unit with its factor from SI.
     const fn entry(self) -> (&'static str, &'static [&'static str], &'static str, (&'static str, f64)) {
         const DEGREES_PER_RAD: f64 = 180.0 / std::f64::consts::PI;
         match self {
@@ -116,7 +116,7 @@ impl Quantity {
         }
     }
 
-    /// A component of it in a sample, SI; NaN for a component it does not have.
+    /// Returns a component in a sample, SI; NaN for a component that the quantity does not have.
     #[must_use]
     pub fn value(self, sample: &Sample, component: usize) -> f64 {
         let of = |values: &[f32], offset: usize| {

@@ -1,4 +1,4 @@
-//! The pointer as the hand: handles that can be dragged, and the requests that come of it.
+//! Pointer as the hand: draggable handles, and the requests of a drag.
 
 use super::Viewer;
 use crate::palette::Palette;
@@ -11,11 +11,11 @@ use flotor_history::player::Motion;
 use flotor_live::ChangeMessage;
 use std::time::{Duration, Instant};
 
-/// How soon the window looks again while a hand is held.
+/// Repaint interval while a hand is held.
 const HOLDING: Duration = Duration::from_millis(50);
 
 impl Viewer {
-    /// The handles of the newest moment in an area with the 3D view.
+    /// Shows the draggable handles of the newest samples over the 3D view, and sends the requests of a drag.
     pub(super) fn handles(&mut self, ui: &Ui, area: Rect, samples: &[Sample], palette: &Palette) {
         for (device, sample) in samples.iter().enumerate() {
             if !self.can_drag(device) {
@@ -52,17 +52,17 @@ impl Viewer {
         }
     }
 
-    /// Returns whether the handle of a device can be dragged: its hand can be guided, and the newest moment of a session is shown.
+    /// Returns whether the handle of a device can be dragged: its hand can be guided, and the newest sample of a session is shown.
     fn can_drag(&self, device: usize) -> bool {
         self.source.is_running() && self.player.motion == Motion::Follow && self.guide.has_hand(device)
     }
 
-    /// Returns whether the hint for dragging is shown: no handle is dragged, and one can be.
+    /// Returns whether the hint for dragging is shown: a handle can be dragged, and none is.
     pub(super) fn wants_drag_hint(&self) -> bool {
         self.drag.is_none() && (0..self.devices.count()).any(|device| self.can_drag(device))
     }
 
-    /// Hears of a change of the hand: another client may guide it.
+    /// Processes a change of the hand, and warns if another client guides it.
     pub(super) fn take_in_guide(&mut self, change: &ChangeMessage) {
         if self.guide.take_in(change) {
             self.say("Another window guides this hand; wait until it has released the handle");

@@ -1,4 +1,4 @@
-//! What has come since the last picture, from a running host or a search for one.
+//! Intake of new data from a running host, and the search for a run.
 
 use super::source::{Parts, connect};
 use super::{Audience, Heading, Source, Viewer, Wanted};
@@ -14,18 +14,18 @@ use flotor_history::{History, Keep};
 use flotor_live::{ChangeMessage, Outcome, Subject};
 use std::time::{Duration, Instant};
 
-/// How often a run is looked for while there is none.
+/// Poll interval of the search for a run.
 const LOOK_PERIOD: Duration = Duration::from_millis(500);
-/// How much of a running host is kept, s, and how many ticks at most.
+/// Retained time of a running host, s, and the largest number of retained ticks.
 const KEPT_S: f64 = 60.0;
 const MOST_KEPT: usize = 120_000;
-/// What a hand should be warned of with a sound.
+/// Events that trigger a warning sound.
 const EXCESS: Events = Events::from_bits(
     Events::FORCE_LIMITED.bits() | Events::TORQUE_LIMITED.bits() | Events::EXCESS_FORCE.bits(),
 );
 
 impl Viewer {
-    /// Takes in what has come since the last picture.
+    /// Processes all data received since the last picture, and searches for a run while there is none.
     pub(super) fn take_in(&mut self, context: &Context) {
         let due = self.last_look.is_none_or(|last| last.elapsed() >= LOOK_PERIOD);
         let wanted = match &self.source {
@@ -34,7 +34,7 @@ impl Viewer {
             _ => None,
         };
         if let Some(wanted) = wanted {
-            // Somebody may start the next run at any time.
+            // The next run may start at any time.
             context.request_repaint_after(LOOK_PERIOD);
             if due {
                 self.last_look = Some(Instant::now());
@@ -43,12 +43,12 @@ impl Viewer {
             }
         }
         if let Source::Live { feed, .. } = &self.source {
-            // Before its arrivals: of a run that was over by then, nothing is missing from them.
+            // Read the state before the arrivals: if the run is over by then, the arrivals are complete.
             let is_running = feed.state() == FeedState::Running;
             let arrivals = feed.arrivals();
             self.devices.set_dropped(feed.dropped());
             if is_running {
-                context.request_repaint_after(STALE_AFTER); // to notice that nothing comes
+                context.request_repaint_after(STALE_AFTER); // to detect stale data
             } else {
                 self.panels.iter_mut().for_each(Panel::freeze);
             }
@@ -100,10 +100,10 @@ impl Viewer {
         }
     }
 
-    /// A parameter has a new value in the loop: the drawn instance follows, and what depends on it.
+    /// Applies a new parameter value to the drawn instance and its panels.
     fn follow(&mut self, change: &ChangeMessage) {
         if self.audience == Audience::Subject {
-            return; // what a subject sees does not change with what is felt
+            return; // the picture of a subject is independent of the felt force
         }
         if let Some(shape) = self.shapes.iter_mut().find(|shape| shape.name() == change.plugin) {
             shape.set_parameter(&change.parameter, change.number);
@@ -115,7 +115,7 @@ impl Viewer {
     }
 }
 
-/// The changes that the drawn instances follow. A number on its way changes with every tick; the last one in force is what is drawn.
+/// Selects the applied parameter changes to draw: the last of each parameter, because a moving number changes with every tick.
 fn to_draw(changes: &[ChangeMessage]) -> Vec<&ChangeMessage> {
     let is_in_force =
         |change: &&ChangeMessage| change.outcome == Outcome::Applied && change.subject == Subject::Parameter;

@@ -1,4 +1,4 @@
-//! What keys do in the window of an experimenter.
+//! Keyboard shortcuts in the window of an experimenter.
 
 use super::Viewer;
 use crate::scene::SceneBuilder;
@@ -9,8 +9,8 @@ use flotor_history::player::Motion;
 use flotor_live::Ask;
 
 impl Viewer {
-    /// Keys, unless somebody types into a field. The space bar is the largest key: with a run it is the emergency stop,
-    /// whatever has the focus.
+    /// Handles shortcuts, unless a text field has the focus. The space bar, the largest key, is the emergency stop of a run
+    /// regardless of the focus.
     pub(super) fn keys(&mut self, ui: &Ui) {
         let span_s = self.devices.history().span_s();
         let is_live = self.source.is_running();

@@ -1,4 +1,4 @@
-//! The parts of an experimenter's window and where they stand: bar, messages, side, view, traces.
+//! Layout of an experimenter's window: bar, messages, side panel, 3D view, traces.
 //!
 //! The room is shared by priority: emergency stop and state of the run ([`top_bar`]), messages ([`messages`]), the clock (in the bar of
 //! the playback and over the view), numbers and the other texts over the view ([`overlay`]), traces, panel.
@@ -29,18 +29,18 @@ use flotor_history::compared::Compared;
 use flotor_live::{Ask, SetValue};
 use std::time::Instant;
 
-/// Height of the bar, points, for which its texts have their usual size.
+/// Height of the bar for texts of the usual size, points.
 const USUAL_BAR_PT: f32 = 42.0;
-/// Part of the height of the window that the messages of a run that has failed may take.
+/// Largest fraction of the window height for the messages of a run that is over.
 const MOST_OF_HEIGHT: f32 = 0.3;
-/// What the border is called.
+/// Accessible name of the border.
 const BORDER: &str = "Border between view and traces";
-/// Part of the height that the 3D view has at least, where there are traces.
+/// Smallest fraction of the height for the 3D view above traces.
 const LEAST_VIEW_PART: f32 = 0.27;
 /// Height of the row with the names of the devices, points.
 const DEVICES_PT: f32 = 28.0;
 
-/// Returns the part of the height that the 3D view gets: in low windows, and above many traces, it gives way to them.
+/// Returns the fraction of the height for the 3D view: less in low windows and above many traces.
 fn view_part(height_pt: f32, traces_pt: f32) -> f32 {
     let most = match height_pt {
         ..360.0 => LEAST_VIEW_PART,
@@ -50,7 +50,7 @@ fn view_part(height_pt: f32, traces_pt: f32) -> f32 {
     most.min(1.0 - traces_pt / height_pt).max(LEAST_VIEW_PART)
 }
 
-/// Returns whether an area, so high, has room for traces beneath the 3D view.
+/// Returns whether an area of this height has room for traces beneath the 3D view.
 fn has_room_for_traces(height_pt: f32) -> bool {
     (1.0 - LEAST_VIEW_PART) * height_pt >= PlotStack::least_height_of_one_pt()
 }
@@ -58,15 +58,15 @@ fn has_room_for_traces(height_pt: f32) -> bool {
 impl Viewer {
     pub(super) fn top(&mut self, ui: &mut Ui, palette: &Palette) {
         let State { words, status } = self.state();
-        // The screens of a sitting say it, in the language of the person.
+        // The screens of a sitting show the state, in the language of the person.
         let words = if self.audience == Audience::Subject { "" } else { words };
         let title = match (&self.source, self.audience) {
             (Source::Waiting(_), _) => "Flotor",
-            // Names of parameters are nothing for a subject's eyes.
+            // A subject must not see the names of parameters.
             (_, Audience::Subject) => "",
             _ => self.heading.title.as_str(),
         };
-        // A rehearsal shows what a person sees.
+        // A rehearsal shows the same bar as a sitting.
         let can_stop = self.source.is_running() || self.is_rehearsal();
         let bar = TopBar {
             title,
@@ -89,7 +89,7 @@ impl Viewer {
         }
     }
 
-    /// Returns the name and the key of the emergency stop: the largest key, except in a sitting.
+    /// Returns the name and the key of the emergency stop: the space bar, or in a sitting the configured key.
     fn stop(&self) -> Stop {
         match &self.sitting {
             Some(prompt) => Stop { name: prompt.texts.stop.clone(), key: prompt.stop_key.key().name() },
@@ -121,13 +121,13 @@ impl Viewer {
     pub(super) fn side(&mut self, ui: &mut Ui, palette: &Palette) {
         let mut values: Vec<SetValue> = Vec::new();
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            ui.set_max_width(ui.available_width() - 12.0); // room for the bar that scrolls
-            // How close the hand is to the limits comes before anything that can be changed.
+            ui.set_max_width(ui.available_width() - 12.0); // room for the scroll bar
+            // The margin to the limits comes before all parameters.
             if let Some(sample) = self.devices.history().at(self.player.now_s) {
                 standing::limits(ui, sample, &self.limits, self.plots.units, palette);
                 ui.add_space(8.0);
             }
-            // Models before devices: they are what people came for.
+            // Models before devices: users mostly change models.
             let has_device = self.devices.history().run().devices().count().min(self.panels.len());
             let (device, models) = self.panels.split_at_mut(has_device);
             for panel in models.iter_mut().chain(device) {
@@ -142,7 +142,7 @@ impl Viewer {
         }
     }
 
-    /// Takes back the last change of a panel: of the models first, they are what people change.
+    /// Undoes the last change of a panel, in models before devices.
     pub(super) fn undo(&mut self) {
         let has_device = self.devices.history().run().devices().count().min(self.panels.len());
         let (device, models) = self.panels.split_at_mut(has_device);
@@ -196,7 +196,7 @@ impl Viewer {
         legend::names(&mut overlay, view, &self.facts, &camera, names, palette);
     }
 
-    /// Shows the button that returns to the experimenter's view, once the view was turned.
+    /// Shows the button that resets the view, if the view was turned.
     fn reset_button(&mut self, ui: &mut Ui, overlay: &mut Overlay) {
         let size = vec2(78.0, 22.0);
         let Some(place) = self.view.is_turned().then(|| overlay.take(Corner::RightBottom, size)).flatten()
@@ -232,7 +232,7 @@ impl Viewer {
         }
     }
 
-    /// The border between view and traces, which can be pulled; a double click puts it back.
+    /// Handles the border between view and traces: a drag moves the border, a double click restores the default.
     fn border(&mut self, ui: &Ui, area: Rect, y: f32) {
         let strip = Rect::from_x_y_ranges(area.x_range(), (y - 3.0)..=(y + 4.0));
         let response = ui.interact(strip, ui.scope_id().with("border"), Sense::click_and_drag());
@@ -247,8 +247,7 @@ impl Viewer {
         response.on_hover_cursor(CursorIcon::ResizeVertical);
     }
 
-    /// Shows the names of the devices, where there are several, to choose the one that numbers and traces are of; returns the area
-    /// beneath.
+    /// Shows a row to choose the device for numbers and traces, if there are several devices; returns the area beneath.
     fn choose_device(&mut self, ui: &mut Ui, area: Rect) -> Rect {
         if self.devices.count() < 2 {
             return area;
@@ -264,14 +263,14 @@ impl Viewer {
         beneath
     }
 
-    /// Numbers and traces are of this device from now on.
+    /// Chooses the device for numbers and traces.
     pub(super) fn look_at(&mut self, number: usize) {
         if self.devices.choose(number) {
             self.plots.look_at_another();
         }
     }
 
-    /// The 3D view at a moment.
+    /// Shows the 3D view at the displayed time.
     pub(super) fn scene(&mut self, ui: &mut Ui, area: Rect, samples: &[Sample]) {
         let (shapes, version, scale) =
             (&mut self.shapes, self.shape_version, self.devices.scale().with_chosen(self.arrow_force_n));
@@ -280,7 +279,7 @@ impl Viewer {
         self.facts = self.view.show(ui, area, self.look, Subject { shapes, version, moment, scale });
     }
 
-    /// Says that there is nothing to show and what to do; while there is no run, offers recordings.
+    /// Shows a hint in place of missing data; while there is no run, offers recordings.
     fn nothing(&mut self, ui: &mut Ui, area: Rect, palette: &Palette) {
         let (first, second) = match &self.source {
             Source::Waiting(_) => ("Waiting for a run", "Start one in a terminal:  flotor run"),

@@ -1,7 +1,7 @@
-//! The window: a running host or a recording, seen and handled.
+//! Window of the viewer: state, and handling of a running host or a recording.
 //!
-//! A picture is made when something has changed, and not otherwise: ticks that came, a hand on the mouse, time that
-//! goes on. All that is shown is state of this module; the parts in [`crate::ui`] only show it.
+//! A picture is made only after a change: new ticks, user input, or playback. This module owns all displayed state; the
+//! parts in [`crate::ui`] only show the state.
 
 mod hand;
 mod intake;
@@ -42,53 +42,53 @@ use source::{FRAME, FRAME_OF_WORDS, FRAME_ON_CPU};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Width of the side, points: where nobody has pulled it, and how far it can be pulled.
+/// Default width of the side panel, points, and its range.
 const SIDE_PT: f32 = 300.0;
 const SIDE_RANGE_PT: std::ops::RangeInclusive<f32> = 240.0..=480.0;
-/// How much of the height the 3D view can be given.
+/// Range for the fraction of the height that belongs to the 3D view.
 pub(super) const VIEW_PARTS: std::ops::RangeInclusive<f32> = 0.15..=0.85;
-/// Width of a window from which on the panel stands beside the run unasked, points: narrower, the run would be squeezed.
+/// Smallest width of a window that shows the panel by default, points; in a narrower window too little width is left for the run.
 const ROOM_FOR_PANEL_PT: f32 = 900.0;
-/// Width of a window below which the panel takes the room of view and traces, points.
+/// Width of a window below which the panel replaces view and traces, points.
 const ROOM_BESIDE_PANEL_PT: f32 = 560.0;
-/// Time that the traces of a running host show first, s.
+/// Initial time span of the traces of a running host, s.
 const LIVE_WINDOW_S: f64 = 10.0;
 /// Height of a window below which its bars are lower, points.
 const LOW_PT: f32 = 480.0;
 
-/// What the window begins with.
+/// Initial content of the window.
 pub enum Start {
-    /// A run, now or when it comes.
+    /// A running host, or the next run.
     Live(Wanted),
-    /// A run, in front of a subject.
+    /// A run with the screens of a sitting, for a subject.
     Sitting(Wanted, Box<Prompt>),
     /// A recording.
     Recording(Recorded),
 }
 
-/// A recording to be shown.
+/// Recording to show.
 pub struct Recorded {
-    /// The file, if the recording comes from one.
+    /// File of the recording, if any.
     pub file: Option<PathBuf>,
-    /// The samples of each device.
+    /// Samples of each device.
     pub histories: Vec<History>,
-    /// The first moment shown, s; without one, that of the largest force.
+    /// Initial time, s; `None`: the time of the largest force.
     pub at_s: Option<f64>,
-    /// Files of the plugins whose bodies can be drawn.
+    /// Plugin files for drawing the bodies.
     pub plugins: Vec<PathBuf>,
-    /// A second recording over this one.
+    /// Second recording for comparison.
     pub compared: Option<Compared>,
 }
 
 impl Recorded {
-    /// Shows the samples of each device at the moment of the largest force.
+    /// Creates a recording without file and comparison, to show at the time of the largest force.
     #[must_use]
     pub fn new(histories: Vec<History>, plugins: Vec<PathBuf>) -> Self {
         Self { file: None, histories, at_s: None, plugins, compared: None }
     }
 }
 
-/// The window's state.
+/// State of the window.
 pub struct Viewer {
     source: Source,
     devices: Devices,
@@ -100,25 +100,25 @@ pub struct Viewer {
     missing: Vec<String>,
     player: Player,
     view: View3d,
-    /// Force that arrows are scaled for, N, if somebody chose it.
+    /// Force of an arrow of full length, N, if chosen.
     arrow_force_n: Option<f64>,
     facts: SceneFacts,
-    /// The hands that can be guided, and the drag of a handle that is under way.
+    /// Hands that can be guided, and the current drag of a handle.
     guide: Guide,
     drag: Option<Drag>,
     plots: PlotStack,
     opening: Opening,
-    /// The recording over the run that is shown.
+    /// Second recording over the run.
     compared: Option<Compared>,
     look: Look,
-    /// What was chosen, if anything was.
+    /// Choice of the user; `None`: by the width of the window.
     shows_panel: Option<bool>,
     side_pt: f32,
-    /// Part of the height that the 3D view gets, where somebody has pulled the border.
+    /// Fraction of the height for the 3D view, if the border was dragged.
     view_part: Option<f32>,
     remark: Option<(String, Instant)>,
     done: Option<(String, Instant)>,
-    /// Whether the list of keys is in sight.
+    /// True while the list of shortcuts is shown.
     shows_keys: bool,
     bell: Bell,
     frame_rate: FrameRate,
@@ -142,7 +142,7 @@ impl Heading {
     }
 }
 
-/// Who sits in front of the window.
+/// Kind of user in front of the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Audience {
     Experimenter,
@@ -150,7 +150,7 @@ enum Audience {
 }
 
 impl Viewer {
-    /// A window on a device; without one, the 3D view is drawn on the processor.
+    /// Creates a window; without a render device, the 3D view is drawn by the processor.
     #[must_use]
     pub fn new(context: &Context, device: Option<&RenderState>, start: Start, look: Look) -> Self {
         style::apply(context, look);
@@ -202,72 +202,72 @@ impl Viewer {
         viewer
     }
 
-    /// The moment shown.
+    /// Returns the player: displayed time and playback mode.
     #[must_use]
     pub fn player(&self) -> &Player {
         &self.player
     }
 
-    /// What has been seen of the device looked at.
+    /// Returns the history of the chosen device.
     #[must_use]
     pub fn history(&self) -> &History {
         self.devices.history()
     }
 
-    /// Shows what a command line says.
+    /// Applies the display options of the command line.
     pub fn choose(&mut self, chosen: &Chosen) {
         self.look_at(chosen.device);
         self.arrow_force_n = chosen.arrow_force_n;
         self.plots.choose(chosen);
     }
 
-    /// The recording over the run that is shown.
+    /// Returns the second recording over the run.
     #[must_use]
     pub fn compared(&self) -> Option<&Compared> {
         self.compared.as_ref()
     }
 
-    /// The devices.
+    /// Returns the devices of the run.
     #[must_use]
     pub fn devices(&self) -> &Devices {
         &self.devices
     }
 
-    /// The panels, the device's first.
+    /// Returns the panels, devices before models.
     #[must_use]
     pub fn panels(&self) -> &[Panel] {
         &self.panels
     }
 
-    /// The 3D view.
+    /// Returns the 3D view.
     #[must_use]
     pub fn view(&self) -> &View3d {
         &self.view
     }
 
-    /// The traces.
+    /// Returns the plots of the traces.
     #[must_use]
     pub fn plots(&self) -> &PlotStack {
         &self.plots
     }
 
-    /// Shows the screens of a sitting over what it shows, as the person would see them.
+    /// Shows the screens of a sitting over a recording, as in a real sitting.
     pub fn rehearse(&mut self, prompt: Prompt) {
         (self.sitting, self.audience) = (Some(prompt), Audience::Subject);
     }
 
-    /// Whether screens of a sitting are shown without one.
+    /// Returns whether screens of a sitting are shown over a recording.
     fn is_rehearsal(&self) -> bool {
         matches!(self.source, Source::Recording) && self.audience == Audience::Subject
     }
 
-    /// Light or dark.
+    /// Returns the look, light or dark.
     #[must_use]
     pub fn look(&self) -> Look {
         self.look
     }
 
-    /// What a person has chosen about the window, for the next time.
+    /// Returns the user's settings of the window, to be saved.
     #[must_use]
     pub fn remembered(&self) -> Remembered {
         Remembered {
@@ -282,7 +282,7 @@ impl Viewer {
         }
     }
 
-    /// Makes the window what it was the last time.
+    /// Restores the saved settings of the window.
     pub fn recall(&mut self, context: &Context, remembered: &Remembered) {
         let Remembered { look, units, traces, shows_panel, side_pt, view_part, latest, .. } = remembered;
         self.opening.recall(latest);
@@ -297,10 +297,10 @@ impl Viewer {
         self.side_pt = side_pt.clamp(*SIDE_RANGE_PT.start(), *SIDE_RANGE_PT.end());
     }
 
-    /// Shows everything.
+    /// Draws the whole window, and processes input and new data.
     pub fn show(&mut self, ui: &mut Ui) {
         let palette = Palette::of(self.look);
-        // Further passes lay the same picture out again.
+        // Count each picture once: further passes repeat its layout.
         if ui.ctx().current_pass_index() == 0 {
             self.frame_rate.count(Instant::now());
         }
@@ -346,7 +346,7 @@ impl Viewer {
         }
     }
 
-    /// Whether the panel is in sight: as was chosen, else where there is room for it beside the run.
+    /// Returns whether the panel is shown: by the user's choice, else by the width of the window.
     fn is_panel_shown(&self, context: &Context) -> bool {
         self.shows_panel.unwrap_or_else(|| context.content_rect().width() >= ROOM_FOR_PANEL_PT)
     }
@@ -355,7 +355,7 @@ impl Viewer {
         self.shows_panel = Some(!self.is_panel_shown(context));
     }
 
-    /// Whether anything in sight moves with the ticks that come.
+    /// Returns whether any visible part moves with new ticks.
     fn is_moving(&self) -> bool {
         match &self.sitting {
             Some(prompt) => prompt.shows_scene(),

@@ -1,4 +1,4 @@
-//! Recordings that are opened in the window: dropped on it, named by a path, or one of the latest.
+//! Opening of recordings in the window: by drag and drop, by path, or from the list of latest recordings.
 
 use super::source::{Parts, Source};
 use super::{Heading, Recorded, Viewer};
@@ -16,29 +16,29 @@ use flotor_live::WrenchLimits;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Number of recordings that are offered again, at most.
+/// Largest number of latest recordings.
 const MOST_LATEST: usize = 5;
 /// Width of the field for a path, and of the button beside it, points.
 const FIELD_PT: f32 = 340.0;
 const BUTTON_PT: f32 = 70.0;
 /// Height of a row with the gap beneath, points.
 const ROW_PT: f32 = 26.0;
-/// Name of the field for a path.
+/// Accessible name of the field for a path.
 const FIELD: &str = "Path of a recording";
 
-/// The recordings that can be opened.
+/// Form for opening a recording.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Opening {
     /// Text of the field.
     typed: String,
-    /// The recordings opened last, the newest first.
+    /// Recordings opened last, the newest first.
     latest: Vec<PathBuf>,
-    /// Files of the plugins whose bodies can be drawn.
+    /// Plugin files for drawing the bodies.
     plugins: Vec<PathBuf>,
 }
 
 impl Opening {
-    /// Draws bodies with the plugins of these files.
+    /// Creates a form for recordings whose bodies are drawn with the plugins of these files.
     pub(super) fn with_plugins(plugins: Vec<PathBuf>) -> Self {
         Self { plugins, ..Self::default() }
     }
@@ -48,7 +48,7 @@ impl Opening {
         &self.latest
     }
 
-    /// Adds the recordings of earlier windows after those of this one.
+    /// Appends the latest recordings of earlier windows.
     pub(super) fn recall(&mut self, earlier: &[PathBuf]) {
         let others: Vec<PathBuf> =
             earlier.iter().filter(|file| !self.latest.contains(file)).cloned().collect();
@@ -56,7 +56,7 @@ impl Opening {
         self.latest.truncate(MOST_LATEST);
     }
 
-    /// Puts a recording first among the latest.
+    /// Moves a recording to the front of the latest recordings.
     fn remember(&mut self, file: &Path) {
         let file = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
         self.latest.retain(|known| *known != file);
@@ -64,7 +64,7 @@ impl Opening {
         self.latest.truncate(MOST_LATEST);
     }
 
-    /// Shows a field for a path and the latest recordings, as many as have room, and returns the file that was chosen.
+    /// Shows a field for a path and as many of the latest recordings as fit; returns the chosen file.
     pub(super) fn show(&mut self, ui: &mut Ui, palette: &Palette) -> Option<PathBuf> {
         let has_room = |ui: &Ui| ui.available_height() >= ROW_PT;
         let quiet = |text: String| RichText::new(text).size(SMALL_PT);
@@ -104,8 +104,8 @@ impl Opening {
 }
 
 impl Viewer {
-    /// Opens a recording that was dropped on an empty window, or lays it over what is shown: a session and its emergency stop stay in
-    /// sight.
+    /// Opens a recording dropped on an empty window; otherwise shows it over the current run, so that a session and its emergency stop stay
+    /// visible.
     pub(super) fn open_dropped(&mut self, ui: &Ui) {
         let path = |file: &Arc<dyn DroppedFile + Send + Sync>| file.path().to_path_buf();
         let dropped: Vec<PathBuf> = ui.input(|input| input.raw.dropped_files.iter().map(path).collect());
@@ -118,7 +118,7 @@ impl Viewer {
         }
     }
 
-    /// Lays a recording over what is shown, or shows a warning why the file cannot be read.
+    /// Shows a recording over the current run, or a warning if the file cannot be read.
     fn lay_over(&mut self, file: &Path) {
         match Compared::read(file) {
             Ok(compared) => {
@@ -129,7 +129,7 @@ impl Viewer {
         }
     }
 
-    /// Shows a recording in place of what is shown, or a warning why the file cannot be read.
+    /// Shows a recording in place of the current run, or a warning if the file cannot be read.
     pub(super) fn open(&mut self, file: &Path) {
         match History::read(file) {
             Ok(histories) => {
@@ -144,7 +144,7 @@ impl Viewer {
         }
     }
 
-    /// Shows a recording, at the moment of the largest force unless another is given.
+    /// Shows a recording, at the time of the largest force unless another time is given.
     pub(super) fn show_recording(&mut self, recorded: Recorded) {
         let Recorded { histories, at_s, plugins, file, compared } = recorded;
         self.devices = Devices::new(histories);

@@ -1,4 +1,4 @@
-//! The window in front of a person in a sitting: one screen at a time, the emergency stop, and nothing else.
+//! Window for a person in a sitting: one screen at a time and the emergency stop.
 
 use super::{Source, Viewer};
 use crate::experiment::{Prompt, screens};
@@ -8,18 +8,18 @@ use egui::{CentralPanel, Frame, Key, Panel as Edge, Rect, Ui, ViewportCommand};
 use flotor_live::Ask;
 use flotor_study::screen::Screen;
 
-/// Height of the bar, part of that of the window, and its least height, points.
+/// Height of the bar as a fraction of the window height, and its smallest height, points.
 const BAR_PART: f32 = 0.06;
 const LEAST_BAR_PT: f32 = 48.0;
 
 impl Viewer {
-    /// The sitting under way, if this window is one.
+    /// Returns the prompt of the sitting; `None` in a window for an experimenter.
     #[must_use]
     pub fn prompt(&self) -> Option<&Prompt> {
         self.sitting.as_ref()
     }
 
-    /// Shows the screen of a sitting, and tells the experiment what the person does.
+    /// Shows the screen of a sitting, and sends the input of the person to the experiment.
     pub(super) fn sit(&mut self, ui: &mut Ui, palette: &Palette) {
         let is_running = self.source.is_running();
         let stop_key = self.sitting.as_ref().map(|prompt| prompt.stop_key.key());
@@ -31,7 +31,7 @@ impl Viewer {
             self.bell.ring();
         }
         if let Some(rest) = prompt.warned_for() {
-            ui.ctx().request_repaint_after(rest); // to take it out of sight again
+            ui.ctx().request_repaint_after(rest); // to hide the warning again
         }
         if prompt.screen() == Some(&Screen::Over) || prompt.is_lost() {
             if ui.input(|input| input.key_pressed(Key::Enter)) {
@@ -41,7 +41,7 @@ impl Viewer {
             screens::keys(ui).into_iter().for_each(|key| prompt.key(key));
         }
         let plain = Frame::new().fill(palette.panel).inner_margin(egui::Margin::symmetric(16, 4));
-        self.sitting = Some(prompt); // the bar has its texts
+        self.sitting = Some(prompt); // the bar reads its texts
         let bar_pt = (BAR_PART * ui.available_height()).max(LEAST_BAR_PT);
         Edge::top("top")
             .exact_size(bar_pt)
@@ -69,8 +69,8 @@ impl Viewer {
             }
             (Source::Live { .. } | Source::Recording, Some(_), Some(samples)) => {
                 if prompt.shows_scene() {
-                    // Nothing of what is drawn may tell how stiff it is: no arrows, no colours of the moment's
-                    // largest force, and a wire that stays what it is.
+                    // The picture must not reveal the stiffness: no arrows, no colours of the moment's
+                    // largest force, and a wire that does not follow the parameters.
                     self.view.shows_arrows = false;
                     self.scene(ui, screens::beneath_scene(area).0, &samples);
                     self.view.keys(ui, SceneBuilder::extent(&self.shapes, self.devices.count()));

@@ -1,4 +1,4 @@
-//! What the window shows: nothing yet, a running host, or a recording.
+//! Source of the window's data: no run yet, a running host, or a recording.
 
 use crate::feed::{Feed, FeedState};
 use crate::panel::{Panel, Use};
@@ -11,18 +11,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Between two pictures of a running host on a GPU, and on a software adapter, which needs the processor for itself.
+/// Frame interval of a running host on a GPU, and on a software adapter, which itself uses the processor.
 pub(super) const FRAME: Duration = Duration::from_millis(16);
 pub(super) const FRAME_ON_CPU: Duration = Duration::from_millis(33);
-/// The same where nothing that moves is in sight: counts and words go on.
+/// Frame interval while only counts and texts change.
 pub(super) const FRAME_OF_WORDS: Duration = Duration::from_millis(250);
 
-/// How soon ticks that have come are to be seen: said by the window, followed by the thread that reads them.
+/// Frame interval, set by the window and read by the thread that receives ticks.
 #[derive(Clone, Debug)]
 pub struct Pace(Arc<AtomicU64>);
 
 impl Pace {
-    /// A picture so long after the last one.
+    /// Creates a pace with this frame interval.
     #[must_use]
     pub fn of(frame: Duration) -> Self {
         let pace = Self(Arc::default());
@@ -30,7 +30,7 @@ impl Pace {
         pace
     }
 
-    /// Changes it.
+    /// Changes the frame interval.
     pub fn set(&self, frame: Duration) {
         self.0.store(u64::try_from(frame.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
     }
@@ -40,37 +40,37 @@ impl Pace {
     }
 }
 
-/// Which run is to be watched.
+/// Selection of the run to watch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wanted {
-    /// Where runs are found.
+    /// Directory of the runs.
     pub directory: Directory,
-    /// The process that runs it; without one, the newest.
+    /// Process of the run; `None`: the newest run.
     pub process: Option<u32>,
-    /// Files of the plugins whose bodies are drawn if the window opens a recording instead.
+    /// Plugin files for drawing the bodies of a recording, if the window opens one instead.
     pub plugins: Vec<PathBuf>,
 }
 
 impl Wanted {
-    /// The newest run of a folder.
+    /// Selects the newest run of a directory.
     #[must_use]
     pub fn newest(directory: Directory) -> Self {
         Self { directory, process: None, plugins: Vec::new() }
     }
 }
 
-/// Where ticks come from.
+/// Source of ticks.
 pub enum Source {
     /// No run yet.
     Waiting(Wanted),
     /// A running host.
     Live {
-        /// The connection.
+        /// Connection to the host.
         feed: Box<Feed>,
-        /// What is looked for when it is over.
+        /// Selection of the next run, once this run is over.
         wanted: Wanted,
     },
-    /// A file.
+    /// A recording.
     Recording,
 }
 
@@ -82,10 +82,10 @@ impl Source {
     }
 }
 
-/// Connects to a run; the window is woken whenever there is something new.
+/// Connects to a run; new data requests a repaint of the window.
 ///
 /// # Errors
-/// [`LiveError`]: there is none, or it cannot be watched.
+/// [`LiveError`] if there is no such run or the connection fails.
 pub fn connect(wanted: &Wanted, context: &Context, pace: &Pace) -> Result<Feed, LiveError> {
     let (context, pace) = (context.clone(), pace.clone());
     let client = match wanted.process {
@@ -97,16 +97,16 @@ pub fn connect(wanted: &Wanted, context: &Context, pace: &Pace) -> Result<Feed, 
 
 /// Bodies and panels of a run.
 pub(super) struct Parts {
-    /// What can be drawn.
+    /// Bodies for the 3D view.
     pub(super) shapes: Vec<Shape>,
-    /// What can be set.
+    /// Panels for the parameters.
     pub(super) panels: Vec<Panel>,
-    /// What is missing, in words.
+    /// Messages about missing bodies.
     pub(super) missing: Vec<String>,
 }
 
 impl Parts {
-    /// Of a running host: its plugins lie where it says.
+    /// Builds the parts of a running host, from the plugin files of its greeting.
     #[must_use]
     pub(super) fn of_host(feed: &Feed) -> Self {
         let files: Vec<PathBuf> = feed.greeting().plugins.iter().map(|plugin| plugin.file.clone()).collect();
@@ -115,7 +115,7 @@ impl Parts {
         Self { shapes, panels, missing: missing.iter().map(ToString::to_string).collect() }
     }
 
-    /// Of a recording: plugins as far as they were found.
+    /// Builds the parts of a recording, from the plugin files that were found.
     #[must_use]
     pub(super) fn of_recording(run: &RunDescription, files: &[PathBuf]) -> Self {
         let (shapes, missing) = shapes_of(run, files);
@@ -133,7 +133,7 @@ impl Parts {
     }
 }
 
-/// A panel that can be pulled; the instance that is drawn is brought to the values in force.
+/// Creates an editable panel, and sets the drawn instance to the values in force.
 fn panel(plugin: &PanelPlugin, shapes: &mut [Shape]) -> Panel {
     let mut panel = Panel::new(plugin, Use::Change);
     if let Some(shape) = shapes.iter_mut().find(|shape| shape.name() == plugin.name) {

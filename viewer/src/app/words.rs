@@ -1,4 +1,4 @@
-//! The state of the run and the messages of the moment, in words.
+//! Texts for the state of the run and the current messages.
 
 use super::{Source, Viewer};
 use crate::feed::FeedState;
@@ -10,23 +10,23 @@ use flotor_live::EndKind;
 use flotor_record::Severity;
 use std::time::Duration;
 
-/// How long something that happened in one tick stays in sight, s.
+/// Display time of an event of one tick, s.
 const IN_SIGHT_S: f64 = 1.0;
-/// What ends a run that should go on.
+/// Events that end a run abnormally.
 const FATAL: Events = Events::from_bits(Events::EMERGENCY_STOP.bits() | Events::DEVICE_FAULT.bits());
-/// How long a remark stays in sight.
+/// Display time of a remark.
 const REMARK: Duration = Duration::from_secs(6);
 
-/// State of the run.
+/// Displayed state of the run.
 pub(super) struct State {
-    /// In a word or two, which always have room.
+    /// State in one or two words, for a bar of any width.
     pub(super) words: &'static str,
-    /// Whether the state is in order.
+    /// Severity of the state.
     pub(super) status: RunStatus,
 }
 
 impl Viewer {
-    /// Returns the state of the run.
+    /// Returns the displayed state of the run.
     pub(super) fn state(&self) -> State {
         let events = self.devices.newest_events();
         let (words, status) = match &self.source {
@@ -54,7 +54,7 @@ impl Viewer {
         State { words, status }
     }
 
-    /// Returns the warnings of the moment, each once, the most urgent first.
+    /// Returns the current warnings, each once, the most urgent first.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut said = Vec::new();
         let mut known = Events::NONE;
@@ -63,7 +63,7 @@ impl Viewer {
                 said.push("Stale data: no ticks come; look at the terminal of `flotor run`".to_owned());
             }
             match feed.state() {
-                // The reason says more than the event of the last tick.
+                // The reason is more specific than the event of the last tick.
                 FeedState::Ended(reason, _) if self.state().status == RunStatus::Failed => {
                     said.push(reason);
                     known = FATAL;
@@ -84,7 +84,7 @@ impl Viewer {
         said
     }
 
-    /// Returns the events of each device by name: those of the moment, and while the run is followed those of the last second, because
+    /// Returns the events of each device by name: at the displayed time, and while the run is followed in the last second, because
     /// an event of one tick is over in a millisecond.
     fn recent_events(&self) -> impl Iterator<Item = (&str, Events)> {
         let now_s = self.player.now_s;
@@ -97,7 +97,7 @@ impl Viewer {
         })
     }
 
-    /// Returns what was done last, or how the run ended in order: no warnings.
+    /// Returns the message about the last action, or the reason for the end of the run.
     pub(super) fn done(&self) -> Option<String> {
         let done = self.done.as_ref().filter(|(_, since)| since.elapsed() < REMARK);
         let end = || match &self.source {

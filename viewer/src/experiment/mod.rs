@@ -1,9 +1,9 @@
-//! A sitting of a perception experiment, as the window in front of a person sees it.
+//! Sitting of a perception experiment, in the window in front of the person.
 //!
-//! The experiment is another program, `flotor study`: trials, stimuli, answers and the log are its own. It tells this window
-//! which screen to show, and the window says what the person does ([`wire`]). Here is what lies between the two: the screen of
-//! the moment, the digits typed so far, and what a key means now. All of it works by keyboard alone: in studies the other hand
-//! holds the device.
+//! The experiment is a separate program, `flotor study`, which owns trials, stimuli, answers and the log. It sends the screen to
+//! show, and the window sends the input of the person ([`wire`]). This module has the state in between: the current screen, the
+//! digits typed so far, and the meaning of each key. All input works by keyboard alone: in studies the other hand holds the
+//! device.
 
 pub mod screens;
 pub mod texts;
@@ -17,31 +17,31 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use texts::Texts;
 
-/// What a key means.
+/// Meaning of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StudyKey {
-    /// Go on.
+    /// Continue.
     Enter,
-    /// Feel it again.
+    /// Feel the stimulus again.
     Again,
-    /// Practise before the sitting goes on.
+    /// Practise before the sitting continues.
     Practise,
-    /// Take the last answer back.
+    /// Withdraw the last answer.
     Withdraw,
-    /// A digit of a rating, or the answer of this number.
+    /// Type a digit of a rating, or choose the answer of this number.
     Digit(u8),
-    /// The decimal point of a rating.
+    /// Type the decimal point of a rating.
     Point,
-    /// Takes the last digit back.
+    /// Delete the last digit.
     Back,
 }
 
-/// Digits of a rating at most.
+/// Largest number of digits of a rating.
 const MOST_DIGITS: usize = 8;
-/// How long a warning stays in sight after the last one.
+/// Display time of a warning.
 const WARNED: Duration = Duration::from_secs(2);
 
-/// The key that is the emergency stop in a sitting: not the largest one, which a person presses to go on.
+/// Key of the emergency stop in a sitting; by default not the largest key, which a person tends to press to continue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum StopKey {
     /// Escape
@@ -54,7 +54,7 @@ pub enum StopKey {
 }
 
 impl StopKey {
-    /// The same for the window.
+    /// Returns the key of the window.
     #[must_use]
     pub const fn key(self) -> egui::Key {
         match self {
@@ -65,32 +65,32 @@ impl StopKey {
     }
 }
 
-/// The screen of the moment, and both ways to the experiment.
+/// Current screen, and the channels from and to the experiment.
 #[derive(Debug)]
 pub struct Prompt {
     told: Receiver<Told>,
     said: Sender<Said>,
     screen: Option<Screen>,
-    /// Keys mean something; else the experiment was told what the person did, and prepares the next screen.
+    /// True while keys are accepted; false while the experiment prepares the next screen.
     is_persons_turn: bool,
     typed: String,
     warned: Option<Instant>,
     refused: Option<String>,
     is_lost: bool,
     waker: Waker,
-    /// What stops the device at once.
+    /// Key of the emergency stop.
     pub stop_key: StopKey,
     /// Texts of the screens.
     pub texts: Texts,
 }
 
-/// Wakes the window when the experiment has said something: shared with who listens to it, and without effect until the window is
-/// open.
+/// Handle for waking the window on a message of the experiment; shared with the thread that receives messages, and without effect
+/// until the window is open.
 #[derive(Clone, Debug, Default)]
 pub struct Waker(Arc<OnceLock<Context>>);
 
 impl Waker {
-    /// Asks for a picture.
+    /// Requests a picture.
     pub fn wake(&self) {
         if let Some(context) = self.0.get() {
             context.request_repaint();
@@ -99,7 +99,7 @@ impl Waker {
 }
 
 impl Prompt {
-    /// A window that is told by one channel and speaks by the other.
+    /// Creates a prompt with the channels from and to the experiment.
     #[must_use]
     pub fn new(told: Receiver<Told>, said: Sender<Said>) -> Self {
         Self {
@@ -117,19 +117,19 @@ impl Prompt {
         }
     }
 
-    /// What is to be woken by who sends what the experiment says.
+    /// Returns the waker for the thread that receives messages.
     #[must_use]
     pub fn waker(&self) -> Waker {
         self.waker.clone()
     }
 
-    /// Says that the window is open.
+    /// Reports to the experiment that the window is open.
     pub fn open(&mut self, window: &Context) {
         let _ = self.waker.0.set(window.clone()); // a window opens once
         self.say(Said::Window { window: WindowState::Open });
     }
 
-    /// Takes in what the experiment has said since; true if the person is to be warned with a sound.
+    /// Processes new messages of the experiment; returns true if a warning sound is due.
     pub fn take_in(&mut self) -> bool {
         let mut warn = false;
         loop {
@@ -157,55 +157,55 @@ impl Prompt {
         }
     }
 
-    /// What is shown; none before the experiment has said so.
+    /// Returns the current screen; `None` before the first message of the experiment.
     #[must_use]
     pub fn screen(&self) -> Option<&Screen> {
         self.screen.as_ref()
     }
 
-    /// Whether the experiment has gone before its last screen.
+    /// Returns whether the experiment has ended before its last screen.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.is_lost && self.screen != Some(Screen::Over)
     }
 
-    /// Whether keys mean something now.
+    /// Returns whether keys are accepted now.
     #[must_use]
     pub fn is_persons_turn(&self) -> bool {
         self.is_persons_turn
     }
 
-    /// The digits typed so far.
+    /// Returns the digits typed so far.
     #[must_use]
     pub fn typed(&self) -> &str {
         &self.typed
     }
 
-    /// Whether the handle was out of its range a moment ago.
+    /// Returns whether the warning is shown that the handle was out of its range.
     #[must_use]
     pub fn is_warned(&self) -> bool {
         self.warned_for().is_some()
     }
 
-    /// How much longer that stays in sight.
+    /// Returns the rest of the display time of the warning; `None` without a warning.
     #[must_use]
     pub fn warned_for(&self) -> Option<Duration> {
         self.warned.and_then(|since| WARNED.checked_sub(since.elapsed()))
     }
 
-    /// Why the last answer was not taken, if so.
+    /// Returns the reason for the rejection of the last answer; `None` if accepted.
     #[must_use]
     pub fn refused(&self) -> Option<&str> {
         self.refused.as_deref()
     }
 
-    /// Whether the person may see the scene now: while feeling, and never in the haptics-alone condition.
+    /// Returns whether the person may see the scene now: while feeling, and never in the haptics-alone condition.
     #[must_use]
     pub fn shows_scene(&self) -> bool {
         matches!(&self.screen, Some(Screen::Feel { trial, .. }) if trial.object_is_shown)
     }
 
-    /// Follows a key; a key that means nothing now is ignored.
+    /// Processes a key; ignores a key without meaning on the current screen.
     pub fn key(&mut self, key: StudyKey) {
         let Some(screen) = self.screen.as_ref().filter(|_| self.is_persons_turn) else { return };
         let answer = |response| Some(Input::Answer { response });

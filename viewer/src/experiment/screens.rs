@@ -1,7 +1,7 @@
-//! The screens of a person in a sitting: few words, large, in the middle; nothing that tells how stiff anything is.
+//! Screens for a person in a sitting: few words, large, in the middle, without any hint at the stiffness.
 //!
-//! All sizes are shares of the height, so that a text is read from the same distance on every display, and the keys stand beneath the
-//! text that they belong to.
+//! All sizes are fractions of the height, so that a text is readable from the same distance on every display. The keys stand beneath
+//! their text.
 
 use super::texts::Texts;
 use super::{Prompt, StudyKey};
@@ -12,16 +12,16 @@ use flotor_study::protocol::Quality;
 use flotor_study::screen::{May, Pause, Question, Screen, TrialView};
 use flotor_study::trial::{Phase, Position};
 
-/// Part of the height that is for words where the scene is seen.
+/// Fraction of the height for texts beneath a visible scene.
 const WORDS_PART: f32 = 0.27;
-/// Part of the height above the words where nothing is seen.
+/// Fraction of the height above the texts without a visible scene.
 const ABOVE_PART: f32 = 0.2;
-/// Part of the height of a text to be read, at most: a longer one is scrolled.
+/// Largest fraction of the height for a text to read; a longer text is scrolled.
 const READ_PART: f32 = 0.6;
-/// Least height whose share is taken, of the width: on a display that stands on end the lines are still wide enough.
+/// Largest height for text sizes, as a fraction of the width: on a display in portrait orientation, lines are still wide enough.
 const HEIGHT_OF_WIDTH: f32 = 0.75;
 
-/// Sizes of text, points: shares of the height.
+/// Sizes of text, points.
 struct Sizes {
     headline: f32,
     text: f32,
@@ -40,20 +40,20 @@ impl Sizes {
     }
 }
 
-/// The words of a screen.
+/// Texts of a screen.
 struct Words<'a> {
     headline: &'a str,
     text: String,
     keys: String,
 }
 
-/// Returns the areas of the scene and of the words beneath it.
+/// Returns the areas of the scene and of the texts beneath the scene.
 #[must_use]
 pub fn beneath_scene(area: Rect) -> (Rect, Rect) {
     area.split_top_bottom_at_y((area.bottom() - WORDS_PART * area.height()).round())
 }
 
-/// Shows the screen of a moment in an area; the scene, if it may be seen, has its own part of it.
+/// Shows the current screen in an area, beneath the scene if the scene is visible.
 pub fn show(ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
     let Some(screen) = prompt.screen() else { return };
     let sizes = Sizes::of(area);
@@ -83,7 +83,7 @@ pub fn show(ui: &mut Ui, area: Rect, prompt: &Prompt, palette: &Palette) {
     below(&mut inner, prompt, &keys, &sizes, palette);
 }
 
-/// Shows a line and what to do about it.
+/// Shows a message and, smaller, the action required.
 pub fn line(ui: &mut Ui, area: Rect, [first, second]: [&str; 2], palette: &Palette) {
     let (sizes, centred) = (Sizes::of(area), Layout::top_down(Align::Center));
     let mut inner = ui.new_child(UiBuilder::new().max_rect(area).layout(centred));
@@ -92,7 +92,7 @@ pub fn line(ui: &mut Ui, area: Rect, [first, second]: [&str; 2], palette: &Palet
     inner.label(RichText::new(second).size(sizes.text).color(palette.faint));
 }
 
-/// Shows a text of the experimenter, from the top; a long one is scrolled by the wheel.
+/// Shows a text of the experimenter, from the top; a long text is scrolled by the wheel.
 fn read(ui: &mut Ui, text: &str, sizes: &Sizes, area: Rect, palette: &Palette) {
     let (title, rest) = text.split_once('\n').unwrap_or((text, ""));
     let width = 0.76 * area.width();
@@ -109,7 +109,7 @@ fn read(ui: &mut Ui, text: &str, sizes: &Sizes, area: Rect, palette: &Palette) {
     });
 }
 
-/// Shows what follows the words of a screen: warnings, the keys that mean something, the count of trials.
+/// Shows the lines beneath the text of a screen: active keys, count of trials, warnings.
 fn below(ui: &mut Ui, prompt: &Prompt, keys: &str, sizes: &Sizes, palette: &Palette) {
     let texts = &prompt.texts;
     let (keys, color) =
@@ -135,7 +135,7 @@ fn words<'a>(screen: &Screen, texts: &'a Texts) -> Words<'a> {
         Screen::Ready { reason, next } => pause(*reason, next, texts),
         Screen::Feel { trial, position } => feel(trial, *position, texts),
         Screen::Ask { trial, question } => ask(trial, *question, texts),
-        // Shown by itself.
+        // Shown by `read`.
         Screen::Read { .. } => Words { headline: "", text: String::new(), keys: String::new() },
         Screen::Over => {
             Words { headline: &texts.over, text: texts.over_how.clone(), keys: texts.key_close.clone() }
@@ -165,7 +165,7 @@ fn pause<'a>(reason: Pause, next: &TrialView, texts: &'a Texts) -> Words<'a> {
     Words { headline, text, keys: keys.to_owned() + &others(next, texts) }
 }
 
-/// Returns the keys for what a person may do but need not.
+/// Returns the texts for the keys of optional actions.
 fn others(trial: &TrialView, texts: &Texts) -> String {
     let key = |may: &May| match may {
         May::Again { left } => {
@@ -183,7 +183,7 @@ fn others(trial: &TrialView, texts: &Texts) -> String {
     trial.may.iter().map(|may| format!("          {}", key(may))).collect()
 }
 
-/// Returns the task of a trial and how it goes.
+/// Returns the task of a trial and its instructions.
 fn task<'a>(trial: &TrialView, texts: &'a Texts) -> (&'a String, &'a str) {
     match (trial.stimuli, trial.quality) {
         (1, Quality::Stiffness) => (&texts.task_rate_stiffness, &texts.how_rate_stiffness),
@@ -223,7 +223,7 @@ fn ask<'a>(trial: &TrialView, question: Question, texts: &'a Texts) -> Words<'a>
     Words { headline, text, keys: keys.to_owned() + &others(trial, texts) }
 }
 
-/// The keys pressed in this picture that mean something here.
+/// Returns the keys of a sitting pressed in this picture.
 #[must_use]
 pub fn keys(ui: &Ui) -> Vec<StudyKey> {
     ui.input(|input| {

@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 /// The English texts.
 const ENGLISH: &str = include_str!("../../texts/english.toml");
 
-/// Texts by their keys.
+/// Texts of the screens, one field for each key of the file.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Texts {
@@ -78,17 +78,17 @@ impl Texts {
     /// Returns the English texts.
     ///
     /// # Panics
-    /// Never: a test reads them.
+    /// Never: a test parses the English texts.
     #[must_use]
     pub fn english() -> Self {
         static TEXTS: OnceLock<Texts> = OnceLock::new();
         TEXTS.get_or_init(|| Self::parse(ENGLISH).expect("the English texts are complete")).clone()
     }
 
-    /// Reads a file.
+    /// Reads the texts from a file.
     ///
     /// # Errors
-    /// In a line: the file cannot be read, or a key is missing, unknown, or without the place of its number.
+    /// A message of one line if the file cannot be read, or a key is missing, unknown, or without the place of its number.
     pub fn read(file: &Path) -> Result<Self, String> {
         let text =
             std::fs::read_to_string(file).map_err(|cause| format!("cannot read the texts: {cause}"))?;

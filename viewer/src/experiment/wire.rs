@@ -1,5 +1,5 @@
-//! The two ways between this window and the experiment that opened it: a line of JSON for each thing said, on standard input
-//! and output. Threads of their own read and write, so that neither program waits for the other.
+//! Channels between this window and the experiment that opened it: a line of JSON for each message, on standard input
+//! and output. Separate threads read and write, so that neither program waits for the other.
 
 use super::Prompt;
 use flotor_study::screen::{Said, Told};
@@ -7,19 +7,19 @@ use std::io::{BufRead, Write, stdin, stdout};
 use std::sync::mpsc::channel;
 use std::thread::Builder;
 
-/// The experiment at this program's standard input and output.
+/// Connects to the experiment at this program's standard input and output.
 ///
 /// # Errors
-/// There are no threads to be had.
+/// If a thread cannot be started.
 pub fn at_standard_streams() -> std::io::Result<Prompt> {
     let (teller, told) = channel();
     let (said, sayer) = channel::<Said>();
     let prompt = Prompt::new(told, said);
     let waker = prompt.waker();
-    // Both end with the process, or with the experiment.
+    // Both threads end with the process, or with the experiment.
     Builder::new().name("flotor-told".to_owned()).spawn(move || {
         for line in stdin().lock().lines().map_while(Result::ok) {
-            // A word of a newer experiment that is not known here is nothing to show.
+            // Skip an unknown message of a newer experiment.
             let Ok(word) = serde_json::from_str::<Told>(&line) else { continue };
             if teller.send(word).is_err() {
                 return;
@@ -27,7 +27,7 @@ pub fn at_standard_streams() -> std::io::Result<Prompt> {
             waker.wake();
         }
         drop(teller);
-        waker.wake(); // the experiment has gone, which the person is told
+        waker.wake(); // the window then shows that the experiment has ended
     })?;
     Builder::new().name("flotor-said".to_owned()).spawn(move || {
         let mut out = stdout();

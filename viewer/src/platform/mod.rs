@@ -1,4 +1,4 @@
-//! What differs between systems for the viewer: what the process has cost so far, and where a user's settings are.
+//! System-dependent functions of the viewer: processor time, memory, and the user's settings folder.
 
 #[cfg(not(windows))]
 mod linux;

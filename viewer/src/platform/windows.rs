@@ -1,5 +1,5 @@
-//! Windows: times and working set of the process.
-#![allow(unsafe_code)] // two questions to the system; tests/tests/system/architecture.rs lists it
+//! Windows: processor time and working set of the process, and the user's settings folder.
+#![allow(unsafe_code)] // two system calls; listed in tests/tests/system/architecture.rs
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -7,14 +7,14 @@ use windows_sys::Win32::Foundation::FILETIME;
 use windows_sys::Win32::System::ProcessStatus::{GetProcessMemoryInfo, PROCESS_MEMORY_COUNTERS};
 use windows_sys::Win32::System::Threading::{GetCurrentProcess, GetProcessTimes};
 
-/// Processor time of this process so far.
+/// Returns the processor time of this process so far.
 pub(crate) fn processor() -> Duration {
     let [mut made, mut ended, mut kernel, mut user] = [FILETIME { dwLowDateTime: 0, dwHighDateTime: 0 }; 4];
     // SAFETY: the handle that means this process is always there, and the four times are written during the call.
     unsafe {
         GetProcessTimes(GetCurrentProcess(), &raw mut made, &raw mut ended, &raw mut kernel, &raw mut user)
     };
-    // In units of 100 ns.
+    // `FILETIME` counts units of 100 ns.
     let of = |time: FILETIME| {
         let units = u64::from(time.dwHighDateTime) << 32 | u64::from(time.dwLowDateTime);
         Duration::from_nanos(units.saturating_mul(100))
@@ -22,7 +22,7 @@ pub(crate) fn processor() -> Duration {
     of(kernel) + of(user)
 }
 
-/// Memory of this process that is in use, MiB, where the system tells.
+/// Returns the resident memory of this process, MiB; `None` if the system does not report it.
 pub(crate) fn resident_mib() -> Option<u64> {
     let size = u32::try_from(size_of::<PROCESS_MEMORY_COUNTERS>()).ok()?;
     let mut memory = PROCESS_MEMORY_COUNTERS { cb: size, ..Default::default() };
@@ -32,7 +32,7 @@ pub(crate) fn resident_mib() -> Option<u64> {
     (told != 0).then(|| u64::try_from(memory.WorkingSetSize >> 20).unwrap_or(u64::MAX))
 }
 
-/// Where programs keep the settings of this user.
+/// Returns the folder for the settings of this user.
 pub(crate) fn settings_folder() -> Option<PathBuf> {
     std::env::var_os("APPDATA").map(PathBuf::from).filter(|path| path.is_absolute())
 }

@@ -1,13 +1,13 @@
-//! The row of the devices of a run, to choose the one that numbers and traces are of.
+//! Row of the devices of a run, to choose the device for numbers and traces.
 
 use crate::ui::overlay::{shortened, width_pt};
 use egui::{Button, ComboBox, Role, TextStyle, Ui, WidgetInfo};
 
-/// A name that is shortened to less is no choice, points.
+/// Smallest width of a name on a button, points.
 const LEAST_NAME_PT: f32 = 60.0;
 
-/// Shows the names, shortened to equal widths where they have no room, or a list where that leaves too little; returns the number of the
-/// device chosen now.
+/// Shows the names as buttons, if necessary shortened to equal widths, or as a list if these are too narrow; returns the number of a newly
+/// chosen device.
 pub fn choose(ui: &mut Ui, names: &[&str], chosen: usize) -> Option<usize> {
     let around_pt = 2.0 * ui.spacing().button_padding.x + ui.spacing().item_spacing.x;
     let name_pt = |name: &&str| width_pt(ui.painter(), name, TextStyle::Button.resolve(ui.style()));

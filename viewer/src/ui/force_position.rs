@@ -1,4 +1,4 @@
-//! Force over position: the curve that a hand feels, its slope, and the area of its loop.
+//! Plot of force over position, with the slope of the curve and the area of its loop.
 
 use crate::palette::Palette;
 use crate::ui::overlay::shortened;
@@ -9,29 +9,29 @@ use flotor_history::History;
 use flotor_history::derived::ForcePosition;
 use flotor_history::quantity::{Quantity, Units};
 
-/// Narrower, the choice of the axis has the row alone, points.
+/// Smallest width for a name beside the choice of the axis, points.
 const ROOM_FOR_NAME_PT: f32 = 230.0;
-/// Height of the plot for which the text above it gives way, points.
+/// Smallest height of the plot, points; the text above is shortened or left out for it.
 const LEAST_PLOT_PT: f32 = 90.0;
-/// Points drawn at most.
+/// Largest number of points drawn.
 const MOST_POINTS: usize = 2000;
 
-/// The curve of an axis, kept from picture to picture.
+/// Curve of force over position along an axis, cached from picture to picture.
 #[derive(Clone, Debug, Default)]
 pub struct ForcePositionPlot {
-    /// The axis, x, y or z; none while it is not shown.
+    /// Axis, 0 to 2 (x, y, z); `None`: not shown.
     pub axis: Option<usize>,
     made_of: Option<(usize, [u64; 2])>,
     curve: ForcePosition,
 }
 
 impl ForcePositionPlot {
-    /// Shows it, or puts it away.
+    /// Shows the plot, along z, or hides it.
     pub fn toggle(&mut self) {
         self.axis = if self.axis.is_some() { None } else { Some(2) };
     }
 
-    /// The curve of the chosen axis between two times, s.
+    /// Returns the curve of the chosen axis between two times, s; `None` if not shown.
     pub fn curve(&mut self, history: &History, span_s: [f64; 2]) -> Option<&ForcePosition> {
         let axis = self.axis?;
         let made_of =
@@ -43,12 +43,12 @@ impl ForcePositionPlot {
         Some(&self.curve)
     }
 
-    /// Forgets what was made of another run or device.
+    /// Discards the cached curve, for another run or device.
     pub fn start_over(&mut self) {
         self.made_of = None;
     }
 
-    /// Shows the curve in all of the room there is, with the moment of the cursor as a dot.
+    /// Shows the curve in the available area, with the time of the cursor as a dot.
     pub fn show(
         &mut self,
         ui: &mut Ui,
@@ -63,7 +63,7 @@ impl ForcePositionPlot {
             if ui.available_width() >= ROOM_FOR_NAME_PT {
                 ui.strong("Force over position");
             }
-            // A picture, in which no moment is shown, has nothing to press.
+            // A picture, without a cursor, has no buttons.
             if cursor_s.is_nan() {
                 ui.weak(Quantity::Position.components()[axis]);
                 return;
@@ -105,7 +105,7 @@ impl ForcePositionPlot {
     }
 }
 
-/// Returns, for each axis of some points, the ends of a range about their middle that is as wide as the least range of the axis:
+/// Returns, for each axis of some points, the ends of a range about the middle of the points, as wide as the smallest range of the axis:
 /// smaller differences are rounding.
 fn least_ranges(points: &[[f64; 2]], least: [f64; 2]) -> [[f64; 2]; 2] {
     std::array::from_fn(|axis| {
@@ -116,7 +116,7 @@ fn least_ranges(points: &[[f64; 2]], least: [f64; 2]) -> [[f64; 2]; 2] {
     })
 }
 
-/// Shows slopes and area above the plot, as far as the plot keeps its room: in several lines, in one with "…", or not.
+/// Shows slopes and area above the plot if the plot keeps its smallest height: in several lines, in one line with "…", or not.
 fn text_above(ui: &mut Ui, text: &str) {
     let (font, color) = (TextStyle::Body.resolve(ui.style()), ui.visuals().weak_text_color());
     let (width_pt, room_pt) = (ui.available_width(), ui.available_height() - LEAST_PLOT_PT);
@@ -127,7 +127,7 @@ fn text_above(ui: &mut Ui, text: &str) {
     }
 }
 
-/// Returns the slopes and the area of a curve in words: what each number is stands beside it.
+/// Returns the slopes and the area of a curve as text, each number with its label.
 #[must_use]
 pub fn said(curve: &ForcePosition, units: Units) -> String {
     let (stiffness, per_si) = Quantity::Stiffness.unit(units);

@@ -1,4 +1,4 @@
-//! The handle in the 3D view, which is dragged where a hand can be guided.
+//! Handle in the 3D view, draggable if the hand can be guided.
 
 use crate::guide::Guide;
 use crate::palette::Palette;
@@ -9,40 +9,40 @@ use flotor_drawing::camera::Camera;
 use flotor_drawing::drag::{DragPlane, Ray};
 use flotor_hal::DVec3;
 
-/// What the handle is called, with how it is moved.
+/// Accessible name of the handle, with the ways to move it.
 pub const DRAG: &str = "Drag the handle; the wheel, Q and E move it nearer and away, Shift ten times finer";
 /// Hint over the view while no handle is dragged.
 pub const HINT: &str = "Drag the handle; wheel, Q, E for its depth, Shift for fine motion";
-/// Distance from the handle at which it can be taken, points.
+/// Radius around the handle in which a drag can start, points.
 const REACH_PT: f32 = 22.0;
-/// Depth for a point of the wheel and for a press of a key, mm.
+/// Motion away from the eye per point of the wheel and per press of a key, mm.
 const DEPTH_MM_PER_POINT: f64 = 0.02;
 const DEPTH_MM_PER_KEY: f64 = 0.1;
-/// Share of the pointer's way in fine motion.
+/// Factor on the motion of the pointer in fine motion.
 const FINE: f64 = 0.1;
 
-/// A handle at a moment.
+/// Handle at one time.
 #[derive(Clone, Copy, Debug)]
 pub struct Handle {
-    /// Number of its device.
+    /// Number of the device.
     pub device: usize,
     /// Position in the device frame, m.
     pub position_m: DVec3,
     /// Position in the scene, mm.
     pub scene_mm: DVec3,
-    /// Size of the force on the hand, N.
+    /// Magnitude of the force on the hand, N.
     pub force_n: f64,
 }
 
-/// The drag under way: the plane, and where the pointer was.
+/// Current drag: its plane, and the last position of the pointer.
 #[derive(Clone, Copy, Debug)]
 pub struct Drag {
     plane: DragPlane,
     pointer: Pos2,
 }
 
-/// Shows a handle as one that can be taken, and moves the guide's target as the pointer says. `to_device` turns a way in the scene
-/// (m) into one in the device frame.
+/// Shows a draggable handle, and moves the guide's target with the pointer. `to_device` turns a displacement in the scene (m) into a
+/// displacement in the device frame.
 pub fn handle(
     ui: &Ui,
     (area, camera): (Rect, &Camera),
@@ -94,7 +94,7 @@ pub fn handle(
     }
 }
 
-/// How far the wheel and the keys move the target away from the eye, mm, and the share of every way that counts.
+/// Returns the motion of the target away from the eye by wheel and keys, mm, and the factor on all motions.
 fn depth_and_share(ui: &Ui) -> (f64, f64) {
     ui.input(|input| {
         let pressed = |key: Key| f64::from(u8::from(input.key_pressed(key)));

@@ -1,8 +1,8 @@
-//! The keys of the window.
+//! List of shortcuts of the window.
 
 use egui::{Context, Grid, RichText, ScrollArea, Window};
 
-/// Key and what it does.
+/// Keys and their effects.
 const KEYS: [(&str, &str); 28] = [
     ("Space", "emergency stop; of a recording: play"),
     ("Enter", "takes a typed number; Escape leaves it"),
@@ -34,7 +34,7 @@ const KEYS: [(&str, &str); 28] = [
     ("F1  ?", "these keys"),
 ];
 
-/// Shows the list until it is closed.
+/// Shows the list of shortcuts until it is closed.
 pub fn keys(context: &Context, is_open: &mut bool) {
     let window = Window::new("Keys").open(is_open).collapsible(false).resizable(false);
     window.anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO).show(context, |ui| {

@@ -1,9 +1,9 @@
-//! Keys as they were pressed.
+//! Key presses with their modifiers.
 
 use egui::{Event, InputState, Key};
 
-/// Returns whether a key was pressed alone: with Ctrl, Alt or Command it means something else. The modifiers are those of the press; of a
-/// short one, they are up again at the end of the picture.
+/// Returns whether a key was pressed without Ctrl, Alt or Command, which give it another meaning. Checks the modifiers at the time of the
+/// press: after a short press they are up again at the end of the picture.
 #[must_use]
 pub fn pressed_alone(input: &InputState, wanted: Key) -> bool {
     input.events.iter().any(|event| match event {

@@ -1,4 +1,4 @@
-//! What the colours of the 3D view mean.
+//! Legend of the 3D view: colours, arrows, grid, axes, and names of devices.
 
 use crate::palette::{Palette, strain_color};
 use crate::scene::{ArrowKey, ColorScale, SceneFacts, field_color};
@@ -9,25 +9,25 @@ use flotor_drawing::camera::Camera;
 use flotor_drawing::placing::round_below;
 use flotor_hal::DVec3;
 
-/// Size of the scale of strain, points, and the height of a line of text with it.
+/// Size of the colour scale, and height of a line of text, points.
 const SCALE: egui::Vec2 = vec2(190.0, 9.0);
 const LINE_PT: f32 = SMALL_PT + 4.0;
-/// Narrower, the scales of arrows and ground would stand before the body, points.
+/// Smallest width of a view with scales of arrows and ground, points: in a narrower view they would cover the body.
 const ROOM_FOR_SCALES_PT: f32 = 600.0;
-/// Length of the arrow of the scale, part of the width of the view, at most.
+/// Largest length of the arrow of the scale, as a fraction of the width of the view.
 const MOST_OF_WIDTH: f64 = 0.3;
-/// A torque that is not above this was never there, N·m.
+/// Scale of torque above which a run has torques, N·m.
 const LEAST_TORQUE_NM: f64 = 1.0e-5;
 
-/// Paints what the colours of bodies, of the arrows and of a contact mean into the lower left, and the distance of the lines of the
-/// ground into the lower right.
+/// Paints the legend of the colours of bodies, of the arrows and of a contact into the lower left, and the distance between the grid
+/// lines into the lower right.
 pub fn paint(overlay: &mut Overlay, area: Rect, facts: &SceneFacts, camera: &Camera, palette: &Palette) {
     if let Some(scale) = facts.scale
         && let Some(rect) = overlay.take(Corner::LeftBottom, SCALE + vec2(0.0, 2.0 * LINE_PT))
     {
         paint_scale(overlay.painter(), rect.left_top() + vec2(0.0, LINE_PT), scale, facts.peak_part, palette);
     }
-    // In a narrow view they would stand before the body.
+    // In a narrow view the scales would cover the body.
     if area.width() < ROOM_FOR_SCALES_PT {
         return;
     }
@@ -59,7 +59,7 @@ pub fn paint(overlay: &mut Overlay, area: Rect, facts: &SceneFacts, camera: &Cam
     }
 }
 
-/// Paints a line of text behind room for a sign so wide, and returns where the sign begins, points.
+/// Paints a line of text after a gap for a sign of this width, and returns the start of the sign, points.
 fn sign(overlay: &mut Overlay, corner: Corner, words: &str, sign_pt: f32, palette: &Palette) -> Option<Pos2> {
     let font = FontId::proportional(SMALL_PT);
     let size = vec2(sign_pt + width_pt(overlay.painter(), words, font.clone()), LINE_PT);
@@ -69,7 +69,7 @@ fn sign(overlay: &mut Overlay, corner: Corner, words: &str, sign_pt: f32, palett
     Some(rect.left_center())
 }
 
-/// Scale of the force arrows: length, points, of an arrow for a round number of newtons at the centre of the view, and its label.
+/// Returns the length, points, of an arrow for a round number of newtons at the centre of the view, and its label.
 fn force_scale(key: ArrowKey, camera: &Camera, area: Rect) -> (f32, String) {
     let per_n = key.mm_per_n * camera.pixels_per_mm(f64::from(area.height()));
     let force_n = round_below(key.full_force_n.min(MOST_OF_WIDTH * f64::from(area.width()) / per_n));
@@ -78,7 +78,7 @@ fn force_scale(key: ArrowKey, camera: &Camera, area: Rect) -> (f32, String) {
     (length_pt, format!("force on the hand, as long as {} N", significant_short(force_n)))
 }
 
-/// A round number without needless zeros.
+/// Formats a round number without trailing zeros.
 fn significant_short(number: f64) -> String {
     format!("{}", (number * 1.0e6).round() / 1.0e6)
 }
@@ -114,7 +114,7 @@ fn paint_scale(painter: &Painter, at: Pos2, scale: ColorScale, peak_part: f64, p
     painter.text(below + vec2(SCALE.x, 0.0), Align2::RIGHT_TOP, high, font, palette.faint);
 }
 
-/// A number in three significant digits.
+/// Formats a number with three significant digits.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a handful of digits
 fn significant(number: f64) -> String {
@@ -122,7 +122,7 @@ fn significant(number: f64) -> String {
     format!("{number:.*}", (2 - before).clamp(0, 9) as usize)
 }
 
-/// A colour of the scene as one of the interface.
+/// Converts a colour of the scene to an opaque colour of the interface.
 #[must_use]
 pub fn opaque([r, g, b, _]: flotor_drawing::geometry::Color) -> Color32 {
     Color32::from_rgb(r, g, b)
@@ -143,7 +143,7 @@ pub fn axes(overlay: &mut Overlay, facts: &SceneFacts, camera: &Camera, palette:
         painter.line_segment([middle, middle + tip], Stroke::new(2.0, color));
         let at = middle + on_screen(axis * 1.4 * LENGTH_PT);
         let letter = Rect::from_center_size(at, vec2(SMALL_PT, SMALL_PT));
-        // Of two axes behind each other one has its letter.
+        // Of two overlapping axes, only the first has its letter.
         if letters.iter().all(|before| !before.intersects(letter)) {
             painter.text(at, Align2::CENTER_CENTER, name, FontId::proportional(SMALL_PT), color);
             letters.push(letter);
@@ -151,7 +151,7 @@ pub fn axes(overlay: &mut Overlay, facts: &SceneFacts, camera: &Camera, palette:
     }
 }
 
-/// Paints the name of each device below the device, shortened to the distance of the next; the chosen one's is brighter.
+/// Paints the name of each device below the device, shortened to the distance of the next device; the chosen device's name is brighter.
 pub fn names<'a>(
     overlay: &mut Overlay,
     area: Rect,
@@ -163,7 +163,7 @@ pub fn names<'a>(
     /// Distance of a name from the lower end of its device, and between two names, points.
     const BELOW_PT: f32 = 12.0;
     const BETWEEN_PT: f32 = 12.0;
-    /// A name shorter than this says nothing, points.
+    /// Smallest width of a readable name, points.
     const LEAST_PT: f32 = 24.0;
     if facts.placing.count < 2 {
         return;

@@ -1,5 +1,5 @@
-//! Events as marks over the time: bars at its foot where a limit acted, ticks were missed or a parameter changed, and a line with a
-//! cross over the traces for each fault.
+//! Marks of events over time: bars at the foot of the traces where a limit acted, ticks were missed or a parameter changed, and a line
+//! with a cross over the traces for each fault.
 
 use crate::palette::Palette;
 use egui::{Color32, CornerRadius, Rect, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
@@ -8,23 +8,23 @@ use flotor_history::History;
 use flotor_history::decimate::bucket_width_s;
 use std::collections::VecDeque;
 
-/// Number of intervals, at most, into which the time shown is divided.
+/// Largest number of intervals in the displayed time.
 const INTERVALS: usize = 400;
 
-/// Classes of events of ticks, the gravest first; each has its colour. Changes of parameters are marked from the changes themselves.
+/// Classes of marked events, the most severe first; each has its colour. Changes of parameters are marked separately.
 const RANKS: [Events; 2] = [Events::FAULTS, Events::LIMITS];
-/// Name of the mark of a change.
+/// Hover text of the mark of a parameter change.
 const CHANGE: &str = "parameter changed";
 
-/// Half the size of the cross of a fault, and how far its middle lies below the top of a trace, points.
+/// Half the size of the cross of a fault, and the distance of its centre from the top of a trace, points.
 const CROSS_PT: f32 = 4.5;
 const CROSS_DEPTH_PT: f32 = 8.0;
 
-/// Events of the time shown, kept from picture to picture as the traces are.
+/// Events of the displayed time, kept from picture to picture like the traces.
 #[derive(Clone, Debug, Default)]
 pub struct Marks {
     width_s: f64,
-    /// Number of an interval, and what happened in it.
+    /// Number of each interval, and its events.
     kept: VecDeque<(f64, Events)>,
     next: u64,
 }
@@ -80,7 +80,7 @@ impl Marks {
         }
     }
 
-    /// Paints the marks at the foot of the traces; what they are is said to who points at one.
+    /// Paints the marks at the foot of the traces; the mark under the pointer shows its events as hover text.
     pub fn show(&mut self, ui: &mut Ui, history: &History, span_s: [f64; 2], frame: Rect, palette: &Palette) {
         self.look(history, span_s);
         let x = |time_s: f64| place(time_s, span_s, frame);
@@ -126,7 +126,7 @@ impl Marks {
     }
 }
 
-/// Where a time lies in a frame, points.
+/// Returns the x coordinate of a time in a frame, points.
 fn place(time_s: f64, span_s: [f64; 2], frame: Rect) -> f32 {
     let per_s = f64::from(frame.width()) / (span_s[1] - span_s[0]);
     #[allow(clippy::cast_possible_truncation)] // points
@@ -145,7 +145,7 @@ fn color(rank: usize, palette: &Palette) -> Color32 {
     }
 }
 
-/// Names of the events that are marked.
+/// Returns the names of the marked events.
 fn names(events: Events) -> Vec<String> {
     events.named().filter(|(event, _)| rank(*event).is_some()).map(|(_, name)| name).collect()
 }

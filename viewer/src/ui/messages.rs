@@ -1,7 +1,7 @@
-//! The row of messages beneath the bar: warnings have a place of their own, and cover nothing.
+//! Row of messages beneath the bar: a separate place for warnings, which cover nothing.
 //!
-//! The row is always there, so a message moves nothing. It shows the warnings, the most urgent first; without warnings, what was done
-//! last or what the run is made of. When a run has failed the row grows: nothing moves any more, and the reason is read in full.
+//! The row is always shown, so a message moves nothing. It shows the warnings, the most urgent first; without warnings, the last action
+//! or the subtitle of the run. When a run is over the row grows: nothing moves any more, and the whole reason is shown.
 
 use crate::palette::Palette;
 use crate::ui::overlay::{shortened, width_pt};
@@ -17,31 +17,31 @@ use std::sync::Arc;
 pub const ROW_PT: f32 = 26.0;
 /// Height of the chip of a warning, points.
 const CHIP_PT: f32 = 22.0;
-/// Distance of a text from the border of its chip, and of a chip from the next, points.
+/// Distance of a text from the border of its chip, and between two chips, points.
 const PADDING_PT: f32 = 8.0;
 const GAP_PT: f32 = 8.0;
-/// Distance of the lines of a row that has grown, points.
+/// Distance between the lines of a row of several lines, points.
 const LINE_GAP_PT: f32 = 4.0;
 
-/// How much room the row has.
+/// Height of the row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extent {
-    /// One line, for a run that goes on.
+    /// One line, for a running session.
     Line,
     /// As many lines as the messages need, up to a height, points.
     Lines {
-        /// The greatest height.
+        /// Largest height, points.
         most_pt: f32,
     },
 }
 
-/// Messages of a moment.
+/// Current messages.
 pub struct Messages<'a> {
     /// Warnings, the most urgent first.
     pub warnings: &'a [String],
-    /// Text without warnings.
+    /// Text shown without warnings.
     pub otherwise: &'a str,
-    /// Room of the row.
+    /// Height of the row.
     pub extent: Extent,
 }
 
@@ -59,7 +59,7 @@ impl Messages<'_> {
         }
     }
 
-    /// Shows the row.
+    /// Shows the row, with warnings that do not fit as a count.
     pub fn show(&self, ui: &mut Ui, palette: &Palette) {
         match (self.extent, self.warnings) {
             (_, []) => {
@@ -81,7 +81,7 @@ impl Messages<'_> {
     }
 }
 
-/// Lays out a warning in as many lines as it needs within a width and a height, points; beyond them it is shortened.
+/// Lays out a warning in as many lines as necessary within a width and a height, points, shortened beyond them.
 fn in_full(ui: &Ui, warning: &String, [width_pt, most_pt]: [f32; 2], color: Color32) -> Arc<Galley> {
     let mut job = LayoutJob::simple(with_sign(warning), FontId::proportional(BODY_PT), color, width_pt);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a handful of lines
@@ -90,7 +90,7 @@ fn in_full(ui: &Ui, warning: &String, [width_pt, most_pt]: [f32; 2], color: Colo
     ui.painter().layout_job(job)
 }
 
-/// Shows as many warnings as one line has room for, and the number of the others. The first one is shortened rather than left out.
+/// Shows as many warnings as fit into one line, and the number of the others. The first warning is shortened rather than left out.
 fn line(ui: &mut Ui, warnings: &[String], palette: &Palette) {
     let font = FontId::proportional(BODY_PT);
     let more_pt = width_pt(ui.painter(), "+00 more", font.clone()) + GAP_PT;
@@ -122,7 +122,7 @@ fn line(ui: &mut Ui, warnings: &[String], palette: &Palette) {
 
 fn chip(ui: &mut Ui, warning: &String, text_pt: f32, palette: &Palette) {
     let font = FontId::proportional(BODY_PT);
-    // A hair more than measured: a text that fits is not shortened.
+    // Slightly more than measured, so that a text that fits is not shortened.
     let galley = shortened(ui.painter(), &with_sign(warning), font, palette.warning, text_pt + 0.5);
     let (area, response) = ui.allocate_exact_size(vec2(text_pt + 2.0 * PADDING_PT, CHIP_PT), Sense::hover());
     let stroke = Stroke::new(1.0, palette.warning);

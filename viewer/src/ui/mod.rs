@@ -1,4 +1,4 @@
-//! The interface: parts that window, tests and headless pictures put together.
+//! Parts of the interface, used by window, tests and headless pictures.
 
 pub mod device_row;
 pub mod force_position;

@@ -1,7 +1,7 @@
-//! The layout of texts over the 3D view: one pass, in order of priority.
+//! Layout of texts over the 3D view: one pass, in order of priority.
 //!
-//! Every part asks one [`Overlay`] for its rectangle, in a corner or below a point. The order of the calls is the priority: a later
-//! part moves past the rectangles taken before, and is left out without room. Nothing is painted over another text. The order is:
+//! Every part requests its rectangle from one [`Overlay`], in a corner or below a point. The order of the calls is the priority: a later
+//! part moves past the rectangles taken before, and is left out without room. No text covers another text. The order is:
 //!
 //! 1. in a picture, title and warnings ([`crate::ui::readout`]); a window has the bar and the row of messages for them,
 //! 2. the clock and the rows of numbers ([`crate::ui::readout::numbers`]): a new number is one more
@@ -17,10 +17,10 @@ use std::sync::Arc;
 pub const MARGIN_PT: f32 = 16.0;
 /// Distance between two rectangles, points.
 pub const GAP_PT: f32 = 4.0;
-/// Overlap below which two rectangles are apart, points: the rounding of sums.
+/// Overlap below which two rectangles count as disjoint, points: the rounding of sums.
 const ROUNDING_PT: f32 = 1.0e-2;
 
-/// Corner of the view. Rectangles at the top follow each other downwards, those at the bottom upwards.
+/// Corner of the view. Rectangles at the top are stacked downwards, rectangles at the bottom upwards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Corner {
     /// Upper left.
@@ -43,7 +43,7 @@ impl Corner {
     }
 }
 
-/// Room over the view, and the rectangles taken so far.
+/// Area over the view, and the rectangles taken so far.
 pub struct Overlay {
     painter: Painter,
     inside: Rect,
@@ -69,7 +69,7 @@ impl Overlay {
         self.inside
     }
 
-    /// Takes a rectangle in a corner, past those taken before; none without room for it.
+    /// Takes a rectangle in a corner, past the rectangles taken before; `None` without room.
     pub fn take(&mut self, corner: Corner, size: Vec2) -> Option<Rect> {
         let left = if corner.is_left() { self.inside.left() } else { self.inside.right() - size.x };
         let mut top = if corner.is_top() { self.inside.top() } else { self.inside.bottom() - size.y };
@@ -80,7 +80,7 @@ impl Overlay {
         }
     }
 
-    /// Takes a rectangle centred below a point, or moved sideways into the area; none where another is taken.
+    /// Takes a rectangle centred below a point, or moved sideways into the area; `None` if it overlaps a rectangle taken before.
     pub fn take_below(&mut self, point: Pos2, size: Vec2) -> Option<Rect> {
         let most = (self.inside.right() - size.x).max(self.inside.left());
         let left = (point.x - 0.5 * size.x).clamp(self.inside.left(), most);

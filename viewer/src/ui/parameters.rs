@@ -1,4 +1,4 @@
-//! The panel of a plugin: a row for each parameter, in three groups.
+//! Panel of a plugin: a row for each parameter, in three groups.
 
 use crate::palette::Palette;
 use crate::panel::{Knob, Panel, Standing, Value};
@@ -9,20 +9,20 @@ use egui::{
 };
 use flotor_live::ParameterShape;
 
-/// Ranges wider than this are travelled in steps of the same ratio.
+/// Ratio of the ends of a range above which its slider is logarithmic.
 const LOGARITHMIC_FROM: f64 = 200.0;
 
-/// What a person did with a parameter.
+/// Edit of a parameter by the user.
 enum Edit {
-    /// Began to change it, from the value given; it may have changed already.
+    /// Start of a change, with the value before; the value may have changed already.
     Begun(Value),
-    /// Goes on.
+    /// Continuation of a change.
     Goes,
-    /// The value it had at the start of the run.
+    /// Reset to the value at the start of the run.
     Reset,
 }
 
-/// Shows a panel; gives the indices of the parameters a person has changed.
+/// Shows a panel; returns the indices of the parameters changed by the user.
 pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
     let mut changed = Vec::new();
     let title =
@@ -76,7 +76,7 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
     changed
 }
 
-/// The symbol that papers have for a parameter of this name, if there is one.
+/// Returns the symbol used in papers for a parameter of this name, if any.
 fn symbol(name: &str) -> Option<&'static str> {
     Some(match name {
         "alpha" => "α",
@@ -101,8 +101,8 @@ fn heading(ui: &mut Ui, text: &str, palette: &Palette) {
     ui.label(RichText::new(text).size(SMALL_PT).color(palette.faint));
 }
 
-/// A parameter that can be pulled, or follows, and what was done with it. The slider covers the soft range; a number beyond it
-/// is typed, and counts when Enter is pressed.
+/// Shows a free or dependent parameter and returns the edit. The slider covers the soft range; a number outside is typed, and
+/// applied with Enter.
 fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> Option<Edit> {
     let (name, unit, help) = (knob.name.clone(), knob.unit().to_owned(), help(knob));
     let is_free = knob.standing == Standing::Free;
@@ -127,7 +127,7 @@ fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> Option<Edit> {
                     let field = ui.add_enabled(is_free, field);
                     let is_left = field.lost_focus() && !ui.input(|input| input.key_pressed(Key::Enter));
                     if is_left {
-                        *number = before; // half a number, perhaps
+                        *number = before; // possibly half a number
                     }
                     label.map(|label| field.labelled_by(label).on_hover_text(&help));
                     if is_moved {
@@ -178,7 +178,7 @@ fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> Option<Edit> {
     }
 }
 
-/// A parameter that only stands there.
+/// Shows a read-only parameter.
 fn fact(ui: &mut Ui, knob: &Knob, palette: &Palette) {
     let typed = match &knob.value {
         Value::Number(number) => format!("{} {}", short(*number), knob.unit()),
@@ -193,7 +193,7 @@ fn fact(ui: &mut Ui, knob: &Knob, palette: &Palette) {
     });
 }
 
-/// What a person reads who asks: what it is, how far it goes, where it starts, why it cannot be pulled.
+/// Returns the hover text of a parameter: description, id, range, default, and the reason if it is not editable.
 fn help(knob: &Knob) -> String {
     let mut help = format!("{}\n{}", knob.parameter.doc, knob.parameter.id);
     if let ParameterShape::Real { min, max, default } = knob.parameter.shape {
@@ -213,7 +213,7 @@ fn help(knob: &Knob) -> String {
     help
 }
 
-/// A number in as many digits as a person reads.
+/// Rounds a number to six significant digits.
 fn short(number: f64) -> f64 {
     const DIGITS: i32 = 6;
     #[allow(clippy::cast_possible_truncation)] // a power of ten

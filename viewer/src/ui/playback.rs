@@ -1,4 +1,4 @@
-//! The bar beneath everything: where in time, going or standing, how fast.
+//! Playback bar at the bottom: time, play and pause, speed.
 
 use crate::palette::Palette;
 use crate::ui::style::SMALL_PT;
@@ -6,10 +6,10 @@ use egui::{Align, ComboBox, Layout, RichText, Role, Slider, Ui, WidgetInfo};
 use flotor_history::player::{Motion, Player, SPEEDS};
 use flotor_history::{History, Sample};
 
-/// Narrower, the bar has the button, the clock and the slider only, points.
+/// Width below which the bar has only the button, the clock and the slider, points.
 const ROOM_FOR_ALL_PT: f32 = 480.0;
 
-/// Shows the bar of a recording or of a running host.
+/// Shows the playback bar of a recording or of a running host, and applies its input to the player.
 pub fn playback(ui: &mut Ui, player: &mut Player, history: &History, is_live: bool, palette: &Palette) {
     let span_s = history.span_s();
     ui.horizontal_centered(|ui| {
@@ -24,13 +24,13 @@ pub fn playback(ui: &mut Ui, player: &mut Player, history: &History, is_live: bo
         if button.clicked() {
             player.toggle(is_live, span_s);
         }
-        // The time of the sample whose numbers are shown; in a gap there is none.
+        // Time of the sample whose numbers are shown; a gap has no sample.
         let shown_s = history.seen_at(player.now_s).map_or(player.now_s, Sample::time_s);
         ui.monospace(format!("{shown_s:>8.3} s"));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let has_room = ui.available_width() >= ROOM_FOR_ALL_PT - 130.0;
             if !has_room {
-                // The slider alone.
+                // Only the slider.
             } else if is_live {
                 let text = if player.motion == Motion::Follow { "follows the run" } else { "stands still" };
                 ui.label(RichText::new(text).size(SMALL_PT).color(palette.faint));

@@ -1,4 +1,4 @@
-//! Traces one above the other over one time, and what a person chooses about them.
+//! Stack of traces over one time axis, with the user's choices.
 
 mod choices;
 
@@ -17,67 +17,67 @@ use flotor_history::quantity::{Quantity, Units};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The traces shown to who has not chosen others.
+/// Default traces.
 pub const FIRST_TRACES: [Quantity; 2] = [Quantity::Force, Quantity::Position];
 
 /// Height of the row of choices with the gap beneath, points.
 const CHOICES_PT: f32 = 30.0;
-/// No trace is lower than this, points: three marks of an axis are still apart. Traces without room are scrolled to.
+/// Smallest height of a trace, points: room for three marks of an axis. Traces that do not fit are reached by scrolling.
 const LEAST_TRACE_PT: f32 = 48.0;
-/// Height of a trace for which the 3D view gives way, points.
+/// Height of a trace that takes precedence over the 3D view, points.
 const GOOD_TRACE_PT: f32 = 60.0;
-/// Distance of headings and traces, points.
+/// Distance between headings and traces, points.
 const GAP_PT: f32 = 3.0;
-/// Turn of the wheel by which the next trace comes into sight, points.
+/// Turn of the wheel for scrolling by one trace, points.
 const SCROLL_PT: f32 = 30.0;
-/// Narrower, force over position has the room of the traces, points.
+/// Width below which force over position replaces the traces, points.
 const ROOM_BESIDE_PT: f32 = 560.0;
-/// No trace of a picture is lower than this, points: nobody can scroll there, and the marks of the axis need their numbers.
+/// Smallest height of a trace in a picture, points: a picture cannot be scrolled, and the marks of the axis need their numbers.
 const LEAST_TRACE_OF_PICTURE_PT: f32 = 58.0;
-/// Height of what stands above a trace, and of the times below the last one, points.
+/// Height of the heading of a trace, and of the time axis below the last trace, points.
 const HEADING_PT: f32 = 29.0;
 const TIMES_PT: f32 = 22.0;
-/// Height of what stands above a trace, with the gaps around it, points.
+/// Height of the heading of a trace with its gaps, points.
 const HEADING_AND_GAPS_PT: f32 = 32.0;
-/// Shortest time that can be shown, s: a few ticks.
+/// Shortest time span that can be shown, s: a few ticks.
 const LEAST_TIME_S: f64 = 5.0e-3;
 
-/// How much of the past is shown.
+/// Displayed time span.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Window {
-    /// All of it.
+    /// The whole run.
     Whole,
-    /// So many seconds, ending at the newest.
+    /// The newest seconds; the value is the length, s.
     Newest(f64),
     /// From one time to another, s.
     Between(f64, f64),
 }
 
-/// What a person asks for beside the traces themselves.
+/// Request of the user, besides changes of the plots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PlotRequest {
-    /// Another moment, s.
+    /// Display another time, s.
     Seek(f64),
-    /// A file of what is shown.
+    /// Export the shown traces to a file.
     Export(ExportFormat),
 }
 
-/// Files that traces go into.
+/// File format of exported traces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportFormat {
-    /// Numbers.
+    /// Numbers as CSV.
     Csv,
-    /// A picture of lines.
+    /// Vector graphics as SVG.
     Svg,
-    /// A picture of pixels.
+    /// Pixels as PNG.
     Png,
 }
 
 impl ExportFormat {
-    /// What a file is to be, by the ending of its name.
+    /// Returns the format of a file, from the extension of its name.
     ///
     /// # Errors
-    /// In a line: it has another.
+    /// A message of one line if the extension is none of csv, svg and png.
     pub fn of_file(file: &Path) -> Result<Self, String> {
         match file.extension().and_then(|ending| ending.to_str()) {
             Some("csv") => Ok(Self::Csv),
@@ -88,70 +88,70 @@ impl ExportFormat {
     }
 }
 
-/// Why traces cannot be drawn into a picture of a given height.
+/// Error of a picture too low for its traces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the picture is {height_px} pixels high, and for {count} traces that can be read it has to be {least_px}; make it higher, or choose fewer traces"
 )]
 pub struct TooLow {
-    /// How many they are.
+    /// Number of traces.
     pub count: usize,
-    /// Height the picture has to have, pixels.
+    /// Required height of the picture, pixels.
     pub least_px: usize,
-    /// Height it has, pixels.
+    /// Actual height of the picture, pixels.
     pub height_px: usize,
 }
 
-/// What traces are drawn of.
+/// Data source of the traces.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
-    /// The samples of a device.
+    /// Samples of a device.
     pub history: &'a History,
-    /// Name of the device, where there are several.
+    /// Name of the device, if there are several.
     pub device: Option<&'a str>,
-    /// The samples of the same device in a second recording, dashed beneath the others.
+    /// Samples of the same device in a second recording, drawn dashed beneath the first.
     pub compared: Option<&'a History>,
 }
 
-/// The traces shown.
+/// Stack of traces, with their time span, units and zoom.
 #[derive(Clone, Debug)]
 pub struct PlotStack {
-    /// From the top.
+    /// Shown quantities, from the top.
     pub shown: Vec<Quantity>,
-    /// How much of the past.
+    /// Displayed time span.
     pub window: Window,
     /// Units of all numbers.
     pub units: Units,
     /// Force over position, beside the traces.
     pub force_position: ForcePositionPlot,
-    /// How files of traces are made.
+    /// Options for pictures of the traces.
     pub export: ExportOptions,
-    /// The one that has the room of all.
+    /// Maximised trace.
     alone: Option<Quantity>,
-    /// Values shown of a trace that is zoomed, SI.
+    /// Range of values of each zoomed trace, SI.
     values: BTreeMap<Quantity, [f64; 2]>,
-    /// How much of the past was shown before a zoom.
+    /// Time span before a zoom.
     unzoomed: Window,
-    /// What has been made of the history, for each quantity shown so far.
+    /// Decimated traces of the history, for each quantity shown so far.
     traces: BTreeMap<Quantity, Trace>,
-    /// The same of the second recording.
+    /// Decimated traces of the second recording.
     compared: BTreeMap<Quantity, Trace>,
-    /// What happened, beneath the traces.
+    /// Marks of events beneath the traces.
     marks: Marks,
-    /// End of a window that is shorter than the run, s; the newest while none has been shown.
+    /// End of a window that is shorter than the run, s; infinite before the first picture.
     end_s: f64,
-    /// Where the pointer was in the last picture, s.
+    /// Time under the pointer in the last picture, s.
     hover_s: Option<f64>,
-    /// Number of the first trace in sight, of those that have no room together.
+    /// Number of the first visible trace, if not all fit.
     first: usize,
-    /// How many traces are out of sight above and below.
+    /// Number of hidden traces above and below.
     out_of_sight: [usize; 2],
-    /// Turn of the wheel since the last trace came into sight, points.
+    /// Turn of the wheel since the last scroll, points.
     turned_pt: f32,
 }
 
 impl PlotStack {
-    /// Force and position.
+    /// Creates a stack with the default traces.
     #[must_use]
     pub fn new(window: Window) -> Self {
         Self {
@@ -174,19 +174,19 @@ impl PlotStack {
         }
     }
 
-    /// Returns the height with which all traces can be read well, with the choices above them, points.
+    /// Returns the height at which all traces are easy to read, with the choices above, points.
     #[must_use]
     pub fn good_height_pt(&self) -> f32 {
         CHOICES_PT + (HEADING_PT + GOOD_TRACE_PT) * self.in_sight().len().max(1) as f32 + TIMES_PT
     }
 
-    /// Returns the height with which one trace can be read, with the choices above it, points.
+    /// Returns the height at which one trace is readable, with the choices above, points.
     #[must_use]
     pub const fn least_height_of_one_pt() -> f32 {
         CHOICES_PT + HEADING_PT + LEAST_TRACE_PT + TIMES_PT
     }
 
-    /// Shows what a command line says.
+    /// Applies the traces and the axis of force over position of a command line.
     pub fn choose(&mut self, chosen: &Chosen) {
         if let Some(traces) = chosen.traces() {
             self.shown = traces.to_vec();
@@ -194,22 +194,22 @@ impl PlotStack {
         self.force_position.axis = chosen.force_position;
     }
 
-    /// The height with which every trace of a picture can be read, points.
+    /// Returns the height at which every trace of a picture is readable, points.
     #[must_use]
     pub fn least_height_pt(&self) -> f32 {
         (HEADING_AND_GAPS_PT + LEAST_TRACE_OF_PICTURE_PT) * self.in_sight().len().max(1) as f32 + TIMES_PT
     }
 
-    /// Whether every trace can be read in a picture of one height, if that takes another, pixels.
+    /// Checks that a picture has the required height `least_px`, pixels.
     ///
     /// # Errors
-    /// [`TooLow`].
+    /// [`TooLow`] if the picture is lower.
     pub fn has_room(&self, height_px: usize, least_px: usize) -> Result<(), TooLow> {
         let count = self.in_sight().len();
         if height_px >= least_px { Ok(()) } else { Err(TooLow { count, least_px, height_px }) }
     }
 
-    /// Draws the traces, and force over position, into all of the room there is: a picture, in which nothing can be pressed.
+    /// Draws the traces, and force over position, into the available area, as a picture without controls.
     pub fn still(&mut self, ui: &mut Ui, seen: Seen<'_>, cursor_s: f64, palette: &Palette) {
         let Seen { history, device, .. } = seen;
         let span_s = self.span_of_both_s(seen);
@@ -220,7 +220,7 @@ impl PlotStack {
             let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
             self.force_position.show(&mut right, (history, f64::NAN), span_s, self.units, palette);
         }
-        // The last time of an axis stands half beside it.
+        // Half of the last number of the time axis is beyond its end.
         let mut ui = ui.new_child(UiBuilder::new().max_rect(left.with_max_x(left.right() - 16.0)));
         ui.spacing_mut().item_spacing.y = GAP_PT;
         let in_sight = self.in_sight();
@@ -250,13 +250,13 @@ impl PlotStack {
         }
     }
 
-    /// Values shown of a trace that is zoomed, in the units shown.
+    /// Returns the range of values of a zoomed trace, in the displayed units.
     fn shown_values_of(&self, quantity: Quantity) -> Option<[f64; 2]> {
         let (_, per_si) = quantity.unit(self.units);
         self.values_of(quantity).map(|values| values.map(|value| value * per_si))
     }
 
-    /// Another run is shown from now on.
+    /// Clears traces and zoom, for another run.
     pub fn start_over(&mut self) {
         self.look_at_another();
         self.end_s = f64::INFINITY;
@@ -264,7 +264,7 @@ impl PlotStack {
         self.values.clear();
     }
 
-    /// Another device of the same run is shown from now on.
+    /// Clears all traces, for another device of the same run.
     pub fn look_at_another(&mut self) {
         self.traces.clear();
         self.forget_compared();
@@ -272,24 +272,24 @@ impl PlotStack {
         self.force_position.start_over();
     }
 
-    /// Another second recording is shown from now on, or none.
+    /// Clears the traces of the second recording.
     pub fn forget_compared(&mut self) {
         self.compared.clear();
     }
 
-    /// The traces in sight, from the top.
+    /// Returns the chosen quantities from the top, or only the maximised quantity.
     #[must_use]
     pub fn in_sight(&self) -> Vec<Quantity> {
         self.alone.map_or_else(|| self.shown.clone(), |alone| vec![alone])
     }
 
-    /// Values shown of a trace that is zoomed, SI.
+    /// Returns the range of values of a zoomed trace, SI; `None` without a zoom.
     #[must_use]
     pub fn values_of(&self, quantity: Quantity) -> Option<[f64; 2]> {
         self.values.get(&quantity).copied()
     }
 
-    /// Gives the first trace, or the one named, the room of all; or all their own again.
+    /// Maximises the named trace, else the first trace; if a trace is maximised, restores all traces.
     pub fn switch_maximised(&mut self, quantity: Option<Quantity>) {
         self.alone = match self.alone {
             None if self.shown.len() > 1 => quantity.or_else(|| self.shown.first().copied()),
@@ -327,13 +327,13 @@ impl PlotStack {
         }
     }
 
-    /// Samples looked at so far: once for each quantity, not once for each picture.
+    /// Returns the number of samples processed so far: once for each quantity, not once for each picture.
     #[must_use]
     pub fn visited(&self) -> u64 {
         self.traces.values().map(Trace::visited).sum()
     }
 
-    /// First and last time shown, s.
+    /// Returns the first and last displayed time, s.
     #[must_use]
     pub fn span_s(&self, history: &History) -> [f64; 2] {
         let [first_s, last_s] = history.span_s();
@@ -342,14 +342,14 @@ impl PlotStack {
             Window::Between(from_s, to_s) => [from_s, to_s],
             Window::Newest(length_s) => {
                 let end_s = self.end_s.min(last_s);
-                // Before the run there is nothing to show: its beginning stays at the left until it is longer.
+                // Before the run there is nothing to show: the start of the run stays at the left until the run is longer than the window.
                 let from_s = (end_s - length_s).max(first_s.min(end_s));
                 [from_s, from_s + length_s]
             }
         }
     }
 
-    /// Returns first and last time shown, s: of all, those of both recordings.
+    /// Returns the first and last displayed time, s; the window `Whole` covers both recordings.
     fn span_of_both_s(&self, seen: Seen<'_>) -> [f64; 2] {
         let span_s = self.span_s(seen.history);
         match (self.window, seen.compared.map(History::span_s)) {
@@ -358,7 +358,7 @@ impl PlotStack {
         }
     }
 
-    /// Shows the row of choices and the traces; says what was requested.
+    /// Shows the row of choices and the traces; returns the requests of the user.
     pub fn show(
         &mut self,
         ui: &mut Ui,
@@ -385,7 +385,7 @@ impl PlotStack {
         requests
     }
 
-    /// Shows the traces: all of them, or as many as have room, with the number of the others.
+    /// Shows all traces, or as many as fit, and stores the number of the others.
     fn over_time(
         &mut self,
         ui: &mut Ui,
@@ -409,7 +409,7 @@ impl PlotStack {
         requests.extend(self.stack(ui, seen, now_s, (shown, height_pt, wheel), palette));
     }
 
-    /// Brings the next trace into sight, or the one before, when the wheel turns over the traces.
+    /// Scrolls by a trace when the wheel turns over the traces.
     fn scroll(&mut self, ui: &Ui, last: usize) {
         let is_over = ui.rect_contains_pointer(ui.available_rect_before_wrap());
         let turned = |input: &egui::InputState| (input.smooth_scroll_delta().y, input.modifiers.alt);
@@ -427,7 +427,7 @@ impl PlotStack {
         self.first = first.min(last);
     }
 
-    /// Shows traces of a height, one above the other.
+    /// Shows traces of a given height, one above the other.
     fn stack(
         &mut self,
         ui: &mut Ui,
@@ -484,9 +484,9 @@ impl PlotStack {
         requests
     }
 
-    /// A trace that is looked at stands still, as long as the moment shown is in it and not at its edge.
+    /// Returns the end of the displayed window: constant as long as the displayed time is inside the window and not near an edge.
     fn end_of_window(&self, [first_s, last_s]: [f64; 2], now_s: f64, motion: Motion) -> f64 {
-        /// Part of the window between the moment and an edge.
+        /// Smallest distance of the displayed time from an edge, as a fraction of the window.
         const MARGIN: f64 = 0.1;
         match (motion, self.window) {
             (Motion::Follow, _) | (_, Window::Whole | Window::Between(..)) => last_s,
@@ -498,7 +498,7 @@ impl PlotStack {
         }
     }
 
-    /// Shows or hides a quantity; the last one stays.
+    /// Shows or hides a quantity; the last quantity cannot be hidden.
     pub fn toggle(&mut self, quantity: Quantity) {
         self.alone = None;
         match self.shown.iter().position(|shown| *shown == quantity) {
@@ -513,7 +513,7 @@ impl PlotStack {
         }
     }
 
-    /// Millimetres or metres.
+    /// Switches between handy units (mm) and SI.
     pub fn switch_units(&mut self) {
         self.units = match self.units {
             Units::Handy => Units::Si,
@@ -522,9 +522,9 @@ impl PlotStack {
     }
 }
 
-/// The room of the traces, and of force over position to the right of them.
+/// Splits an area into one for the traces and, to the right, one for force over position.
 fn split_for_force_position(all: Rect, gap_pt: f32) -> (Rect, Rect) {
-    /// Part of the width that force over position gets.
+    /// Fraction of the width for force over position.
     const PART: f32 = 0.36;
     let beside = all.with_min_x(all.right() - (PART * all.width()).round());
     (all.with_max_x(beside.left() - gap_pt), beside)

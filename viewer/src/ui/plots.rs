@@ -1,4 +1,4 @@
-//! Traces over time.
+//! Plots of traces over time.
 
 use crate::palette::Palette;
 use crate::trace::Trace;
@@ -13,65 +13,65 @@ use flotor_history::History;
 use flotor_history::quantity::{Quantity, Units};
 use flotor_plot::{covered_style, covering_lines};
 
-/// How a plot is shown.
+/// Display options of a plot.
 #[derive(Clone, Copy, Debug)]
 pub struct PlotView<'a> {
-    /// Name of the device it is of, where there are several.
+    /// Name of the device, if there are several.
     pub device: Option<&'a str>,
-    /// First and last time, s.
+    /// First and last displayed time, s.
     pub span_s: [f64; 2],
-    /// Where the time is, s.
+    /// Time of the cursor, s; NaN: no cursor.
     pub cursor_s: f64,
     /// Units of the axis.
     pub units: Units,
     /// Height, points.
     pub height: f32,
-    /// Whether time stands beneath: the lowest of a stack.
+    /// True for a time axis beneath, at the lowest plot of a stack.
     pub time_axis: bool,
-    /// Smallest and largest value shown, in these units; without them, all that there are.
+    /// Smallest and largest value shown, in these units; `None`: all values.
     pub values: Option<[f64; 2]>,
-    /// Whether it can have the room of all.
+    /// State of the button for maximising.
     pub maximise: Maximise,
     /// Effect of the wheel.
     pub wheel: Wheel,
 }
 
-/// Whether a trace can have the room of all, and whether it has.
+/// State of a trace regarding maximising.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Maximise {
-    /// There is no other, or this is a picture.
+    /// Not possible: the only trace, or a picture.
     No,
-    /// It can.
+    /// Possible: one of several traces.
     Possible,
-    /// It has.
+    /// Maximised.
     Done,
 }
 
-/// What a person did to a plot.
+/// User input to a plot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlotAnswer {
-    /// Time the pointer asks for, s.
+    /// Time selected by the pointer, s.
     pub seek_s: Option<f64>,
     /// Time under the pointer, s.
     pub hover_s: Option<f64>,
-    /// Another part of it.
+    /// Request for a zoom.
     pub zoom: Option<ZoomRequest>,
-    /// Whether the button for the room of all was pressed.
+    /// True if the button for maximising was pressed.
     pub switches_maximised: bool,
-    /// Where the traces are, points.
+    /// Area of the traces, points.
     pub frame: egui::Rect,
 }
 
-/// Samples, and the trace of a quantity made of them so far.
+/// Samples, and the decimated trace of a quantity.
 pub struct Lines<'a> {
-    /// The samples.
+    /// Samples of a device.
     pub history: &'a History,
-    /// The trace.
+    /// Trace of the samples, updated by drawing.
     pub trace: &'a mut Trace,
 }
 
-/// Shows one quantity over time, and dashed beneath it the same of a second recording. The components' names and values at the cursor
-/// stand above.
+/// Shows a quantity over time, with the dashed trace of a second recording beneath. The heading has names and values of the components at
+/// the cursor.
 pub fn plot(
     ui: &mut Ui,
     Lines { history, trace }: Lines<'_>,
@@ -89,12 +89,12 @@ pub fn plot(
     let traces = trace.points(history, span_s, buckets, per_si);
     let compared = compared.map(|Lines { history, trace }| trace.points(history, span_s, buckets, per_si));
 
-    // The mark at the end of the values has room for its number.
+    // Leave room for the number at the last mark of the values.
     #[allow(clippy::cast_possible_truncation)] // a part
     let margin = (1.3 * part_of_number(height) as f32).max(0.08);
     let y_axis = y_axis(52.0);
     let x_axis = AxisHints::new_x().formatter(|mark, _| format!("{} s", short(mark.value)));
-    // Bounds once set stay with a plot: one that shows all values is another than one that is zoomed.
+    // A plot keeps its bounds once set, so a plot of all values and a zoomed plot have different ids.
     let plot = Plot::new(("plot", quantity.name(), values.is_some()))
         .height(height)
         .show_axes([time_axis, true])
@@ -104,8 +104,8 @@ pub fn plot(
         .include_x(span_s[0])
         .include_x(span_s[1]);
     let plot = plain(plot, palette).y_grid_spacer(move |grid| marks_inside(grid.bounds, height));
-    // Zero is in sight unless somebody chose other values.
-    // Smaller differences than the least range are rounding.
+    // Zero is visible unless the user chose other values.
+    // Differences smaller than the least range are rounding.
     let least = 0.5 * quantity.least_range(units);
     let plot = if values.is_none() { plot.include_y(-least).include_y(least) } else { plot };
     let shown = plot.show(ui, |plot| {
@@ -115,7 +115,7 @@ pub fn plot(
         }
         for (component, stretches) in compared.iter().flat_map(|traces| traces.iter().enumerate()) {
             for points in stretches {
-                // As wide and pale as to be seen beside a line on top of it.
+                // Wide and pale enough to be visible beside a line on top.
                 let line = Line::new("", PlotPoints::Borrowed(points)).allow_band(false);
                 let color = palette.components[component % 3].gamma_multiply(0.6);
                 plot.line(line.color(color).width(3.2).style(LineStyle::dashed_dense()));
@@ -128,7 +128,7 @@ pub fn plot(
             #[allow(clippy::cast_possible_truncation)] // points, and a part
             let (width, opacity) = (LINE_PT * width as f32, opacity as f32);
             for points in stretches {
-                // Two points a bucket are few enough: joined they are as wide everywhere.
+                // Two points per bucket are few enough for joined lines of uniform width.
                 let line = Line::new(name, PlotPoints::Borrowed(points)).allow_band(false);
                 let color = palette.components[component % 3].gamma_multiply(opacity);
                 plot.line(line.color(color).width(width));
@@ -157,7 +157,7 @@ pub fn plot(
 /// Width of a trace, points.
 const LINE_PT: f32 = 1.6;
 
-/// Counts, for each component, the later ones whose trace covers its own, as a picture of lines does.
+/// Counts, for each component, the later components whose traces cover its trace, as for SVG pictures.
 fn covers(plot: &PlotUi<'_>, traces: &[Vec<Vec<PlotPoint>>]) -> Vec<usize> {
     let on_screen = |point: &PlotPoint| {
         let at = plot.screen_from_plot(*point);
@@ -170,7 +170,7 @@ fn covers(plot: &PlotUi<'_>, traces: &[Vec<Vec<PlotPoint>>]) -> Vec<usize> {
     covering_lines(&lines, [frame.left(), frame.right()].map(f64::from))
 }
 
-/// A plot that only shows: what the mouse does is read from it, and nothing is drawn but lines and grid.
+/// Disables the plot's own mouse handling and decoration: the caller reads the mouse, and only lines and grid are drawn.
 pub(super) fn plain<'a>(plot: Plot<'a>, palette: &Palette) -> Plot<'a> {
     plot.allow_drag(false)
         .allow_zoom(false)
@@ -184,20 +184,20 @@ pub(super) fn plain<'a>(plot: Plot<'a>, palette: &Palette) -> Plot<'a> {
         .label_formatter(|_| None)
 }
 
-/// Returns the marks of an axis so high, points, without those at its ends: their numbers would stand in the text beyond it.
+/// Returns the marks of an axis of this height, points, without marks at the ends, whose numbers would overlap the text beyond.
 fn marks_inside(bounds: (f64, f64), height_pt: f32) -> Vec<GridMark> {
     let margin = (bounds.1 - bounds.0) * part_of_number(height_pt);
     let is_inside = |mark: &GridMark| mark.value >= bounds.0 + margin && mark.value <= bounds.1 - margin;
     marks(bounds).into_iter().filter(is_inside).collect()
 }
 
-/// Returns half the height of a number as a part of an axis so high, points.
+/// Returns half the height of a number as a fraction of an axis of this height, points.
 fn part_of_number(height_pt: f32) -> f64 {
     const HALF_PT: f64 = 6.0;
     (HALF_PT / f64::from(height_pt)).min(0.2)
 }
 
-/// The axis of values, to the left, at least so wide.
+/// Returns an axis of values at the left, of at least this width, points.
 pub(super) fn y_axis<'a>(least_pt: f32) -> AxisHints<'a> {
     AxisHints::new_y()
         .placement(HPlacement::Left)
@@ -206,7 +206,7 @@ pub(super) fn y_axis<'a>(least_pt: f32) -> AxisHints<'a> {
         .formatter(|mark, _| short(mark.value))
 }
 
-/// Shows name, unit and values at the cursor; returns whether the button for the room of all was pressed.
+/// Shows name, unit and values at the cursor; returns whether the button for maximising was pressed.
 ///
 /// In a narrow plot the values are left out first, then the names of the components; the name of the device is shortened.
 fn heading(
@@ -250,13 +250,13 @@ fn heading(
     pressed
 }
 
-/// Height of a heading, and additional distance between two components in it, points.
+/// Height of a heading, and additional distance between two components, points.
 const HEADING_PT: f32 = 22.0;
 const COMPONENT_GAP_PT: f32 = 10.0;
-/// A name of a device that is shortened to less says nothing, points.
+/// Smallest width of a readable name of a device, points.
 const LEAST_DEVICE_PT: f32 = 40.0;
 
-/// Returns number, name and value at the cursor of the components that have room beside the name of the quantity, and their width.
+/// Returns number, name and value at the cursor of the components that fit beside the name of the quantity, and their width.
 fn values_with_room(
     ui: &Ui,
     history: &History,
@@ -288,7 +288,7 @@ fn values_with_room(
     (Vec::new(), 0.0)
 }
 
-/// Width of the name of a quantity with its unit, points.
+/// Returns the width of the name of a quantity with its unit, points.
 fn name_pt(ui: &Ui, quantity: Quantity, unit: &str) -> f32 {
     let gaps_pt = 3.0 * ui.spacing().item_spacing.x + 4.0;
     text_pt(ui, quantity.name(), TextStyle::Body) + text_pt(ui, unit, TextStyle::Body) + gaps_pt
@@ -298,7 +298,7 @@ fn text_pt(ui: &Ui, text: &str, style: TextStyle) -> f32 {
     width_pt(ui.painter(), text, style.resolve(ui.style()))
 }
 
-/// Shows a name, shortened to a width, points; nothing where nothing of it could be read.
+/// Shows a name, shortened to a width, points, unless the width is too small for a readable name.
 fn shortened_label(ui: &mut Ui, name: &str, most_pt: f32) {
     if most_pt >= LEAST_DEVICE_PT {
         let color = ui.visuals().weak_text_color();
@@ -307,7 +307,7 @@ fn shortened_label(ui: &mut Ui, name: &str, most_pt: f32) {
     }
 }
 
-/// A number as it is read in these units: of metres and joules the digits that matter are behind the third place.
+/// Formats a number for these units: in SI with more decimals, which metres and joules need.
 #[must_use]
 pub fn digits(value: f64, units: Units) -> String {
     match units {
@@ -318,13 +318,13 @@ pub fn digits(value: f64, units: Units) -> String {
     }
 }
 
-/// A number that is zero in the digits shown has no minus.
+/// Removes the minus from a number that is zero in the digits shown.
 fn without_minus_of_zero(text: String) -> String {
     let is_zero = !text.contains(|digit: char| ('1'..='9').contains(&digit));
     if is_zero { text.replace('-', "+") } else { text }
 }
 
-/// A number in seven columns, whatever its size.
+/// Formats a number in seven columns, regardless of its magnitude.
 #[must_use]
 pub fn fixed(value: f64) -> String {
     match value.abs() {
@@ -337,7 +337,7 @@ pub fn fixed(value: f64) -> String {
     }
 }
 
-/// Marks of an axis at steps of 1, 2 or 5 times a power of ten, three to six of them.
+/// Returns three to six marks of an axis at steps of 1, 2 or 5 times a power of ten.
 #[allow(clippy::cast_possible_truncation)] // a handful
 pub(super) fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
     let wanted = (high - low) / 4.0;
@@ -351,7 +351,7 @@ pub(super) fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
     (first..=last).map(|k| GridMark { value: k as f64 * step_size, step_size }).collect()
 }
 
-/// A mark of an axis: no more digits than it has, no minus on zero.
+/// Formats a mark of an axis without trailing digits and without a minus on zero.
 pub(super) fn short(value: f64) -> String {
     let rounded = (value * 1.0e6).round() / 1.0e6;
     if rounded == 0.0 { "0".to_owned() } else { format!("{rounded}") }

@@ -1,4 +1,4 @@
-//! Texts of a moment: title, numbers, warnings.
+//! Texts over the picture: title, numbers, warnings.
 
 use crate::palette::Palette;
 use crate::scene::SceneFacts;
@@ -12,23 +12,23 @@ use flotor_history::Sample;
 use flotor_history::quantity::{Quantity, Units};
 use flotor_record::RunDescription;
 
-/// Part of the width of the view that rows of numbers may take: beyond it they would cover the body.
+/// Largest fraction of the width of the view for rows of numbers: wider rows would cover the body.
 const MOST_OF_WIDTH: f32 = 0.5;
 /// Height of a row of numbers, points.
 const ROW_PT: f32 = BODY_PT + 3.0;
 /// Width of the units at the end of the rows, with a gap, and of their names, points.
 const UNIT_PT: f32 = 42.0;
 const NAME_PT: f32 = 66.0;
-/// Characters of the name of a device in a warning, at most.
+/// Largest number of characters of a device's name in a warning.
 const MOST_OF_NAME: usize = 20;
 
-/// A number that is not known: the energy of models of which one does not give its own, a rate before the second tick.
+/// Text for an unknown number: the energy if a model does not report its own, or a rate before the second tick.
 const NOT_GIVEN: &str = "not given";
 
-/// Events of the loop: they concern all devices.
+/// Events of the loop, which concern all devices.
 const OF_THE_LOOP: Events = Events::MISSED;
 
-/// Title of a run and what it was made with.
+/// Returns the title of the scene of a run.
 #[must_use]
 pub fn title_of(run: &RunDescription) -> String {
     let scene: Option<toml::Table> = run.scene_toml.parse().ok();
@@ -36,7 +36,7 @@ pub fn title_of(run: &RunDescription) -> String {
     title.unwrap_or("A run").to_owned()
 }
 
-/// The plugins of a run, its rate and its clock, in one line.
+/// Returns the plugins of a run, its rate and its clock, in one line.
 #[must_use]
 pub fn subtitle_of(run: &RunDescription) -> String {
     let plugins = run.plugins.iter().map(|plugin| format!("{} {}", plugin.id, plugin.version));
@@ -54,10 +54,10 @@ pub fn title(overlay: &mut Overlay, run: &RunDescription, palette: &Palette) {
     line(overlay, &subtitle_of(run), SMALL_PT, palette.faint);
 }
 
-/// Returns the height of title, subtitle and so many warnings, points.
+/// Returns the height of title, subtitle and this number of warnings, points.
 #[must_use]
 pub fn heading_pt(warnings: usize) -> f32 {
-    /// Height of a line of text, part of its size.
+    /// Height of a line of text, as a multiple of the size of the text.
     const LINE: f32 = 1.4;
     let lines_pt = TITLE_PT + SMALL_PT + warnings as f32 * BODY_PT;
     2.0 * MARGIN_PT + LINE * lines_pt + GAP_PT * (1 + warnings) as f32
@@ -82,7 +82,7 @@ fn line(overlay: &mut Overlay, text: &str, size_pt: f32, color: Color32) {
     }
 }
 
-/// One row of numbers: up to three values of one unit.
+/// Row of numbers: up to three values of one unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NumberRow {
     /// Name of the quantity.
@@ -123,7 +123,7 @@ pub fn rates(haptic_hz: Option<f64>, graphic_hz: Option<f64>, palette: &Palette)
     [row("Haptics", haptic_hz), row("Graphics", graphic_hz)]
 }
 
-/// Paints the time, s, and rows of numbers into the upper right, as far as there is room.
+/// Paints the time, s, and as many rows of numbers as fit into the upper right.
 pub fn numbers(overlay: &mut Overlay, time_s: f64, rows: &[NumberRow], units: Units, palette: &Palette) {
     clock(overlay, time_s, palette);
     let column_pt = match units {
@@ -157,13 +157,13 @@ fn clock(overlay: &mut Overlay, time_s: f64, palette: &Palette) {
     }
 }
 
-/// Returns the warnings about events of devices by name and about their bodies, each once, the most urgent first.
+/// Returns the warnings about events of the devices (with their names) and about bodies, each once, the most urgent first.
 #[must_use]
 pub fn warnings(devices: &[(&str, Events)], facts: &SceneFacts) -> Vec<String> {
     happened(devices).into_iter().chain(of_shapes(facts).map(str::to_owned)).collect()
 }
 
-/// Returns the warnings about events of devices by name, each once: with the names of its devices where there are several.
+/// Returns the warnings about events of the devices, each once, with the names of the devices concerned if there are several.
 #[must_use]
 pub fn happened(devices: &[(&str, Events)]) -> Vec<String> {
     const WORDS: [(Events, &str); 10] = [
@@ -184,7 +184,7 @@ pub fn happened(devices: &[(&str, Events)]) -> Vec<String> {
         match names.len() {
             0 => None,
             _ if devices.len() == 1 || event.intersects(OF_THE_LOOP) => Some((*words).to_owned()),
-            // The words first: a narrow window shortens the names.
+            // The warning comes first: a narrow window shortens the names.
             count if count == devices.len() => Some(format!("{words} (all devices)")),
             _ => Some(format!("{words} ({})", names.join(", "))),
         }
@@ -200,7 +200,7 @@ fn short_name(name: &str) -> String {
     name.chars().take(MOST_OF_NAME - 1).chain(['…']).collect()
 }
 
-/// What people should know about the bodies that are drawn.
+/// Returns the warnings about the drawn bodies.
 pub fn of_shapes(facts: &SceneFacts) -> impl Iterator<Item = &'static str> {
     let shape = [
         (facts.lifted, "Off its seat: the lower plate hangs in the air, without load"),

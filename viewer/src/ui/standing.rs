@@ -1,4 +1,4 @@
-//! How close to the limits the run is, and what has happened in it so far.
+//! Use of the limits, and counts of events so far.
 
 use crate::palette::Palette;
 use crate::tally::Tally;
@@ -13,7 +13,7 @@ use flotor_history::Sample;
 use flotor_history::quantity::{Quantity, Units};
 use flotor_live::WrenchLimits;
 
-/// Shows how much of each limit is used.
+/// Shows the used fraction of each limit.
 pub fn limits(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, units: Units, palette: &Palette) {
     CollapsingHeader::new(RichText::new("Limits").strong()).default_open(true).show(ui, |ui| {
         if *limits == WrenchLimits::default() {
@@ -35,7 +35,7 @@ pub fn limits(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, units: Units,
     });
 }
 
-/// Shows a line for each event, counted since the first tick seen. A new line moves what is beneath it: nothing that a pointer may be on.
+/// Shows a line for each event, counted since the first tick received. New lines move no control under the pointer: none is beneath.
 pub fn events(ui: &mut Ui, tally: &Tally, palette: &Palette) {
     let title = RichText::new(format!("Events since {:.1} s", tally.since_s())).strong();
     CollapsingHeader::new(title).id_salt("events").default_open(true).show(ui, |ui| {
@@ -59,7 +59,7 @@ fn line(ui: &mut Ui, name: &str, value: &str, palette: &Palette) {
     });
 }
 
-/// Value on a bar, SI.
+/// Scale of a bar with its value, SI.
 #[derive(Clone, Copy)]
 enum Scale {
     /// Between the negative and the positive limit: zero is in the middle.
@@ -80,7 +80,7 @@ impl Scale {
         }
     }
 
-    /// Returns the part of the limit that is used, and the filled part of the bar.
+    /// Returns the used fraction of the limit, and the filled range of the bar (0 to 1).
     fn parts(self, limit: Option<f64>) -> (f64, [f64; 2]) {
         let of_limit = |value: f64| limit.map_or(0.0, |limit| (value / limit).clamp(-1.0, 1.0));
         match self {
@@ -93,14 +93,14 @@ impl Scale {
     }
 }
 
-/// Returns the decimals with which a small part of a limit is seen.
+/// Returns the number of decimals that shows a small fraction of a limit.
 fn decimals(limit: Option<f64>, per_si: f64) -> usize {
     if limit.is_some_and(|limit| limit * per_si < 10.0) { 3 } else { 1 }
 }
 
 /// Shows a value and its limit as a bar with a text.
 fn bar(ui: &mut Ui, name: &str, scale: Scale, limit: Option<f64>, unit: (&str, f64), palette: &Palette) {
-    /// A bar shorter than this shows nothing, points.
+    /// Smallest length of a bar, points.
     const LEAST_PT: f32 = 20.0;
     let text = scale.text(limit, unit);
     ui.horizontal(|ui| {

@@ -1,16 +1,16 @@
-//! One style for window and pictures: quiet colours, room to breathe, numbers in columns.
+//! Style of window and pictures: quiet colours, wide spacing, numbers in columns.
 
 use crate::palette::{Look, Palette};
 use egui::{Color32, Context, FontFamily, FontId, Stroke, TextStyle, Theme};
 
-/// Sizes of text, points.
+/// Size of titles, points.
 pub const TITLE_PT: f32 = 21.0;
-/// Text of readouts and labels.
+/// Size of readouts and labels, points.
 pub const BODY_PT: f32 = 13.5;
-/// Text of axes and remarks.
+/// Size of axes and remarks, points.
 pub const SMALL_PT: f32 = 11.5;
 
-/// Puts a look in force.
+/// Applies the colours and text sizes of a look to the interface.
 pub fn apply(context: &Context, look: Look) {
     let palette = Palette::of(look);
     let theme = match look {
@@ -34,7 +34,7 @@ pub fn apply(context: &Context, look: Look) {
         visuals.override_text_color = Some(palette.text);
         visuals.weak_text_color = Some(palette.faint);
         visuals.warn_fg_color = palette.warning;
-        // Opaque: between panels there is nothing beneath it.
+        // Opaque: nothing is painted beneath the seam between panels.
         let seam = palette.panel.lerp_to_gamma(palette.grid, 0.6);
         visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, seam);
         visuals.text_edit_bg_color = Some(palette.panel.lerp_to_gamma(palette.grid, 0.3));
@@ -43,7 +43,7 @@ pub fn apply(context: &Context, look: Look) {
     });
 }
 
-/// A button that is a sign, with what it does for those who ask.
+/// Shows a button with a sign, without a frame; `help` is its hover text and accessible name.
 pub fn quiet(ui: &mut egui::Ui, sign: &str, help: &str) -> egui::Response {
     let button =
         ui.add(egui::Button::new(egui::RichText::new(sign).size(15.0)).frame(false)).on_hover_text(help);

@@ -1,7 +1,7 @@
-//! The bar above everything: title, state of the run, emergency stop.
+//! Bar at the top of the window: title, state of the run, emergency stop.
 //!
-//! The emergency stop and the state are never shortened. The other parts get what is left, in this order: the buttons, the name of the
-//! panel's button, the title, which is shortened with "…".
+//! The emergency stop and the state are never shortened. The other parts get the remaining width, in this order: the buttons, the name of
+//! the panel's button, the title, which is shortened with "…".
 
 use crate::palette::{Look, Palette};
 use crate::ui::overlay::width_pt;
@@ -11,62 +11,62 @@ use egui::{
     Align, Button, Color32, CornerRadius, FontId, Label, Layout, RichText, Role, Stroke, Ui, WidgetInfo, vec2,
 };
 
-/// Name of the emergency stop in front of an experimenter.
+/// Name of the emergency stop in an experimenter's window.
 pub const STOP: &str = "EMERGENCY STOP";
 /// Width of a button that is a sign, with its gaps, and of the dot before the state, points.
 const SIGN_PT: f32 = 32.0;
 const DOT_PT: f32 = 18.0;
-/// A title narrower than this says nothing, points.
+/// Smallest width of a readable title, points.
 const LEAST_TITLE_PT: f32 = 40.0;
 
-/// What stands in the bar.
+/// Content of the bar.
 pub struct TopBar<'a> {
     /// Title of the scene.
     pub title: &'a str,
-    /// State of the run, in a word or two.
+    /// State of the run, in one or two words.
     pub state: &'a str,
-    /// Whether the state is in order.
+    /// Severity of the state.
     pub status: RunStatus,
-    /// The emergency stop, while there is a run to stop.
+    /// Emergency stop; `None` without a run to stop.
     pub stop: Option<Stop>,
-    /// Size of the emergency stop, of the usual one.
+    /// Factor on the usual size of the emergency stop.
     pub scale: f32,
-    /// What the button of the panel does.
+    /// Effect of the button for the panel.
     pub panel: PanelSwitch,
-    /// Light or dark, where that can be switched.
+    /// Current look, if a button can switch it.
     pub look: Option<Look>,
 }
 
-/// The emergency stop: what its button says.
+/// Texts on the button of the emergency stop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stop {
-    /// Name.
+    /// Name of the button.
     pub name: String,
-    /// Name of its key.
+    /// Name of the key.
     pub key: &'static str,
 }
 
-/// What the button of the panel does.
+/// Effect of the button for the panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PanelSwitch {
-    /// There is none.
+    /// No button.
     None,
-    /// It puts the panel away.
+    /// Hide the panel.
     PutAway,
-    /// It brings it out.
+    /// Show the panel.
     BringOut,
 }
 
-/// Whether a run is in order.
+/// Severity of the state of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunStatus {
-    /// Nothing runs, and nothing is wrong.
+    /// No run, or a normal end.
     Idle,
-    /// It runs.
+    /// The run is in order.
     InOrder,
-    /// It runs, and not as it should.
+    /// The run continues with a warning.
     Warning,
-    /// It ended by a fault or an emergency stop, or cannot be reached.
+    /// The run ended by a fault or an emergency stop, or the connection is lost.
     Failed,
 }
 
@@ -81,19 +81,19 @@ impl RunStatus {
     }
 }
 
-/// What was pressed.
+/// Request of a pressed button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TopBarRequest {
-    /// The emergency stop.
+    /// Emergency stop.
     EmergencyStop,
-    /// The other look.
+    /// Switch to the other look.
     SwitchLook,
-    /// The panel in or out of sight.
+    /// Show or hide the panel.
     SwitchPanel,
 }
 
 impl TopBar<'_> {
-    /// Shows the bar.
+    /// Shows the bar; returns the request of a pressed button.
     pub fn show(&self, ui: &mut Ui, palette: &Palette) -> Option<TopBarRequest> {
         let mut request = None;
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -113,14 +113,14 @@ impl TopBar<'_> {
         request
     }
 
-    /// Shows the buttons that have room in so many points.
+    /// Shows the buttons that fit into this width, points.
     fn switches(&self, ui: &mut Ui, mut room_pt: f32) -> Option<TopBarRequest> {
         let mut request = None;
         let long = "☰ Parameters";
         let long_pt = width_pt(ui.painter(), long, FontId::proportional(15.0)) + SIGN_PT;
         let sign = match self.panel {
             PanelSwitch::None => None,
-            // Who does not see the panel is told that there is one.
+            // The long name shows users that there is a hidden panel.
             PanelSwitch::BringOut if room_pt >= long_pt + SIGN_PT + LEAST_TITLE_PT => Some((long, long_pt)),
             PanelSwitch::BringOut | PanelSwitch::PutAway => Some(("☰", SIGN_PT)),
         };
@@ -150,7 +150,7 @@ impl TopBar<'_> {
     }
 }
 
-/// Shows the one button that must be found without a search: in the same colours light and dark, with its key.
+/// Shows the button that must be found without a search: in the same colours for both looks, with its key.
 fn emergency_stop(ui: &mut Ui, Stop { name, key }: &Stop, scale: f32) -> egui::Response {
     const RED: Color32 = Color32::from_rgb(196, 30, 36);
     const YELLOW: Color32 = Color32::from_rgb(255, 214, 64);

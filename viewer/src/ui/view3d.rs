@@ -1,4 +1,4 @@
-//! The 3D view and what a person does with it: orbit, zoom, incline, reset.
+//! 3D view and its handling: orbit, zoom, incline, reset.
 
 use crate::canvas::Canvas;
 use crate::palette::{Look, Palette};
@@ -9,44 +9,44 @@ use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, 
 use flotor_drawing::camera::{Camera, Extent};
 use flotor_hal::Pose;
 
-/// Turn for a drag over a point of the screen, rad.
+/// Rotation per point of a drag, rad.
 const ORBIT_RAD_PER_POINT: f64 = 0.008;
 const INCLINE_RAD_PER_POINT: f64 = 0.006;
-/// Turn for a press of a key, rad.
+/// Rotation per press of a key, rad.
 const ORBIT_RAD_PER_KEY: f64 = 0.12;
 const INCLINE_RAD_PER_KEY: f64 = 0.08;
-/// Zoom for a press of a key, and for a point of the wheel.
+/// Zoom factor per press of a key, and per point of the wheel.
 const ZOOM_PER_KEY: f64 = 1.12;
 const ZOOM_PER_POINT: f64 = 1.003;
 
-/// What the view shows.
+/// Content of the view.
 pub struct Subject<'a> {
     /// Bodies of the models.
     pub shapes: &'a mut [Shape],
-    /// Raised whenever a body changes otherwise than by the pose.
+    /// Version of the bodies, raised by every change other than of the pose.
     pub version: u64,
-    /// The moment.
+    /// Samples at the displayed time.
     pub moment: Moment<'a>,
-    /// Lengths of arrows.
+    /// Scale of the arrows.
     pub scale: ArrowScale,
 }
 
-/// The view: camera, buffers, and the picture drawn last.
+/// 3D view: camera, buffers, and the last picture.
 pub struct View3d {
-    /// From where.
+    /// Camera of the view.
     pub camera: Camera,
-    /// Extent of the bodies when the view was reset last: the camera stays where it was put when a body grows.
+    /// Extent of the bodies at the last reset: the camera does not move when a body grows.
     extent: Extent,
-    /// Width of the view to its height.
+    /// Aspect ratio of the view, width to height.
     aspect: f64,
-    /// Whether force and torque are drawn.
+    /// True to draw arrows of force and torque.
     pub shows_arrows: bool,
     canvas: Canvas,
     builder: SceneBuilder,
     drawn: Option<(Look3d, TextureId, SceneFacts)>,
 }
 
-/// All that a picture depends on: equal ones are the same picture.
+/// All inputs of a picture, compared to reuse the last picture.
 #[derive(Clone, Debug, PartialEq)]
 struct Look3d {
     handles: Vec<(Pose, [f32; 6])>,
@@ -60,7 +60,7 @@ struct Look3d {
 }
 
 impl View3d {
-    /// The experimenter's view of bodies.
+    /// Creates the default view of bodies of this extent.
     #[must_use]
     pub fn new(canvas: Canvas, extent: Extent) -> Self {
         const ASPECT: f64 = 2.0;
@@ -75,24 +75,24 @@ impl View3d {
         }
     }
 
-    /// Returns to the experimenter's view, of bodies of this extent.
+    /// Returns to the default view of bodies of this extent.
     pub fn reset(&mut self, extent: Extent) {
         self.extent = extent;
         self.camera = self.first();
     }
 
-    /// Returns whether the camera is elsewhere than where it was put last.
+    /// Returns whether the camera has moved from the default view.
     #[must_use]
     pub fn is_turned(&self) -> bool {
         self.camera != self.first()
     }
 
-    /// Returns the experimenter's view in the present shape of the view.
+    /// Returns the default camera for the current aspect ratio.
     fn first(&self) -> Camera {
         Camera::fitting(self.extent, self.aspect)
     }
 
-    /// Follows a change of the shape of the view, with a camera that nobody has turned.
+    /// Updates the aspect ratio, and a camera that is in the default view.
     fn fit(&mut self, area: Rect) {
         let is_turned = self.is_turned();
         self.aspect = f64::from(area.width() / area.height().max(1.0));
@@ -101,13 +101,13 @@ impl View3d {
         }
     }
 
-    /// Corners of triangles put together so far: none for a picture in which nothing has moved.
+    /// Returns the number of corners built so far: an unchanged picture adds none.
     #[must_use]
     pub fn corners_made(&self) -> u64 {
         self.builder.corners_made()
     }
 
-    /// Shows the scene in a rectangle, follows the mouse, and says what is in the picture.
+    /// Shows the scene in a rectangle, handles the mouse, and returns the facts of the picture.
     pub fn show(&mut self, ui: &mut Ui, area: Rect, look: Look, subject: Subject<'_>) -> SceneFacts {
         let extent = SceneBuilder::extent(subject.shapes, subject.moment.samples.len());
         self.fit(area);
@@ -133,7 +133,7 @@ impl View3d {
         facts
     }
 
-    /// Follows the keys that turn and zoom: W A S D, plus, minus, R for the experimenter's view.
+    /// Handles the keys that turn and zoom: W A S D, plus, minus, and R for the default view.
     pub fn keys(&mut self, ui: &Ui, extent: Extent) {
         ui.input(|input| {
             let pressed = |key: Key| f64::from(u8::from(pressed_alone(input, key)));
@@ -181,7 +181,7 @@ impl View3d {
     }
 }
 
-/// The whole pixels of a size, one at least.
+/// Rounds a size to whole pixels, at least one.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
 pub fn pixels(size: Vec2) -> [usize; 2] {

@@ -1,38 +1,38 @@
-//! What the mouse asks of the part of a trace that is shown: a box, other values, other times, all of it again.
+//! Zoom of a trace by the mouse: a box, other values, other times, or the whole trace.
 
 use crate::palette::Palette;
 use egui::{PointerButton, Pos2, Rect, Stroke, StrokeKind, Ui, Vec2};
 use egui_plot::PlotResponse;
 
-/// Another part of a trace.
+/// Request for another range of a trace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ZoomRequest {
-    /// These times, s, and these values, in the units shown.
+    /// Time range, s, and range of values, in the displayed units.
     Box([f64; 2], [f64; 2]),
-    /// These values, in the units shown.
+    /// Range of values, in the displayed units.
     Values([f64; 2]),
-    /// These times, s.
+    /// Time range, s.
     Time([f64; 2]),
-    /// All of it.
+    /// The whole trace.
     All,
 }
 
 /// Effect of the wheel over a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wheel {
-    /// It zooms the values: all traces are in sight.
+    /// Zoom the values: all traces are visible.
     Zooms,
-    /// It scrolls the traces; with Alt it zooms the values.
+    /// Scroll the traces; with Alt, zoom the values.
     Scrolls,
 }
 
-/// Zoom for a point of the wheel.
+/// Zoom factor per point of the wheel.
 const ZOOM_PER_POINT: f64 = 1.003;
-/// A box smaller than this in a direction leaves that direction as it is, points.
+/// Smallest size of a box, points: below, the range in that direction does not change.
 const LEAST_BOX_PT: f32 = 6.0;
 
-/// Returns the request of the mouse: the right button draws a box, the wheel zooms the values about the pointer unless it scrolls, the
-/// wheel with Ctrl the time, the middle button shifts the time, and a double click shows all of the trace again.
+/// Returns the zoom requested by the mouse: the right button draws a box, the wheel zooms the values about the pointer unless it scrolls,
+/// the wheel with Ctrl zooms the time, the middle button shifts the time, and a double click shows the whole trace again.
 pub fn requested<R>(
     ui: &Ui,
     shown: &PlotResponse<R>,
@@ -64,14 +64,14 @@ pub fn requested<R>(
         return Some(ZoomRequest::Time(about(at.x, time_s, pinch)));
     }
     if scroll != 0.0 && (wheel == Wheel::Zooms || ui.input(|input| input.modifiers.alt)) {
-        // What lies around the traces does not scroll as well.
+        // The surroundings of the traces must not scroll as well.
         ui.input_mut(|input| input.smooth_scroll_delta = Vec2::ZERO);
         return Some(ZoomRequest::Values(about(at.y, values, ZOOM_PER_POINT.powf(f64::from(scroll)))));
     }
     None
 }
 
-/// A box that is being drawn with the right button; the request when the button is up.
+/// Draws a box with the right button; returns the request when the button is released.
 fn boxed<R>(ui: &Ui, shown: &PlotResponse<R>, palette: &Palette) -> Option<ZoomRequest> {
     let (response, transform) = (&shown.response, &shown.transform);
     let id = response.id.with("box");

@@ -1,21 +1,21 @@
-//! Force as a straight arrow, torque as one bent around its axis.
+//! Arrows: straight for a force, bent around the axis for a torque.
 
 use super::{Color, Frame, Mesh, revolve};
 use flotor_hal::DVec3;
 use flotor_hal::glam::DVec2;
 use std::f64::consts::TAU;
 
-/// Sides of a shaft and a head.
+/// Number of sides of a shaft and a head.
 const SIDES: usize = 72;
-/// Length of a head in radii of its shaft, and its radius.
+/// Length and radius of a head, in radii of the shaft.
 const HEAD_LENGTH: f64 = 6.0;
 const HEAD_RADIUS: f64 = 2.6;
 
-/// An arrow from a point along a vector, m. Shorter than a head, it is all head.
+/// Adds an arrow from a point along a vector, m. An arrow shorter than two heads is scaled down as a whole.
 pub fn force_arrow(mesh: &mut Mesh, from_m: DVec3, vector_m: DVec3, shaft_radius_m: f64, color: Color) {
     let length_m = vector_m.length();
     let Some(direction) = vector_m.try_normalize() else { return };
-    // A small force is a small arrow: below two heads everything shrinks alike.
+    // A small force is a small arrow: below two heads, shaft and head shrink alike.
     let radius_m = shaft_radius_m.min(length_m / (2.0 * HEAD_LENGTH));
     let neck_m = length_m - HEAD_LENGTH * radius_m;
     let head_m = HEAD_RADIUS * radius_m;
@@ -23,7 +23,7 @@ pub fn force_arrow(mesh: &mut Mesh, from_m: DVec3, vector_m: DVec3, shaft_radius
     revolve(mesh, &Frame::along(from_m, direction), &profile, SIDES, color);
 }
 
-/// An arc with a head about an axis, in the sense a torque turns; `angle_rad` is how far around it goes.
+/// Adds an arc with a head about an axis, in the sense of a torque; `angle_rad` is the angle of the arc with its head.
 pub fn torque_arrow(
     mesh: &mut Mesh,
     center_m: DVec3,

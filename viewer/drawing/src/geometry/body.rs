@@ -1,21 +1,21 @@
-//! A body as its model describes it, at rest.
+//! Body of a model, at rest.
 
 use super::Curve;
 use flotor_hal::{CenterlineInfo, Pose};
 
-/// What does not change while the handle moves: how the body is drawn, and its shape at rest.
+/// Constant data of a body: sizes for drawing, and the shape at rest.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// How to draw it around its centreline.
+    /// Radii and turns around the centreline.
     pub info: CenterlineInfo,
-    /// Its centreline at home.
+    /// Centreline at home.
     pub rest: Curve,
     /// Length of the centreline at home, m.
     pub rest_length_m: f64,
 }
 
 impl Body {
-    /// From what a model says; `None` if there is nothing to draw.
+    /// Checks the description of a model; `None` if there is nothing to draw.
     #[must_use]
     pub fn new(info: CenterlineInfo, rest: &[Pose]) -> Option<Self> {
         let numbers = [info.tube_radius_m, info.helix_radius_m, info.helix_turns, info.plate_radius_m];

@@ -1,4 +1,4 @@
-//! The centreline a model reports as a handful of sections, made smooth.
+//! Smooth centreline through the few sections reported by a model.
 
 use flotor_hal::{DQuat, DVec3, Pose};
 
@@ -7,14 +7,14 @@ use flotor_hal::{DQuat, DVec3, Pose};
 pub struct Section {
     /// Centre, m.
     pub center_m: DVec3,
-    /// The z axis turned by it is the section's normal.
+    /// Orientation; the turned z axis is the normal of the section.
     pub orientation: DQuat,
 }
 
-/// Position and quaternion: what is interpolated, component by component.
+/// Position and quaternion, interpolated component by component.
 type Components = [f64; 7];
 
-/// A smooth curve with a frame along it through reported sections, which are even in arc length at rest.
+/// Smooth curve with a frame along it, through reported sections at even arc lengths at rest.
 ///
 /// Cubic Hermite pieces whose slopes are differences of fourth order (third at the ends): between 65 sections of a
 /// spring bent by its own length the error is below a thousandth of its wire (a test holds it).
@@ -25,8 +25,7 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Through reported sections, from the fixed end to the handle; `None` if there are fewer than four or one is
-    /// not finite.
+    /// Interpolates reported sections, from the fixed end to the handle; `None` for fewer than four sections or a non-finite section.
     #[must_use]
     pub fn through(sections: &[Pose]) -> Option<Self> {
         if sections.len() < 4 || !sections.iter().all(Pose::is_finite) {
@@ -44,13 +43,13 @@ impl Curve {
         Some(Self { values, slopes })
     }
 
-    /// How many sections it goes through.
+    /// Returns the number of reported sections.
     #[must_use]
     pub fn sections(&self) -> usize {
         self.values.len()
     }
 
-    /// The section at the fraction `s` of the length at rest, 0 at the fixed end, 1 at the handle.
+    /// Returns the section at the fraction `s` of the length at rest, 0 at the fixed end, 1 at the handle.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pieces
     pub fn section(&self, s: f64) -> Section {
@@ -81,7 +80,7 @@ fn components(pose: &Pose) -> Components {
     [x, y, z, qx, qy, qz, qw]
 }
 
-/// Derivative per piece at section `i`.
+/// Returns the derivative per piece at section `i`.
 fn slope(values: &[Components], i: usize) -> Components {
     let last = values.len() - 1;
     let at = |stencil: &[(usize, f64)]| -> Components {

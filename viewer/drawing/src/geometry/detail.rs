@@ -1,32 +1,32 @@
-//! How finely to mesh: as finely as can be seen, and no finer.
+//! Resolution of meshes: as fine as can be seen, and no finer.
 
 use super::Body;
 use std::f64::consts::PI;
 
-/// Rings and sides of a tube.
+/// Mesh resolution of a tube.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Detail {
-    /// Rings along the whole tube.
+    /// Number of rings along the whole tube.
     pub rings: usize,
-    /// Corners of a ring.
+    /// Number of corners of a ring.
     pub sides: usize,
 }
 
-/// How far a chord may lie inside its arc, in pixels: below what anti-aliasing resolves.
+/// Largest distance of a chord from its arc, in pixels: below the resolution of anti-aliasing.
 const SAG_PX: f64 = 0.12;
-/// Rings of one turn: a coil still looks round, and never costs more than it shows.
+/// Range of rings per turn: a coil looks round at the lower limit and costs no more than can be seen at the upper.
 const RINGS_PER_TURN: std::ops::RangeInclusive<f64> = 16.0..=96.0;
-/// Corners of a ring.
+/// Range of corners of a ring.
 const SIDES: std::ops::RangeInclusive<f64> = 8.0..=40.0;
 /// Rings of a plain tube, which may bend anywhere.
 const RINGS_OF_A_TUBE: usize = 129;
-/// Rings of any tube at most: a hundred turns at full size would be more than anybody sees.
+/// Largest number of rings of a tube: a hundred turns at full resolution would be more than can be seen.
 const MOST_RINGS: f64 = 6000.0;
 
 impl Detail {
-    /// For a body drawn at so many pixels per millimetre.
+    /// Returns the resolution for a body drawn at this many pixels per millimetre.
     ///
-    /// A chord of `n` on a circle of radius r lies `r (pi / n)² / 2` inside it.
+    /// One of `n` chords on a circle of radius r lies `r (pi / n)² / 2` inside the arc.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within the ranges above
     pub fn for_size(body: &Body, pixels_per_mm: f64) -> Self {

@@ -1,20 +1,20 @@
-//! The ground: a grid that fades out, and soft shadows, so that the eye finds up, near and far.
+//! Ground of the scene: a grid that fades out and soft shadows, as cues for up, near and far.
 //!
-//! Grid and surface stand still; where the shadows fall is all that changes from picture to picture.
+//! Grid and surface are static; only the shadows change from picture to picture.
 
 use super::{Color, MM_PER_M, Mesh, Vertex};
 use flotor_hal::DVec3;
 use flotor_hal::glam::DVec2;
 use std::f64::consts::TAU;
 
-/// A round patch of the plane `z = height_m`.
+/// Round patch of the plane `z = height_m`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
     /// Height of the plane, m.
     pub height_m: f64,
-    /// Where it has faded out, m from the origin.
+    /// Radius at which the ground has faded out, m.
     pub radius_m: f64,
-    /// Distance of grid lines, m.
+    /// Distance between grid lines, m.
     pub spacing_m: f64,
     /// Colour of the surface in the middle.
     pub surface: Color,
@@ -22,33 +22,33 @@ pub struct Ground {
     pub line: Color,
 }
 
-/// A soft dark spot.
+/// Soft dark spot on the ground.
 #[derive(Clone, Copy, Debug)]
 pub struct Shadow {
-    /// Its middle, m.
+    /// Centre, m.
     pub center_m: DVec2,
-    /// Where it has lost two thirds of its strength, m; at twice that it has gone.
+    /// Radius at which two thirds of the strength are lost, m; the shadow ends at twice this radius.
     pub radius_m: f64,
-    /// How dark its middle is, 0 to 1.
+    /// Darkness of the centre, 0 to 1.
     pub strength: f64,
 }
 
-/// Rings and sectors of the surface: as fine as a shadow is soft.
+/// Rings and sectors of the surface: fine enough for soft shadows.
 const RINGS: usize = 48;
 const SECTORS: usize = 96;
-/// Half the width of a grid line, part of the distance of lines.
+/// Half the width of a grid line, as a fraction of the line distance.
 const LINE_HALF_WIDTH: f64 = 0.012;
-/// Lines lie this part of the distance of lines above the surface, to be in front of it.
+/// Height of the lines above the surface, as a fraction of the line distance, so that they are drawn in front.
 const LINE_LIFT: f64 = 0.002;
 
 impl Ground {
-    /// Adds surface and lines, without shadows. Draw it first: what stands on it covers it.
+    /// Adds surface and lines, without shadows. To be drawn first: bodies on the ground cover it.
     pub fn append(&self, mesh: &mut Mesh) {
         self.surface(mesh);
         self.lines(mesh);
     }
 
-    /// Lets shadows fall on a ground: on the corners that [`Ground::append`] has added, whatever fell on them before.
+    /// Casts shadows on the corners added by [`Ground::append`]; replaces earlier shadows.
     pub fn shade(&self, corners: &mut [Vertex], shadows: &[Shadow]) {
         for corner in corners.iter_mut().take((RINGS + 1) * (SECTORS + 1)) {
             let [x_mm, y_mm, _] = corner.position_mm.map(f64::from);
@@ -102,7 +102,7 @@ impl Ground {
 }
 
 impl Shadow {
-    /// `(1 - x/4)^4` of the squared distance x in radii: close to `exp(-x)`, and nothing from two radii on.
+    /// Returns the darkness at a point: `strength (1 - x/4)^4` of the squared distance x in radii, close to `exp(-x)`, 0 from two radii on.
     fn at(&self, point_m: DVec2) -> f64 {
         let left = 1.0 - 0.25 * point_m.distance_squared(self.center_m) / (self.radius_m * self.radius_m);
         let square = left.max(0.0) * left.max(0.0);

@@ -1,17 +1,17 @@
-//! Triangles to draw, in the form a GPU takes and the CPU rasteriser reads.
+//! Triangle meshes, in the layout of the GPU and the CPU rasteriser.
 
 use flotor_hal::DVec3;
 
 /// Millimetres per metre: the picture's unit keeps `f32` coordinates near one.
 pub const MM_PER_M: f64 = 1.0e3;
 
-/// A corner of a triangle. 28 bytes.
+/// Corner of a triangle, 28 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
     /// Position, mm, in the frame of the picture (z up).
     pub position_mm: [f32; 3],
-    /// Unit normal; zero for a surface that no light changes.
+    /// Unit normal; zero for an unlit surface.
     pub normal: [f32; 3],
     /// Colour and opacity, sRGB.
     pub color: Color,
@@ -20,23 +20,23 @@ pub struct Vertex {
 /// Colour and opacity, sRGB, straight alpha.
 pub type Color = [u8; 4];
 
-/// A list of triangles. Corners run counter-clockwise seen from outside.
+/// List of triangles, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
-    /// The corners.
+    /// Corners of the triangles.
     pub vertices: Vec<Vertex>,
-    /// Three indices a triangle.
+    /// Three indices per triangle.
     pub indices: Vec<u32>,
 }
 
 impl Mesh {
-    /// Forgets everything but the memory.
+    /// Removes all triangles and keeps the allocated memory.
     pub fn clear(&mut self) {
         self.vertices.clear();
         self.indices.clear();
     }
 
-    /// Adds a corner and gives its index. The position is in metres.
+    /// Adds a corner at a position in metres and returns its index.
     #[allow(clippy::cast_possible_truncation)] // a picture needs no more than f32, and no more than 2^32 corners
     pub fn vertex(&mut self, position_m: DVec3, normal: DVec3, color: Color) -> u32 {
         let index = self.vertices.len() as u32;
@@ -55,7 +55,7 @@ impl Mesh {
         self.indices.extend_from_slice(&[a, b, c, a, c, d]);
     }
 
-    /// Adds a surface of so many rows of corners: `row` adds one, and quads join it to the one before.
+    /// Adds a surface of `rows` rows of corners: `row` adds a row, and quads join each row to the previous row.
     pub fn sheet<Row: AsRef<[u32]>>(&mut self, rows: usize, row: impl Fn(&mut Self, usize) -> Row) {
         let mut last: Option<Row> = None;
         for number in 0..rows {

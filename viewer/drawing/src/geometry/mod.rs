@@ -1,7 +1,7 @@
-//! From what a model describes to triangles: the wire wound about a centreline, primitives, surfaces, end plates, ground,
+//! Triangles for the description of a model: the wire wound about a centreline, primitives, surfaces, end plates, ground,
 //! arrows.
 //!
-//! Everything here is in metres and `f64` until a vertex is written. Frames are right-handed with z up.
+//! Coordinates are in metres and `f64` until a vertex is written. Frames are right-handed with z up.
 
 mod arrow;
 mod body;

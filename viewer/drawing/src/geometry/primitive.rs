@@ -1,17 +1,17 @@
-//! What a model describes beside a centreline: bodies of simple form, and a surface of triangles.
+//! Primitives and triangle surfaces of a model.
 
 use super::{Color, Frame, MM_PER_M, Mesh, Vertex, revolve};
 use flotor_hal::glam::DVec2;
 use flotor_hal::{DVec3, Form, Primitive, Sides, Surface};
 use std::f64::consts::{PI, TAU};
 
-/// Depth of the slab that a plane is drawn as, in halves of its longer side.
+/// Thickness of the slab drawn for a plane, as a fraction of half its longer side.
 const SLAB: f64 = 0.15;
-/// Sectors of what is round, and rings of a ball.
+/// Sectors of round primitives, and rings of a ball.
 const SECTORS: usize = 64;
 const RINGS: usize = 32;
 
-/// Adds a primitive; one of a form that is not known is left out.
+/// Adds a primitive; skips a primitive of an unknown form.
 pub fn append_primitive(mesh: &mut Mesh, primitive: &Primitive, color: Color) {
     let (pose, [x, y, z]) = (primitive.pose(), primitive.half_sides_m());
     let frame = Frame::at(&pose);
@@ -58,7 +58,7 @@ fn cuboid(mesh: &mut Mesh, frame: &Frame, half_m: DVec3, color: Color) {
     }
 }
 
-/// Adds a surface, coloured by its numbers; a sheet is seen from both sides.
+/// Adds a surface coloured by the values of its vertices; a surface with two sides is also drawn from the back.
 #[allow(clippy::cast_possible_truncation)] // a picture needs no more than f32, and no more than 2^32 corners
 pub fn append_surface(mesh: &mut Mesh, surface: &Surface, color: impl Fn(f64) -> Color) {
     let first = mesh.vertices.len() as u32;

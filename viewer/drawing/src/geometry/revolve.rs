@@ -5,7 +5,7 @@ use flotor_hal::glam::DVec2;
 use flotor_hal::{DVec3, Pose};
 use std::f64::consts::TAU;
 
-/// Where an axis stands: origin and three unit vectors, z along the axis.
+/// Frame of an axis: origin and three unit vectors, z along the axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
     /// Origin, m.
@@ -14,25 +14,25 @@ pub struct Frame {
     pub x: DVec3,
     /// Second direction across the axis.
     pub y: DVec3,
-    /// The axis.
+    /// Direction of the axis.
     pub z: DVec3,
 }
 
 impl Frame {
-    /// At a point, with the axis in a direction.
+    /// Returns a frame at a point, with the axis in a direction.
     #[must_use]
     pub fn along(origin_m: DVec3, direction: DVec3) -> Self {
         let (x, y) = direction.any_orthonormal_pair();
         Self { origin_m, x, y, z: direction }
     }
 
-    /// That of a section.
+    /// Returns the frame of a section.
     #[must_use]
     pub fn of(section: &Section) -> Self {
         Self::at(&Pose::new(section.center_m, section.orientation))
     }
 
-    /// That of a pose.
+    /// Returns the frame of a pose.
     #[must_use]
     pub fn at(pose: &Pose) -> Self {
         let turn = pose.orientation();
@@ -40,8 +40,8 @@ impl Frame {
     }
 }
 
-/// Turns a profile of points `(radius, height)`, m, about the z axis of a frame. The profile runs upwards on the
-/// outside; every edge of it is a sharp one.
+/// Sweeps a profile of points `(radius, height)`, m, about the z axis of a frame. The profile runs upwards on the
+/// outside; all its edges are sharp.
 pub fn revolve(mesh: &mut Mesh, frame: &Frame, profile: &[(f64, f64)], sides: usize, color: Color) {
     for pair in profile.windows(2) {
         let [(r0, z0), (r1, z1)] = [pair[0], pair[1]];
@@ -56,8 +56,8 @@ pub fn revolve(mesh: &mut Mesh, frame: &Frame, profile: &[(f64, f64)], sides: us
     }
 }
 
-/// An end plate: a disc with chamfered rims that touches the section's plane and lies outside of it.
-/// `outward` is +1 for the handle's end and -1 for the fixed one.
+/// Adds an end plate: a disc with chamfered rims that touches the plane of a section and lies outside of it.
+/// `outward` is +1 for the end at the handle and -1 for the fixed end.
 pub fn plate(
     mesh: &mut Mesh,
     section: &Section,

@@ -1,4 +1,4 @@
-//! How much the wire works, place by place: what the colour of a body shows.
+//! Local strain of the wire, shown by the colour of a body.
 //!
 //! Only the centreline is known, so the measure is geometric: the local change of length of the body at the place
 //! of the wire. With axial strain `e` of the centreline, shear `g` and curvature `k` (per length at rest, in the
@@ -8,7 +8,7 @@
 //! e + k_x y - k_y x        along the axis, and by |g| across it
 //! ```
 //!
-//! A coil's wire is twisted in proportion to it: it is the wire's shear stress up to one factor. The scale ends
+//! The twist of a coil's wire, and thus its shear stress, is proportional to this strain. The scale ends
 //! where the turns of a coil touch: there the distance of two turns has become the wire's diameter.
 
 use super::{Body, Curve};
@@ -31,14 +31,14 @@ struct Piece {
 /// Strain at a place of the wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalStrain {
-    /// Change of length along the axis; negative where turns come closer.
+    /// Relative change of length along the axis; negative where turns come closer.
     pub axial: f64,
-    /// Sideways shift per length.
+    /// Shear: sideways displacement per length.
     pub shear: f64,
 }
 
 impl LocalStrain {
-    /// One number for a colour.
+    /// Returns the norm of both components, for a colour scale.
     #[must_use]
     pub fn magnitude(self) -> f64 {
         self.axial.hypot(self.shear)
@@ -46,7 +46,7 @@ impl LocalStrain {
 }
 
 impl Strain {
-    /// Of a body against itself at rest; both need the same number of sections.
+    /// Compares the centreline of a body with its centreline at rest; both need the same number of sections.
     #[must_use]
     pub fn between(rest: &Curve, now: &Curve) -> Self {
         let count = rest.sections().min(now.sections());
@@ -74,7 +74,7 @@ impl Strain {
         Self { pieces: (0..count - 1).map(piece).collect() }
     }
 
-    /// At the fraction `s` of the length, for a fibre at `(x, y)` of the section, m.
+    /// Returns the strain at the fraction `s` of the length, for a fibre at `(x, y)` of the section, m.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pieces
     pub fn at(&self, s: f64, fibre_m: DVec2) -> LocalStrain {
@@ -92,7 +92,7 @@ impl Strain {
     }
 }
 
-/// Axial strain at which neighbouring turns of a coil touch (negative); `None` for a plain tube or a coil whose
+/// Returns the axial strain at which neighbouring turns of a coil touch (negative); `None` for a plain tube or a coil whose
 /// turns touch at rest.
 #[must_use]
 pub fn contact_strain(body: &Body) -> Option<f64> {

@@ -1,12 +1,12 @@
-//! The point of a primitive's surface that is closest to a point of the scene, with the normal there.
+//! Search for the point of a primitive's surface that is closest to a point of the scene, with its normal.
 
 use super::Frame;
 use flotor_hal::{DVec3, Form, Primitive};
 
-/// A point of a surface, seen from another point.
+/// Point of a surface that is closest to another point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Its position, m.
+    /// Position, m.
     pub position_m: DVec3,
     /// Unit vector out of the body.
     pub normal: DVec3,
@@ -36,7 +36,7 @@ pub fn closest_surface_point(primitive: &Primitive, to_m: DVec3) -> Option<Surfa
     Some(SurfacePoint { position_m: frame.origin_m + turned(position_m), normal: turned(normal), depth_m })
 }
 
-/// Returns position, normal and depth for a box about the origin: inside, those of the nearest face.
+/// Returns position, normal and depth for a box about the origin: for a point inside, of the nearest face.
 fn closest_of_box(half_m: DVec3, local_m: DVec3) -> Option<(DVec3, DVec3, f64)> {
     let outside_m = local_m - local_m.clamp(-half_m, half_m);
     if let Some(normal) = outside_m.try_normalize() {

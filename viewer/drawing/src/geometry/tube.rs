@@ -1,4 +1,4 @@
-//! The wire: a tube swept along its centre with a frame that is carried along, never fixed to an axis.
+//! Tube of the wire, swept along its centre with a frame that is transported along the curve, never fixed to an axis.
 //!
 //! Rings in a fixed plane would fold to a ribbon where the wire runs along that plane; a frame transported along
 //! the curve has no such place. The number of rings is fixed beforehand, so that the last one lies in the plate.
@@ -8,13 +8,13 @@ use flotor_hal::DVec3;
 use flotor_hal::glam::DVec2;
 use std::f64::consts::TAU;
 
-/// Centre of the wire at the fraction `s` of the body, where it crosses the section at `fibre`, m.
+/// Returns the centre of the wire at the fraction `s` of the body, where it crosses the section at `fibre`, m.
 fn wire_center(curve: &Curve, s: f64, fibre: DVec2) -> DVec3 {
     let section = curve.section(s);
     section.center_m + section.orientation * fibre.extend(0.0)
 }
 
-/// Where the wire crosses the section at `s`, in the section's frame, m.
+/// Returns the point where the wire crosses the section at `s`, in the section's frame, m.
 fn fibre(body: &Body, s: f64) -> DVec2 {
     if !body.is_coil() {
         return DVec2::ZERO;
@@ -22,7 +22,7 @@ fn fibre(body: &Body, s: f64) -> DVec2 {
     DVec2::from_angle(TAU * body.info.helix_turns * s) * body.info.helix_radius_m
 }
 
-/// Adds the wire with its flat ends; `color` says how a place of it looks.
+/// Adds the wire with its flat ends; `color` maps the local strain to a colour.
 #[allow(clippy::cast_possible_truncation)] // thousands of corners
 pub fn append_tube(
     mesh: &mut Mesh,
@@ -65,7 +65,7 @@ pub fn append_tube(
     }
 }
 
-/// Direction of the wire at ring `k`: differences of second order, one-sided at the ends.
+/// Returns the direction of the wire at ring `k`: differences of second order, one-sided at the ends.
 fn tangent(centers: &[DVec3], k: usize) -> DVec3 {
     let last = centers.len() - 1;
     let direction = match k {
@@ -77,13 +77,13 @@ fn tangent(centers: &[DVec3], k: usize) -> DVec3 {
     direction.try_normalize().unwrap_or(DVec3::Z)
 }
 
-/// The direction across the wire carried on from the last ring, with no turn about the wire.
+/// Transports the direction across the wire from the last ring, without a turn about the wire.
 fn carry(across: Option<DVec3>, tangent: DVec3) -> DVec3 {
     let start = across.unwrap_or_else(|| tangent.any_orthonormal_vector());
     (start - tangent * tangent.dot(start)).try_normalize().unwrap_or_else(|| tangent.any_orthonormal_vector())
 }
 
-/// Closes an end with a flat disc of its own corners, which have the end's normal.
+/// Closes an end with a flat disc, with separate corners for the normal of the end.
 #[allow(clippy::cast_possible_truncation)] // thousands of corners
 fn cap(mesh: &mut Mesh, ring: u32, sides: u32, center_m: DVec3, normal: DVec3, forward: bool) {
     let color = mesh.vertices[ring as usize].color;

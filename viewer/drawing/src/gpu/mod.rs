@@ -1,7 +1,7 @@
-//! The 3D view on a GPU or a software adapter: into a texture of our own, which window, tests and pictures share.
+//! Renderer of the 3D view on a GPU or a software adapter, into a texture shared by window, tests and pictures.
 //!
-//! Why a texture and not egui's own pass: it has a depth buffer and multisampling whatever the window has, works where
-//! there is no window, and its pixels can be read back.
+//! Reasons for a texture instead of egui's own pass: it has a depth buffer and multisampling regardless of the window,
+//! works without a window, and its pixels can be read back.
 
 mod pipeline;
 mod target;
@@ -14,7 +14,7 @@ use pipeline::{Pipelines, pipelines};
 use target::Target;
 use wgpu::{BufferDescriptor, BufferUsages, Device, Queue, TextureView};
 
-/// What the shader knows beside the triangles; laid out as `View` in `scene.wgsl`.
+/// Uniform buffer of the shader, laid out as `View` in `scene.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct ViewUniform {
@@ -24,7 +24,7 @@ struct ViewUniform {
     bottom: [f32; 4],
 }
 
-/// Draws scenes; keeps buffers and textures from picture to picture.
+/// Renderer of scenes; buffers and textures are reused from picture to picture.
 pub struct GpuScene {
     device: Device,
     queue: Queue,
@@ -36,14 +36,14 @@ pub struct GpuScene {
     target: Option<Target>,
 }
 
-/// A buffer that grows by doubling.
+/// GPU buffer that grows by doubling.
 struct Growing {
     buffer: wgpu::Buffer,
     usage: BufferUsages,
 }
 
 impl GpuScene {
-    /// On a device. Compiles the shaders.
+    /// Creates a renderer on a device and compiles the shaders.
     #[must_use]
     pub fn new(device: &Device, queue: &Queue) -> Self {
         let pipelines = pipelines(device);
@@ -70,7 +70,7 @@ impl GpuScene {
         }
     }
 
-    /// Draws a mesh. The texture view is another one whenever the size has changed; `Rgba8Unorm`, in gamma space.
+    /// Draws a mesh and returns its texture view: `Rgba8Unorm`, in gamma space. A change of size creates a new view.
     pub fn draw(
         &mut self,
         mesh: &Mesh,
@@ -82,7 +82,7 @@ impl GpuScene {
         let size = size.map(|length| length.min(self.device.limits().max_texture_dimension_2d));
         let fits = self.target.as_ref().is_some_and(|target| target.size == size);
         if !fits {
-            self.target = None; // the old one first: both at once may be more than there is
+            self.target = None; // free the old texture first: both at once may exceed the memory
         }
         let target = self.target.get_or_insert_with(|| Target::new(&self.device, size));
         self.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&uniform(camera, backdrop, size)));
@@ -108,7 +108,7 @@ impl GpuScene {
 
 impl Growing {
     fn new(device: &Device, usage: BufferUsages) -> Self {
-        /// Enough for an empty scene.
+        /// Initial size, enough for an empty scene.
         const FIRST_BYTES: u64 = 1 << 16;
         Self { buffer: Self::buffer(device, usage, FIRST_BYTES), usage }
     }

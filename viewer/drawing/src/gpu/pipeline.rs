@@ -1,4 +1,4 @@
-//! How triangles become pixels: the two pipelines of the 3D view.
+//! Render pipelines of the 3D view: backdrop and triangles.
 
 use super::ViewUniform;
 use crate::geometry::Vertex;
@@ -10,10 +10,10 @@ use wgpu::{
     TextureFormat, VertexBufferLayout, VertexState, VertexStepMode,
 };
 
-/// Gamma space, which is what egui mixes in.
+/// Colour format, in gamma space like the blending of egui.
 pub(super) const COLOR: TextureFormat = TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
-/// Samples a pixel: every adapter has four.
+/// Samples per pixel: every adapter supports four.
 pub(super) const SAMPLES: u32 = 4;
 
 pub(super) struct Pipelines {
@@ -50,7 +50,7 @@ pub(super) fn pipelines(device: &Device) -> Pipelines {
         step_mode: VertexStepMode::Vertex,
         attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4],
     };
-    // Surfaces hide what is behind them, and are seen from outside only.
+    // Surfaces write depth, and their back faces are culled.
     let solid = Stage { vertex: "place", fragment: "shade", buffers: &[Some(corners)], hides: true };
     let backdrop = Stage { vertex: "cover", fragment: "backdrop", buffers: &[], hides: false };
     let [solid, backdrop] = [solid, backdrop].map(|stage| stage.pipeline(device, &shader, &layout));

@@ -1,4 +1,4 @@
-//! Where pixels go: several samples each, made one.
+//! Render target with several samples per pixel, resolved to one.
 
 use super::pipeline::{COLOR, DEPTH, SAMPLES};
 use wgpu::{
@@ -38,7 +38,7 @@ impl Target {
         Self { size, samples: view(&samples), depth: view(&depth), view: view(&texture) }
     }
 
-    /// A pass over an empty picture.
+    /// Begins a render pass on a cleared picture.
     pub(super) fn begin<'a>(&self, encoder: &'a mut CommandEncoder) -> RenderPass<'a> {
         encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("scene"),

@@ -1,4 +1,4 @@
-//! The row above the traces: the quantities, the number of traces out of sight, time, units, export.
+//! Row above the traces: quantities, number of hidden traces, time span, units, export.
 
 use super::{ExportFormat, PlotRequest, PlotStack, Window};
 use crate::palette::Palette;
@@ -8,18 +8,18 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Color32, ComboBox, FontId, PopupCloseBehavior, RichText, Role, Ui, WidgetInfo};
 use flotor_history::quantity::{Quantity, Units};
 
-/// Lengths of time that can be shown, s.
+/// Selectable time spans, s.
 const WINDOWS_S: [f64; 5] = [2.0, 5.0, 10.0, 30.0, 60.0];
 
-/// Lower, the choice of traces is a menu, points.
+/// Height below which the choice of traces is a menu, points.
 const ROOM_FOR_TABS_PT: f32 = 230.0;
 /// Width of the choices of time, units and export, points.
 const PRESENTATION_PT: f32 = 200.0;
-/// Width of the number of traces that are out of sight, points.
+/// Width of the number of hidden traces, points.
 const MORE_PT: f32 = 130.0;
 
 impl PlotStack {
-    /// Shows the row.
+    /// Shows the row of choices and collects the requests.
     pub(super) fn choices(&mut self, ui: &mut Ui, palette: &Palette, requests: &mut Vec<PlotRequest>) {
         let more_pt = if self.out_of_sight == [0; 2] { 0.0 } else { MORE_PT };
         let has_tabs = ui.available_height() >= ROOM_FOR_TABS_PT
@@ -39,7 +39,7 @@ impl PlotStack {
         });
     }
 
-    /// Shows how many traces are out of sight.
+    /// Shows the number of hidden traces.
     fn more(&self, ui: &mut Ui, palette: &Palette) {
         let counts = self.out_of_sight.into_iter().zip(["above", "below"]).filter(|(count, _)| *count > 0);
         let more: Vec<String> = counts.map(|(count, place)| format!("{count} more {place}")).collect();
@@ -49,13 +49,13 @@ impl PlotStack {
         }
     }
 
-    /// Shows the quantities, to choose those shown.
+    /// Shows the quantities, for switching each on or off.
     fn quantities(&mut self, ui: &mut Ui, palette: &Palette) {
         ui.spacing_mut().item_spacing.x = 4.0;
         for quantity in Quantity::ALL {
             let is_shown = self.shown.contains(&quantity);
             let text = RichText::new(quantity.name()).size(SMALL_PT + 0.5);
-            // White on the blue of what is chosen, light and dark.
+            // White on the blue of a selection, in both looks.
             let text = text.color(if is_shown { Color32::WHITE } else { palette.faint });
             if ui.selectable_label(is_shown, text).clicked() {
                 self.toggle(quantity);
@@ -69,7 +69,7 @@ impl PlotStack {
         }
     }
 
-    /// Shows time, units and export, from the right.
+    /// Shows time span, units and export, from the right.
     fn presentation(&mut self, ui: &mut Ui, requests: &mut Vec<PlotRequest>) {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
