@@ -219,6 +219,22 @@ impl Axes {
     pub const fn contains(self, other: Axes) -> bool {
         self.bits & other.bits == other.bits
     }
+
+    /// Gives these axes a value for translations and another for rotations, and all other axes zero.
+    const fn spread(self, translation: f64, rotation: f64) -> ([f64; 3], [f64; 3]) {
+        let (mut translations, mut rotations) = ([0.0; 3], [0.0; 3]);
+        let mut axis = 0;
+        while axis < 3 {
+            if self.bits & (1 << axis) != 0 {
+                translations[axis] = translation;
+            }
+            if self.bits & (1 << (axis + 3)) != 0 {
+                rotations[axis] = rotation;
+            }
+            axis += 1;
+        }
+        (translations, rotations)
+    }
 }
 
 impl std::ops::BitOr for Axes {
@@ -281,6 +297,54 @@ impl Capabilities {
         rate_hz: [100.0, 10_000.0],
         latency_s: 0.0,
     };
+
+    /// Time to the full force and torque from which [`Self::with_limits`] computes the slew, s.
+    const DEFAULT_RISE_S: f64 = 0.5e-3;
+
+    /// Returns the capabilities of a device that senses and drives these axes, with range and limits of zero.
+    #[must_use]
+    pub const fn driving(axes: Axes) -> Self {
+        Self { sensed: axes, actuated: axes, ..Self::UNDRIVEN }
+    }
+
+    /// Sets the sensed axes.
+    #[must_use]
+    pub const fn sensing(self, axes: Axes) -> Self {
+        Self { sensed: axes, ..self }
+    }
+
+    /// Sets the range of every sensed axis: largest displacement, m, and rotation, rad.
+    #[must_use]
+    pub const fn with_range(self, range_m: f64, range_rad: f64) -> Self {
+        let (range_m, range_rad) = self.sensed.spread(range_m, range_rad);
+        Self { range_m, range_rad, ..self }
+    }
+
+    /// Sets the largest force, N, and torque, N·m, of every driven axis, and a slew that reaches them in 0.5 ms.
+    #[must_use]
+    pub const fn with_limits(self, max_force_n: f64, max_torque_nm: f64) -> Self {
+        let (force_n, torque_nm) = self.actuated.spread(max_force_n, max_torque_nm);
+        Self { max_force_n: force_n, max_torque_nm: torque_nm, ..self }
+            .with_slew(max_force_n / Self::DEFAULT_RISE_S, max_torque_nm / Self::DEFAULT_RISE_S)
+    }
+
+    /// Sets the fastest accepted change of force, N/s, and of torque, N·m/s.
+    #[must_use]
+    pub const fn with_slew(self, max_force_slew_n_per_s: f64, max_torque_slew_nm_per_s: f64) -> Self {
+        Self { max_force_slew_n_per_s, max_torque_slew_nm_per_s, ..self }
+    }
+
+    /// Sets the largest stiffness rendered stably, N/m.
+    #[must_use]
+    pub const fn with_stiffness(self, max_stiffness_n_per_m: f64) -> Self {
+        Self { max_stiffness_n_per_m, ..self }
+    }
+
+    /// Sets the latency beyond one period, s.
+    #[must_use]
+    pub const fn with_latency(self, latency_s: f64) -> Self {
+        Self { latency_s, ..self }
+    }
 }
 
 /// Embodiment of a device: a physical handle, or a simulation only; a closed set.
@@ -368,6 +432,10 @@ pub trait SafeStop: Send + Sync + 'static {
     /// Sets the actuators to zero (or to a controlled landing) until the next activation.
     /// Bounded, no allocation, no lock; may be called twice and while another thread is inside `read` or `write`.
     fn safe_stop(&self);
+
+    /// Allows force again. [`Simple`](crate::Simple) calls it before each activation; a [`Device`] does so in
+    /// [`Device::activate`]. Not real-time.
+    fn arm(&self) {}
 }
 
 /// Stop of a device without actuators: there is no force to remove.

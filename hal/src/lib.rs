@@ -23,7 +23,7 @@
 //! # Where to look
 //!
 //! - Models: [`ForceModel`], [`export_model!`]; parameters: [`Parameter`], [`Settings`].
-//! - Devices: [`Device`], [`ActiveDevice`], [`SafeStop`], [`export_device!`].
+//! - Devices: [`SimpleDevice`], or [`Device`] and [`ActiveDevice`] where phases differ; [`SafeStop`], [`export_device!`].
 //! - Optional interfaces of a plugin: [`extension`].
 //! - Rules for every plugin: [`conformance`]; functions with the same bits on every machine: [`math`]; text for a
 //!   terminal: [`terminal`].
@@ -39,6 +39,7 @@ mod model;
 mod parameter;
 mod refusal;
 mod sampled_loop;
+mod simple_device;
 mod table;
 pub mod terminal;
 mod text_file;
@@ -76,5 +77,6 @@ pub use model::{Demand, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output
 pub use parameter::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Settings};
 pub use refusal::{Refusal, RefusalKind};
 pub use sampled_loop::{Damper, SampledLoop};
+pub use simple_device::{ActiveSimple, Opened, Simple, SimpleDevice, SimpleStop, StopFlag};
 pub use table::{HashLines, Row, Table};
 pub use text_file::{TextProblem, open_file, read_file, read_text, text_from_bytes};

@@ -249,6 +249,12 @@ impl<'a> Settings<'a> {
         Self { schema, values }
     }
 
+    /// Returns settings without an explicit value, as tests of a plugin use them.
+    #[must_use]
+    pub const fn defaults(schema: &'static [Parameter]) -> Settings<'static> {
+        Settings { schema, values: &[] }
+    }
+
     fn explicit(&self, id: &str) -> Option<&'a ParameterValue> {
         let index = self.schema.iter().position(|parameter| parameter.id() == id)?;
         self.values.iter().rev().find(|value| value.index as usize == index)

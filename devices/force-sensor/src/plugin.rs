@@ -2,8 +2,8 @@
 
 use crate::line::{Heard, LineLost, SensorLine};
 use flotor_hal::{
-    ActiveDevice, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, Fault, LoopConfig,
-    NothingToStop, Parameter, Refusal, Settings, Tick, Wrench, export_device,
+    Capabilities, Cycle, DVec3, DeviceInfo, DeviceState, Fault, NothingToStop, Opened, Parameter, Refusal,
+    Settings, Simple, SimpleDevice, Tick, Wrench, export_device,
 };
 use flotor_serial::{PORT_EXAMPLE, PORT_HELP};
 use std::time::Duration;
@@ -23,15 +23,10 @@ const SCHEMA: &[Parameter] = &[
 /// Poll interval for the first reading.
 const LOOK_AGAIN: Duration = Duration::from_millis(1);
 
-/// Opened force sensor that has replied once.
+/// Force sensor, polled in each tick.
 pub struct ForceSensor {
     line: SensorLine,
     timeout: Duration,
-}
-
-/// Active force sensor, polled in each tick.
-pub struct AskedSensor {
-    opened: ForceSensor,
     /// Newest reading.
     state: DeviceState,
 }
@@ -64,60 +59,35 @@ impl ForceSensor {
     }
 }
 
-impl Device for ForceSensor {
+impl SimpleDevice for ForceSensor {
     const INFO: DeviceInfo = DeviceInfo::new(
         "force-sensor",
         "Force sensor",
         "A force sensor on a serial port: measures a vertical force, exerts none",
     );
     const PARAMETERS: &'static [Parameter] = SCHEMA;
-    type Active = AskedSensor;
     type Stop = NothingToStop;
 
-    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+    fn open(settings: &Settings<'_>) -> Result<Opened<Self>, Refusal> {
         let port = settings.text("port").ok_or_else(|| {
             Refusal::resource(format!("no `port` for the force sensor; set it, as in {PORT_EXAMPLE}"))
         })?;
         let timeout = Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3);
-        let mut sensor = Self { line: SensorLine::open(port).map_err(Refusal::resource)?, timeout };
-        sensor.prove(port).map_err(Refusal::resource)?;
-        Ok(sensor)
-    }
-
-    fn capabilities(&self) -> Capabilities {
+        let line = SensorLine::open(port).map_err(Refusal::resource)?;
+        let mut device = Self { line, timeout, state: DeviceState::HOME };
+        device.prove(port).map_err(Refusal::resource)?;
         // A request and its reply over USB, a frame each.
-        Capabilities { latency_s: 2.0e-3, ..Capabilities::UNDRIVEN }
+        let capabilities = Capabilities::UNDRIVEN.with_latency(2.0e-3);
+        Ok(Opened { device, capabilities, stop: NothingToStop })
     }
-
-    fn stopper(&self) -> NothingToStop {
-        NothingToStop
-    }
-
-    fn activate(self, _config: &LoopConfig) -> Result<AskedSensor, (Self, Refusal)> {
-        Ok(AskedSensor { opened: self, state: DeviceState::HOME })
-    }
-
-    fn parameter(&self, index: usize) -> f64 {
-        match index {
-            0 => 0.0,
-            1 => self.timeout.as_secs_f64() * 1.0e3,
-            _ => f64::NAN,
-        }
-    }
-}
-
-impl ActiveDevice for AskedSensor {
-    type Opened = ForceSensor;
 
     /// Reads the force on the sensor, N; fresh with each reading.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        let heard = self.opened.line.hear().and_then(|heard| self.opened.line.ask().map(|()| heard));
+        let heard = self.line.hear().and_then(|heard| self.line.ask().map(|()| heard));
         let cycle = match heard {
             Err(LineLost) => Cycle::Fault(Fault::Disconnected),
             Ok(Heard::Nonsense) => Cycle::Fault(Fault::Protocol),
-            Ok(Heard::Nothing) if self.opened.line.silence() > self.opened.timeout => {
-                Cycle::Fault(Fault::Timeout)
-            }
+            Ok(Heard::Nothing) if self.line.silence() > self.timeout => Cycle::Fault(Fault::Timeout),
             Ok(Heard::Nothing) => Cycle::Stale,
             Ok(Heard::Force(force_n)) => {
                 self.state.delivered = Wrench::from_force(DVec3::Z * force_n);
@@ -132,10 +102,6 @@ impl ActiveDevice for AskedSensor {
     fn write(&mut self, _tick: &Tick, _wrench: &Wrench) -> Cycle {
         Cycle::Fresh
     }
-
-    fn deactivate(self) -> ForceSensor {
-        self.opened
-    }
 }
 
-export_device!(ForceSensor);
+export_device!(Simple<ForceSensor>);

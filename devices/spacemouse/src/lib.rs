@@ -18,4 +18,4 @@ mod plugin;
 pub mod report;
 pub mod source;
 
-pub use plugin::{FLOTOR_ENTRY, OpenPuck, SpaceMouse};
+pub use plugin::{FLOTOR_ENTRY, SpaceMouse};

@@ -5,8 +5,8 @@ use crate::platform::PATH_HELP;
 use crate::report::Report;
 use crate::source::{Gone, HidPuck, REPORT_BYTES, Reports};
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Cycle, Device, DeviceInfo, DeviceState, Fault, LoopConfig,
-    NothingToStop, OutOfRange, Parameter, Refusal, Settings, Tick, Wrench, export_device,
+    Axes, Capabilities, Cycle, DeviceInfo, DeviceState, Fault, LoopConfig, NothingToStop, Opened, OutOfRange,
+    Parameter, Refusal, Settings, Simple, SimpleDevice, Tick, Wrench, export_device,
 };
 
 /// Limit on reports read in a tick: a puck sends one or two every 8 ms or slower. Further reports wait for the next tick.
@@ -69,76 +69,53 @@ impl Values {
     }
 }
 
-/// Opened puck. The source of reports is a type parameter so that tests can supply their own.
+/// Puck whose reports move the pose. The source of reports is a type parameter so that tests can supply their own.
 pub struct SpaceMouse<S = HidPuck> {
     source: S,
     values: Values,
-}
-
-/// Active puck whose reports move the pose.
-pub struct OpenPuck<S = HidPuck> {
-    opened: SpaceMouse<S>,
     deflection: Deflection,
     motion: Motion,
     buttons: u32,
 }
 
 impl<S: Reports> SpaceMouse<S> {
-    /// Starts the motion of the pose from home.
-    fn follow(self) -> OpenPuck<S> {
-        OpenPuck { opened: self, deflection: Deflection::default(), motion: Motion::default(), buttons: 0 }
+    /// Creates a puck with its pose at home.
+    fn new(source: S, values: Values) -> Self {
+        Self { source, values, deflection: Deflection::default(), motion: Motion::default(), buttons: 0 }
     }
 }
 
-impl Device for SpaceMouse {
+impl<S: Reports> SimpleDevice for SpaceMouse<S> {
     const INFO: DeviceInfo =
         DeviceInfo::new("spacemouse", "3Dconnexion SpaceMouse", "A six-axis puck: pose in, no force out");
     const PARAMETERS: &'static [Parameter] = SCHEMA;
-    type Active = OpenPuck;
     type Stop = NothingToStop;
 
-    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        Ok(Self { source: HidPuck::open(settings.text("path"))?, values: Values::new(settings) })
+    fn open(settings: &Settings<'_>) -> Result<Opened<Self>, Refusal> {
+        let device = Self::new(S::open(settings.text("path"))?, Values::new(settings));
+        let Gains { range_m, range_rad, .. } = device.values.gains();
+        // A report every 8 ms and slower.
+        let capabilities =
+            Capabilities::UNDRIVEN.sensing(Axes::ALL).with_range(range_m, range_rad).with_latency(8.0e-3);
+        Ok(Opened { device, capabilities, stop: NothingToStop })
     }
 
-    fn capabilities(&self) -> Capabilities {
-        let Gains { range_m, range_rad, .. } = self.values.gains();
-        Capabilities {
-            sensed: Axes::ALL,
-            range_m: [range_m; 3],
-            range_rad: [range_rad; 3],
-            // A report every 8 ms or slower.
-            latency_s: 8.0e-3,
-            ..Capabilities::UNDRIVEN
-        }
+    /// Starts the motion of the pose from home.
+    fn activate(&mut self, _config: &LoopConfig) -> Result<(), Refusal> {
+        (self.deflection, self.motion, self.buttons) = Default::default();
+        Ok(())
     }
-
-    fn stopper(&self) -> NothingToStop {
-        NothingToStop
-    }
-
-    fn activate(self, _config: &LoopConfig) -> Result<OpenPuck, (Self, Refusal)> {
-        Ok(self.follow())
-    }
-
-    fn parameter(&self, index: usize) -> f64 {
-        self.values.0.get(index).copied().unwrap_or(f64::NAN)
-    }
-}
-
-impl<S: Reports> ActiveDevice for OpenPuck<S> {
-    type Opened = SpaceMouse<S>;
 
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         if self.take_reports() == Err(Gone) {
             return Cycle::Fault(Fault::Disconnected);
         }
-        let request = match self.buttons & self.opened.values.home_bit() {
+        let request = match self.buttons & self.values.home_bit() {
             0 => MotionRequest::Follow(self.deflection),
             _ => MotionRequest::Home,
         };
         let dt_s = (tick.dt_ns as f64 * 1.0e-9).min(LONGEST_TIME_S);
-        let twist = self.motion.advance(&request, &self.opened.values.gains(), dt_s);
+        let twist = self.motion.advance(&request, &self.values.gains(), dt_s);
         *state = DeviceState {
             pose: self.motion.pose(),
             twist,
@@ -154,23 +131,19 @@ impl<S: Reports> ActiveDevice for OpenPuck<S> {
     }
 
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
-        match self.opened.values.0.get_mut(index) {
+        match self.values.0.get_mut(index) {
             Some(place) if [SPEED, SPIN, DEAD_ZONE, HOME_BUTTON].contains(&index) => *place = value,
             _ => return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
         }
         Ok(())
     }
-
-    fn deactivate(self) -> SpaceMouse<S> {
-        self.opened
-    }
 }
 
-impl<S: Reports> OpenPuck<S> {
+impl<S: Reports> SpaceMouse<S> {
     fn take_reports(&mut self) -> Result<(), Gone> {
         let mut bytes = [0; REPORT_BYTES];
         for _ in 0..REPORTS_PER_TICK {
-            let length = self.opened.source.next(&mut bytes)?;
+            let length = self.source.next(&mut bytes)?;
             if length == 0 {
                 break;
             }
@@ -184,7 +157,7 @@ impl<S: Reports> OpenPuck<S> {
     }
 }
 
-export_device!(SpaceMouse);
+export_device!(Simple<SpaceMouse>);
 
 #[cfg(test)]
 mod tests {
@@ -196,6 +169,10 @@ mod tests {
     struct Scripted(VecDeque<Option<Vec<u8>>>);
 
     impl Reports for Scripted {
+        fn open(_path: Option<&str>) -> Result<Self, Refusal> {
+            Ok(Self(VecDeque::new()))
+        }
+
         fn next(&mut self, report: &mut [u8; REPORT_BYTES]) -> Result<usize, Gone> {
             match self.0.pop_front() {
                 None => Err(Gone),
@@ -212,17 +189,17 @@ mod tests {
         Some([number].into_iter().chain(axes.iter().flat_map(|axis| axis.to_le_bytes())).collect())
     }
 
-    fn read(puck: &mut OpenPuck<Scripted>, index: u64) -> (Cycle, DeviceState) {
+    fn read(puck: &mut SpaceMouse<Scripted>, index: u64) -> (Cycle, DeviceState) {
         let mut state = DeviceState::HOME;
         let dt_ns = if index == 0 { 0 } else { 1_000_000 };
         let tick = Tick { index, time_ns: index * 1_000_000, dt_ns };
         (puck.read(&tick, &mut state), state)
     }
 
-    fn puck(reports: impl IntoIterator<Item = Option<Vec<u8>>>) -> OpenPuck<Scripted> {
+    fn puck(reports: impl IntoIterator<Item = Option<Vec<u8>>>) -> SpaceMouse<Scripted> {
         let mut values = [0.0; SCHEMA.len()];
         values.iter_mut().zip(SCHEMA).for_each(|(value, parameter)| *value = parameter.default());
-        SpaceMouse { source: Scripted(reports.into_iter().collect()), values: Values(values) }.follow()
+        SpaceMouse::new(Scripted(reports.into_iter().collect()), Values(values))
     }
 
     #[test]
@@ -247,7 +224,7 @@ mod tests {
         let flood = (0..20).map(|index| motion(2, [index, 0, 0]));
         let mut puck = puck(flood);
         let (cycle, _) = read(&mut puck, 0);
-        assert_eq!((cycle, puck.opened.source.0.len()), (Cycle::Fresh, 20 - REPORTS_PER_TICK));
+        assert_eq!((cycle, puck.source.0.len()), (Cycle::Fresh, 20 - REPORTS_PER_TICK));
         let faults: Vec<Cycle> = (1..4).map(|index| read(&mut puck, index).0).collect();
         assert_eq!(faults[2], Cycle::Fault(Fault::Disconnected));
         assert_eq!(faults[0], Cycle::Fresh);

@@ -20,7 +20,13 @@ pub const REPORT_BYTES: usize = 64;
 pub struct Gone;
 
 /// Source of reports.
-pub trait Reports: Send + 'static {
+pub trait Reports: Sized + Send + 'static {
+    /// Opens the puck at a device path, or the first puck found. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] with the cause and the remedy.
+    fn open(path: Option<&str>) -> Result<Self, Refusal>;
+
     /// Reads the next pending report and returns its length; 0 without one. Real-time: bounded, no allocation; one call of the
     /// system.
     ///
@@ -32,12 +38,16 @@ pub trait Reports: Send + 'static {
 /// Puck opened as a HID device of the system.
 pub struct HidPuck(HidDevice);
 
-impl HidPuck {
-    /// Opens the puck at a device path, or the first puck found. Not real-time.
-    ///
-    /// # Errors
-    /// A [`Refusal`] with the cause and the remedy.
-    pub fn open(path: Option<&str>) -> Result<Self, Refusal> {
+fn refused(path: &str, error: &HidError) -> Refusal {
+    Refusal::resource(if is_refused(error) {
+        format!("this user may not use {path}; {ACCESS_REMEDY}")
+    } else {
+        format!("cannot open {path}: {error}")
+    })
+}
+
+impl Reports for HidPuck {
+    fn open(path: Option<&str>) -> Result<Self, Refusal> {
         let api = HidApi::new().map_err(Refusal::resource)?;
         let puck = |info: &&hidapi::DeviceInfo| {
             let (vendor, product) = (info.vendor_id(), info.product_id());
@@ -58,17 +68,7 @@ impl HidPuck {
         device.set_blocking_mode(false).map_err(Refusal::resource)?;
         Ok(Self(device))
     }
-}
 
-fn refused(path: &str, error: &HidError) -> Refusal {
-    Refusal::resource(if is_refused(error) {
-        format!("this user may not use {path}; {ACCESS_REMEDY}")
-    } else {
-        format!("cannot open {path}: {error}")
-    })
-}
-
-impl Reports for HidPuck {
     fn next(&mut self, report: &mut [u8; REPORT_BYTES]) -> Result<usize, Gone> {
         // Any read error means a disconnected puck: hidapi returns no error code.
         self.0.read_timeout(report, 0).map_err(|_| Gone)

@@ -187,4 +187,8 @@ fn what_the_book_shows_of_an_example_is_its_file() {
     }
     let lines = text("examples/model/src/lib.rs").lines().count();
     assert!(lines <= 25, "a model in {lines} lines");
+    let device = text("examples/device/src/lib.rs");
+    let code = device.lines().take_while(|line| *line != "#[cfg(test)]").map(str::trim);
+    let lines = code.filter(|line| !line.is_empty() && !line.starts_with("//")).count();
+    assert!(lines <= 40, "a device in {lines} lines of code");
 }

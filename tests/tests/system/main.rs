@@ -29,6 +29,7 @@ mod force_sensor;
 mod gallery;
 mod golden;
 mod hand_recording;
+mod hanging_device;
 mod haply;
 mod inputs;
 mod installation;

@@ -103,6 +103,16 @@ fn the_model_a_newcomer_starts_from_is_forty_lines_at_most() {
 }
 
 #[test]
+fn the_device_a_newcomer_starts_from_is_that_of_the_book() {
+    let scratch = Scratch::default();
+    let ran = new(scratch.path(), &["device", "crank"]);
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let source = std::fs::read_to_string(scratch.path().join("crank/src/lib.rs")).expect("it was made");
+    let example = workspace_root().join("examples/device/src/lib.rs");
+    assert_eq!(source, std::fs::read_to_string(example).expect("it is there"));
+}
+
+#[test]
 fn a_new_device_builds_validates_and_moves() {
     for language in ["rust", "c"] {
         let (scratch, name) = (Scratch::default(), format!("crank-in-{language}"));

@@ -106,9 +106,18 @@ pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Seen> {
     if push != Wrench::ZERO {
         running.feel(&push)?;
     }
-    let stopping = std::thread::Builder::new().spawn(move || stopper.safe_stop());
+    // Reads and writes go on meanwhile: the stop comes in the middle of them.
+    let stopping = std::thread::Builder::new().spawn(move || {
+        std::thread::sleep(5 * TICK);
+        stopper.safe_stop();
+    });
     let stopping = stopping.map_err(|cause| Seen::no_thread(&cause))?;
+    let mut went_on = Ok(());
+    while went_on.is_ok() && !stopping.is_finished() {
+        went_on = running.push_on(&push);
+    }
     stopping.join().map_err(|_| "safe_stop panicked".to_owned())?;
+    went_on?;
     Ok(running.feel_nothing(&push)?)
 }
 
@@ -277,6 +286,16 @@ impl Running {
             let _ = self.turn(push)?;
             std::thread::sleep(TICK);
         }
+        Ok(())
+    }
+
+    /// Runs one tick of a device that is about to be stopped, and waits for the next.
+    fn push_on(&mut self, push: &Wrench) -> Result<(), String> {
+        match self.turn(push) {
+            Err(Trouble { fault: Some(Fault::EmergencyStop), .. }) | Ok(_) => {}
+            Err(trouble) => return Err(format!("during safe_stop, {}", trouble.words)),
+        }
+        std::thread::sleep(TICK);
         Ok(())
     }
 

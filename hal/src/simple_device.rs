@@ -1,0 +1,197 @@
+//! The short form of a device: three functions, and a part that takes the force away.
+//!
+//! [`Device`] has a type for each phase of its life. Where both phases hold the same data, [`SimpleDevice`] says less, and
+//! [`Simple`] makes a [`Device`] of it: `export_device!(Simple<Crank>);`. The contract beneath is the same.
+
+use crate::{
+    ActiveDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, LoopConfig, OutOfRange, Parameter,
+    Refusal, SafeStop, Settings, Tick, Wrench,
+};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A device with the same data before and after activation.
+pub trait SimpleDevice: Sized + Send + 'static {
+    /// Constant description of the device.
+    const INFO: DeviceInfo;
+    /// Schema of the parameters.
+    const PARAMETERS: &'static [Parameter] = &[];
+    /// Part that takes the force away from another thread: a second descriptor, or a [`StopFlag`]. It borrows nothing from
+    /// the device, and so works while [`Self::read`] hangs.
+    type Stop: SafeStop;
+
+    /// Opens the device. The settings are already checked against the schema. May block. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] with the remedy if the device is missing, busy, forbidden or badly configured.
+    fn open(settings: &Settings<'_>) -> Result<Opened<Self>, Refusal>;
+
+    /// Energises the device at zero wrench. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`]; the device stays open, and may be activated again.
+    fn activate(&mut self, config: &LoopConfig) -> Result<(), Refusal> {
+        let _ = config;
+        Ok(())
+    }
+
+    /// Reads the newest sample into `state`. Real-time: bounded, no allocation.
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle;
+
+    /// Commands the wrench on the hand until the next write; zero from a stop on. Real-time: bounded, no allocation.
+    fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle;
+
+    /// Changes a live parameter at a tick boundary; range already checked. Real-time: bounded, no allocation.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if the value does not fit the others; the old value stays.
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        let _ = index;
+        Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
+    }
+}
+
+/// Parts of an opened [`SimpleDevice`].
+#[derive(Debug)]
+pub struct Opened<D: SimpleDevice> {
+    /// The device, not energised.
+    pub device: D,
+    /// Capabilities, constant from now on.
+    pub capabilities: Capabilities,
+    /// Part that takes the force away.
+    pub stop: D::Stop,
+}
+
+/// Flag set by a stop and cleared by the next activation, for devices whose force is a number in memory.
+#[derive(Clone, Debug, Default)]
+pub struct StopFlag(Arc<AtomicBool>);
+
+impl StopFlag {
+    /// Returns true from a stop to the next activation. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn is_set(&self) -> bool {
+        self.0.load(Ordering::Acquire)
+    }
+}
+
+impl SafeStop for StopFlag {
+    fn safe_stop(&self) {
+        self.0.store(true, Ordering::Release);
+    }
+
+    fn arm(&self) {
+        self.0.store(false, Ordering::Release);
+    }
+}
+
+/// Stop of a [`Simple`] device: stops its part, and holds later writes at zero.
+pub struct SimpleStop<S>(Arc<(StopFlag, S)>);
+
+impl<S> Clone for SimpleStop<S> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<S: SafeStop> SafeStop for SimpleStop<S> {
+    fn safe_stop(&self) {
+        let (flag, part) = &*self.0;
+        flag.safe_stop();
+        part.safe_stop();
+    }
+
+    fn arm(&self) {
+        let (flag, part) = &*self.0;
+        flag.arm();
+        part.arm();
+    }
+}
+
+/// A [`SimpleDevice`] as a [`Device`], not energised.
+pub struct Simple<D: SimpleDevice> {
+    device: D,
+    capabilities: Capabilities,
+    stop: SimpleStop<D::Stop>,
+    /// Values of the parameters, by index.
+    values: Vec<f64>,
+}
+
+/// A [`SimpleDevice`] as an [`ActiveDevice`].
+pub struct ActiveSimple<D: SimpleDevice> {
+    simple: Simple<D>,
+    /// Stops the device when this value is dropped.
+    _stop: StopOnDrop<D::Stop>,
+}
+
+struct StopOnDrop<S: SafeStop>(SimpleStop<S>);
+
+impl<S: SafeStop> Drop for StopOnDrop<S> {
+    fn drop(&mut self) {
+        self.0.safe_stop();
+    }
+}
+
+impl<D: SimpleDevice> Device for Simple<D> {
+    const INFO: DeviceInfo = D::INFO;
+    const PARAMETERS: &'static [Parameter] = D::PARAMETERS;
+    type Active = ActiveSimple<D>;
+    type Stop = SimpleStop<D::Stop>;
+
+    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+        let Opened { device, capabilities, stop } = D::open(settings)?;
+        let values =
+            D::PARAMETERS.iter().map(|parameter| settings.number_or_default(parameter.id())).collect();
+        Ok(Self { device, capabilities, stop: SimpleStop(Arc::new((StopFlag::default(), stop))), values })
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        self.capabilities
+    }
+
+    fn stopper(&self) -> Self::Stop {
+        self.stop.clone()
+    }
+
+    fn activate(mut self, config: &LoopConfig) -> Result<ActiveSimple<D>, (Self, Refusal)> {
+        self.stop.arm();
+        match self.device.activate(config) {
+            Ok(()) => Ok(ActiveSimple { _stop: StopOnDrop(self.stop.clone()), simple: self }),
+            Err(refusal) => {
+                self.stop.safe_stop();
+                Err((self, refusal))
+            }
+        }
+    }
+
+    fn parameter(&self, index: usize) -> f64 {
+        self.values.get(index).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl<D: SimpleDevice> ActiveDevice for ActiveSimple<D> {
+    type Opened = Simple<D>;
+
+    #[inline]
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        self.simple.device.read(tick, state)
+    }
+
+    #[inline]
+    fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
+        let is_stopped = self.simple.stop.0.0.is_set();
+        self.simple.device.write(tick, if is_stopped { &Wrench::ZERO } else { wrench })
+    }
+
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+        self.simple.device.set_parameter(index, value)?;
+        if let Some(place) = self.simple.values.get_mut(index) {
+            *place = value;
+        }
+        Ok(())
+    }
+
+    fn deactivate(self) -> Simple<D> {
+        self.simple
+    }
+}
