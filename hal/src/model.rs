@@ -124,7 +124,7 @@ impl StepStatus {
 
     /// Returns the name that `flotor eval` prints.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Ok => "ok",
             Self::Clamped => "clamped",

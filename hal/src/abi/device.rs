@@ -1,7 +1,7 @@
 //! `flotor.device/1`: function table of a device, and its implementation for a [`Device`], whose phases are types.
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind};
-use super::instance::{self, Plugged, call, fill, from_any_thread, refusable};
+use super::instance::{self, PluginAdapter, call, fill, from_any_thread, refusable};
 use super::interface::{Extensions, find, table};
 use super::layout::layout;
 use super::{Message, Str};
@@ -112,7 +112,7 @@ layout! {
     }
 }
 /// Adapter of a [`Device`] for the function tables.
-pub(crate) struct DevicePlug<D>(PhantomData<D>);
+pub(crate) struct DeviceAdapter<D>(PhantomData<D>);
 
 /// Phase of a device instance.
 pub(crate) enum Phase<D: Device> {
@@ -165,7 +165,7 @@ pub(crate) fn not_opened() -> Refusal {
     Refusal::broken("the device is not in the opened phase")
 }
 
-impl<D: Device> Plugged for DevicePlug<D> {
+impl<D: Device> PluginAdapter for DeviceAdapter<D> {
     type State = Phase<D>;
     type Shared = D::Stop;
     const PARAMETERS: &'static [Parameter] = D::PARAMETERS;
@@ -180,7 +180,7 @@ impl<D: Device> Plugged for DevicePlug<D> {
 unsafe extern "C" fn capabilities<D: Device>(instance: Instance, out: *mut Capabilities) -> u32 {
     // SAFETY: the contract of every table call: a live instance, used by one thread, and pointers to initialised
     // values that are the callee's for the call.
-    unsafe { fill::<DevicePlug<D>, _>(instance, out, |phase| Ok(phase.opened()?.capabilities())) }
+    unsafe { fill::<DeviceAdapter<D>, _>(instance, out, |phase| Ok(phase.opened()?.capabilities())) }
 }
 
 unsafe extern "C" fn activate<D: Device>(
@@ -189,12 +189,12 @@ unsafe extern "C" fn activate<D: Device>(
     message: *mut Message,
 ) -> u32 {
     // SAFETY: as in `capabilities`.
-    unsafe { refusable::<DevicePlug<D>>(instance, message, |phase| phase.activate(&*config)) }
+    unsafe { refusable::<DeviceAdapter<D>>(instance, message, |phase| phase.activate(&*config)) }
 }
 
 unsafe extern "C" fn deactivate<D: Device>(instance: Instance) -> u32 {
     // SAFETY: as in `capabilities`.
-    unsafe { call::<DevicePlug<D>>(instance, Phase::deactivate) }
+    unsafe { call::<DeviceAdapter<D>>(instance, Phase::deactivate) }
 }
 
 /// Runs one cycle of an active device.
@@ -206,7 +206,7 @@ unsafe fn cycle<D: Device>(instance: Instance, body: impl FnOnce(&mut D::Active)
     let mut cycle = Cycle::Fault(Fault::Broken);
     // SAFETY: by the contract of this function.
     let _ = unsafe {
-        call::<DevicePlug<D>>(instance, |phase| {
+        call::<DeviceAdapter<D>>(instance, |phase| {
             cycle = body(phase.active()?);
             Ok(())
         })
@@ -234,7 +234,7 @@ unsafe extern "C" fn write<D: Device>(
 
 unsafe extern "C" fn safe_stop<D: Device>(instance: Instance) {
     // SAFETY: the contract of `safe_stop`: a live instance, on any thread.
-    unsafe { from_any_thread::<DevicePlug<D>>(instance, SafeStop::safe_stop) };
+    unsafe { from_any_thread::<DeviceAdapter<D>>(instance, SafeStop::safe_stop) };
 }
 
 unsafe extern "C" fn set_parameter<D: Device>(instance: Instance, index: u32, value: f64) -> u32 {
@@ -242,22 +242,22 @@ unsafe extern "C" fn set_parameter<D: Device>(instance: Instance, index: u32, va
         phase.active()?.set_parameter(index as usize, value).map_err(|_| CallStatus::OutOfRange)
     };
     // SAFETY: as in `capabilities`.
-    unsafe { instance::set_parameter::<DevicePlug<D>>(instance, index, value, set) }
+    unsafe { instance::set_parameter::<DeviceAdapter<D>>(instance, index, value, set) }
 }
 
 unsafe extern "C" fn parameter<D: Device>(instance: Instance, index: u32) -> f64 {
     let ask =
         |phase: &mut Phase<D>| phase.opened().map_or(f64::NAN, |device| device.parameter(index as usize));
     // SAFETY: as in `capabilities`.
-    unsafe { instance::parameter::<DevicePlug<D>>(instance, ask) }
+    unsafe { instance::parameter::<DeviceAdapter<D>>(instance, ask) }
 }
 
 table!(DeviceTable: "flotor.device/1", D: [Device] {
     parameter_count: D::PARAMETERS.len() as u32,
     parameters: D::PARAMETERS.as_ptr(),
     info: D::INFO,
-    open: Some(instance::create::<DevicePlug<D>>),
-    close: Some(instance::destroy::<DevicePlug<D>>),
+    open: Some(instance::create::<DeviceAdapter<D>>),
+    close: Some(instance::destroy::<DeviceAdapter<D>>),
     capabilities: Some(capabilities::<D>),
     activate: Some(activate::<D>),
     deactivate: Some(deactivate::<D>),
@@ -266,7 +266,7 @@ table!(DeviceTable: "flotor.device/1", D: [Device] {
     safe_stop: Some(safe_stop::<D>),
     set_parameter: Some(set_parameter::<D>),
     parameter: Some(parameter::<D>),
-    last_message: Some(instance::last_message::<DevicePlug<D>>),
+    last_message: Some(instance::last_message::<DeviceAdapter<D>>),
 });
 
 unsafe extern "C" fn get_interface<D: Device, E: Extensions<D>>(id: Str) -> *const c_void {

@@ -39,7 +39,7 @@ impl PluginKind {
 
     /// Returns the name of the kind in metadata and lists.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Model => "model",
             Self::Device => "device",

@@ -7,7 +7,7 @@ use crate::{Mutability, Parameter, ParameterValue, Refusal, RefusalKind, Setting
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Adapter of a plugin type for the function tables.
-pub(crate) trait Plugged: 'static {
+pub(crate) trait PluginAdapter: 'static {
     /// State for the thread that uses an instance.
     type State;
     /// State that any other thread may use concurrently.
@@ -20,7 +20,7 @@ pub(crate) trait Plugged: 'static {
 
 /// Target of an [`Instance`] pointer. The two halves are borrowed separately and never as a whole while the instance
 /// lives: `shared` from any thread, `work` by the thread that uses the instance.
-struct Slot<P: Plugged> {
+struct Slot<P: PluginAdapter> {
     shared: P::Shared,
     work: Work<P::State>,
 }
@@ -61,7 +61,7 @@ fn guarded(body: impl FnOnce()) {
 /// The contract of every table call: `instance` came from [`create`] of this type, is alive, and no other thread uses
 /// its working half during `'a`.
 #[inline]
-unsafe fn work<'a, P: Plugged>(instance: Instance) -> &'a mut Work<P::State> {
+unsafe fn work<'a, P: PluginAdapter>(instance: Instance) -> &'a mut Work<P::State> {
     // SAFETY: by the contract of this function; only `work` is borrowed, `shared` stays shareable.
     unsafe { &mut (*instance.cast::<Slot<P>>()).work }
 }
@@ -70,7 +70,7 @@ unsafe fn work<'a, P: Plugged>(instance: Instance) -> &'a mut Work<P::State> {
 ///
 /// # Safety
 /// `instance` came from [`create`] of this type and is alive during `'a`.
-unsafe fn shared<'a, P: Plugged>(instance: Instance) -> &'a P::Shared {
+unsafe fn shared<'a, P: PluginAdapter>(instance: Instance) -> &'a P::Shared {
     // SAFETY: by the contract of this function. A concurrent call borrows `work` only, and `Shared` is `Sync`.
     unsafe { &(*instance.cast::<Slot<P>>()).shared }
 }
@@ -79,7 +79,7 @@ unsafe fn shared<'a, P: Plugged>(instance: Instance) -> &'a P::Shared {
 ///
 /// # Safety
 /// As for [`shared`].
-pub(super) unsafe fn from_any_thread<P: Plugged>(instance: Instance, body: impl FnOnce(&P::Shared)) {
+pub(super) unsafe fn from_any_thread<P: PluginAdapter>(instance: Instance, body: impl FnOnce(&P::Shared)) {
     // SAFETY: by the contract of this function.
     let shared = unsafe { shared::<P>(instance) };
     guarded(|| body(shared));
@@ -90,7 +90,7 @@ pub(super) unsafe fn from_any_thread<P: Plugged>(instance: Instance, body: impl 
 /// # Safety
 /// As for [`work`].
 #[inline]
-pub(crate) unsafe fn call<P: Plugged>(
+pub(crate) unsafe fn call<P: PluginAdapter>(
     instance: Instance,
     body: impl FnOnce(&mut P::State) -> Result<(), CallStatus>,
 ) -> u32 {
@@ -108,7 +108,7 @@ pub(crate) unsafe fn call<P: Plugged>(
 /// # Safety
 /// As for [`work`]; `out` is valid for a write.
 #[inline]
-pub(crate) unsafe fn fill<P: Plugged, T>(
+pub(crate) unsafe fn fill<P: PluginAdapter, T>(
     instance: Instance,
     out: *mut T,
     body: impl FnOnce(&mut P::State) -> Result<T, CallStatus>,
@@ -126,7 +126,7 @@ pub(crate) unsafe fn fill<P: Plugged, T>(
 ///
 /// # Safety
 /// As for [`work`]; `message` is valid for a write.
-pub(crate) unsafe fn refusable<P: Plugged>(
+pub(crate) unsafe fn refusable<P: PluginAdapter>(
     instance: Instance,
     message: *mut Message,
     body: impl FnOnce(&mut P::State) -> Result<(), Refusal>,
@@ -156,7 +156,7 @@ unsafe fn refuse(refusal: &Refusal, message: *mut Message) -> u32 {
 }
 
 /// Creates an instance: `create` of models, `open` of devices.
-pub(super) unsafe extern "C" fn create<P: Plugged>(
+pub(super) unsafe extern "C" fn create<P: PluginAdapter>(
     values: *const ParameterValue,
     count: u32,
     message: *mut Message,
@@ -188,7 +188,7 @@ pub(super) unsafe extern "C" fn create<P: Plugged>(
 }
 
 /// Destroys an instance: `destroy` of models, `close` of devices.
-pub(super) unsafe extern "C" fn destroy<P: Plugged>(instance: Instance) {
+pub(super) unsafe extern "C" fn destroy<P: PluginAdapter>(instance: Instance) {
     // SAFETY: the contract of `destroy`: `instance` came from `create` of this type and is not used again.
     let slot = unsafe { Box::from_raw(instance.cast::<Slot<P>>()) };
     guarded(|| drop(slot));
@@ -198,7 +198,7 @@ pub(super) unsafe extern "C" fn destroy<P: Plugged>(instance: Instance) {
 ///
 /// # Safety
 /// As for [`work`].
-pub(super) unsafe fn set_parameter<P: Plugged>(
+pub(super) unsafe fn set_parameter<P: PluginAdapter>(
     instance: Instance,
     index: u32,
     value: f64,
@@ -217,7 +217,7 @@ pub(super) unsafe fn set_parameter<P: Plugged>(
 ///
 /// # Safety
 /// As for [`work`].
-pub(super) unsafe fn parameter<P: Plugged>(
+pub(super) unsafe fn parameter<P: PluginAdapter>(
     instance: Instance,
     body: impl FnOnce(&mut P::State) -> f64,
 ) -> f64 {
@@ -226,7 +226,7 @@ pub(super) unsafe fn parameter<P: Plugged>(
 }
 
 /// Writes the reason of the last failure.
-pub(super) unsafe extern "C" fn last_message<P: Plugged>(instance: Instance, message: *mut Message) {
+pub(super) unsafe extern "C" fn last_message<P: PluginAdapter>(instance: Instance, message: *mut Message) {
     // SAFETY: the contract of every table call; `message` is valid for a write.
     unsafe { message.write(work::<P>(instance).message) };
 }

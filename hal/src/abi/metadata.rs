@@ -59,7 +59,7 @@ impl<const N: usize> Writer<N> {
 
 const fn write<const N: usize>(facts: &Facts) -> Writer<N> {
     Writer { bytes: [0; N], len: 0 }
-        .line("kind", facts.kind.word())
+        .line("kind", facts.kind.name())
         .line("id", facts.id)
         .line("name", facts.name)
         .line("doc", facts.doc)

@@ -30,14 +30,14 @@ mod text;
 pub mod loader;
 
 pub use device::{CycleCode, DeviceTable, device_entry, device_entry_with};
-pub(crate) use device::{DevicePlug, not_opened};
+pub(crate) use device::{DeviceAdapter, not_opened};
 pub use entry::{
     ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, CallStatus, Entry, HOST_QUIET_PANICS, Host, Instance,
     LayoutProof, MAGIC, PluginKind,
 };
 pub use interface::{Extensions, Interface};
 pub use layout::{FieldLayout, LAYOUTS};
-pub(crate) use model::ModelPlug;
+pub(crate) use model::ModelAdapter;
 pub use model::{ForceTable, model_entry, model_entry_with};
 pub use text::{Choices, MESSAGE_BYTES, Message, Str};
 

@@ -1,7 +1,7 @@
 //! `flotor.force/1`: function table of a force model, and its implementation for a [`ForceModel`].
 
 use super::entry::{CallStatus, Entry, Instance, PluginKind};
-use super::instance::{self, Plugged, call, refusable};
+use super::instance::{self, PluginAdapter, call, refusable};
 use super::interface::{Extensions, find, table};
 use super::layout::layout;
 use super::{Message, Str};
@@ -67,9 +67,9 @@ layout! {
     }
 }
 /// Adapter of a [`ForceModel`] for the function tables.
-pub(crate) struct ModelPlug<M>(PhantomData<M>);
+pub(crate) struct ModelAdapter<M>(PhantomData<M>);
 
-impl<M: ForceModel> Plugged for ModelPlug<M> {
+impl<M: ForceModel> PluginAdapter for ModelAdapter<M> {
     type State = M;
     type Shared = ();
     const PARAMETERS: &'static [Parameter] = M::PARAMETERS;
@@ -86,7 +86,7 @@ unsafe extern "C" fn prepare<M: ForceModel>(
 ) -> u32 {
     // SAFETY: the contract of every table call: a live instance, used by one thread, and pointers to initialised
     // values that are the callee's for the call.
-    unsafe { refusable::<ModelPlug<M>>(instance, message, |model| model.prepare(&*config)) }
+    unsafe { refusable::<ModelAdapter<M>>(instance, message, |model| model.prepare(&*config)) }
 }
 
 unsafe extern "C" fn step<M: ForceModel>(
@@ -96,7 +96,7 @@ unsafe extern "C" fn step<M: ForceModel>(
 ) -> u32 {
     // SAFETY: as in `prepare`.
     unsafe {
-        call::<ModelPlug<M>>(instance, |model| {
+        call::<ModelAdapter<M>>(instance, |model| {
             output.write(model.step(&*input));
             Ok(())
         })
@@ -119,7 +119,7 @@ unsafe extern "C" fn step_batch<M: ForceModel>(
     };
     // SAFETY: as in `prepare`.
     unsafe {
-        call::<ModelPlug<M>>(instance, |model| {
+        call::<ModelAdapter<M>>(instance, |model| {
             model.step_batch(inputs, outputs);
             Ok(())
         })
@@ -129,18 +129,18 @@ unsafe extern "C" fn step_batch<M: ForceModel>(
 unsafe extern "C" fn set_parameter<M: ForceModel>(instance: Instance, index: u32, value: f64) -> u32 {
     let set = |model: &mut M| model.set_parameter(index as usize, value).map_err(|_| CallStatus::OutOfRange);
     // SAFETY: as in `prepare`.
-    unsafe { instance::set_parameter::<ModelPlug<M>>(instance, index, value, set) }
+    unsafe { instance::set_parameter::<ModelAdapter<M>>(instance, index, value, set) }
 }
 
 unsafe extern "C" fn parameter<M: ForceModel>(instance: Instance, index: u32) -> f64 {
     // SAFETY: as in `prepare`.
-    unsafe { instance::parameter::<ModelPlug<M>>(instance, |model| model.parameter(index as usize)) }
+    unsafe { instance::parameter::<ModelAdapter<M>>(instance, |model| model.parameter(index as usize)) }
 }
 
 unsafe extern "C" fn reset<M: ForceModel>(instance: Instance) -> u32 {
     // SAFETY: as in `prepare`.
     unsafe {
-        call::<ModelPlug<M>>(instance, |model| {
+        call::<ModelAdapter<M>>(instance, |model| {
             model.reset();
             Ok(())
         })
@@ -151,15 +151,15 @@ table!(ForceTable: "flotor.force/1", M: [ForceModel] {
     parameter_count: M::PARAMETERS.len() as u32,
     parameters: M::PARAMETERS.as_ptr(),
     info: M::INFO,
-    create: Some(instance::create::<ModelPlug<M>>),
-    destroy: Some(instance::destroy::<ModelPlug<M>>),
+    create: Some(instance::create::<ModelAdapter<M>>),
+    destroy: Some(instance::destroy::<ModelAdapter<M>>),
     prepare: Some(prepare::<M>),
     step: Some(step::<M>),
     step_batch: Some(step_batch::<M>),
     set_parameter: Some(set_parameter::<M>),
     parameter: Some(parameter::<M>),
     reset: Some(reset::<M>),
-    last_message: Some(instance::last_message::<ModelPlug<M>>),
+    last_message: Some(instance::last_message::<ModelAdapter<M>>),
 });
 
 unsafe extern "C" fn get_interface<M: ForceModel, E: Extensions<M>>(id: Str) -> *const c_void {

@@ -5,7 +5,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
-use crate::abi::{Instance, ModelPlug};
+use crate::abi::{Instance, ModelAdapter};
 use crate::{DVec3, ForceModel};
 
 /// Shape of an active region.
@@ -137,7 +137,7 @@ layout! {
 }
 unsafe extern "C" fn region<M: ActiveRegionModel>(instance: Instance, out: *mut ActiveRegion) -> u32 {
     // SAFETY: the contract of every table call.
-    unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.active_region())) }
+    unsafe { fill::<ModelAdapter<M>, _>(instance, out, |model| Ok(model.active_region())) }
 }
 
 table!(ActiveRegionTable: "flotor.active-region/1", M: [ActiveRegionModel] {

@@ -9,7 +9,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::{OpenedDevice, refusal_from};
-use crate::abi::{DevicePlug, Instance, Message, not_opened};
+use crate::abi::{DeviceAdapter, Instance, Message, not_opened};
 use crate::{Device, Refusal};
 
 /// Maximum number of coefficients of a calibration: a polynomial of degree seven.
@@ -215,7 +215,7 @@ layout! {
 unsafe extern "C" fn serial<D: CalibrationDevice>(instance: Instance, serial: *mut Message) -> u32 {
     // SAFETY: the contract of every table call.
     unsafe {
-        fill::<DevicePlug<D>, _>(instance, serial, |phase| {
+        fill::<DeviceAdapter<D>, _>(instance, serial, |phase| {
             let mut text = Message::default();
             text.set(&phase.opened()?.serial());
             Ok(text)
@@ -230,7 +230,7 @@ unsafe extern "C" fn calibrate_vertical<D: CalibrationDevice>(
 ) -> u32 {
     // SAFETY: the contract of every table call.
     unsafe {
-        refusable::<DevicePlug<D>>(instance, message, |phase| {
+        refusable::<DeviceAdapter<D>>(instance, message, |phase| {
             (*calibration).check().map_err(Refusal::parameter)?;
             phase.opened().map_err(|_| not_opened())?.calibrate_vertical(&*calibration)
         })

@@ -8,7 +8,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
-use crate::abi::{CallStatus, Instance, ModelPlug};
+use crate::abi::{CallStatus, Instance, ModelAdapter};
 use crate::{ForceModel, Input, Pose};
 
 /// Drawing style of the body around its centreline: a tube, or a wire wound about it. 40 bytes.
@@ -115,7 +115,7 @@ layout! {
 }
 unsafe extern "C" fn info<M: CenterlineModel>(instance: Instance, out: *mut CenterlineInfo) -> u32 {
     // SAFETY: the contract of every table call.
-    unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.centerline_info())) }
+    unsafe { fill::<ModelAdapter<M>, _>(instance, out, |model| Ok(model.centerline_info())) }
 }
 
 unsafe extern "C" fn centerline<M: CenterlineModel>(
@@ -130,7 +130,7 @@ unsafe extern "C" fn centerline<M: CenterlineModel>(
     }
     // SAFETY: the contract of every table call; `points` has room for `capacity` poses.
     unsafe {
-        call::<ModelPlug<M>>(instance, |model| {
+        call::<ModelAdapter<M>>(instance, |model| {
             let points = std::slice::from_raw_parts_mut(points, capacity as usize);
             let valid = model.centerline(&*input, points);
             count.write(u32::try_from(valid).unwrap_or(capacity).min(capacity));

@@ -9,7 +9,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
-use crate::abi::{CallStatus, Choices, Instance, ModelPlug, Str};
+use crate::abi::{CallStatus, Choices, Instance, ModelAdapter, Str};
 use crate::{ForceModel, choices};
 
 /// Diagnostic number of a step. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
@@ -132,7 +132,7 @@ unsafe extern "C" fn values<M: DetailsModel>(instance: Instance, values: *mut f6
     }
     // SAFETY: the contract of every table call; `values` has room for `capacity` numbers, of which there are enough.
     unsafe {
-        call::<ModelPlug<M>>(instance, |model| {
+        call::<ModelAdapter<M>>(instance, |model| {
             model.details(std::slice::from_raw_parts_mut(values, M::DETAILS.len()));
             Ok(())
         })

@@ -5,7 +5,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader;
-use crate::abi::{DevicePlug, Instance};
+use crate::abi::{DeviceAdapter, Instance};
 use crate::{ActiveDevice, Device};
 
 /// Balance of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
@@ -99,7 +99,7 @@ unsafe extern "C" fn ledger<D: Device<Active: EnergyLedgerDevice>>(
     out: *mut EnergyLedger,
 ) -> u32 {
     // SAFETY: the contract of every table call.
-    unsafe { fill::<DevicePlug<D>, _>(instance, out, |phase| Ok(phase.active()?.energy_ledger())) }
+    unsafe { fill::<DeviceAdapter<D>, _>(instance, out, |phase| Ok(phase.active()?.energy_ledger())) }
 }
 
 table!(EnergyLedgerTable: "flotor.energy-ledger/1", D: [Device<Active: EnergyLedgerDevice>] {

@@ -9,7 +9,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::OpenedDevice;
-use crate::abi::{DevicePlug, Instance};
+use crate::abi::{DeviceAdapter, Instance};
 #[cfg(feature = "loader")]
 use crate::{Refusal, extension::independent_stop::means::Independence};
 
@@ -132,7 +132,7 @@ unsafe extern "C" fn independent_stop<D: IndependentStopDevice>(
     stop: *mut IndependentStop,
 ) -> u32 {
     // SAFETY: the contract of every table call.
-    unsafe { fill::<DevicePlug<D>, _>(instance, stop, |phase| Ok(phase.opened()?.independent_stop())) }
+    unsafe { fill::<DeviceAdapter<D>, _>(instance, stop, |phase| Ok(phase.opened()?.independent_stop())) }
 }
 
 table!(IndependentStopTable: "flotor.independent-stop/1", D: [IndependentStopDevice] {
@@ -170,27 +170,27 @@ pub mod means {
 
     impl Independence {
         /// Checks a plugin's declaration and duplicates its descriptor; `None` without an independent stop.
-        pub(crate) fn of(told: &IndependentStop) -> Result<Option<Self>, Refusal> {
+        pub(crate) fn of(declared: &IndependentStop) -> Result<Option<Self>, Refusal> {
             let wrong = |what: String| Refusal::broken(format!("its independent stop {what}"));
-            let state = match told.state {
+            let state = match declared.state {
                 0 => StoppedState::Zero,
                 1 => StoppedState::Landed,
                 other => return Err(wrong(format!("leads to state {other}; it must be 0 or 1"))),
             };
-            let length = told.length as usize;
-            if told.descriptor == BY_ITSELF {
-                return match (length, told.within_ns) {
+            let length = declared.length as usize;
+            if declared.descriptor == BY_ITSELF {
+                return match (length, declared.within_ns) {
                     (0, NEVER_NS) => Ok(None),
                     (0, within_ns) => Ok(Some(Self::Itself { within_ns, state })),
                     _ => Err(wrong("has a message and no descriptor".to_owned())),
                 };
             }
-            let message = told.message.get(..length).filter(|message| !message.is_empty());
+            let message = declared.message.get(..length).filter(|message| !message.is_empty());
             let Some(message) = message.map(<[u8]>::to_vec) else {
                 return Err(wrong(format!("has {length} bytes; it must have 1 to {STOP_MESSAGE_BYTES}")));
             };
             // SAFETY: the plugin keeps it open until the device is closed (contract), and the device is open.
-            let handle = unsafe { writable_duplicate(told.descriptor) }.map_err(wrong)?;
+            let handle = unsafe { writable_duplicate(declared.descriptor) }.map_err(wrong)?;
             Ok(Some(Self::Message { handle, message, state }))
         }
     }
@@ -209,9 +209,9 @@ impl OpenedDevice {
         }
         // Invalid initial value: rejected below unless the plugin writes it.
         let unfilled = IndependentStop::by_message(BY_ITSELF, &[0], StoppedState::Zero, 0);
-        let Some(told) = self.asked(ask, unfilled) else {
+        let Some(declared) = self.asked(ask, unfilled) else {
             return Err(Refusal::broken("it does not say how it is stopped without its host"));
         };
-        Independence::of(&told)
+        Independence::of(&declared)
     }
 }

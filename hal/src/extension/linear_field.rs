@@ -9,7 +9,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::{CallStatus, loader::Model};
-use crate::abi::{Instance, ModelPlug};
+use crate::abi::{Instance, ModelAdapter};
 use crate::{DVec3, ForceModel, Input, Pose, Wrench, rotation_vector};
 
 /// Wrench around a pose, in the model frame: `W(d) = W0 - K d`. 416 bytes.
@@ -166,7 +166,7 @@ unsafe extern "C" fn linear_field<M: LinearFieldModel>(
     field: *mut LinearField,
 ) -> u32 {
     // SAFETY: the contract of every table call.
-    unsafe { fill::<ModelPlug<M>, _>(instance, field, |model| Ok(model.linear_field(&*input))) }
+    unsafe { fill::<ModelAdapter<M>, _>(instance, field, |model| Ok(model.linear_field(&*input))) }
 }
 
 table!(LinearFieldTable: "flotor.linear-field/1", M: [LinearFieldModel] {
@@ -189,7 +189,7 @@ impl Model {
         };
         // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
         let asked = || unsafe { ask(self.instance, input, field) };
-        CallStatus::from_code(crate::abi::loader::keeping_floats(&mut self.float_changes, asked))
+        CallStatus::from_code(crate::abi::loader::preserving_float_control(&mut self.float_changes, asked))
     }
 }
 

@@ -5,7 +5,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader;
-use crate::abi::{CallStatus, DevicePlug, Instance};
+use crate::abi::{CallStatus, DeviceAdapter, Instance};
 use crate::{ActiveDevice, Device};
 
 /// Result of waiting for a sample.
@@ -104,7 +104,7 @@ unsafe extern "C" fn wait_for_sample<D: Device<Active: PacingDevice>>(
 ) -> u32 {
     // SAFETY: the contract of every table call.
     unsafe {
-        fill::<DevicePlug<D>, _>(instance, samples, |phase| {
+        fill::<DeviceAdapter<D>, _>(instance, samples, |phase| {
             match phase.active()?.wait_for_sample(timeout_ns) {
                 SampleWait::NotPaced => Err(CallStatus::Unsupported),
                 waited => Ok(waited.samples()),
@@ -137,7 +137,7 @@ impl loader::ActiveDevice {
         let instance = self.instance();
         // SAFETY: a live, active instance used by this thread only (`&mut`), an out pointer valid for the call.
         let waited = || unsafe { wait(instance, timeout_ns, &raw mut samples) };
-        let code = loader::keeping_floats(&mut self.float_changes, waited);
+        let code = loader::preserving_float_control(&mut self.float_changes, waited);
         match CallStatus::from_code(code) {
             CallStatus::Ok if samples > 0 => SampleWait::Arrived { samples },
             CallStatus::Unsupported => SampleWait::NotPaced,

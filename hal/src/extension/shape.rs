@@ -9,7 +9,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
-use crate::abi::{Instance, ModelPlug, Str};
+use crate::abi::{Instance, ModelAdapter, Str};
 use crate::{DVec3, ForceModel, Input, Pose};
 #[cfg(feature = "loader")]
 use std::ptr::null;
@@ -324,7 +324,7 @@ unsafe extern "C" fn shape<M: ShapeModel>(
     out: *mut ShapeView,
 ) -> u32 {
     // SAFETY: the contract of every table call. What `out` points at belongs to the model, which keeps it until the next call.
-    unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(ShapeView::of(model.shape(&*input)))) }
+    unsafe { fill::<ModelAdapter<M>, _>(instance, out, |model| Ok(ShapeView::of(model.shape(&*input)))) }
 }
 
 table!(ShapeTable: "flotor.shape/1", M: [ShapeModel] {

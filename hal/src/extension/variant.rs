@@ -8,7 +8,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
-use crate::abi::{Instance, ModelPlug};
+use crate::abi::{Instance, ModelAdapter};
 use crate::{Demand, ForceModel, Memory};
 
 /// Demands and memory of one instance; constant over its life. 8 bytes.
@@ -85,7 +85,7 @@ layout! {
 }
 unsafe extern "C" fn info<M: VariantModel>(instance: Instance, out: *mut VariantInfo) -> u32 {
     // SAFETY: the contract of every table call.
-    unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.variant_info())) }
+    unsafe { fill::<ModelAdapter<M>, _>(instance, out, |model| Ok(model.variant_info())) }
 }
 
 table!(VariantTable: "flotor.variant/1", M: [VariantModel] {

@@ -8,7 +8,7 @@ use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::Model;
-use crate::abi::{Instance, ModelPlug};
+use crate::abi::{Instance, ModelAdapter};
 use crate::{DVec3, ForceModel};
 
 /// Positions of the handle, in the model frame, for which a model is valid: a box along the axes. 48 bytes.
@@ -99,7 +99,7 @@ layout! {
 }
 unsafe extern "C" fn bounds<M: WorkspaceBoundsModel>(instance: Instance, out: *mut WorkspaceBounds) -> u32 {
     // SAFETY: the contract of every table call.
-    unsafe { fill::<ModelPlug<M>, _>(instance, out, |model| Ok(model.workspace_bounds())) }
+    unsafe { fill::<ModelAdapter<M>, _>(instance, out, |model| Ok(model.workspace_bounds())) }
 }
 
 table!(WorkspaceBoundsTable: "flotor.workspace-bounds/1", M: [WorkspaceBoundsModel] {

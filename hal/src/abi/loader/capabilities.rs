@@ -27,8 +27,8 @@ struct Group {
 const MOST_RATE_HZ: f64 = 1.0e7;
 
 /// Refuses numbers that no host can enforce.
-pub(super) fn check(told: &Capabilities) -> Result<(), Refusal> {
-    for (field, axes) in [("sensed", told.sensed), ("actuated", told.actuated)] {
+pub(super) fn check(declared: &Capabilities) -> Result<(), Refusal> {
+    for (field, axes) in [("sensed", declared.sensed), ("actuated", declared.actuated)] {
         if !Axes::ALL.contains(axes) {
             let found = format!("{:#b}", axes.bits);
             return Err(wrong(field, &found, "there are six axes; set no bit beyond them"));
@@ -36,22 +36,22 @@ pub(super) fn check(told: &Capabilities) -> Result<(), Refusal> {
     }
     let translation = Group {
         axes: [Axes::X, Axes::Y, Axes::Z],
-        range: number("range_m", told.range_m, 100.0, "m"),
-        limit: number("max_force_n", told.max_force_n, 1.0e5, "N"),
-        slew: number("max_force_slew_n_per_s", told.max_force_slew_n_per_s, 1.0e10, "N/s"),
+        range: number("range_m", declared.range_m, 100.0, "m"),
+        limit: number("max_force_n", declared.max_force_n, 1.0e5, "N"),
+        slew: number("max_force_slew_n_per_s", declared.max_force_slew_n_per_s, 1.0e10, "N/s"),
     };
     let rotation = Group {
         axes: [Axes { bits: 1 << 3 }, Axes { bits: 1 << 4 }, Axes { bits: 1 << 5 }],
-        range: number("range_rad", told.range_rad, 1.0e3, "rad"),
-        limit: number("max_torque_nm", told.max_torque_nm, 1.0e5, "N·m"),
-        slew: number("max_torque_slew_nm_per_s", told.max_torque_slew_nm_per_s, 1.0e10, "N·m/s"),
+        range: number("range_rad", declared.range_rad, 1.0e3, "rad"),
+        limit: number("max_torque_nm", declared.max_torque_nm, 1.0e5, "N·m"),
+        slew: number("max_torque_slew_nm_per_s", declared.max_torque_slew_nm_per_s, 1.0e10, "N·m/s"),
     };
-    translation.check(told)?;
-    rotation.check(told)?;
-    let [slowest_hz, fastest_hz] = told.rate_hz;
-    number("resolution_m", told.resolution_m, 1.0, "m").has_an_end()?;
-    number("max_stiffness_n_per_m", told.max_stiffness_n_per_m, 1.0e10, "N/m").has_an_end()?;
-    number("latency_s", told.latency_s, 10.0, "s").has_an_end()?;
+    translation.check(declared)?;
+    rotation.check(declared)?;
+    let [slowest_hz, fastest_hz] = declared.rate_hz;
+    number("resolution_m", declared.resolution_m, 1.0, "m").has_an_end()?;
+    number("max_stiffness_n_per_m", declared.max_stiffness_n_per_m, 1.0e10, "N/m").has_an_end()?;
+    number("latency_s", declared.latency_s, 10.0, "s").has_an_end()?;
     let are_rates = slowest_hz > 0.0 && slowest_hz <= fastest_hz && fastest_hz <= MOST_RATE_HZ; // false for NaN
     if !are_rates {
         let found = format!("{slowest_hz} to {fastest_hz} Hz");
@@ -67,18 +67,18 @@ pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Resu
     if before == now {
         return Ok(());
     }
-    let numbers = |told: &Capabilities| {
+    let numbers = |declared: &Capabilities| {
         [
-            ("range_m", told.range_m.to_vec()),
-            ("range_rad", told.range_rad.to_vec()),
-            ("resolution_m", vec![told.resolution_m]),
-            ("max_force_n", told.max_force_n.to_vec()),
-            ("max_torque_nm", told.max_torque_nm.to_vec()),
-            ("max_force_slew_n_per_s", vec![told.max_force_slew_n_per_s]),
-            ("max_torque_slew_nm_per_s", vec![told.max_torque_slew_nm_per_s]),
-            ("max_stiffness_n_per_m", vec![told.max_stiffness_n_per_m]),
-            ("rate_hz", told.rate_hz.to_vec()),
-            ("latency_s", vec![told.latency_s]),
+            ("range_m", declared.range_m.to_vec()),
+            ("range_rad", declared.range_rad.to_vec()),
+            ("resolution_m", vec![declared.resolution_m]),
+            ("max_force_n", declared.max_force_n.to_vec()),
+            ("max_torque_nm", declared.max_torque_nm.to_vec()),
+            ("max_force_slew_n_per_s", vec![declared.max_force_slew_n_per_s]),
+            ("max_torque_slew_nm_per_s", vec![declared.max_torque_slew_nm_per_s]),
+            ("max_stiffness_n_per_m", vec![declared.max_stiffness_n_per_m]),
+            ("rate_hz", declared.rate_hz.to_vec()),
+            ("latency_s", vec![declared.latency_s]),
         ]
     };
     let changed = numbers(before).into_iter().zip(numbers(now)).find(|(before, now)| before != now);
@@ -91,12 +91,12 @@ pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Resu
 }
 
 impl Group {
-    fn check(&self, told: &Capabilities) -> Result<(), Refusal> {
+    fn check(&self, declared: &Capabilities) -> Result<(), Refusal> {
         let Self { axes, range, limit, slew } = self;
         range.has_an_end()?;
         limit.has_an_end()?;
-        let driven = axes.map(|axis| told.actuated.contains(axis));
-        let held = axes.map(|axis| told.actuated.contains(axis) && told.sensed.contains(axis));
+        let driven = axes.map(|axis| declared.actuated.contains(axis));
+        let held = axes.map(|axis| declared.actuated.contains(axis) && declared.sensed.contains(axis));
         limit
             .is_more_than_nothing_on(driven, "say the most it gives there, or leave it out of `actuated`")?;
         // Without a range the boundary wall would stand at home.
@@ -198,8 +198,8 @@ mod tests {
         let endless = Capabilities { max_torque_slew_nm_per_s: f64::INFINITY, ..PLANAR }; // of nothing
         let silent = Capabilities { max_stiffness_n_per_m: 0.0, ..HELD }; // says nothing
         let buzzer = Capabilities { sensed: Axes::NONE, range_m: [0.0; 3], range_rad: [0.0; 3], ..HELD };
-        for told in [HELD, PLANAR, puck, endless, silent, buzzer, Capabilities::UNDRIVEN] {
-            assert_eq!(check(&told), Ok(()), "{told:?}");
+        for declared in [HELD, PLANAR, puck, endless, silent, buzzer, Capabilities::UNDRIVEN] {
+            assert_eq!(check(&declared), Ok(()), "{declared:?}");
         }
     }
 
@@ -208,27 +208,27 @@ mod tests {
         // Where each number stands, and whether it may be nothing.
         type Field = (&'static str, fn(&mut Capabilities) -> &mut f64, bool);
         let fields: [Field; 11] = [
-            ("range_m", |told| &mut told.range_m[1], false),
-            ("range_rad", |told| &mut told.range_rad[2], false),
-            ("resolution_m", |told| &mut told.resolution_m, true),
-            ("max_force_n", |told| &mut told.max_force_n[0], false),
-            ("max_torque_nm", |told| &mut told.max_torque_nm[2], false),
-            ("max_force_slew_n_per_s", |told| &mut told.max_force_slew_n_per_s, false),
-            ("max_torque_slew_nm_per_s", |told| &mut told.max_torque_slew_nm_per_s, false),
-            ("max_stiffness_n_per_m", |told| &mut told.max_stiffness_n_per_m, true),
-            ("rate_hz", |told| &mut told.rate_hz[0], false),
-            ("rate_hz", |told| &mut told.rate_hz[1], false),
-            ("latency_s", |told| &mut told.latency_s, true),
+            ("range_m", |declared| &mut declared.range_m[1], false),
+            ("range_rad", |declared| &mut declared.range_rad[2], false),
+            ("resolution_m", |declared| &mut declared.resolution_m, true),
+            ("max_force_n", |declared| &mut declared.max_force_n[0], false),
+            ("max_torque_nm", |declared| &mut declared.max_torque_nm[2], false),
+            ("max_force_slew_n_per_s", |declared| &mut declared.max_force_slew_n_per_s, false),
+            ("max_torque_slew_nm_per_s", |declared| &mut declared.max_torque_slew_nm_per_s, false),
+            ("max_stiffness_n_per_m", |declared| &mut declared.max_stiffness_n_per_m, true),
+            ("rate_hz", |declared| &mut declared.rate_hz[0], false),
+            ("rate_hz", |declared| &mut declared.rate_hz[1], false),
+            ("latency_s", |declared| &mut declared.latency_s, true),
         ];
         for (field, number, may_be_nothing) in fields {
             for value in [f64::NAN, f64::INFINITY, -f64::INFINITY, -1.0e-9, 1.0e308, f64::MAX, 0.0] {
-                let mut told = HELD;
-                *number(&mut told) = value;
+                let mut declared = HELD;
+                *number(&mut declared) = value;
                 if value == 0.0 && may_be_nothing {
-                    assert_eq!(check(&told), Ok(()), "{field}");
+                    assert_eq!(check(&declared), Ok(()), "{field}");
                     continue;
                 }
-                let reason = check(&told).expect_err(field).reason;
+                let reason = check(&declared).expect_err(field).reason;
                 assert!(reason.starts_with(&format!("its capability `{field}")), "{value}: {reason}");
                 assert!(reason.contains(": ") && !reason.contains('\n'), "{reason}");
             }
@@ -245,8 +245,8 @@ mod tests {
             (Capabilities { actuated: Axes::TRANSLATION, ..PLANAR }, "z is driven, so say the most it gives"),
             (Capabilities { range_m: [0.0; 3], ..HELD }, "x is driven, so say how far it moves there"),
         ];
-        for (told, words) in cases {
-            let reason = check(&told).expect_err(words).reason;
+        for (declared, words) in cases {
+            let reason = check(&declared).expect_err(words).reason;
             assert!(reason.contains(words), "{reason}");
         }
     }

@@ -1,7 +1,7 @@
 //! Loaded device, in two types: [`OpenedDevice`] (answers queries) and [`ActiveDevice`] (energised).
 
 use super::capabilities::{check, check_unchanged};
-use super::float_control::keeping_floats;
+use super::float_control::preserving_float_control;
 use super::model::refusal_from;
 use super::setting::{Setting, index_of, live_index, to_raw};
 use crate::abi::{CallStatus, CycleCode, DeviceTable, Instance, Message};
@@ -10,7 +10,7 @@ use crate::{Axes, Capabilities, Cycle, DeviceState, Fault, LoopConfig, Parameter
 use std::sync::Arc;
 
 /// Table function that writes one value.
-type Ask<T> = unsafe extern "C" fn(Instance, *mut T) -> u32;
+type QueryFn<T> = unsafe extern "C" fn(Instance, *mut T) -> u32;
 
 /// Opened instance; closed when the last reference is dropped.
 struct Handle {
@@ -30,7 +30,7 @@ impl Drop for Handle {
     fn drop(&mut self) {
         if let Some(close) = self.table.close {
             // SAFETY: the last handle: nobody uses the instance after this.
-            keeping_floats(&mut 0, || unsafe { close(self.instance) });
+            preserving_float_control(&mut 0, || unsafe { close(self.instance) });
         }
     }
 }
@@ -39,14 +39,14 @@ impl Drop for Handle {
 pub struct OpenedDevice {
     handle: Arc<Handle>,
     /// Capabilities returned by the first call; `None` before.
-    told: Option<Box<Capabilities>>,
+    declared: Option<Box<Capabilities>>,
 }
 
 /// Energised device; deactivated on drop.
 pub struct ActiveDevice {
     /// `None` only after `deactivate` has taken the handle.
     handle: Option<Arc<Handle>>,
-    told: Option<Box<Capabilities>>,
+    declared: Option<Box<Capabilities>>,
     instance: Instance,
     read: unsafe extern "C" fn(Instance, *const Tick, *mut DeviceState) -> CycleCode,
     write: unsafe extern "C" fn(Instance, *const Tick, *const Wrench) -> CycleCode,
@@ -72,7 +72,7 @@ impl Stopper {
     pub fn safe_stop(&self) {
         if let Some(safe_stop) = self.handle.table.safe_stop {
             // SAFETY: a live instance (this handle keeps it open); `safe_stop` may come from any thread.
-            keeping_floats(&mut 0, || unsafe { safe_stop(self.handle.instance) });
+            preserving_float_control(&mut 0, || unsafe { safe_stop(self.handle.instance) });
         }
     }
 }
@@ -95,12 +95,12 @@ impl OpenedDevice {
         // SAFETY: all pointers are valid for the call, as the contract of `open` asks.
         let opened = || unsafe { open(values.as_ptr(), count, &raw mut message, &raw mut instance) };
         // Before activation nothing depends on the floating-point environment: a change is restored but not reported.
-        let code = keeping_floats(&mut 0, opened);
+        let code = preserving_float_control(&mut 0, opened);
         refusal_from(code, &message)?;
         if instance.is_null() {
             return Err(Refusal::broken("it reported success but opened nothing"));
         }
-        Ok(Self { handle: Arc::new(Handle { instance, table, extensions, parameters }), told: None })
+        Ok(Self { handle: Arc::new(Handle { instance, table, extensions, parameters }), declared: None })
     }
 
     /// Returns the parameter schema of the device.
@@ -128,7 +128,7 @@ impl OpenedDevice {
             return Err(Refusal::broken(self.last_message()));
         };
         check(&capabilities)?;
-        check_unchanged(self.told.get_or_insert_with(|| Box::new(capabilities)), &capabilities)?;
+        check_unchanged(self.declared.get_or_insert_with(|| Box::new(capabilities)), &capabilities)?;
         Ok(capabilities)
     }
 
@@ -151,13 +151,13 @@ impl OpenedDevice {
         // SAFETY: a live instance, used by this thread only (`self` is owned), pointers valid for the call.
         let activated = || unsafe { activate(self.handle.instance, config, &raw mut message) };
         let mut float_changes = 0;
-        let code = keeping_floats(&mut float_changes, activated);
+        let code = preserving_float_control(&mut float_changes, activated);
         match refusal_from(code, &message) {
             Ok(()) => {
                 let instance = self.handle.instance;
                 Ok(ActiveDevice {
                     handle: Some(self.handle),
-                    told: self.told,
+                    declared: self.declared,
                     instance,
                     read,
                     write,
@@ -179,7 +179,7 @@ impl OpenedDevice {
     }
 
     /// Calls a function of this device's tables and returns the value written; `None` if the function is missing or failed.
-    pub(crate) fn asked<T>(&mut self, ask: Option<Ask<T>>, answer: T) -> Option<T> {
+    pub(crate) fn asked<T>(&mut self, ask: Option<QueryFn<T>>, answer: T) -> Option<T> {
         asked(self.handle.instance, ask, answer)
     }
 
@@ -199,7 +199,7 @@ impl ActiveDevice {
     pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         // SAFETY: a live, active instance used by this thread only (`&mut`), pointers valid for the call.
         let read = || unsafe { (self.read)(self.instance, tick, state) };
-        let code = keeping_floats(&mut self.float_changes, read);
+        let code = preserving_float_control(&mut self.float_changes, read);
         self.known("read", code)
     }
 
@@ -232,7 +232,7 @@ impl ActiveDevice {
     pub fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
         // SAFETY: as in `read`.
         let written = || unsafe { (self.write)(self.instance, tick, wrench) };
-        let code = keeping_floats(&mut self.float_changes, written);
+        let code = preserving_float_control(&mut self.float_changes, written);
         self.known("write", code)
     }
 
@@ -244,7 +244,7 @@ impl ActiveDevice {
         let Some(index) = live_index(handle.parameters, index, value) else { return CallStatus::OutOfRange };
         // SAFETY: as in `read`.
         let set = || unsafe { set_parameter(self.instance, index, value) };
-        CallStatus::from_code(keeping_floats(&mut self.float_changes, set))
+        CallStatus::from_code(preserving_float_control(&mut self.float_changes, set))
     }
 
     pub(crate) fn extensions(&self) -> Option<&DeviceExtensions> {
@@ -256,7 +256,7 @@ impl ActiveDevice {
     }
 
     /// Calls a function of this device's tables and returns the value written; `None` if the function is missing or failed.
-    pub(crate) fn asked<T>(&mut self, ask: Option<Ask<T>>, answer: T) -> Option<T> {
+    pub(crate) fn asked<T>(&mut self, ask: Option<QueryFn<T>>, answer: T) -> Option<T> {
         asked(self.instance, ask, answer)
     }
 
@@ -281,7 +281,7 @@ impl ActiveDevice {
     pub fn deactivate(mut self) -> Option<OpenedDevice> {
         let handle = self.handle.take()?;
         match deactivate(&handle) {
-            CallStatus::Ok => Some(OpenedDevice { handle, told: self.told.take() }),
+            CallStatus::Ok => Some(OpenedDevice { handle, declared: self.declared.take() }),
             _ => None,
         }
     }
@@ -296,17 +296,17 @@ impl Drop for ActiveDevice {
 }
 
 /// Calls a function of an instance's table; both `asked` methods above hold the instance by `&mut`.
-fn asked<T>(instance: Instance, ask: Option<Ask<T>>, mut answer: T) -> Option<T> {
+fn asked<T>(instance: Instance, ask: Option<QueryFn<T>>, mut answer: T) -> Option<T> {
     let ask = ask?;
     // SAFETY: a live instance, used by this thread only, an out pointer valid for the call.
-    let code = keeping_floats(&mut 0, || unsafe { ask(instance, &raw mut answer) });
+    let code = preserving_float_control(&mut 0, || unsafe { ask(instance, &raw mut answer) });
     (code == CallStatus::Ok as u32).then_some(answer)
 }
 
 fn deactivate(handle: &Handle) -> CallStatus {
     let Some(deactivate) = handle.table.deactivate else { return CallStatus::Unsupported };
     // SAFETY: called from the owner of the one working handle, which is giving it up.
-    CallStatus::from_code(keeping_floats(&mut 0, || unsafe { deactivate(handle.instance) }))
+    CallStatus::from_code(preserving_float_control(&mut 0, || unsafe { deactivate(handle.instance) }))
 }
 
 /// Initial value of the out parameter; fails every check unless the plugin writes it.

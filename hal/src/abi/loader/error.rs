@@ -181,5 +181,5 @@ const fn advice(kind: RefusalKind) -> &'static str {
 }
 
 fn kind_word(code: u32) -> &'static str {
-    PluginKind::from_code(code).map_or("unknown", PluginKind::word)
+    PluginKind::from_code(code).map_or("unknown", PluginKind::name)
 }

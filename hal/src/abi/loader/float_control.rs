@@ -102,7 +102,7 @@ impl FloatControl {
 /// Runs a plugin call, restores the floating-point environment, and increments `changed` if the call modified it.
 /// Real-time: the call plus six instructions.
 #[inline(always)]
-pub(crate) fn keeping_floats<T>(changed: &mut u64, call: impl FnOnce() -> T) -> T {
+pub(crate) fn preserving_float_control<T>(changed: &mut u64, call: impl FnOnce() -> T) -> T {
     let before = FloatControl::now();
     let answer = call();
     if !FloatControl::now().is_as(before) {
@@ -127,7 +127,7 @@ mod tests {
         let third = || black_box(1.0_f64) / black_box(3.0);
         let before = third();
         let mut changed = 0;
-        let inside = keeping_floats(&mut changed, || {
+        let inside = preserving_float_control(&mut changed, || {
             round_up();
             third()
         });
@@ -138,7 +138,9 @@ mod tests {
     #[test]
     fn flags_of_what_happened_are_nobodys_fault() {
         let mut changed = 0;
-        let _ = keeping_floats(&mut changed, || black_box(1.0e-320_f64) * black_box(0.1) / black_box(0.0));
+        let _ = preserving_float_control(&mut changed, || {
+            black_box(1.0e-320_f64) * black_box(0.1) / black_box(0.0)
+        });
         assert_eq!(changed, 0);
     }
 }

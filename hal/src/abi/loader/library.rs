@@ -124,7 +124,7 @@ impl Plugin {
         if PluginKind::from_code(entry.kind) != Some(metadata.kind) {
             return Err(LoadError::OtherEntryKind {
                 path: path.clone(),
-                metadata: metadata.kind.word(),
+                metadata: metadata.kind.name(),
                 entry: entry.kind,
             });
         }
@@ -228,7 +228,7 @@ impl Plugin {
 
     fn other_kind(&self, wanted: PluginKind) -> LoadError {
         let Metadata { path, id, kind, .. } = &self.metadata;
-        LoadError::OtherKind { path: path.clone(), id: id.clone(), found: kind.word(), wanted: wanted.word() }
+        LoadError::OtherKind { path: path.clone(), id: id.clone(), found: kind.name(), wanted: wanted.name() }
     }
 
     fn refused(&self, refusal: crate::Refusal) -> LoadError {

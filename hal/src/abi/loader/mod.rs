@@ -22,7 +22,7 @@ mod setting;
 
 pub use device::{ActiveDevice, OpenedDevice, Stopper};
 pub use error::LoadError;
-pub(crate) use float_control::keeping_floats;
+pub(crate) use float_control::preserving_float_control;
 pub(crate) use interfaces::Offers;
 pub use library::Plugin;
 pub use metadata_file::{Metadata, read_metadata};

@@ -1,6 +1,6 @@
 //! Loaded force model: an instance and its function table.
 
-use super::float_control::keeping_floats;
+use super::float_control::preserving_float_control;
 use super::setting::{Setting, index_of, live_index, to_raw};
 use crate::abi::{CallStatus, ForceTable, Instance, Message};
 use crate::extension::ModelExtensions;
@@ -50,7 +50,7 @@ impl Model {
         let mut float_changes = 0;
         // SAFETY: all pointers are valid for the call, as the contract of `create` asks.
         let made = || unsafe { create(values.as_ptr(), count, &raw mut message, &raw mut instance) };
-        let code = keeping_floats(&mut float_changes, made);
+        let code = preserving_float_control(&mut float_changes, made);
         refusal_from(code, &message)?;
         if instance.is_null() {
             return Err(Refusal::broken("it reported success but made nothing"));
@@ -71,7 +71,7 @@ impl Model {
         let ask = ask?;
         // SAFETY: a live instance used by this thread only (`&mut`), an out pointer valid for the call.
         let asked = || unsafe { ask(self.instance, &raw mut answer) };
-        let code = keeping_floats(&mut self.float_changes, asked);
+        let code = preserving_float_control(&mut self.float_changes, asked);
         (code == CallStatus::Ok as u32).then_some(answer)
     }
 
@@ -127,7 +127,7 @@ impl Model {
         let mut message = Message::default();
         // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.
         let prepared = || unsafe { prepare(self.instance, config, &raw mut message) };
-        let code = keeping_floats(&mut self.float_changes, prepared);
+        let code = preserving_float_control(&mut self.float_changes, prepared);
         refusal_from(code, &message)
     }
 
@@ -136,7 +136,7 @@ impl Model {
     pub fn step(&mut self, input: &Input, output: &mut Output) -> CallStatus {
         // SAFETY: as in `prepare`.
         let stepped = || unsafe { (self.step)(self.instance, input, output) };
-        CallStatus::from_code(keeping_floats(&mut self.float_changes, stepped))
+        CallStatus::from_code(preserving_float_control(&mut self.float_changes, stepped))
     }
 
     /// Steps through inputs in order, up to the length of the shorter slice. Real-time per pose.
@@ -146,7 +146,7 @@ impl Model {
             // SAFETY: as in `prepare`; both slices hold at least `count` structs and do not overlap (`&`, `&mut`).
             let stepped =
                 || unsafe { step_batch(self.instance, count as u64, inputs.as_ptr(), outputs.as_mut_ptr()) };
-            return CallStatus::from_code(keeping_floats(&mut self.float_changes, stepped));
+            return CallStatus::from_code(preserving_float_control(&mut self.float_changes, stepped));
         }
         for (input, output) in inputs.iter().zip(outputs) {
             match self.step(input, output) {
@@ -164,7 +164,7 @@ impl Model {
         let Some(index) = live_index(self.parameters, index, value) else { return CallStatus::OutOfRange };
         // SAFETY: as in `prepare`.
         let set = || unsafe { set_parameter(self.instance, index, value) };
-        CallStatus::from_code(keeping_floats(&mut self.float_changes, set))
+        CallStatus::from_code(preserving_float_control(&mut self.float_changes, set))
     }
 
     /// Returns the current value of the parameter at `index`, presets resolved; NaN if unknown. Real-time.
@@ -173,14 +173,16 @@ impl Model {
         let Some(parameter) = self.table.parameter else { return f64::NAN };
         let Some(index) = index_of(self.parameters, index) else { return f64::NAN };
         // SAFETY: as in `prepare`.
-        keeping_floats(&mut self.float_changes, || unsafe { parameter(self.instance, index) })
+        preserving_float_control(&mut self.float_changes, || unsafe { parameter(self.instance, index) })
     }
 
     /// Clears the history. Real-time: bounded, no allocation.
     pub fn reset(&mut self) -> CallStatus {
         let Some(reset) = self.table.reset else { return CallStatus::Ok };
         // SAFETY: as in `prepare`.
-        CallStatus::from_code(keeping_floats(&mut self.float_changes, || unsafe { reset(self.instance) }))
+        CallStatus::from_code(preserving_float_control(&mut self.float_changes, || unsafe {
+            reset(self.instance)
+        }))
     }
 
     /// Returns the model's message about the call that failed. Not real-time.
@@ -189,7 +191,7 @@ impl Model {
         let mut message = Message::default();
         if let Some(last_message) = self.table.last_message {
             // SAFETY: as in `prepare`.
-            keeping_floats(&mut self.float_changes, || unsafe {
+            preserving_float_control(&mut self.float_changes, || unsafe {
                 last_message(self.instance, &raw mut message)
             });
         }
@@ -201,7 +203,7 @@ impl Drop for Model {
     fn drop(&mut self) {
         if let Some(destroy) = self.table.destroy {
             // SAFETY: the instance came from `create` of this table and is not used after this.
-            keeping_floats(&mut self.float_changes, || unsafe { destroy(self.instance) });
+            preserving_float_control(&mut self.float_changes, || unsafe { destroy(self.instance) });
         }
     }
 }
