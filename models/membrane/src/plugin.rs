@@ -238,9 +238,9 @@ impl LinearFieldModel for Membrane {
     fn linear_field(&mut self, input: &Input) -> LinearField {
         let Ok((handle_m, _)) = Self::reached(input) else { return LinearField::NONE };
         let (centre_m, time_s) = (self.centre_m(handle_m), input.dt_s().min(LONGEST_TIME_S));
-        let felt = self.touch.feel(centre_m, time_s, PROBE_SHARE * self.coarseness_m);
+        let measured = self.touch.measure_slope(centre_m, time_s, PROBE_SHARE * self.coarseness_m);
         // Within half the distance of two masses other masses make or lose contact.
-        LinearField::of_force(input, felt.force_n, felt.slope_n_per_m, 0.5 * self.coarseness_m)
+        LinearField::of_force(input, measured.force_n, measured.slope_n_per_m, 0.5 * self.coarseness_m)
     }
 }
 

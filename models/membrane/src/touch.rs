@@ -10,14 +10,14 @@ pub struct Touch {
     ball: Ball,
     /// Initial state of the network.
     untouched: State,
-    /// Preallocated states for [`Self::feel`].
+    /// Preallocated states for [`Self::measure_slope`].
     before: State,
     after: State,
 }
 
 /// Force on the ball, and its change with the end point of the ball's movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Felt {
+pub struct ForceSlope {
     /// Force on the ball, N.
     pub force_n: DVec3,
     /// Change of the force per displacement along x, y and z, N/m.
@@ -69,7 +69,7 @@ impl Touch {
     /// each with the ball ending `probe_m` farther along one axis, in its direction of motion. So the slope contains
     /// the network's inertia and compliance over this time, and upcoming contacts. A short probe mistakes the impact of
     /// a single mass for stiffness. Bounded by four times [`Self::steps_in`], no allocation.
-    pub fn feel(&mut self, centre_m: DVec3, duration_s: f64, probe_m: f64) -> Felt {
+    pub fn measure_slope(&mut self, centre_m: DVec3, duration_s: f64, probe_m: f64) -> ForceSlope {
         let from_m = self.ball.centre_m;
         let way_m = centre_m - from_m;
         self.before.clone_from(self.network.state());
@@ -83,7 +83,7 @@ impl Touch {
         });
         self.network.restore(&self.after);
         self.ball.centre_m = centre_m;
-        Felt { force_n, slope_n_per_m }
+        ForceSlope { force_n, slope_n_per_m }
     }
 
     /// Relaxes `state` under a ball fixed at `centre_m`; the network itself does not change. Returns true if the masses

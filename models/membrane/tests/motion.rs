@@ -131,7 +131,7 @@ fn the_slope_of_a_field_is_the_change_of_the_force_it_predicts() {
         touch.advance(at(0.002 * f64::from(step) / 40.0), period_s);
     }
     let before = touch.network().state().clone();
-    let field = touch.feel(at(0.002), period_s, 1.0e-5);
+    let field = touch.measure_slope(at(0.002), period_s, 1.0e-5);
     let after = touch.network().positions_m().get(144);
     // The same period lived again, the ball going elsewhere: the field knows the force beforehand.
     for offset_m in [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-0.5, 0.5, -1.0), (0.0, 1.0, -1.0)] {

@@ -18,7 +18,7 @@ use crate::spline::{Curve, Volume};
 
 /// Body that the sphere touches, with the tables of its law.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ground {
+pub enum TouchedBody {
     /// Half-space `z <= 0`.
     HalfSpace,
     /// Block, its bottom clamped.
@@ -62,7 +62,7 @@ pub struct Atlas {
     /// Depth at which the stiffness starts to fall to zero, over a tenth of the radius, m.
     pub deepest_m: f64,
     /// Body that the sphere touches.
-    pub ground: Ground,
+    pub body: TouchedBody,
 }
 
 /// Width over which the energy ratio levels off behind the deepest solved depth, as root of depth over radius.
@@ -78,7 +78,7 @@ const NOTHING_M2: f64 = 1.0e-30;
 struct Touch {
     depth_m: Jet,
     ratio: Jet,
-    is_beyond: bool,
+    is_extrapolated: bool,
 }
 
 /// Number of square roots in the smooth minimum of [`least`]; its power is two to this number.
@@ -92,7 +92,7 @@ pub struct Answer {
     /// Depth of the undeformed face inside the sphere, m; not positive without contact.
     pub depth_m: f64,
     /// True where the law is that of a nearby position: off a face, or on the side of a cylinder.
-    pub is_beyond: bool,
+    pub is_extrapolated: bool,
 }
 
 impl Atlas {
@@ -100,28 +100,28 @@ impl Atlas {
     #[must_use]
     pub fn answer(&self, centre_m: [f64; 3]) -> Answer {
         let centre = [0, 1, 2].map(|axis| Jet::variable(centre_m[axis], axis));
-        let touch = match &self.ground {
-            Ground::HalfSpace => Some(Touch {
+        let touch = match &self.body {
+            TouchedBody::HalfSpace => Some(Touch {
                 depth_m: -centre[2] + self.radius_m,
                 ratio: Jet::constant(1.0),
-                is_beyond: false,
+                is_extrapolated: false,
             }),
-            Ground::Block { size, ratios, rounding_m } => {
+            TouchedBody::Block { size, ratios, rounding_m } => {
                 self.touch_block(centre, *size, ratios, *rounding_m)
             }
-            Ground::Cylinder { radius_m, height_m, ratio, rounding_m } => {
+            TouchedBody::Cylinder { radius_m, height_m, ratio, rounding_m } => {
                 self.touch_cylinder(centre, [*radius_m, *height_m], ratio, *rounding_m)
             }
-            Ground::Face { outline_m, ratio } => self.touch_face(centre, *outline_m, ratio),
+            TouchedBody::Face { outline_m, ratio } => self.touch_face(centre, *outline_m, ratio),
         };
         let Some(touch) = touch else {
-            return Answer { energy: Jet::default(), depth_m: -1.0, is_beyond: false };
+            return Answer { energy: Jet::default(), depth_m: -1.0, is_extrapolated: false };
         };
-        let (depth_m, is_beyond) = (touch.depth_m.value, touch.is_beyond);
+        let (depth_m, is_extrapolated) = (touch.depth_m.value, touch.is_extrapolated);
         if depth_m <= 0.0 {
-            return Answer { energy: Jet::default(), depth_m, is_beyond: false };
+            return Answer { energy: Jet::default(), depth_m, is_extrapolated: false };
         }
-        Answer { energy: self.unbounded(touch.depth_m) * touch.ratio, depth_m, is_beyond }
+        Answer { energy: self.unbounded(touch.depth_m) * touch.ratio, depth_m, is_extrapolated }
     }
 
     /// Returns the energy of the top face of a block alone: zero beyond its edges, fading in over half a radius inside
@@ -129,18 +129,20 @@ impl Atlas {
     /// bounded, no allocation.
     #[must_use]
     pub fn top(&self, centre_m: [f64; 3]) -> Answer {
-        let Ground::Block { size, ratios, rounding_m } = &self.ground else { return self.answer(centre_m) };
+        let TouchedBody::Block { size, ratios, rounding_m } = &self.body else {
+            return self.answer(centre_m);
+        };
         let centre = [0, 1, 2].map(|axis| Jet::variable(centre_m[axis], axis));
         let depth_m = -centre[2] + self.radius_m;
         let width_m = 0.5 * self.radius_m;
         let half_m = [size.half_x_m, size.half_y_m];
         let inside = [0, 1].map(|k| (-centre[k].abs() + half_m[k]) * (1.0 / width_m));
         if depth_m.value <= 0.0 || inside.iter().any(|s| s.value <= 0.0) {
-            return Answer { energy: Jet::default(), depth_m: depth_m.value, is_beyond: false };
+            return Answer { energy: Jet::default(), depth_m: depth_m.value, is_extrapolated: false };
         }
         let ratio = ratios[0].at(self.place_on_top(centre, depth_m, &ratios[0], *rounding_m));
         let energy = self.unbounded(depth_m) * ratio * step(inside[0]) * step(inside[1]);
-        Answer { energy, depth_m: depth_m.value, is_beyond: false }
+        Answer { energy, depth_m: depth_m.value, is_extrapolated: false }
     }
 
     /// Returns the coordinates of a block's top energy ratio.
@@ -166,8 +168,12 @@ impl Atlas {
             let width = 0.05 * (high - low);
             -ease_at(-ease_at(centre[k], high, width), -low, width)
         };
-        let is_beyond = (0..2).any(|k| !(outline_m[k][0]..=outline_m[k][1]).contains(&centre[k].value));
-        Some(Touch { depth_m, ratio: ratio.at([within(0), within(1), self.root(depth_m, ratio)]), is_beyond })
+        let is_extrapolated = (0..2).any(|k| !(outline_m[k][0]..=outline_m[k][1]).contains(&centre[k].value));
+        Some(Touch {
+            depth_m,
+            ratio: ratio.at([within(0), within(1), self.root(depth_m, ratio)]),
+            is_extrapolated,
+        })
     }
 
     /// Returns depth and energy ratio at a cylinder; `None` without contact.
@@ -193,7 +199,7 @@ impl Atlas {
         }
         let place = ease_at(from_axis, ratio.range(0).1, rounding_m);
         let ratio = ratio.at([place, Jet::constant(0.0), self.root(depth_m, ratio)]);
-        Some(Touch { depth_m, ratio, is_beyond: shares[0].value > 0.5 })
+        Some(Touch { depth_m, ratio, is_extrapolated: shares[0].value > 0.5 })
     }
 
     /// Evaluates `P(d)`. Beyond the deepest depth the second derivative falls to zero, then `P` is a straight line.
@@ -260,7 +266,7 @@ impl Atlas {
             };
             ratio = ratio + share * part;
         }
-        Some(Touch { depth_m, ratio, is_beyond: false })
+        Some(Touch { depth_m, ratio, is_extrapolated: false })
     }
 }
 
@@ -375,7 +381,7 @@ mod tests {
             hertz: 1.0,
             profile: Curve::new(vec![0.0, 0.5, 1.2], vec![1.0; 3], [End::Parabola; 2]),
             deepest_m: 0.006,
-            ground: Ground::Block { size, ratios, rounding_m: 0.001 },
+            body: TouchedBody::Block { size, ratios, rounding_m: 0.001 },
         }
     }
 

@@ -121,9 +121,9 @@ impl Drawing {
             .map(|i| {
                 let slope = (-answer.forces_n[i]).to_array();
                 let energy = Jet { value: 0.0, slope };
-                let alone = Answer { energy, depth_m: answer.depths_m[i], is_beyond: false };
+                let alone = Answer { energy, depth_m: answer.depths_m[i], is_extrapolated: false };
                 // Relative to the surface as lowered by the other spheres.
-                let lifted_m = answer.centres_m[i] + DVec3::Z * answer.sunk_m[i];
+                let lifted_m = answer.centres_m[i] + DVec3::Z * answer.depressions_m[i];
                 let contact = Contact::new(self.height_m, atlas, lifted_m, &alone, modulus_pa);
                 Contact { centre_m: answer.centres_m[i], ..contact }
             })
@@ -230,7 +230,7 @@ impl Contact {
     /// Returns the displacement of a surface point, m.
     fn moved_m(&self, place_m: DVec3) -> DVec3 {
         let share = free_share(self.height_m, place_m.z);
-        self.normal * -(share * self.sunk_m(place_m.distance(self.at_m)))
+        self.normal * -(share * self.depression_m(place_m.distance(self.at_m)))
     }
 
     /// Moves a displaced surface point that lies inside the sphere out to the sphere's surface.
@@ -257,7 +257,7 @@ impl Contact {
     }
 
     /// Returns the depression of the surface at a distance from the middle: the sphere's inside the contact, Hertz's outside.
-    fn sunk_m(&self, distance_m: f64) -> f64 {
+    fn depression_m(&self, distance_m: f64) -> f64 {
         if self.radius_m == 0.0 {
             return 0.0;
         }

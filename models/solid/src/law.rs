@@ -9,12 +9,12 @@ use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
 use crate::plate::{Hold, plate, plate_on};
 use crate::prepare::{
-    Footing, Prepared, Resolution, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
+    BodyKind, Prepared, Resolution, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
 };
 use crate::punch::{Bond, Outline, extrapolated};
 use crate::remainder::{Face, Fineness, Remainder, Size};
 use crate::rigid::{MODES, RigidPatch};
-use crate::several::{Beyond, Spheres};
+use crate::several::{ExtraCompliance, Spheres};
 use crate::table::Table;
 use crate::tetrahedra::Tetrahedra;
 use flotor_hal::{Refusal, Settings};
@@ -308,9 +308,9 @@ impl Description {
                 let fineness = RESOLUTIONS[self.resolution.min(2)].fineness;
                 let solve = || beyond_half_space(self.poisson_ratio, size, fineness).map_err(not_positive);
                 let numbers = remember(&words, &solve)?;
-                match Beyond::from_numbers(&numbers) {
+                match ExtraCompliance::from_numbers(&numbers) {
                     Some(beyond) => Some(beyond),
-                    None => Beyond::from_numbers(&solve()?),
+                    None => ExtraCompliance::from_numbers(&solve()?),
                 }
             }
             _ => None,
@@ -320,18 +320,18 @@ impl Description {
     }
 
     /// Returns the kind of body under a sphere.
-    fn footing(&self) -> Footing {
+    fn body_kind(&self) -> BodyKind {
         match self.body {
-            Body::Block(size) => Footing::Block(size),
-            Body::Cylinder { radius_m, height_m } => Footing::Cylinder([radius_m, height_m]),
-            Body::File { .. } => Footing::Face,
-            Body::Beam { .. } | Body::HalfSpace => Footing::HalfSpace,
+            Body::Block(size) => BodyKind::Block(size),
+            Body::Cylinder { radius_m, height_m } => BodyKind::Cylinder([radius_m, height_m]),
+            Body::File { .. } => BodyKind::Face,
+            Body::Beam { .. } | Body::HalfSpace => BodyKind::HalfSpace,
         }
     }
 
     fn read(&self, numbers: &[f64]) -> Option<(Law, f64)> {
         if let Tool::Sphere { radius_m } = self.tool {
-            let prepared = Prepared::from_numbers(numbers, self.poisson_ratio, radius_m, self.footing())?;
+            let prepared = Prepared::from_numbers(numbers, self.poisson_ratio, radius_m, self.body_kind())?;
             return Some((Law::Sphere(Box::new(prepared.atlas)), prepared.mesh_error));
         }
         let (&mesh_error, rest) = numbers.split_first()?;
@@ -385,7 +385,7 @@ impl Description {
         }
         if let Tool::Sphere { radius_m } = self.tool {
             let rings = RESOLUTIONS[self.resolution.min(2)].rings;
-            let prepared = sphere_on_mesh(mesh, self.footing(), self.poisson_ratio, radius_m, rings);
+            let prepared = sphere_on_mesh(mesh, self.body_kind(), self.poisson_ratio, radius_m, rings);
             return Ok(sphere(prepared.map_err(not_positive)?));
         }
         let Tool::Punch { outline, bond } = self.tool else {

@@ -4,7 +4,7 @@ use crate::drawing::Drawing;
 use crate::friction::Friction;
 use crate::law::{Description, Law, Tool};
 use crate::mesh::Mesh;
-use crate::several::{self, MOST};
+use crate::several::{self, MAX_SPHERES};
 use crate::{cache, gmsh};
 use flotor_hal::{
     Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output,
@@ -107,7 +107,7 @@ pub struct Solid {
     mesh_error: f64,
     youngs_modulus_pa: f64,
     /// Friction of each sphere.
-    friction: [Friction; MOST],
+    friction: [Friction; MAX_SPHERES],
     depth_m: f64,
     contacts: f64,
     parameters: [f64; SCHEMA.len()],
@@ -177,7 +177,7 @@ fn worse(status: StepStatus, answer: &several::Answer, is_too_deep: bool) -> Ste
         StepStatus::Clamped
     } else if !answer.is_settled {
         StepStatus::NotConverged
-    } else if answer.is_beyond {
+    } else if answer.is_extrapolated {
         StepStatus::OutOfDomain
     } else {
         status
@@ -216,7 +216,7 @@ impl ForceModel for Solid {
             law,
             mesh_error,
             youngs_modulus_pa,
-            friction: [friction; MOST],
+            friction: [friction; MAX_SPHERES],
             depth_m: f64::NAN,
             contacts: f64::NAN,
             parameters,
@@ -250,7 +250,7 @@ impl ForceModel for Solid {
                 self.contacts = f64::from(u8::from(answer.depth_m > 0.0));
                 if answer.depth_m > atlas.deepest_m {
                     status = StepStatus::Clamped;
-                } else if answer.is_beyond && status == StepStatus::Ok {
+                } else if answer.is_extrapolated && status == StepStatus::Ok {
                     status = StepStatus::OutOfDomain;
                 }
                 let normal_n = DVec3::from_array(answer.energy.slope) * -modulus;

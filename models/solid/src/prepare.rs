@@ -1,6 +1,6 @@
 //! Slow preparation of a law from a solid and a tool, before the loop.
 
-use crate::atlas::{Atlas, Ground};
+use crate::atlas::{Atlas, TouchedBody};
 use crate::body::{Body, outline_m};
 use crate::dense::NotPositive;
 use crate::half_space::HalfSpace;
@@ -148,13 +148,13 @@ fn ends(face: Face) -> [[End; 2]; 3] {
     [[End::Level, End::Parabola], along_q, [End::Parabola; 2]]
 }
 
-fn atlas(solid: &HalfSpace, radius_m: f64, profile: Curve, ground: Ground) -> Atlas {
+fn atlas(solid: &HalfSpace, radius_m: f64, profile: Curve, body: TouchedBody) -> Atlas {
     Atlas {
         radius_m,
         hertz: 8.0 / 15.0 / (1.0 - solid.poisson_ratio * solid.poisson_ratio) * radius_m.sqrt(),
         profile,
         deepest_m: DEEPEST * radius_m,
-        ground,
+        body,
     }
 }
 
@@ -162,7 +162,7 @@ fn atlas(solid: &HalfSpace, radius_m: f64, profile: Curve, ground: Ground) -> At
 #[must_use]
 pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Prepared {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
-    Prepared { atlas: atlas(&solid, radius_m, profile(&solid), Ground::HalfSpace), mesh_error: 0.0 }
+    Prepared { atlas: atlas(&solid, radius_m, profile(&solid), TouchedBody::HalfSpace), mesh_error: 0.0 }
 }
 
 /// Prepares the law of a sphere on a block. Not real-time: some seconds.
@@ -184,15 +184,15 @@ pub fn sphere_on_block(
     let side_y = if size.half_x_m == size.half_y_m { side_x.clone() } else { builder.ratios(Face::SideY) };
     let ratios = Box::new([top, side_x, side_y]);
     let mesh_error = builder.mesh_error()?;
-    let ground = Ground::Block { size, ratios, rounding_m };
-    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), ground), mesh_error })
+    let body = TouchedBody::Block { size, ratios, rounding_m };
+    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), body), mesh_error })
 }
 
 /// Positions at which contacts on a block are compared, in halves of a side from the middle.
 const BEYOND_PLACES: [f64; 4] = [0.0, 0.4, 0.75, 0.97];
 
 /// Solves for the vertical compliance between places of a block's top beyond that of a half-space: the numbers of
-/// [`crate::several::Beyond`], for a modulus of 1 Pa. Not real-time: up to some seconds.
+/// [`crate::several::ExtraCompliance`], for a modulus of 1 Pa. Not real-time: up to some seconds.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
@@ -224,7 +224,7 @@ fn rounding_m(size: Size, radius_m: f64) -> f64 {
 
 /// Kind of body under a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Footing {
+pub enum BodyKind {
     /// Half-space `z <= 0`.
     HalfSpace,
     /// Block.
@@ -240,14 +240,14 @@ fn around([radius_m, height_m]: [f64; 2]) -> Size {
     Size { half_x_m: radius_m, half_y_m: radius_m, height_m }
 }
 
-/// Prepares the law of a sphere on a mesh: top of a cylinder ([`Footing::Cylinder`]), or any plane face. Not real-time:
+/// Prepares the law of a sphere on a mesh: top of a cylinder ([`BodyKind::Cylinder`]), or any plane face. Not real-time:
 /// some seconds.
 ///
 /// # Errors
 /// [`NotPositive`] if the numbers do not describe a solid.
 pub fn sphere_on_mesh(
     mesh: &Mesh,
-    footing: Footing,
+    body_kind: BodyKind,
     poisson_ratio: f64,
     radius_m: f64,
     rings: i32,
@@ -264,7 +264,7 @@ pub fn sphere_on_mesh(
     };
     let mut levels = vec![0.0];
     levels.extend(&roots);
-    let ground = if let Footing::Cylinder(size @ [rim_m, height_m]) = footing {
+    let touched = if let BodyKind::Cylinder(size @ [rim_m, height_m]) = body_kind {
         let rounding_m = rounding_m(around(size), radius_m);
         let line = table_nodes(rim_m);
         let line: Vec<f64> = line.iter().skip(1).rev().map(|x| -x).chain(line.iter().copied()).collect();
@@ -282,7 +282,7 @@ pub fn sphere_on_mesh(
             }
         }
         let ratio = Volume::new([places, vec![-1.0, 0.0, 1.0], levels], &values, CYLINDER_ENDS);
-        Ground::Cylinder { radius_m: rim_m, height_m, ratio: Box::new(ratio), rounding_m }
+        TouchedBody::Cylinder { radius_m: rim_m, height_m, ratio: Box::new(ratio), rounding_m }
     } else {
         let spread = |shares: &[f64], k: usize, margin: f64| -> Vec<f64> {
             let [low, high] = outline_m[k];
@@ -301,11 +301,11 @@ pub fn sphere_on_mesh(
                 }
             }
         }
-        Ground::Face { outline_m, ratio: Box::new(Volume::new([x, y, levels], &values, FACE_ENDS)) }
+        TouchedBody::Face { outline_m, ratio: Box::new(Volume::new([x, y, levels], &values, FACE_ENDS)) }
     };
     // Evaluate in the middle, and at a quarter of the side from an edge.
     let mesh_error = body.mesh_error(radius_m, &[[0.0; 2], [0.75 * outline_m[0][1], 0.0]]);
-    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), ground), mesh_error })
+    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), touched), mesh_error })
 }
 
 impl Prepared {
@@ -314,13 +314,13 @@ impl Prepared {
     pub fn to_numbers(&self) -> Vec<f64> {
         let mut numbers = vec![self.mesh_error];
         self.atlas.profile.write_numbers(&mut numbers);
-        match &self.atlas.ground {
-            Ground::HalfSpace => {}
-            Ground::Block { ratios, .. } => {
+        match &self.atlas.body {
+            TouchedBody::HalfSpace => {}
+            TouchedBody::Block { ratios, .. } => {
                 ratios.iter().for_each(|volume| volume.write_numbers(&mut numbers))
             }
-            Ground::Cylinder { ratio, .. } => ratio.write_numbers(&mut numbers),
-            Ground::Face { outline_m, ratio } => {
+            TouchedBody::Cylinder { ratio, .. } => ratio.write_numbers(&mut numbers),
+            TouchedBody::Face { outline_m, ratio } => {
                 ratio.write_numbers(&mut numbers);
                 numbers.extend(outline_m.as_flattened());
             }
@@ -334,36 +334,36 @@ impl Prepared {
         mut numbers: &[f64],
         poisson_ratio: f64,
         radius_m: f64,
-        footing: Footing,
+        body_kind: BodyKind,
     ) -> Option<Self> {
         let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
         let (&mesh_error, rest) = numbers.split_first()?;
         numbers = rest;
         let profile = Curve::from_numbers(&mut numbers, [End::Parabola; 2])?;
-        let ground = match footing {
-            Footing::HalfSpace => Ground::HalfSpace,
-            Footing::Block(size) => {
+        let body = match body_kind {
+            BodyKind::HalfSpace => TouchedBody::HalfSpace,
+            BodyKind::Block(size) => {
                 let mut next = |face| Volume::from_numbers(&mut numbers, ends(face));
                 let ratios = Box::new([next(Face::Top)?, next(Face::SideX)?, next(Face::SideY)?]);
-                Ground::Block { size, ratios, rounding_m: rounding_m(size, radius_m) }
+                TouchedBody::Block { size, ratios, rounding_m: rounding_m(size, radius_m) }
             }
-            Footing::Cylinder(size @ [rim_m, height_m]) => {
+            BodyKind::Cylinder(size @ [rim_m, height_m]) => {
                 let ratio = Box::new(Volume::from_numbers(&mut numbers, CYLINDER_ENDS)?);
-                Ground::Cylinder {
+                TouchedBody::Cylinder {
                     radius_m: rim_m,
                     height_m,
                     ratio,
                     rounding_m: rounding_m(around(size), radius_m),
                 }
             }
-            Footing::Face => {
+            BodyKind::Face => {
                 let ratio = Box::new(Volume::from_numbers(&mut numbers, FACE_ENDS)?);
                 let (&[a, b, c, d], rest) = numbers.split_first_chunk()?;
                 numbers = rest;
-                Ground::Face { outline_m: [[a, b], [c, d]], ratio }
+                TouchedBody::Face { outline_m: [[a, b], [c, d]], ratio }
             }
         };
-        numbers.is_empty().then(|| Self { atlas: atlas(&solid, radius_m, profile, ground), mesh_error })
+        numbers.is_empty().then(|| Self { atlas: atlas(&solid, radius_m, profile, body), mesh_error })
     }
 }
 

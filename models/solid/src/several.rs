@@ -27,7 +27,7 @@ use flotor_hal::{DQuat, DVec3, Wrench};
 use std::f64::consts::PI;
 
 /// Maximum number of spheres on a handle.
-pub const MOST: usize = 4;
+pub const MAX_SPHERES: usize = 4;
 /// Maximum number of iterations of a solve.
 const STEPS: usize = 60;
 /// Largest relative change of a force at convergence, relative to the largest force.
@@ -40,7 +40,7 @@ const ROUNDING: f64 = 1.0e-12;
 /// Compliance between places of the top face beyond that of a half-space, for a modulus of 1 Pa: cubic splines through
 /// values between the nodes of a grid.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Beyond {
+pub struct ExtraCompliance {
     /// Spline of each node of an axis: one at this node, zero at the others.
     shapes: [Vec<Curve>; 2],
     /// First and last node of each axis, m.
@@ -55,7 +55,7 @@ const MOST_NODES: usize = 7;
 /// Weights of the nodes at a place, with their derivatives along x and y.
 type Weights = [[f64; 3]; MOST_NODES * MOST_NODES];
 
-impl Beyond {
+impl ExtraCompliance {
     /// Interpolates values between each two nodes of a grid (x first); three to seven nodes along an axis. Not real-time.
     #[must_use]
     pub fn new(nodes_m: [&[f64]; 2], values: Vec<f64>) -> Option<Self> {
@@ -125,7 +125,7 @@ pub struct Spheres {
     /// Centres relative to the handle, in its frame, m.
     offsets_m: Vec<DVec3>,
     /// Addition of a block to the compliance of a half-space, for a modulus of 1 Pa (m/N). `None` on a half-space.
-    pub beyond: Option<Beyond>,
+    pub beyond: Option<ExtraCompliance>,
 }
 
 /// Result of a tick with several spheres, for a modulus of 1 Pa.
@@ -136,15 +136,15 @@ pub struct Answer {
     /// Stored energy, J.
     pub energy_j: f64,
     /// Positions of the centres, m; the first [`Spheres::count`] are valid.
-    pub centres_m: [DVec3; MOST],
+    pub centres_m: [DVec3; MAX_SPHERES],
     /// Force on each sphere, N.
-    pub forces_n: [DVec3; MOST],
+    pub forces_n: [DVec3; MAX_SPHERES],
     /// Depth of the face inside each sphere, including the depression by the others; not positive without contact.
-    pub depths_m: [f64; MOST],
+    pub depths_m: [f64; MAX_SPHERES],
     /// Depression of the surface under each sphere by the others, m.
-    pub sunk_m: [f64; MOST],
+    pub depressions_m: [f64; MAX_SPHERES],
     /// True where the law of some sphere is that of a nearby position.
-    pub is_beyond: bool,
+    pub is_extrapolated: bool,
     /// True if the forces converged.
     pub is_settled: bool,
 }
@@ -157,7 +157,7 @@ impl Spheres {
         poisson_ratio: f64,
         count: usize,
         spacing_m: f64,
-        beyond: Option<Beyond>,
+        beyond: Option<ExtraCompliance>,
     ) -> Self {
         let half = 0.5 * spacing_m;
         let corners: &[[f64; 2]] = match count {
@@ -185,7 +185,7 @@ impl Spheres {
     pub fn answer(&self, position_m: DVec3, orientation: DQuat) -> Answer {
         let count = self.count();
         let home = DVec3::Z * self.atlas.radius_m;
-        let mut arms_m = [DVec3::ZERO; MOST];
+        let mut arms_m = [DVec3::ZERO; MAX_SPHERES];
         arms_m.iter_mut().zip(&self.offsets_m).for_each(|(arm, offset)| *arm = orientation * *offset);
         let centres_m = arms_m.map(|arm| position_m + home + arm);
         let (compliance, slopes) = self.compliance(&centres_m);
@@ -194,15 +194,15 @@ impl Spheres {
             wrench: Wrench::ZERO,
             energy_j: 0.0,
             centres_m,
-            forces_n: [DVec3::ZERO; MOST],
-            depths_m: [-1.0; MOST],
-            sunk_m: [0.0; MOST],
-            is_beyond: false,
+            forces_n: [DVec3::ZERO; MAX_SPHERES],
+            depths_m: [-1.0; MAX_SPHERES],
+            depressions_m: [0.0; MAX_SPHERES],
+            is_extrapolated: false,
             is_settled,
         };
         let (mut force_n, mut torque_nm) = (DVec3::ZERO, DVec3::ZERO);
         for i in 0..count {
-            let (pressed, sunk_m) = settled[i];
+            let (pressed, depression_m) = settled[i];
             let centre_m = centres_m[i].to_array();
             let (alone, top) = (self.atlas.answer(centre_m), self.atlas.top(centre_m));
             // Contribution of other faces to the energy.
@@ -219,9 +219,10 @@ impl Spheres {
                 own_n += slopes[i][j] * both_n2;
             }
             answer.forces_n[i] = own_n;
-            answer.depths_m[i] = if top.energy.value > 0.0 { alone.depth_m - sunk_m } else { alone.depth_m };
-            answer.sunk_m[i] = sunk_m;
-            answer.is_beyond |= alone.is_beyond;
+            answer.depths_m[i] =
+                if top.energy.value > 0.0 { alone.depth_m - depression_m } else { alone.depth_m };
+            answer.depressions_m[i] = depression_m;
+            answer.is_extrapolated |= alone.is_extrapolated;
             force_n += own_n;
             torque_nm += arms_m[i].cross(own_n);
         }
@@ -230,9 +231,13 @@ impl Spheres {
     }
 
     /// Returns the compliance between each two spheres, m/N, and its derivatives by the place of the first.
-    fn compliance(&self, centres_m: &[DVec3; MOST]) -> ([[f64; MOST]; MOST], [[DVec3; MOST]; MOST]) {
+    fn compliance(
+        &self,
+        centres_m: &[DVec3; MAX_SPHERES],
+    ) -> ([[f64; MAX_SPHERES]; MAX_SPHERES], [[DVec3; MAX_SPHERES]; MAX_SPHERES]) {
         let count = self.count();
-        let (mut values, mut slopes) = ([[0.0; MOST]; MOST], [[DVec3::ZERO; MOST]; MOST]);
+        let (mut values, mut slopes) =
+            ([[0.0; MAX_SPHERES]; MAX_SPHERES], [[DVec3::ZERO; MAX_SPHERES]; MAX_SPHERES]);
         for i in 0..count {
             for j in (0..count).filter(|&j| j != i) {
                 // The tool is rigid: this distance is the same at every pose, and its derivative is zero.
@@ -265,14 +270,15 @@ impl Spheres {
     /// Solves for the forces on the top alone: returns each sphere's result with the depression under it, and convergence.
     fn settle(
         &self,
-        centres_m: &[DVec3; MOST],
-        compliance: &[[f64; MOST]; MOST],
-    ) -> ([(atlas::Answer, f64); MOST], bool) {
+        centres_m: &[DVec3; MAX_SPHERES],
+        compliance: &[[f64; MAX_SPHERES]; MAX_SPHERES],
+    ) -> ([(atlas::Answer, f64); MAX_SPHERES], bool) {
         let count = self.count();
-        let alone =
-            |centre: DVec3, sunk_m: f64| (self.atlas.top((centre + DVec3::Z * sunk_m).to_array()), sunk_m);
+        let alone = |centre: DVec3, depression_m: f64| {
+            (self.atlas.top((centre + DVec3::Z * depression_m).to_array()), depression_m)
+        };
         let mut now = centres_m.map(|centre| alone(centre, 0.0));
-        let (mut up_n, mut stiffness) = ([0.0; MOST], [0.0; MOST]);
+        let (mut up_n, mut stiffness) = ([0.0; MAX_SPHERES], [0.0; MAX_SPHERES]);
         for i in 0..count {
             let (answer, _) = now[i];
             up_n[i] = -answer.energy.slope[2];
@@ -281,17 +287,17 @@ impl Spheres {
         }
         for step in 0..STEPS {
             let (mut largest_n, mut miss_n) = (0.0_f64, 0.0_f64);
-            let (mut matrix, mut right) = ([[0.0; MOST]; MOST], [0.0; MOST]);
+            let (mut matrix, mut right) = ([[0.0; MAX_SPHERES]; MAX_SPHERES], [0.0; MAX_SPHERES]);
             for i in 0..count {
                 let (before, before_m) = now[i];
-                let sunk_m: f64 = (0..count).map(|j| compliance[i][j] * up_n[j]).sum();
-                now[i] = alone(centres_m[i], sunk_m);
+                let depression_m: f64 = (0..count).map(|j| compliance[i][j] * up_n[j]).sum();
+                now[i] = alone(centres_m[i], depression_m);
                 let found_n = -now[i].0.energy.slope[2];
                 right[i] = found_n - up_n[i];
                 largest_n = largest_n.max(found_n.abs());
                 miss_n = miss_n.max(right[i].abs());
                 // A force depends on one depression alone: the secant through the last two.
-                let moved_m = sunk_m - before_m;
+                let moved_m = depression_m - before_m;
                 let hertz =
                     if now[i].0.depth_m > 0.0 { (1.5 * found_n / now[i].0.depth_m).abs() } else { 0.0 };
                 if step >= STEPS / 2 {
@@ -319,7 +325,11 @@ impl Spheres {
 }
 
 /// Solves a small system with a dominant diagonal by elimination.
-fn eliminate(mut matrix: [[f64; MOST]; MOST], mut right: [f64; MOST], count: usize) -> [f64; MOST] {
+fn eliminate(
+    mut matrix: [[f64; MAX_SPHERES]; MAX_SPHERES],
+    mut right: [f64; MAX_SPHERES],
+    count: usize,
+) -> [f64; MAX_SPHERES] {
     for column in 0..count {
         let pivot = matrix[column];
         for row in column + 1..count {

@@ -13,7 +13,7 @@ use pulp::{Arch, Simd, WithSimd, bytemuck};
 
 use crate::contract;
 use crate::pose::Coordinates;
-use crate::response::{Answer, Demand, Law, Response};
+use crate::response::{Demand, LaneResponse, Law, Response};
 use flotor_lanes::{Pair, Real, Vector, Wide};
 
 /// Lanes of two of the widest registers, a multiple of those of the others.
@@ -86,13 +86,13 @@ impl<L: Law> WithSimd for Rows<'_, L> {
             let is_common =
                 inputs.iter().fold(true, |is_common, input| is_common & (input.demand == first.demand));
             let demand = if is_common { contract::demand(first) } else { widest(inputs) };
-            let answer = law.answer(&coordinates(simd, inputs), demand);
+            let answer = law.evaluate(&coordinates(simd, inputs), demand);
             let verdict = verdict(&answer);
             let energy_j = match L::HAS_ENERGY && demand >= Demand::WrenchAndEnergy {
                 true => answer.energy_j,
                 false => verdict.like(f64::NAN),
             };
-            put(simd, &Answer { energy_j, ..answer }, outputs);
+            put(simd, &LaneResponse { energy_j, ..answer }, outputs);
             if !is_common || Pair::<Wide<S>>::any(verdict.above(ANSWERED)) {
                 // Transposed back like the answers: lanes need not be in the sequence of the poses.
                 let (first, second) = ([verdict.0.lanes(); 4], [verdict.1.lanes(); 4]);
@@ -143,7 +143,7 @@ fn components<S: Simd>(simd: S, inputs: &[Input]) -> [S::f64s; 7] {
 
 /// Returns the status of each lane's answer.
 #[inline(always)]
-fn verdict<R: Real>(answer: &Answer<R>) -> R {
+fn verdict<R: Real>(answer: &LaneResponse<R>) -> R {
     let like = answer.energy_j;
     let trust = R::select(answer.trusted, like.like(ANSWERED), like.like(CLAMPED));
     R::select(answer.answered, trust, like.like(UNANSWERED))
@@ -151,8 +151,8 @@ fn verdict<R: Real>(answer: &Answer<R>) -> R {
 
 /// Writes outputs, one from each lane of two registers, all with status `Ok`.
 #[inline(always)]
-fn put<S: Simd>(simd: S, answer: &Answer<Pair<Wide<S>>>, outputs: &mut [Output]) {
-    let Answer { force_n: force, torque_nm: torque, energy_j, .. } = answer;
+fn put<S: Simd>(simd: S, answer: &LaneResponse<Pair<Wide<S>>>, outputs: &mut [Output]) {
+    let LaneResponse { force_n: force, torque_nm: torque, energy_j, .. } = answer;
     let (first, second) = outputs.split_at_mut(S::F64_LANES);
     let numbers = [force.x.0, force.y.0, force.z.0, torque.x.0, torque.y.0, torque.z.0, energy_j.0];
     put_register(simd, numbers, first);
@@ -181,7 +181,7 @@ fn put_register<S: Simd>(simd: S, numbers: [Wide<S>; 7], outputs: &mut [Output])
 fn amend(inputs: &[Input], outputs: &mut [Output], verdicts: &[[f64; 4]]) {
     for ((input, output), [verdict, ..]) in inputs.iter().zip(outputs).zip(verdicts) {
         if *verdict == UNANSWERED {
-            *output = contract::output(&Response::none(contract::pose(input).why_unanswered()));
+            *output = contract::output(&Response::none(contract::pose(input).failure_reason()));
             continue;
         }
         let demand = contract::demand(input);

@@ -17,7 +17,7 @@
 use crate::beam_column::{Column, TRUSTED_ARGUMENT};
 use crate::pose::{Coordinates, Pose, Span};
 use crate::precision::{Binary32, Binary64, Precision, Storage};
-use crate::response::{Answer, Demand, Law, Response};
+use crate::response::{Demand, LaneResponse, Law, Response};
 use crate::rigidity::Spring;
 use flotor_lanes::arctangent;
 use flotor_lanes::{Pair, Real, Vector};
@@ -82,7 +82,7 @@ impl ClosedForm {
     }
 
     #[inline(always)]
-    fn evaluate<R: Real, S: Storage>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R> {
+    fn evaluate_stored<R: Real, S: Storage>(&self, at: &Coordinates<R>, demand: Demand) -> LaneResponse<R> {
         let at = at.without_dust();
         let Vector { x, y, z } = at.position_m;
         let position_m = Vector::new(S::store(x), S::store(y), S::store(z));
@@ -130,7 +130,7 @@ impl ClosedForm {
         };
         // Overflow gives no answer. One sum instead of six tests: the sum is finite only if every term is.
         let sum = (force_n.x + force_n.y + force_n.z) + (torque_nm.x + torque_nm.y + torque_nm.z);
-        Answer {
+        LaneResponse {
             force_n,
             torque_nm,
             energy_j: zero,
@@ -144,10 +144,10 @@ impl Law for ClosedForm {
     const HAS_ENERGY: bool = false;
 
     #[inline(always)]
-    fn answer<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R> {
+    fn evaluate<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> LaneResponse<R> {
         match self.precision {
-            Precision::Double => self.evaluate::<R, Binary64>(at, demand),
-            Precision::Single => self.evaluate::<R, Binary32>(at, demand),
+            Precision::Double => self.evaluate_stored::<R, Binary64>(at, demand),
+            Precision::Single => self.evaluate_stored::<R, Binary32>(at, demand),
         }
     }
 }

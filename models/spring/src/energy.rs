@@ -32,7 +32,7 @@
 
 use crate::bending::{Bending, BendingEnergy};
 use crate::pose::{Coordinates, Pose, Span};
-use crate::response::{Answer, Demand, Law, Response};
+use crate::response::{Demand, LaneResponse, Law, Response};
 use crate::rigidity::Spring;
 use flotor_lanes::angle::{TRUSTED_VERSINE, measures};
 use flotor_lanes::{Real, Vector};
@@ -102,7 +102,7 @@ impl Law for EnergyForm {
 
     /// Returns `F = -dW/dr`, `M = -dW/d(rotation)`, `W`.
     #[inline(always)]
-    fn answer<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R> {
+    fn evaluate<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> LaneResponse<R> {
         let Span { vector_m, length_m, shortening_m, usable } = at.span(self.free_length_m);
         let inverse_length = length_m.inverse();
         let directions = Directions::new(vector_m, length_m, inverse_length, at.orientation);
@@ -110,7 +110,7 @@ impl Law for EnergyForm {
         let answered = usable & directions.overturn.above(LEAST_OVERTURN) & sheared_length_m.above(0.0);
         // Early exit: a single pose without an answer needs no further computation.
         if !R::any(answered) {
-            return Answer::none(length_m, answered);
+            return LaneResponse::none(length_m, answered);
         }
         let Directions { versines, twist_versine, twist_sine, .. } = directions;
         let (angles, twist) = measures(versines, twist_versine, twist_sine);
@@ -157,7 +157,7 @@ impl Law for EnergyForm {
         } else {
             zero
         };
-        Answer { force_n, torque_nm, energy_j, answered, trusted: directions.trusted(saturated) }
+        LaneResponse { force_n, torque_nm, energy_j, answered, trusted: directions.trusted(saturated) }
     }
 }
 

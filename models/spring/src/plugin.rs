@@ -5,7 +5,7 @@ use crate::centerline::{Helix, Section};
 use crate::contract;
 use crate::pace::Pace;
 use crate::parameters::{Choice, SCHEMA, Switch};
-use crate::prepared::{Insight, Prepared};
+use crate::prepared::{Diagnostics, Prepared};
 use crate::rod::Branch;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{
@@ -95,7 +95,7 @@ impl DetailsModel for SpringModel {
     ];
 
     fn details(&self, values: &mut [f64]) {
-        let Insight { branch, is_stable, seat_roll_rad, rod_share } = self.law.insight();
+        let Diagnostics { branch, is_stable, seat_roll_rad, rod_share } = self.law.diagnostics();
         let branch = branch.map(|branch| match branch {
             Branch::Unbuckled => 0.0,
             Branch::Buckled => 1.0,

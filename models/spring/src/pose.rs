@@ -23,7 +23,7 @@ const UNIT_NORM_TOLERANCE: f64 = 1e-6;
 
 /// Threshold below which a coordinate is set to zero, in m and as a quaternion component: powers of smaller numbers are
 /// too small for full precision, and a hundred times slower. A stiffness of 1e10 N/m turns this length into 1e-40 N.
-pub(crate) const DUST: f64 = 1e-50;
+pub(crate) const NEGLIGIBLE: f64 = 1e-50;
 
 /// Pose of the upper plate in the model frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +63,7 @@ impl Pose {
         let Span { vector_m: Vector { x, y, z }, length_m, shortening_m, usable } =
             self.coordinates().span(free_length_m);
         let vector_m = DVec3::new(x, y, z);
-        if usable { Ok(Chord { vector_m, length_m, shortening_m }) } else { Err(self.why_unanswered()) }
+        if usable { Ok(Chord { vector_m, length_m, shortening_m }) } else { Err(self.failure_reason()) }
     }
 
     /// Returns the numbers of the pose, for formulas over one pose or many.
@@ -75,7 +75,7 @@ impl Pose {
 
     /// Returns the reason for a missing answer: an invalid pose, or a pose outside the domain of the law.
     #[cold]
-    pub(crate) fn why_unanswered(&self) -> Validity {
+    pub(crate) fn failure_reason(&self) -> Validity {
         if self.is_valid() { Validity::OutOfDomain } else { Validity::InvalidInput }
     }
 
@@ -98,7 +98,7 @@ pub struct Coordinates<R> {
 }
 
 impl<R: Real> Coordinates<R> {
-    /// Returns the pose with negligible coordinates set to zero, see [`DUST`]. Real-time: bounded, no allocation, no branch.
+    /// Returns the pose with negligible coordinates set to zero, see [`NEGLIGIBLE`]. Real-time: bounded, no allocation, no branch.
     #[inline(always)]
     pub(crate) fn without_dust(&self) -> Self {
         let Vector { x, y, z } = self.position_m;
@@ -167,7 +167,7 @@ pub(crate) struct Span<R: Real> {
 
 #[inline(always)]
 fn or_zero<R: Real>(number: R) -> R {
-    R::select(number.abs().below(DUST), number.like(0.0), number)
+    R::select(number.abs().below(NEGLIGIBLE), number.like(0.0), number)
 }
 
 /// Returns the unit quaternion of a rotation vector.

@@ -40,7 +40,7 @@ pub(crate) enum Prepared {
 }
 
 /// Diagnostics of a response beside the wrench; `None` for quantities that a law does not have.
-pub(crate) struct Insight {
+pub(crate) struct Diagnostics {
     pub(crate) branch: Option<Branch>,
     pub(crate) is_stable: Option<bool>,
     /// Roll of the base about the y axis (rad); `None` for a lifted spring.
@@ -186,7 +186,7 @@ impl Prepared {
     }
 
     /// Returns diagnostics of the last response. Real-time: bounded, no allocation.
-    pub(crate) fn insight(&self) -> Insight {
+    pub(crate) fn diagnostics(&self) -> Diagnostics {
         let (state, seat) = match self {
             Self::Thesis(_) | Self::ClosedForm(_) | Self::Energy(_) => (None, None),
             Self::RodBlend(held) => (held.law.rod_state(), None),
@@ -195,7 +195,7 @@ impl Prepared {
             Self::FreeRodBlend(held, seat) => (held.law.rod_state(), Some(seat)),
             Self::FreeRod(held, seat) => (Some(held.law.state()), Some(seat)),
         };
-        Insight {
+        Diagnostics {
             branch: state.map(|state| state.branch),
             is_stable: state.map(|state| state.is_stable()),
             rod_share: match self {
@@ -301,7 +301,7 @@ fn blend_some(law: &mut RodBlend, pace: &mut Pace, inputs: &[Input], outputs: &m
         match law.examine(&contract::pose(input)) {
             Some(at) => *output = examined_step(law, pace, input, &at),
             None => {
-                law.leave();
+                law.reset_weight();
                 *pace = Pace::default();
             }
         }
@@ -313,7 +313,7 @@ fn blend_step(law: &mut RodBlend, pace: &mut Pace, input: &Input) -> Output {
     match law.examine(&contract::pose(input)) {
         Some(at) => examined_step(law, pace, input, &at),
         None => {
-            law.leave();
+            law.reset_weight();
             *pace = Pace::default();
             contract::step(law.energy(), input)
         }

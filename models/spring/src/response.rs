@@ -53,15 +53,15 @@ pub trait Law {
     /// Returns the answer at a pose, or at one pose per lane. Real-time: bounded, no allocation.
     ///
     /// The numbers of a lane without an answer are meaningless. Outputs not demanded are not computed and zero.
-    fn answer<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> Answer<R>;
+    fn evaluate<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> LaneResponse<R>;
 
     /// Returns the response at one pose. Real-time: bounded, no allocation.
     #[inline(always)] // into the instructions of a step, see `contract`
     fn respond_at(&self, pose: &Pose, demand: Demand) -> Response {
-        let Answer { force_n, torque_nm, energy_j, answered, trusted } =
-            self.answer(&pose.coordinates(), demand);
+        let LaneResponse { force_n, torque_nm, energy_j, answered, trusted } =
+            self.evaluate(&pose.coordinates(), demand);
         if !answered {
-            return Response::none(pose.why_unanswered());
+            return Response::none(pose.failure_reason());
         }
         let has_energy = Self::HAS_ENERGY && demand >= Demand::WrenchAndEnergy;
         Response {
@@ -75,7 +75,7 @@ pub trait Law {
 
 /// Answer of a [`Law`] before it is packed into a [`Response`].
 #[derive(Clone, Copy, Debug)]
-pub struct Answer<R: Real> {
+pub struct LaneResponse<R: Real> {
     /// Force on the hand (N).
     pub force_n: Vector<R>,
     /// Torque on the hand (N·m).
@@ -88,7 +88,7 @@ pub struct Answer<R: Real> {
     pub trusted: R::Mask,
 }
 
-impl<R: Real> Answer<R> {
+impl<R: Real> LaneResponse<R> {
     /// Returns zeros for all lanes; `answered` must be false in every lane.
     #[inline(always)]
     pub(crate) fn none(like: R, answered: R::Mask) -> Self {

@@ -15,7 +15,7 @@
 //! column. Past buckling there are several: a bulge may point anywhere, and its direction depends on the path of the
 //! hand. A choice by the pose alone would make the torque jump as a plate is rocked through the level, so past buckling
 //! the rod is followed from tick to tick, until the plates are far enough apart again. A spring too short to buckle
-//! (`ShareOfRod::has_buckling`) has no such poses and no history.
+//! (`RodWeight::has_buckling`) has no such poses and no history.
 
 use flotor_hal::glam::DVec3;
 use pulp::NullaryFnOnce;
@@ -30,7 +30,7 @@ use crate::remainder::{Remainder, RemainderEnergy};
 use crate::response::{Demand, Law as _, Response};
 use crate::rigidity::Spring;
 use crate::rod::{Rod, State};
-use crate::rod_share::{Law, ShareOfRod};
+use crate::rod_share::{Law, RodWeight};
 use crate::validity::Validity;
 
 /// Default tolerance of the force (N): the zero-order-hold error of a 1 kHz loop with an exact model, 5.4 mN rms
@@ -43,7 +43,7 @@ pub struct RodBlend {
     energy: EnergyForm,
     remainder: Option<Remainder>,
     rod: Rod,
-    shares: ShareOfRod,
+    shares: RodWeight,
     spring: Spring,
     tolerance_n: f64,
     share: f64,
@@ -109,7 +109,7 @@ impl RodBlend {
     /// Clears the history. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.rod.reset();
-        self.leave();
+        self.reset_weight();
     }
 
     /// Returns true if a response may depend on earlier poses: the spring can buckle.
@@ -149,7 +149,7 @@ impl RodBlend {
 
     /// Sets the rod's weight to zero; its shape is found anew later.
     #[inline]
-    pub(crate) fn leave(&mut self) {
+    pub(crate) fn reset_weight(&mut self) {
         self.share = 0.0;
         self.follows = Follows::Pose;
     }
@@ -159,7 +159,7 @@ impl RodBlend {
         match self.examine(pose) {
             Some(at) => self.respond_examined(advance, pose, &at, demand),
             None => {
-                self.leave();
+                self.reset_weight();
                 self.energy.respond(pose, demand)
             }
         }
@@ -191,7 +191,7 @@ impl RodBlend {
         let corrected = Corrected { energy, remainder: remainder.as_ref(), pose, at, upright };
         if share.value == 0.0 {
             let response = corrected.respond(demand);
-            self.leave();
+            self.reset_weight();
             return response;
         }
         let law = (share.value < 1.0).then(|| corrected.respond(Demand::WrenchAndEnergy));
@@ -274,8 +274,8 @@ impl NullaryFnOnce for Answering<'_> {
 }
 
 /// Returns the weight function of the rod beside a law with this remainder.
-fn shares(spring: &Spring, tolerance_n: f64, remainder: Option<&Remainder>) -> ShareOfRod {
-    ShareOfRod::new(spring, tolerance_n, if remainder.is_some() { Law::Corrected } else { Law::Plain })
+fn shares(spring: &Spring, tolerance_n: f64, remainder: Option<&Remainder>) -> RodWeight {
+    RodWeight::new(spring, tolerance_n, if remainder.is_some() { Law::Corrected } else { Law::Plain })
 }
 
 impl HeldSpring for RodBlend {

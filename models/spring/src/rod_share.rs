@@ -200,7 +200,7 @@ impl Law {
 
 /// Weight function of the rod for one spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ShareOfRod {
+pub(crate) struct RodWeight {
     free_length_m: f64,
     load: Load,
     has_buckling: bool,
@@ -221,7 +221,7 @@ struct Middle {
     twist: f64,
 }
 
-impl ShareOfRod {
+impl RodWeight {
     /// Prepares the weight function for a tolerance of the force.
     pub(crate) fn new(spring: &Spring, tolerance_n: f64, law: Law) -> Self {
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);

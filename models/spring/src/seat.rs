@@ -44,7 +44,7 @@ use crate::rigidity::Spring;
 use crate::validity::Validity;
 use base::{Base, Lengths, Standing};
 pub use friction::Friction;
-use friction::Grip;
+use friction::FrictionLimit;
 use tilt::Quadratic;
 
 mod base;
@@ -85,7 +85,7 @@ pub struct Seat {
     lengths: Lengths,
     at: Standing,
     quadratic: Quadratic,
-    grip: Grip,
+    grip: FrictionLimit,
     lifted: bool,
     /// Remaining fraction of the wrench in a fall: 1 for a standing spring, 0 for a fallen one.
     hold: f64,
@@ -160,7 +160,7 @@ impl Seat {
             lengths: Lengths::of(spring),
             at: Standing::SEATED,
             quadratic: Quadratic::at_rest(4.0 * spring.rigidities().alpha_n_m2 / free_length_m),
-            grip: Grip::new(spring, friction),
+            grip: FrictionLimit::new(spring, friction),
             lifted: false,
             hold: 1.0,
             stride_rad: LONGEST_STEP_RAD,

@@ -6,7 +6,7 @@ use flotor_hal::DVec3;
 
 /// Force on the handle, with the energy of the spring.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Pull {
+pub struct ContactForce {
     /// Force on the handle, N.
     pub force_n: DVec3,
     /// Energy in the spring, J.
@@ -42,10 +42,10 @@ impl Proxy {
         surface: &Surface,
         handle_m: DVec3,
         velocity_m_per_s: DVec3,
-    ) -> Pull {
+    ) -> ContactForce {
         if !shape.contains(handle_m) {
             *self = Self { contact: None, outside_m: handle_m };
-            return Pull::default();
+            return ContactForce::default();
         }
         let before = self.contact.unwrap_or_else(|| shape.entry(self.outside_m, handle_m));
         let proxy = shape.slide(&before, surface, handle_m, velocity_m_per_s);
@@ -55,7 +55,7 @@ impl Proxy {
         let depth_m = stretch_m.dot(proxy.normal);
         let along_m = stretch_m - proxy.normal * depth_m;
         let normal_n = surface.normal_force_n(depth_m, velocity_m_per_s.dot(proxy.normal));
-        Pull {
+        ContactForce {
             force_n: proxy.normal * normal_n + along_m * surface.stiffness_n_per_m,
             energy_j: 0.5 * surface.stiffness_n_per_m * stretch_m.length_squared(),
         }

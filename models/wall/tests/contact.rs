@@ -1,7 +1,7 @@
 //! The wall against closed forms: depth, cone of friction, work in a loop, and what a wall never does.
 
 use flotor_hal::DVec3;
-use flotor_wall::proxy::{Proxy, Pull};
+use flotor_wall::proxy::{ContactForce, Proxy};
 use flotor_wall::shape::Shape;
 use flotor_wall::surface::Surface;
 use proptest::prelude::*;
@@ -12,8 +12,8 @@ const BALL: Shape = Shape::Sphere { radius_m: 0.02 };
 const CUBE: Shape = Shape::Cube { half_m: 0.01 };
 
 /// Takes a handle from point to point in steps of at most 10 µm; the last pull, and the work the handle got, J.
-fn walk(shape: Shape, surface: Surface, points_m: &[DVec3]) -> (Pull, f64) {
-    let (mut proxy, mut pull, mut work_j) = (Proxy::default(), Pull::default(), 0.0);
+fn walk(shape: Shape, surface: Surface, points_m: &[DVec3]) -> (ContactForce, f64) {
+    let (mut proxy, mut pull, mut work_j) = (Proxy::default(), ContactForce::default(), 0.0);
     for pair in points_m.windows(2) {
         let steps = ((pair[1] - pair[0]).length() / 1.0e-5).ceil().max(1.0);
         let mut before_m = pair[0];
@@ -70,7 +70,7 @@ fn the_cone_is_that_of_the_force_that_is_felt() {
 fn on_a_ball_the_sliding_pull_lies_on_the_cone() {
     let path = [DVec3::Z * 0.001, DVec3::Z * -0.002, DVec3::new(0.008, 0.0, -0.004)];
     let mut proxy = Proxy::default();
-    let mut pull = Pull::default();
+    let mut pull = ContactForce::default();
     for pair in path.windows(2) {
         for step in 1..=1000 {
             pull = proxy.follow(&BALL, &ROUGH, pair[0].lerp(pair[1], f64::from(step) / 1000.0), DVec3::ZERO);
@@ -236,7 +236,7 @@ proptest! {
             at += DVec3::new(x, y, z);
             let pull = proxy.follow(&shape, &surface, at, DVec3::ZERO);
             let Some(place) = proxy.contact() else {
-                prop_assert_eq!(pull, Pull::default());
+                prop_assert_eq!(pull, ContactForce::default());
                 continue;
             };
             let pressed_n = pull.force_n.dot(place.normal);

@@ -122,7 +122,7 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     shape: Shape<N>,
     history: History<N>,
     marked: (Plate, Shape<N>),
-    matrix: KeptMatrix<N>,
+    matrix: CachedMatrix<N>,
     damping: f64,
     stride: Stride,
     unstable_directions: usize,
@@ -167,7 +167,7 @@ struct Stepped<const N: usize> {
 
 /// Factored second derivatives, with the shape and the plate at which they were computed.
 #[derive(Clone, Debug, PartialEq)]
-struct KeptMatrix<const N: usize> {
+struct CachedMatrix<const N: usize> {
     factored: Factored<N>,
     reaction: Reaction<N>,
     shape: Shape<N>,
@@ -180,7 +180,7 @@ struct KeptMatrix<const N: usize> {
     steps_left: u32,
 }
 
-impl<const N: usize> KeptMatrix<N> {
+impl<const N: usize> CachedMatrix<N> {
     /// Returns a placeholder that is valid for no step.
     fn none() -> Self {
         let reaction = Reaction { force: [[0.0; N]; 3], by_lean: [[0.0; N]; 2], torsion: [0.0; N] };
@@ -206,7 +206,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             shape: [0.0; N],
             history: History::new(Plate::HOME, [0.0; N]),
             marked: (Plate::HOME, [0.0; N]),
-            matrix: KeptMatrix::none(),
+            matrix: CachedMatrix::none(),
             damping: LEAST_DAMPING,
             stride: Stride::FELT,
             unstable_directions: 0,

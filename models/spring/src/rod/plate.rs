@@ -8,15 +8,15 @@
 use flotor_hal::glam::{DVec2, DVec3};
 use flotor_hal::math;
 
-use crate::pose::{DUST, Pose};
+use crate::pose::{NEGLIGIBLE, Pose};
 
 /// Smallest `1 + d_z`: 177.4 degrees. There is no shortest turn to upside down.
 const LEAST_OVERTURN: f64 = 1e-3;
 
-/// Returns the number, or zero if negligible, see [`DUST`]. Real-time: bounded, no allocation.
+/// Returns the number, or zero if negligible, see [`NEGLIGIBLE`]. Real-time: bounded, no allocation.
 #[inline]
 pub(crate) fn or_zero(number: f64) -> f64 {
-    if number.abs() < DUST { 0.0 } else { number }
+    if number.abs() < NEGLIGIBLE { 0.0 } else { number }
 }
 
 /// Pose of the upper plate, lengths in free lengths.

@@ -29,7 +29,7 @@ impl Friction {
 
 /// Friction limit of one base, with its observed stiffness.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Grip {
+pub(super) struct FrictionLimit {
     /// Coefficients of the force onto the ground, and of the force of a straight spring of the same shortening.
     by_force: f64,
     by_height: f64,
@@ -42,7 +42,7 @@ pub(super) struct Grip {
     observed: f64,
 }
 
-impl Grip {
+impl FrictionLimit {
     /// Prepares Coulomb's law up to `D/L0`. Beyond, a bent spring whose rim slides loses force onto the ground faster
     /// than its pull is relieved: the rest of the coefficient acts by the height.
     pub(super) fn new(spring: &Spring, friction: Friction) -> Self {
