@@ -8,7 +8,7 @@
 //! ```
 
 use crate::chip::{Chip, ChipLost, PACKET_BYTES, PAYLOAD_BYTES, Request, payload};
-use crate::protocol::{Command, Frames, Heard, Report};
+use crate::protocol::{Command, Frames, Parsed, Report};
 use std::fmt;
 use std::time::{Duration, Instant};
 
@@ -215,7 +215,7 @@ fn run(chip: &dyn Chip) -> Result<Report, BootFailure> {
             (None, None) => return Err(BootFailure::NoReport),
             (Some(_), Some(_)) => return Err(BootFailure::StaleReports),
             (Some(byte), None) => {
-                if let Heard::Frame(bytes) = frames.push(byte) {
+                if let Parsed::Frame(bytes) = frames.push(byte) {
                     report = Some(Report::read(&bytes));
                 }
             }

@@ -88,13 +88,13 @@ mod tests {
         let numbered = |first: u8, length: u8| -> Vec<u8> {
             [1, 0x60].into_iter().chain((0..length).map(|byte| first + byte)).collect()
         };
-        let mut heard = Vec::new();
+        let mut received = Vec::new();
         let packets = [numbered(0, 62), numbered(62, 62), numbered(124, 5)].concat();
-        payload(&packets, |byte| heard.push(byte)).expect("each has its status");
-        assert_eq!(heard, (0..129).collect::<Vec<u8>>());
-        heard.clear();
-        assert_eq!(payload(&[1, 0x60], |byte| heard.push(byte)), Ok(()), "an idle chip");
-        assert_eq!(payload(&[1], |byte| heard.push(byte)), Err(ShortPacket));
-        assert_eq!(heard, []);
+        payload(&packets, |byte| received.push(byte)).expect("each has its status");
+        assert_eq!(received, (0..129).collect::<Vec<u8>>());
+        received.clear();
+        assert_eq!(payload(&[1, 0x60], |byte| received.push(byte)), Ok(()), "an idle chip");
+        assert_eq!(payload(&[1], |byte| received.push(byte)), Err(ShortPacket));
+        assert_eq!(received, []);
     }
 }

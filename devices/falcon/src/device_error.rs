@@ -5,7 +5,7 @@ use flotor_hal::Fault;
 
 /// Fault of a running device; after each the motors are set to rest, if the device still receives commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Trouble {
+pub enum DeviceError {
     /// The device was unplugged, or its hub was reset.
     Gone,
     /// No report to any command: the chip sends its status bytes alone.
@@ -22,7 +22,7 @@ pub enum Trouble {
     NoPosture,
 }
 
-impl Trouble {
+impl DeviceError {
     /// Returns the fault of the contract that the host receives.
     #[must_use]
     pub const fn fault(self) -> Fault {
@@ -35,13 +35,13 @@ impl Trouble {
     }
 }
 
-impl From<ChipLost> for Trouble {
+impl From<ChipLost> for DeviceError {
     fn from(_: ChipLost) -> Self {
         Self::Gone
     }
 }
 
-impl From<ShortPacket> for Trouble {
+impl From<ShortPacket> for DeviceError {
     fn from(_: ShortPacket) -> Self {
         Self::ShortPacket
     }

@@ -5,8 +5,8 @@
 //! watchdog: if no tick posts a command for [`COMMAND_LIFE`], the writer sets the motors to rest.
 
 use crate::chip::{Chip, payload};
-use crate::protocol::{Command, Frames, Heard, Report};
-use crate::trouble::Trouble;
+use crate::device_error::DeviceError;
+use crate::protocol::{Command, Frames, Parsed, Report};
 pub use flotor_force_switch::ForceSwitch;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 /// Validity of a command: without a newer one the motors are then set to rest.
 pub const COMMAND_LIFE: Duration = Duration::from_millis(100);
 /// Report timeout, after which the next command is sent without a report.
-const FORGET: Duration = Duration::from_millis(20);
+const REPLY_TIMEOUT: Duration = Duration::from_millis(20);
 /// Timeout of a report to the last command.
 const LAST_REPORT: Duration = Duration::from_millis(200);
 /// Timeout of a read, and poll interval for the end of the exchange.
@@ -44,7 +44,7 @@ struct Shared {
     /// Locked only to copy a few numbers; the tick never waits for the lock.
     slots: Mutex<Slots>,
     /// First fault.
-    trouble: OnceLock<Trouble>,
+    error: OnceLock<DeviceError>,
     /// Requests the end of the threads; then: the last command is answered.
     is_over: AtomicBool,
     is_done: AtomicBool,
@@ -55,13 +55,13 @@ impl Shared {
         self.slots.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn fail(&self, trouble: Trouble) {
+    fn fail(&self, error: DeviceError) {
         // Only the first fault is stored.
-        let _ = self.trouble.set(trouble);
+        let _ = self.error.set(error);
     }
 
-    fn trouble(&self) -> Option<Trouble> {
-        self.trouble.get().copied()
+    fn error(&self) -> Option<DeviceError> {
+        self.error.get().copied()
     }
 
     fn is_over(&self) -> bool {
@@ -97,17 +97,17 @@ impl Exchange {
     /// Returns the newest report since the last call. Real-time: bounded, no allocation, no wait.
     ///
     /// # Errors
-    /// The first [`Trouble`], from then on in each call.
-    pub fn take(&self) -> Result<Option<Report>, Trouble> {
-        match self.shared.trouble() {
-            Some(trouble) => Err(trouble),
+    /// The first [`DeviceError`], from then on in each call.
+    pub fn take(&self) -> Result<Option<Report>, DeviceError> {
+        match self.shared.error() {
+            Some(error) => Err(error),
             // Contention: a thread is storing data.
             None => Ok(self.shared.slots.try_lock().ok().and_then(|mut slots| slots.report.take())),
         }
     }
 
     /// Posts a command for the writer; returns false if the lock is contended. Real-time: bounded, no allocation, no wait.
-    pub fn leave(&self, command: Command) -> bool {
+    pub fn post(&self, command: Command) -> bool {
         let Ok(mut slots) = self.shared.slots.try_lock() else { return false };
         slots.command = Some(command);
         drop(slots);
@@ -118,7 +118,7 @@ impl Exchange {
     }
 
     /// Sets the motors to rest and ends the threads; returns the first fault. Not real-time.
-    pub fn end(&mut self) -> Option<Trouble> {
+    pub fn end(&mut self) -> Option<DeviceError> {
         self.shared.is_over.store(true, Ordering::Release);
         if let Some(writer) = self.writer.take() {
             writer.thread().unpark();
@@ -127,7 +127,7 @@ impl Exchange {
         if let Some(reader) = self.reader.take() {
             let _ = reader.join();
         }
-        self.shared.trouble()
+        self.shared.error()
     }
 }
 
@@ -140,34 +140,34 @@ impl Drop for Exchange {
 /// Reads reports until the exchange ends or a fault occurs.
 fn read(chip: &dyn Chip, shared: &Shared, writer: &Thread) {
     let (mut frames, mut packets, mut noise) = (Frames::default(), [0; READ_BYTES], 0);
-    while !shared.is_done.load(Ordering::Acquire) && shared.trouble().is_none() {
-        let heard = chip.read(&mut packets, LOOK).map_err(Trouble::from).and_then(|length| {
+    while !shared.is_done.load(Ordering::Acquire) && shared.error().is_none() {
+        let received = chip.read(&mut packets, LOOK).map_err(DeviceError::from).and_then(|length| {
             let read = packets.get(..length).unwrap_or_default();
-            let mut trouble = None;
+            let mut error = None;
             payload(read, |byte| match frames.push(byte) {
-                Heard::Frame(bytes) => {
+                Parsed::Frame(bytes) => {
                     noise = 0;
                     let mut slots = shared.lock();
                     match slots.unanswered.checked_sub(1) {
                         Some(unanswered) => slots.unanswered = unanswered,
-                        None => trouble = Some(Trouble::StaleReport),
+                        None => error = Some(DeviceError::StaleReport),
                     }
                     slots.silent_since = None;
                     slots.report = Some(Report::read(&bytes));
                     drop(slots);
                     writer.unpark();
                 }
-                Heard::Noise => noise += 1,
-                Heard::Part => {}
+                Parsed::Noise => noise += 1,
+                Parsed::Part => {}
             })?;
-            match trouble {
-                Some(trouble) => Err(trouble),
-                None if noise > MOST_NOISE => Err(Trouble::Noise),
+            match error {
+                Some(error) => Err(error),
+                None if noise > MOST_NOISE => Err(DeviceError::Noise),
                 None => Ok(()),
             }
         });
-        if let Err(trouble) = heard {
-            shared.fail(trouble);
+        if let Err(error) = received {
+            shared.fail(error);
             writer.unpark();
         }
     }
@@ -181,7 +181,7 @@ fn write(chip: &dyn Chip, shared: &Shared, switch: &ForceSwitch, timeout: Durati
     // Fails if the device is gone.
     let is_gone = chip.write(&Command::REST.bytes()).is_err();
     let since = Instant::now();
-    let is_awaited = || shared.trouble().is_none() && shared.lock().unanswered > 0;
+    let is_awaited = || shared.error().is_none() && shared.lock().unanswered > 0;
     while !is_gone && is_awaited() && since.elapsed() < LAST_REPORT {
         std::thread::park_timeout(LOOK);
     }
@@ -192,18 +192,18 @@ fn send_commands(chip: &dyn Chip, shared: &Shared, switch: &ForceSwitch, timeout
     let (mut last, mut left, mut sent) = (Command::REST, Instant::now(), None::<Instant>);
     loop {
         let mut slots = shared.lock();
-        if shared.is_over() || shared.trouble().is_some() {
+        if shared.is_over() || shared.error().is_some() {
             return;
         }
         if slots.silent_since.is_some_and(|since| since.elapsed() > timeout) {
             drop(slots);
-            shared.fail(Trouble::Silent);
+            shared.fail(DeviceError::Silent);
             return;
         }
-        let since = sent.map_or(FORGET, |sent| sent.elapsed());
-        if slots.unanswered > 0 && since < FORGET {
+        let since = sent.map_or(REPLY_TIMEOUT, |sent| sent.elapsed());
+        if slots.unanswered > 0 && since < REPLY_TIMEOUT {
             drop(slots);
-            std::thread::park_timeout(FORGET - since);
+            std::thread::park_timeout(REPLY_TIMEOUT - since);
             continue;
         }
         let has_force = last.motors != [0; 3];
@@ -229,7 +229,7 @@ fn send_commands(chip: &dyn Chip, shared: &Shared, switch: &ForceSwitch, timeout
         drop(slots);
         (last, sent) = (command, Some(now));
         if chip.write(&command.bytes()).is_err() {
-            shared.fail(Trouble::Gone);
+            shared.fail(DeviceError::Gone);
         }
     }
 }

@@ -19,6 +19,7 @@
 
 pub mod boot;
 pub mod chip;
+mod device_error;
 pub mod exchange;
 pub mod firmware;
 pub mod kinematics;
@@ -26,8 +27,7 @@ mod platform;
 mod plugin;
 pub mod protocol;
 pub mod remote;
-mod trouble;
 mod usb;
 
+pub use device_error::DeviceError;
 pub use plugin::{FLOTOR_ENTRY, FalconDevice};
-pub use trouble::Trouble;

@@ -2,12 +2,12 @@
 
 use crate::boot;
 use crate::chip::{Chip, PRODUCT, VENDOR};
+use crate::device_error::DeviceError;
 use crate::exchange::{Exchange, ForceSwitch};
 use crate::firmware;
 use crate::kinematics::{CENTRE_M, Posture, RANGE_M, angles_rad, posture, resolution_m};
 use crate::protocol::{ALL_HOMED, Command, Homing, Lamp, Report, clipped_words};
 use crate::remote::RemoteChip;
-use crate::trouble::Trouble;
 use crate::usb;
 use flotor_hal::{
     ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, ConnectionDevice, Cycle, DQuat, DVec3,
@@ -117,7 +117,7 @@ pub struct DrivenDevice {
     force_n: DVec3,
     is_clipped: bool,
     /// Fault that removed the force.
-    trouble: Option<Trouble>,
+    error: Option<DeviceError>,
 }
 
 impl Options {
@@ -218,7 +218,7 @@ impl Device for FalconDevice {
                 sampled_ns: None,
                 force_n: DVec3::ZERO,
                 is_clipped: false,
-                trouble: None,
+                error: None,
             }),
             Err(refusal) => Err((self, refusal)),
         }
@@ -277,7 +277,7 @@ impl FalconDevice {
         loop {
             let report = exchange
                 .take()
-                .map_err(|trouble| Refusal::resource(format!("the Falcon: {}", trouble.fault().advice())))?;
+                .map_err(|error| Refusal::resource(format!("the Falcon: {}", error.fault().advice())))?;
             newest = report.or(newest);
             let patience = self.options.homing.max(self.options.timeout);
             match newest {
@@ -288,7 +288,7 @@ impl FalconDevice {
                 _ => {}
             }
             let command = Command { motors: [0; 3], lamp: Lamp::Red, homing: Homing::Wanted };
-            exchange.leave(command);
+            exchange.post(command);
             std::thread::sleep(HOMING_NAP);
         }
     }
@@ -300,7 +300,7 @@ impl ActiveDevice for DrivenDevice {
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         let report = match self.exchange.take() {
             Ok(report) => report.or(self.first.take()),
-            Err(trouble) => return Cycle::Fault(trouble.fault()),
+            Err(error) => return Cycle::Fault(error.fault()),
         };
         self.first = None;
         let Some(report) = report else {
@@ -308,14 +308,14 @@ impl ActiveDevice for DrivenDevice {
             *state = self.state;
             return Cycle::Stale;
         };
-        self.trouble = self.trouble.or((report.homed != ALL_HOMED).then_some(Trouble::NotHomed));
+        self.error = self.error.or((report.homed != ALL_HOMED).then_some(DeviceError::NotHomed));
         match posture(angles_rad(report.encoders), self.posture.position_m()) {
             Some(posture) => self.posture = posture,
-            None => self.trouble = self.trouble.or(Some(Trouble::NoPosture)),
+            None => self.error = self.error.or(Some(DeviceError::NoPosture)),
         }
-        if let Some(trouble) = self.trouble {
-            self.exchange.leave(Command::REST);
-            return Cycle::Fault(trouble.fault());
+        if let Some(error) = self.error {
+            self.exchange.post(Command::REST);
+            return Cycle::Fault(error.fault());
         }
         self.sample(report.buttons, tick.time_ns);
         *state = self.state;
@@ -325,7 +325,7 @@ impl ActiveDevice for DrivenDevice {
     fn write(&mut self, _tick: &Tick, wrench: &Wrench) -> Cycle {
         let asked_n = wrench.force();
         let Options { max_force_n, words_per_nm, .. } = self.opened.options;
-        let may_push = self.trouble.is_none() && !self.opened.switch.is_stopped();
+        let may_push = self.error.is_none() && !self.opened.switch.is_stopped();
         let wanted_n = match asked_n.is_finite() && may_push {
             true => asked_n.clamp_length_max(max_force_n),
             false => DVec3::ZERO,
@@ -339,7 +339,7 @@ impl ActiveDevice for DrivenDevice {
         let torques_nm = DVec3::from_array(clipped.words.map(f64::from)) / -words_per_nm;
         let given_n = to_host(self.posture.force_n(torques_nm));
         let command = Command { motors: clipped.words, lamp: Lamp::Green, homing: Homing::Done };
-        if !self.exchange.leave(command) {
+        if !self.exchange.post(command) {
             return Cycle::Stale;
         }
         self.force_n = if clipped.words == [0; 3] { DVec3::ZERO } else { given_n.with_z(given_n.z * share) };

@@ -135,7 +135,7 @@ fn words(bytes: &[u8; FRAME_BYTES]) -> [i16; 3] {
 
 /// Result of a received byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heard {
+pub enum Parsed {
     /// Completed frame.
     Frame([u8; FRAME_BYTES]),
     /// Part of an incomplete frame.
@@ -153,7 +153,7 @@ pub struct Frames {
 
 impl Frames {
     /// Parses the next byte. Real-time: bounded, no allocation.
-    pub fn push(&mut self, byte: u8) -> Heard {
+    pub fn push(&mut self, byte: u8) -> Parsed {
         let fits = match self.length {
             0 => byte == START,
             1..INPUTS => (OFFSET..OFFSET + 16).contains(&byte),
@@ -169,14 +169,14 @@ impl Frames {
         }
         self.length += 1;
         if self.length < FRAME_BYTES {
-            return Heard::Part;
+            return Parsed::Part;
         }
         self.length = 0;
-        Heard::Frame(self.bytes)
+        Parsed::Frame(self.bytes)
     }
 
     /// Drops an incomplete frame. The byte may start the next one, and so may the unused byte before it.
-    fn begin_anew(&mut self, byte: u8) -> Heard {
+    fn begin_anew(&mut self, byte: u8) -> Parsed {
         let was_free_start = self.length == LAST && self.bytes[FREE] == START;
         self.length = 0;
         if byte == START {
@@ -184,7 +184,7 @@ impl Frames {
         } else if was_free_start && (OFFSET..OFFSET + 16).contains(&byte) {
             (self.bytes[0], self.bytes[1], self.length) = (START, byte, 2);
         }
-        Heard::Noise
+        Parsed::Noise
     }
 }
 
@@ -275,21 +275,21 @@ mod tests {
             stream.extend(report.bytes());
             expected.push(report);
         }
-        let (mut heard, mut at) = (Vec::with_capacity(expected.len()), 0);
+        let (mut received, mut at) = (Vec::with_capacity(expected.len()), 0);
         while at < stream.len() {
             let length = 1 + (numbers.next() % 62) as usize;
             let mut packet = vec![0x01, 0x60];
             packet.extend(&stream[at..stream.len().min(at + length)]);
             at += length;
             crate::chip::payload(&packet, |byte| {
-                if let Heard::Frame(bytes) = frames.push(byte) {
-                    heard.push(Report::read(&bytes));
+                if let Parsed::Frame(bytes) = frames.push(byte) {
+                    received.push(Report::read(&bytes));
                 }
             })
             .expect("it has its status");
         }
-        assert!(heard == expected, "{} frames of {}", heard.len(), expected.len());
-        println!("{} frames in random pieces, {} heard, none wrong", expected.len(), heard.len());
+        assert!(received == expected, "{} frames of {}", received.len(), expected.len());
+        println!("{} frames in random pieces, {} heard, none wrong", expected.len(), received.len());
     }
 
     proptest! {
@@ -314,8 +314,8 @@ mod tests {
                 let _ = frames.push(byte);
             }
             let report = Report { encoders: motors, buttons: 5, homed: 7 };
-            let heard: Vec<Heard> = [report.bytes(), report.bytes()].concat().iter().map(|byte| frames.push(*byte)).collect();
-            prop_assert_eq!(heard.last(), Some(&Heard::Frame(report.bytes())));
+            let received: Vec<Parsed> = [report.bytes(), report.bytes()].concat().iter().map(|byte| frames.push(*byte)).collect();
+            prop_assert_eq!(received.last(), Some(&Parsed::Frame(report.bytes())));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::ffi::Functions;
 use flotor_hal::{DMat3, DQuat, DVec3, Fault, Pose, Refusal, Twist, Wrench};
-use flotor_vendor_sdk::{Library, LibraryProblem, Sdk, StandIn, without_signals};
+use flotor_vendor_sdk::{DropInPolicy, Library, LibraryProblem, Sdk, without_signals};
 use std::ffi::c_int;
 
 /// Library lookup of the SDK. `libdrd` has the functions of both libraries; `libdhd` cannot initialise.
@@ -81,8 +81,8 @@ pub(crate) enum Wrist {
 
 impl Dhd {
     /// Opens the library, and the first device or the one with a serial number. Causes no motion. Not real-time.
-    pub(crate) fn open(path: Option<&str>, stand_in: StandIn, which: Which) -> Result<Self, Refusal> {
-        let library = Library::open(&SDK, path, stand_in).map_err(Refusal::resource)?;
+    pub(crate) fn open(path: Option<&str>, policy: DropInPolicy, which: Which) -> Result<Self, Refusal> {
+        let library = Library::open(&SDK, path, policy).map_err(Refusal::resource)?;
         let functions = Functions::load(&library).map_err(Refusal::resource)?;
         let [major, minor, release, revision] = functions.version();
         if [major, minor] < OLDEST {

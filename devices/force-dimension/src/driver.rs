@@ -2,7 +2,7 @@
 
 use crate::dhd::{Dhd, Failed, Given, Setup};
 use flotor_hal::{Conditions, Fault, Wrench};
-use flotor_vendor_sdk::{Exchange, Orders, Sample, without_signals};
+use flotor_vendor_sdk::{CommandCursor, Exchange, Sample, without_signals};
 use std::io;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -30,10 +30,10 @@ impl Driver {
             dhd.relax();
             return Err((Some(dhd), Why::Failed(failed)));
         }
-        let orders = exchange.begin();
+        let cursor = exchange.begin();
         let of_thread = Arc::clone(exchange);
         let thread = std::thread::Builder::new().name("force-dimension".to_owned());
-        let started = without_signals(|| thread.spawn(move || follow(dhd, &of_thread, orders)));
+        let started = without_signals(|| thread.spawn(move || follow(dhd, &of_thread, cursor)));
         match started {
             Ok(thread) => Ok(Self { thread: Some(thread), exchange: Arc::clone(exchange) }),
             Err(error) => Err((None, Why::NoThread(error))),
@@ -60,12 +60,12 @@ pub(crate) enum Why {
     NoThread(io::Error),
 }
 
-fn follow(dhd: Dhd, exchange: &Exchange, mut orders: Orders) -> Dhd {
+fn follow(dhd: Dhd, exchange: &Exchange, mut cursor: CommandCursor) -> Dhd {
     let mut given = Given::All;
     let mut cycle = 0_u64;
     while !exchange.is_over() {
         let began = Instant::now();
-        match step(&dhd, exchange, &mut orders, given, cycle) {
+        match step(&dhd, exchange, &mut cursor, given, cycle) {
             Ok(now) => given = now,
             Err(fault) => {
                 exchange.fail(fault);
@@ -86,13 +86,13 @@ fn follow(dhd: Dhd, exchange: &Exchange, mut orders: Orders) -> Dhd {
 fn step(
     dhd: &Dhd,
     exchange: &Exchange,
-    orders: &mut Orders,
+    cursor: &mut CommandCursor,
     given: Given,
     cycle: u64,
 ) -> Result<Given, Fault> {
     let sample = measure(dhd, given).map_err(|failed| failed.fault())?;
     exchange.publish(&sample);
-    let wrench = exchange.next_wrench(orders);
+    let wrench = exchange.next_wrench(cursor);
     let given = dhd.send(&wrench).map_err(|failed| failed.fault())?;
     exchange.note_sent(&wrench);
     if cycle % STATUS_EVERY == STATUS_EVERY - 1 {

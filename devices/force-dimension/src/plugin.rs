@@ -8,7 +8,7 @@ use flotor_hal::{
     IndependentStop, IndependentStopDevice, LoopConfig, PacingDevice, Parameter, Refusal, SampleWait,
     Settings, StoppedState, Tick, UsbAccess, UsbKind, Wrench, choices, export_device,
 };
-use flotor_vendor_sdk::{Exchange, LoopEnd, Pace, StandIn, StopSwitch};
+use flotor_vendor_sdk::{DropInPolicy, Exchange, LoopEnd, Pace, StopSwitch};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -107,11 +107,10 @@ impl Device for ForceDimensionDevice {
     type Stop = StopSwitch;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let stand_in = [StandIn::Refuse, StandIn::Accept];
-        let stand_in =
-            stand_in.get(settings.choice_or_default("stand_in")).copied().unwrap_or(StandIn::Refuse);
-        let dhd =
-            Dhd::open(settings.text("library"), stand_in, which(settings.number_or_default("serial"))?)?;
+        let policy = [DropInPolicy::Refuse, DropInPolicy::Accept];
+        let policy =
+            policy.get(settings.choice_or_default("stand_in")).copied().unwrap_or(DropInPolicy::Refuse);
+        let dhd = Dhd::open(settings.text("library"), policy, which(settings.number_or_default("serial"))?)?;
         let initialises = settings.choice_or_default("initialise") == 1;
         if !initialises && !dhd.is_initialized() {
             return Err(Refusal::resource(format!(

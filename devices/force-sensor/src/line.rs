@@ -16,13 +16,13 @@ pub struct LineLost;
 
 /// Result of polling the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Heard {
+pub enum PollResult {
     /// No complete line yet.
     Nothing,
     /// A force, N.
     Force(f64),
     /// Malformed line; [`SensorLine::last`] returns it.
-    Nonsense,
+    Malformed,
 }
 
 /// Force sensor at the other end of a serial port.
@@ -30,7 +30,7 @@ pub struct SensorLine {
     port: Port,
     lines: Lines,
     /// Time of the pending request.
-    asked: Option<Instant>,
+    requested_at: Option<Instant>,
 }
 
 impl SensorLine {
@@ -41,20 +41,20 @@ impl SensorLine {
     pub fn open(path: &str) -> Result<Self, String> {
         let port = Port::open(path, BAUD).map_err(|reason| format!("no force sensor at {path}: {reason}"))?;
         // Discard input from before the first request.
-        let _ = port.forget_input();
-        Ok(Self { port, lines: Lines::default(), asked: None })
+        let _ = port.discard_input();
+        Ok(Self { port, lines: Lines::default(), requested_at: None })
     }
 
     /// Requests a reading unless a request is pending. Real-time: bounded, no allocation; one call of the system.
     ///
     /// # Errors
     /// If the sensor is gone.
-    pub fn ask(&mut self) -> Result<(), LineLost> {
-        if self.asked.is_some() {
+    pub fn request(&mut self) -> Result<(), LineLost> {
+        if self.requested_at.is_some() {
             return Ok(());
         }
         match self.port.write_all(QUESTION) {
-            Ok(()) => self.asked = Some(Instant::now()),
+            Ok(()) => self.requested_at = Some(Instant::now()),
             // The port is full: retry at the next call.
             Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock) => {}
             Err(_) => return Err(LineLost),
@@ -67,12 +67,12 @@ impl SensorLine {
     ///
     /// # Errors
     /// If the sensor is gone.
-    pub fn hear(&mut self) -> Result<Heard, LineLost> {
+    pub fn poll(&mut self) -> Result<PollResult, LineLost> {
         // Query the count first: a read without data would return an error, which allocates; and a system may wait for more bytes than
         // there are.
         let waiting = self.port.waiting().map_err(|_| LineLost)?;
         if waiting == 0 {
-            return Ok(Heard::Nothing);
+            return Ok(PollResult::Nothing);
         }
         let mut chunk = [0; CHUNK_BYTES];
         let room = CHUNK_BYTES.min(waiting);
@@ -80,14 +80,14 @@ impl SensorLine {
         if length == 0 {
             return Err(LineLost);
         }
-        let mut heard = Heard::Nothing;
+        let mut polled = PollResult::Nothing;
         for byte in chunk.iter().take(length) {
             if let Some(line) = self.lines.push(*byte) {
-                heard = parse(line).map_or(Heard::Nonsense, Heard::Force);
-                self.asked = None;
+                polled = parse(line).map_or(PollResult::Malformed, PollResult::Force);
+                self.requested_at = None;
             }
         }
-        Ok(heard)
+        Ok(polled)
     }
 
     /// Returns the last line, complete or not.
@@ -99,6 +99,6 @@ impl SensorLine {
     /// Returns the age of the pending request; zero without one. Real-time: bounded, no allocation.
     #[must_use]
     pub fn silence(&self) -> Duration {
-        self.asked.map_or(Duration::ZERO, |asked| asked.elapsed())
+        self.requested_at.map_or(Duration::ZERO, |requested_at| requested_at.elapsed())
     }
 }

@@ -1,6 +1,6 @@
 //! Implementation of the device contract for the sensor: a device without axes, whose state contains a measured force.
 
-use crate::line::{Heard, LineLost, SensorLine};
+use crate::line::{LineLost, PollResult, SensorLine};
 use flotor_hal::{
     Capabilities, Cycle, DVec3, DeviceInfo, DeviceState, Fault, NothingToStop, Opened, Parameter, Refusal,
     Settings, Simple, SimpleDevice, Tick, Wrench, export_device,
@@ -37,23 +37,23 @@ impl ForceSensor {
         let gone =
             |LineLost| format!("the force sensor at {port} is disconnected; plug it in and measure again");
         loop {
-            self.line.ask().map_err(gone)?;
-            match self.line.hear().map_err(gone)? {
-                Heard::Force(_) => return Ok(()),
-                Heard::Nonsense => {
+            self.line.request().map_err(gone)?;
+            match self.line.poll().map_err(gone)? {
+                PollResult::Force(_) => return Ok(()),
+                PollResult::Malformed => {
                     let answer = self.line.last();
                     return Err(format!(
                         "the force sensor at {port} answers `{answer}` instead of a force like `F 1.234`"
                     ));
                 }
-                Heard::Nothing if self.line.silence() > self.timeout => {
+                PollResult::Nothing if self.line.silence() > self.timeout => {
                     return Err(format!(
                         "the force sensor at {port} does not answer within {} ms; is it one that answers `R`, at \
                          115200 baud?",
                         self.timeout.as_millis()
                     ));
                 }
-                Heard::Nothing => std::thread::sleep(LOOK_AGAIN),
+                PollResult::Nothing => std::thread::sleep(LOOK_AGAIN),
             }
         }
     }
@@ -83,13 +83,13 @@ impl SimpleDevice for ForceSensor {
 
     /// Reads the force on the sensor, N; fresh with each reading.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        let heard = self.line.hear().and_then(|heard| self.line.ask().map(|()| heard));
-        let cycle = match heard {
+        let polled = self.line.poll().and_then(|polled| self.line.request().map(|()| polled));
+        let cycle = match polled {
             Err(LineLost) => Cycle::Fault(Fault::Disconnected),
-            Ok(Heard::Nonsense) => Cycle::Fault(Fault::Protocol),
-            Ok(Heard::Nothing) if self.line.silence() > self.timeout => Cycle::Fault(Fault::Timeout),
-            Ok(Heard::Nothing) => Cycle::Stale,
-            Ok(Heard::Force(force_n)) => {
+            Ok(PollResult::Malformed) => Cycle::Fault(Fault::Protocol),
+            Ok(PollResult::Nothing) if self.line.silence() > self.timeout => Cycle::Fault(Fault::Timeout),
+            Ok(PollResult::Nothing) => Cycle::Stale,
+            Ok(PollResult::Force(force_n)) => {
                 self.state.delivered = Wrench::from_force(DVec3::Z * force_n);
                 self.state.sampled_ns = tick.time_ns;
                 Cycle::Fresh

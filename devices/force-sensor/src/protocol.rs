@@ -106,11 +106,11 @@ mod tests {
         fn a_force_is_read_after_any_noise(noise in proptest::collection::vec(any::<u8>(), 0..600), force_n in -500.0..500.0_f64) {
             let mut lines = Lines::default();
             let answer = format!("\nF {force_n}\r\n");
-            let mut heard = None;
+            let mut polled = None;
             for byte in noise.iter().copied().chain(answer.bytes()) {
-                heard = lines.push(byte).map(parse);
+                polled = lines.push(byte).map(parse);
             }
-            prop_assert_eq!(heard, Some(Some(force_n)));
+            prop_assert_eq!(polled, Some(Some(force_n)));
         }
     }
 }

@@ -46,7 +46,7 @@ fn main() -> std::io::Result<()> {
         let phase = TAU * started.elapsed().as_secs_f64() / PERIOD_S;
         board.move_handle(centre_m + DVec2::Y * (AMPLITUDE_M * phase.sin()));
         match port.read(&mut chunk) {
-            Ok(length) => port.write_all(&board.hear(&chunk[..length]))?,
+            Ok(length) => port.write_all(&board.receive(&chunk[..length]))?,
             Err(error) if error.kind() == ErrorKind::TimedOut => {}
             Err(error) => return Err(error),
         }

@@ -1,9 +1,9 @@
 //! Board behind a serial port, with one request in flight and no waits.
 //!
-//! A missing reply does not block: after [`FORGET`] the request and the partial reply are dropped and the next request is sent,
+//! A missing reply does not block: after [`REPLY_TIMEOUT`] the request and the partial reply are dropped and the next request is sent,
 //! which also resynchronises after a lost byte.
 
-use crate::protocol::{Answers, Arm, Heard, RESET, setup, torques};
+use crate::protocol::{Answers, Arm, Parsed, RESET, setup, torques};
 use flotor_serial::Port;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// stop bits.
 const BAUD: u32 = 250_000;
 /// Reply timeout: a few times the reply time of the slowest board (4 ms at 57 600 baud).
-pub const FORGET: Duration = Duration::from_millis(20);
+pub const REPLY_TIMEOUT: Duration = Duration::from_millis(20);
 /// Buffer size of one read, bytes: a few replies.
 const CHUNK_BYTES: usize = 64;
 
@@ -41,7 +41,7 @@ pub struct Board {
     port: Port,
     answers: Answers,
     /// Time of the pending request.
-    asked: Option<Instant>,
+    requested_at: Option<Instant>,
     /// Time of the first request without a reply.
     silent_since: Option<Instant>,
     lost_answers: u64,
@@ -64,7 +64,7 @@ impl Board {
         Self {
             port,
             answers: Answers::default(),
-            asked: None,
+            requested_at: None,
             silent_since: None,
             lost_answers: 0,
             noise_bytes: 0,
@@ -85,14 +85,14 @@ impl Board {
     /// [`NoAnswer::Silent`] after `patience`, or [`NoAnswer::Lost`] if the board is gone.
     pub fn start(&mut self, arms: &[Arm; 2], patience: Duration) -> Result<[f64; 2], NoAnswer> {
         let started = Instant::now();
-        let _ = self.port.forget_input();
+        let _ = self.port.discard_input();
         self.answers.clear();
-        self.asked = None;
+        self.requested_at = None;
         self.send(&RESET)?;
         self.send(&setup(arms))?;
         loop {
-            self.ask([0.0; 2])?;
-            if let Some(angles_deg) = self.hear()? {
+            self.request([0.0; 2])?;
+            if let Some(angles_deg) = self.poll()? {
                 return Ok(angles_deg);
             }
             if started.elapsed() > patience {
@@ -107,19 +107,19 @@ impl Board {
     ///
     /// # Errors
     /// If the board is gone.
-    pub fn ask(&mut self, torques_nm: [f64; 2]) -> Result<(), LinkLost> {
-        if let Some(asked) = self.asked {
-            if asked.elapsed() < FORGET {
+    pub fn request(&mut self, torques_nm: [f64; 2]) -> Result<(), LinkLost> {
+        if let Some(requested_at) = self.requested_at {
+            if requested_at.elapsed() < REPLY_TIMEOUT {
                 return Ok(());
             }
             self.lost_answers += 1;
             self.answers.clear();
-            self.port.forget_input().map_err(|_| LinkLost)?;
+            self.port.discard_input().map_err(|_| LinkLost)?;
         }
         #[allow(clippy::cast_possible_truncation)] // f32 is what the board has
         self.send(&torques(torques_nm.map(|torque_nm| torque_nm as f32)))?;
         let now = Instant::now();
-        self.asked = Some(now);
+        self.requested_at = Some(now);
         self.silent_since.get_or_insert(now);
         Ok(())
     }
@@ -129,7 +129,7 @@ impl Board {
     ///
     /// # Errors
     /// If the board is gone.
-    pub fn hear(&mut self) -> Result<Option<[f64; 2]>, LinkLost> {
+    pub fn poll(&mut self) -> Result<Option<[f64; 2]>, LinkLost> {
         let mut newest = None;
         // Query the count first: a read without data would return an error, which allocates; and a system may wait for more bytes than
         // there are.
@@ -142,13 +142,13 @@ impl Board {
         let length = self.port.read(chunk.get_mut(..room).unwrap_or_default()).map_err(|_| LinkLost)?;
         for byte in chunk.iter().take(length) {
             match self.answers.push(*byte) {
-                Heard::Angles(angles_deg) => newest = Some(angles_deg),
-                Heard::Noise => self.noise_bytes += 1,
-                Heard::Part => {}
+                Parsed::Angles(angles_deg) => newest = Some(angles_deg),
+                Parsed::Noise => self.noise_bytes += 1,
+                Parsed::Part => {}
             }
         }
         if newest.is_some() {
-            (self.asked, self.silent_since) = (None, None);
+            (self.requested_at, self.silent_since) = (None, None);
         }
         Ok(newest)
     }

@@ -11,14 +11,14 @@ pub struct EmulatedBoard {
     handle_m: DVec2,
     arms: Option<[Arm; 2]>,
     torques_nm: [f64; 2],
-    heard: Vec<u8>,
+    received: Vec<u8>,
 }
 
 impl EmulatedBoard {
     /// Creates a board whose handle is held at a position in the board's frame, m. A host must configure the arms first.
     #[must_use]
     pub fn new(linkage: Pantograph, handle_m: DVec2) -> Self {
-        Self { linkage, handle_m, arms: None, torques_nm: [0.0; 2], heard: Vec::new() }
+        Self { linkage, handle_m, arms: None, torques_nm: [0.0; 2], received: Vec::new() }
     }
 
     /// Moves the handle to a position in the board's frame, m.
@@ -27,22 +27,22 @@ impl EmulatedBoard {
     }
 
     /// Receives bytes and returns the replies; requests may be split.
-    pub fn hear(&mut self, bytes: &[u8]) -> Vec<u8> {
-        self.heard.extend_from_slice(bytes);
+    pub fn receive(&mut self, bytes: &[u8]) -> Vec<u8> {
+        self.received.extend_from_slice(bytes);
         let mut said = Vec::new();
         loop {
-            match Request::parse(&self.heard) {
+            match Request::parse(&self.received) {
                 Ok(None) => return said,
                 Ok(Some((request, length))) => {
-                    self.heard.drain(..length);
-                    said.extend(self.obey(request));
+                    self.received.drain(..length);
+                    said.extend(self.execute(request));
                 }
-                Err(length) => drop(self.heard.drain(..length)),
+                Err(length) => drop(self.received.drain(..length)),
             }
         }
     }
 
-    fn obey(&mut self, request: Request) -> Vec<u8> {
+    fn execute(&mut self, request: Request) -> Vec<u8> {
         match request {
             Request::Reset => (self.arms, self.torques_nm) = (None, [0.0; 2]),
             Request::Setup(arms) => self.arms = Some(arms),

@@ -250,12 +250,12 @@ impl ActiveDevice for DrivenDevice {
     type Opened = HaplyDevice;
 
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        let heard = match self.opened.board.hear() {
-            Ok(heard) => heard,
+        let polled = match self.opened.board.poll() {
+            Ok(polled) => polled,
             Err(LinkLost) => return Cycle::Fault(Fault::Disconnected),
         };
         // Angles outside the linkage's geometry are malformed data: the next reply will be right.
-        if let Some(posture) = heard.and_then(|angles_deg| self.opened.posture(angles_deg)) {
+        if let Some(posture) = polled.and_then(|angles_deg| self.opened.posture(angles_deg)) {
             (self.posture, self.is_fresh) = (posture, true);
         }
         let cycle = if std::mem::take(&mut self.is_fresh) {
@@ -279,7 +279,7 @@ impl ActiveDevice for DrivenDevice {
         };
         // The board's x and y are the host's, rotated by half a turn.
         let torques_nm = self.posture.torques_nm(-self.force_n);
-        match self.opened.board.ask(torques_nm) {
+        match self.opened.board.request(torques_nm) {
             Ok(()) => Cycle::Fresh,
             Err(LinkLost) => Cycle::Fault(Fault::Disconnected),
         }

@@ -147,7 +147,7 @@ pub fn answer(angles_deg: [f32; 2]) -> [u8; ANSWER_BYTES] {
 
 /// Result of a received byte.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Heard {
+pub enum Parsed {
     /// Completed reply: angles of the first and the second arm, °.
     Angles([f64; 2]),
     /// Malformed data that belongs to no reply.
@@ -165,16 +165,16 @@ pub struct Answers {
 
 impl Answers {
     /// Parses the next byte. Real-time: bounded, no allocation.
-    pub fn push(&mut self, byte: u8) -> Heard {
+    pub fn push(&mut self, byte: u8) -> Parsed {
         if self.length == 0 && byte != DEVICE {
-            return Heard::Noise;
+            return Parsed::Noise;
         }
         if let Some(place) = self.bytes.get_mut(self.length) {
             *place = byte;
             self.length += 1;
         }
         if self.length < ANSWER_BYTES {
-            return Heard::Part;
+            return Parsed::Part;
         }
         self.length = 0;
         let [_, a, b, c, d, e, f, g, h] = self.bytes;
@@ -182,9 +182,9 @@ impl Answers {
         let angles = [first, second];
         // False for NaN.
         if angles.iter().all(|angle| angle.abs() <= LARGEST_DEG) {
-            Heard::Angles(angles)
+            Parsed::Angles(angles)
         } else {
-            Heard::Noise
+            Parsed::Noise
         }
     }
 
@@ -199,9 +199,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn heard(bytes: &[u8]) -> Vec<Heard> {
+    fn parsed(bytes: &[u8]) -> Vec<Parsed> {
         let mut answers = Answers::default();
-        bytes.iter().map(|byte| answers.push(*byte)).filter(|heard| *heard != Heard::Part).collect()
+        bytes.iter().map(|byte| answers.push(*byte)).filter(|parsed| *parsed != Parsed::Part).collect()
     }
 
     #[test]
@@ -234,18 +234,18 @@ mod tests {
     fn answers_arrive_in_pieces_and_after_noise() {
         let bytes =
             [&[7, 0][..], &answer([90.0, 12.5]), &answer([f32::NAN, 0.0]), &answer([1.0, 2.0])].concat();
-        let angles = |first, second| Heard::Angles([first, second]);
+        let angles = |first, second| Parsed::Angles([first, second]);
         assert_eq!(
-            heard(&bytes),
-            [Heard::Noise, Heard::Noise, angles(90.0, 12.5), Heard::Noise, angles(1.0, 2.0)]
+            parsed(&bytes),
+            [Parsed::Noise, Parsed::Noise, angles(90.0, 12.5), Parsed::Noise, angles(1.0, 2.0)]
         );
     }
 
     proptest! {
         #[test]
         fn any_bytes_give_finite_angles_or_noise(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-            for one in heard(&bytes) {
-                if let Heard::Angles(angles) = one {
+            for one in parsed(&bytes) {
+                if let Parsed::Angles(angles) = one {
                     prop_assert!(angles.iter().all(|angle| angle.abs() <= LARGEST_DEG));
                 }
             }
@@ -266,7 +266,7 @@ mod tests {
 
         #[test]
         fn what_is_said_is_what_is_heard(first in -700.0_f32..700.0, second in -700.0_f32..700.0) {
-            prop_assert_eq!(heard(&answer([first, second])), [Heard::Angles([first.into(), second.into()])]);
+            prop_assert_eq!(parsed(&answer([first, second])), [Parsed::Angles([first.into(), second.into()])]);
             let request = Request::parse(&torques([first, second]));
             prop_assert_eq!(request, Ok(Some((Request::Torques([first, second]), TORQUES_BYTES))));
         }

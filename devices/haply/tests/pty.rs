@@ -47,7 +47,7 @@ impl Rig {
                 let length = board_end.read(&mut chunk).unwrap_or(0);
                 let mut shared = of_thread.lock().expect("nobody panics with it");
                 let line = shared.1;
-                let mut said = shared.0.hear(&chunk[..length]);
+                let mut said = shared.0.receive(&chunk[..length]);
                 drop(shared);
                 match line {
                     Line::Whole => {}

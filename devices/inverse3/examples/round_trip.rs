@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for number in 0..EXCHANGES {
         let started = Instant::now();
         let force_n = DVec3::splat((number % 100) as f64 * 0.01);
-        session.exchange(force_n).map_err(|trouble| trouble.to_string())?;
+        session.exchange(force_n).map_err(|error| error.to_string())?;
         times.push(started.elapsed());
     }
     times.sort_unstable();

@@ -5,7 +5,7 @@
 
 use crate::message::Sample;
 use crate::session::Session;
-use crate::trouble::Trouble;
+use crate::session_error::SessionError;
 use flotor_force_switch::ForceSwitch;
 use flotor_hal::DVec3;
 use std::io;
@@ -25,7 +25,7 @@ struct Slots {
     /// Newest sample, not read yet.
     sample: Option<Sample>,
     /// Fault that ended the exchange.
-    trouble: Option<Trouble>,
+    error: Option<SessionError>,
 }
 
 #[derive(Debug, Default)]
@@ -54,16 +54,16 @@ impl Exchange {
     }
 
     /// Returns the newest sample since the last call. Real-time: bounded, no allocation, no wait.
-    pub(crate) fn take(&self) -> Result<Option<Sample>, Trouble> {
+    pub(crate) fn take(&self) -> Result<Option<Sample>, SessionError> {
         match self.shared.slots.try_lock() {
-            Ok(mut slots) => slots.trouble.map_or(Ok(slots.sample.take()), Err),
+            Ok(mut slots) => slots.error.map_or(Ok(slots.sample.take()), Err),
             // Contention: the thread is storing a sample.
             Err(_) => Ok(None),
         }
     }
 
     /// Posts a force for the thread; returns false if the lock is contended. Real-time: bounded, no allocation, no wait.
-    pub(crate) fn leave(&self, force_n: DVec3) -> bool {
+    pub(crate) fn post(&self, force_n: DVec3) -> bool {
         let Ok(mut slots) = self.shared.slots.try_lock() else { return false };
         slots.force_n = Some(force_n);
         drop(slots);
@@ -108,10 +108,10 @@ fn run(mut session: Session, shared: &Shared, switch: &ForceSwitch) -> Option<Se
         last_n = force_n;
         match session.exchange(force_n) {
             Ok(sample) => lock().sample = Some(sample),
-            Err(trouble) => {
+            Err(error) => {
                 // End first: the force is gone when the host receives the fault.
                 session.end();
-                lock().trouble = Some(trouble);
+                lock().error = Some(error);
                 return None;
             }
         }

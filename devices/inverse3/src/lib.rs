@@ -23,9 +23,9 @@ pub mod json;
 pub mod message;
 mod plugin;
 pub mod session;
+mod session_error;
 pub mod socket;
 pub mod stand_in;
-mod trouble;
 
 pub use plugin::{FLOTOR_ENTRY, Inverse3Device};
-pub use trouble::Trouble;
+pub use session_error::SessionError;

@@ -4,7 +4,7 @@
 //! its documentation). A state contains all devices; only the selected arm and grip are read.
 
 use crate::json::{Cursor, Malformed, Scalar};
-use crate::trouble::Trouble;
+use crate::session_error::SessionError;
 use flotor_hal::{DQuat, DVec3};
 use std::io::Write;
 
@@ -162,12 +162,12 @@ pub fn configure(chosen: &Chosen, force_gate: f64) -> String {
 /// Returns path and value of the first setting that differs from its required value. Not real-time.
 ///
 /// # Errors
-/// [`Trouble`] if the message is malformed or does not contain the arm.
+/// [`SessionError`] if the message is malformed or does not contain the arm.
 pub fn differing(
     text: &[u8],
     arm: &str,
     settings: &[Setting],
-) -> Result<Option<(&'static [&'static str], String)>, Trouble> {
+) -> Result<Option<(&'static [&'static str], String)>, SessionError> {
     let mut found = None;
     Cursor::new(text).fields(|name, cursor| {
         if name != ARMS {
@@ -180,7 +180,7 @@ pub fn differing(
             element.skip()
         })
     })?;
-    let element = found.ok_or(Trouble::Unplugged)?;
+    let element = found.ok_or(SessionError::Unplugged)?;
     for Setting { path, value, presence } in settings {
         match element.at(path)? {
             Some(said) if said == *value => {}
@@ -216,13 +216,13 @@ fn parts<const N: usize>(cursor: &mut Cursor<'_>, names: [&str; N]) -> Result<[f
     Ok(parts)
 }
 
-fn whole<const N: usize>(field: &'static str, parts: [f64; N]) -> Result<[f64; N], Trouble> {
+fn whole<const N: usize>(field: &'static str, parts: [f64; N]) -> Result<[f64; N], SessionError> {
     if parts.iter().any(|part| part.is_nan()) {
-        Err(Trouble::Missing(field))
+        Err(SessionError::Missing(field))
     } else if parts.iter().all(|part| part.is_finite()) {
         Ok(parts)
     } else {
-        Err(Trouble::Infinite(field))
+        Err(SessionError::Infinite(field))
     }
 }
 
@@ -307,8 +307,8 @@ fn held(cursor: &mut Cursor<'_>, chosen: &str) -> Result<Held, Malformed> {
 /// Parses the state of the selected devices. Real-time: bounded by the length of the message, no allocation.
 ///
 /// # Errors
-/// A [`Trouble`]: the state is malformed, a device is missing or not ready, or a number is missing or infinite.
-pub fn sample(text: &[u8], chosen: &Chosen) -> Result<Sample, Trouble> {
+/// A [`SessionError`]: the state is malformed, a device is missing or not ready, or a number is missing or infinite.
+pub fn sample(text: &[u8], chosen: &Chosen) -> Result<Sample, SessionError> {
     let (mut of_arm, mut of_grip) = (None, None);
     let mut cursor = Cursor::new(text);
     cursor.fields(|name, cursor| match &chosen.grip {
@@ -325,23 +325,23 @@ pub fn sample(text: &[u8], chosen: &Chosen) -> Result<Sample, Trouble> {
         _ => cursor.skip(),
     })?;
     cursor.end()?;
-    let arm = of_arm.ok_or(Trouble::Unplugged)?;
+    let arm = of_arm.ok_or(SessionError::Unplugged)?;
     let (orientation, buttons) = match (&chosen.grip, of_grip) {
         (None, _) => (DQuat::IDENTITY, 0),
-        (Some(_), None) => return Err(Trouble::Unplugged),
-        (Some(_), Some(held)) if !held.is_ready => return Err(Trouble::NotReady),
+        (Some(_), None) => return Err(SessionError::Unplugged),
+        (Some(_), Some(held)) if !held.is_ready => return Err(SessionError::NotReady),
         (Some(_), Some(held)) => {
             let [w, x, y, z] = whole("orientation", held.orientation)?;
             let turned = DQuat::from_xyzw(x, y, z, w);
             // Single precision: the norm is nearly one, and never zero.
             if turned.length() < SHORTEST {
-                return Err(Trouble::Missing("orientation"));
+                return Err(SessionError::Missing("orientation"));
             }
             (turned.normalize(), held.buttons)
         }
     };
     if !arm.is_ready {
-        return Err(Trouble::NotReady);
+        return Err(SessionError::NotReady);
     }
     Ok(Sample {
         position_m: whole("cursor_position", arm.position)?.into(),
@@ -380,33 +380,45 @@ mod tests {
     #[test]
     fn whatever_a_state_lacks_is_named() {
         let text = stand_in::state(DVec3::ZERO, DVec3::ZERO);
-        for (from, to, trouble) in [
-            ("\"cursor_position\":{\"x\":0.0,", "\"cursor_position\":{", Trouble::Missing("cursor_position")),
-            ("\"cursor_velocity\"", "\"velocity\"", Trouble::Missing("cursor_velocity")),
-            ("\"current_cursor_force\":{\"x\":0.0", "\"current_cursor_force\":{\"x\":NaN", Trouble::NoState),
-            ("\"current_cursor_force\":{\"x\":0.0", "\"current_cursor_force\":{\"x\":null", Trouble::NoState),
+        for (from, to, error) in [
+            (
+                "\"cursor_position\":{\"x\":0.0,",
+                "\"cursor_position\":{",
+                SessionError::Missing("cursor_position"),
+            ),
+            ("\"cursor_velocity\"", "\"velocity\"", SessionError::Missing("cursor_velocity")),
+            (
+                "\"current_cursor_force\":{\"x\":0.0",
+                "\"current_cursor_force\":{\"x\":NaN",
+                SessionError::NoState,
+            ),
+            (
+                "\"current_cursor_force\":{\"x\":0.0",
+                "\"current_cursor_force\":{\"x\":null",
+                SessionError::NoState,
+            ),
             (
                 "\"current_cursor_force\":{\"x\":0.0",
                 "\"current_cursor_force\":{\"x\":1e999",
-                Trouble::Infinite("current_cursor_force"),
+                SessionError::Infinite("current_cursor_force"),
             ),
-            ("\"orientation\":{\"w\":", "\"orientation\":{\"v\":", Trouble::Missing("orientation")),
-            (stand_in::ARM, "FFFF", Trouble::Unplugged),
-            (stand_in::GRIP, "FFFF", Trouble::Unplugged),
-            ("\"power_supply\":true", "\"power_supply\":false", Trouble::NotReady),
-            ("]}", "]", Trouble::NoState),
+            ("\"orientation\":{\"w\":", "\"orientation\":{\"v\":", SessionError::Missing("orientation")),
+            (stand_in::ARM, "FFFF", SessionError::Unplugged),
+            (stand_in::GRIP, "FFFF", SessionError::Unplugged),
+            ("\"power_supply\":true", "\"power_supply\":false", SessionError::NotReady),
+            ("]}", "]", SessionError::NoState),
         ] {
             let broken = text.replace(from, to);
             assert_ne!(broken, text, "{from}");
-            assert_eq!(sample(broken.as_bytes(), &chosen()), Err(trouble), "{to}");
+            assert_eq!(sample(broken.as_bytes(), &chosen()), Err(error), "{to}");
         }
     }
 
     #[test]
     fn a_setting_that_was_not_taken_is_named() {
-        let told = stand_in::configured(0.0);
+        let reported = stand_in::configured(0.0);
         let compare = |text: &str| differing(text.as_bytes(), stand_in::ARM, &settings(0.0));
-        assert_eq!(compare(&told), Ok(None));
+        assert_eq!(compare(&reported), Ok(None));
         for (from, to, name) in [
             ("\"gain\":0", "\"gain\":0.3", "gain"),
             ("XYZ", "XZY", "permutation"),
@@ -414,7 +426,7 @@ mod tests {
             ("\"transform\":{}", "\"transform\":{\"scale\":{\"x\":2}}", "x"),
             ("\"damping\"", "\"dumping\"", "scalar"),
         ] {
-            let other = told.replace(from, to);
+            let other = reported.replace(from, to);
             let found = compare(&other).expect("the arm is there").expect("it differs");
             assert_eq!(found.0.last(), Some(&name), "{to}");
         }

@@ -107,8 +107,8 @@ impl Options {
     fn idle(&self, session: &mut Session) -> Result<Sample, Refusal> {
         let started = Instant::now();
         loop {
-            let sample = session.look().map_err(|trouble| {
-                Refusal::resource(format!("the Inverse Service at {}: {trouble}", self.request.address))
+            let sample = session.poll().map_err(|error| {
+                Refusal::resource(format!("the Inverse Service at {}: {error}", self.request.address))
             })?;
             if !sample.is_commanded {
                 return Ok(sample);
@@ -221,7 +221,7 @@ impl ActiveDevice for DrivenDevice {
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         let newest = match self.exchange.take() {
             Ok(newest) => newest.or(self.first),
-            Err(trouble) => return Cycle::Fault(trouble.fault()),
+            Err(error) => return Cycle::Fault(error.fault()),
         };
         self.first = None;
         let cycle = match newest {
@@ -242,7 +242,7 @@ impl ActiveDevice for DrivenDevice {
             true => asked_n.clamp_length_max(self.opened.options.max_force_n),
             false => DVec3::ZERO,
         };
-        if self.exchange.leave(force_n) { Cycle::Fresh } else { Cycle::Stale }
+        if self.exchange.post(force_n) { Cycle::Fresh } else { Cycle::Stale }
     }
 
     fn deactivate(mut self) -> Inverse3Device {

@@ -2,8 +2,8 @@
 
 use crate::foreign::ForeignForce;
 use crate::message::{self, Chosen, Grip, Inventory, Sample};
+use crate::session_error::SessionError;
 use crate::socket::Socket;
-use crate::trouble::Trouble;
 use flotor_hal::DVec3;
 use std::time::Duration;
 
@@ -68,14 +68,14 @@ impl Session {
             }
             socket.receive().map(<[u8]>::to_vec)
         };
-        let failed = |trouble: Trouble| of_service(trouble.to_string());
+        let failed = |error: SessionError| of_service(error.to_string());
         // The service sends the first message.
         let first = talk("").map_err(failed)?;
         let inventory = message::inventory(&first).map_err(|malformed| failed(malformed.into()))?;
         let chosen = choose(request, &inventory).map_err(of_service)?;
-        let told = talk(&message::configure(&chosen, request.force_gate)).map_err(failed)?;
+        let reported = talk(&message::configure(&chosen, request.force_gate)).map_err(failed)?;
         let wanted = message::settings(request.force_gate);
-        if let Some((path, said)) = message::differing(&told, &chosen.arm, &wanted).map_err(failed)? {
+        if let Some((path, said)) = message::differing(&reported, &chosen.arm, &wanted).map_err(failed)? {
             return Err(of_service(format!(
                 "`{}` of the device {} is {said} and cannot be changed; the force on the hand would not be the commanded one. \
                  End other programs that configure the device, and update the service to 3.5 or newer",
@@ -97,8 +97,8 @@ impl Session {
     /// Reads a sample without a command. Real-time except for the wait: no allocation.
     ///
     /// # Errors
-    /// A [`Trouble`] of the connection or of the state.
-    pub fn look(&mut self) -> Result<Sample, Trouble> {
+    /// A [`SessionError`] of the connection or of the state.
+    pub fn poll(&mut self) -> Result<Sample, SessionError> {
         self.socket.send(message::LOOK)?;
         message::sample(self.socket.receive()?, &self.chosen)
     }
@@ -106,13 +106,13 @@ impl Session {
     /// Commands a force on the hand, N, and waits for the sample of the reply. Real-time except for the wait: no allocation.
     ///
     /// # Errors
-    /// A [`Trouble`]; end the session then, which removes its force.
-    pub fn exchange(&mut self, force_n: DVec3) -> Result<Sample, Trouble> {
+    /// A [`SessionError`]; end the session then, which removes its force.
+    pub fn exchange(&mut self, force_n: DVec3) -> Result<Sample, SessionError> {
         message::force(&mut self.message, &self.chosen.arm, force_n);
         self.socket.send(&self.message)?;
         let sample = message::sample(self.socket.receive()?, &self.chosen)?;
         match self.foreign.is_there(force_n, sample.force_n) {
-            true => Err(Trouble::ForeignForce),
+            true => Err(SessionError::ForeignForce),
             false => Ok(sample),
         }
     }

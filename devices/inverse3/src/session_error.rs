@@ -9,7 +9,7 @@ const UPDATE: &str = "update the service to 3.5 or newer";
 
 /// Fault of a session; after each the session and its force have ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Trouble {
+pub enum SessionError {
     /// The service closed the connection, or is gone.
     Gone,
     /// Timeout: no state came.
@@ -34,7 +34,7 @@ pub enum Trouble {
     ForeignForce,
 }
 
-impl Trouble {
+impl SessionError {
     /// Returns the fault of the contract that the host receives.
     #[must_use]
     pub const fn fault(self) -> Fault {
@@ -51,13 +51,13 @@ impl Trouble {
     }
 }
 
-impl From<Malformed> for Trouble {
+impl From<Malformed> for SessionError {
     fn from(_: Malformed) -> Self {
         Self::NoState
     }
 }
 
-impl fmt::Display for Trouble {
+impl fmt::Display for SessionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Gone => f.write_str("it closed the connection; start it again"),

@@ -3,7 +3,7 @@
 //! The frames are tungstenite's (RFC 6455). Tungstenite's own reader would first receive a message up to its size limit; here
 //! the header of a too long message suffices to refuse it.
 
-use crate::trouble::Trouble;
+use crate::session_error::SessionError;
 use std::io::{self, Cursor, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
@@ -103,11 +103,11 @@ impl Socket {
     ///
     /// # Errors
     /// If the connection is closed.
-    pub fn send(&mut self, text: &[u8]) -> Result<(), Trouble> {
+    pub fn send(&mut self, text: &[u8]) -> Result<(), SessionError> {
         self.send_frame(OpCode::Data(Data::Text), text)
     }
 
-    fn send_frame(&mut self, opcode: OpCode, payload: &[u8]) -> Result<(), Trouble> {
+    fn send_frame(&mut self, opcode: OpCode, payload: &[u8]) -> Result<(), SessionError> {
         // Xorshift (Marsaglia 2003): another mask for each frame.
         self.mask ^= self.mask << 13;
         self.mask ^= self.mask >> 17;
@@ -115,17 +115,17 @@ impl Socket {
         let mask = self.mask.to_le_bytes();
         let header = FrameHeader { opcode, mask: Some(mask), ..FrameHeader::default() };
         self.sent.clear();
-        header.format(payload.len() as u64, &mut self.sent).map_err(|_| Trouble::Gone)?;
+        header.format(payload.len() as u64, &mut self.sent).map_err(|_| SessionError::Gone)?;
         self.sent.extend(payload.iter().zip(mask.iter().cycle()).map(|(byte, mask)| byte ^ mask));
-        self.stream.write_all(&self.sent).map_err(|_| Trouble::Gone)
+        self.stream.write_all(&self.sent).map_err(|_| SessionError::Gone)
     }
 
     /// Waits for the next text message, which stays in the buffer until the next call. Real-time except for the wait: bounded,
     /// no allocation.
     ///
     /// # Errors
-    /// A [`Trouble`]: the connection is closed, silent, or sends malformed or fragmented messages.
-    pub fn receive(&mut self) -> Result<&[u8], Trouble> {
+    /// A [`SessionError`]: the connection is closed, silent, or sends malformed or fragmented messages.
+    pub fn receive(&mut self) -> Result<&[u8], SessionError> {
         let until = Instant::now() + self.patience;
         loop {
             let (opcode, from, to) = self.next_frame(until)?;
@@ -134,7 +134,7 @@ impl Socket {
                 OpCode::Data(Data::Text | Data::Binary) => {
                     return Ok(self.buffer.get(from..to).unwrap_or_default());
                 }
-                OpCode::Control(Control::Close) => return Err(Trouble::Gone),
+                OpCode::Control(Control::Close) => return Err(SessionError::Gone),
                 OpCode::Control(Control::Ping) => {
                     let mut echoed = [0; LONGEST_CONTROL];
                     let payload = self.buffer.get(from..to).unwrap_or_default();
@@ -146,26 +146,28 @@ impl Socket {
                     )?;
                 }
                 OpCode::Control(_) => {}
-                OpCode::Data(_) => return Err(Trouble::NoFrame),
+                OpCode::Data(_) => return Err(SessionError::NoFrame),
             }
         }
     }
 
     /// Waits for the next frame; returns its opcode and the start and end of its payload in the buffer.
-    fn next_frame(&mut self, until: Instant) -> Result<(OpCode, usize, usize), Trouble> {
+    fn next_frame(&mut self, until: Instant) -> Result<(OpCode, usize, usize), SessionError> {
         loop {
             let arrived = self.buffer.get(self.start..self.end).unwrap_or_default();
             let mut cursor = Cursor::new(arrived);
-            if let Some((header, length)) = FrameHeader::parse(&mut cursor).map_err(|_| Trouble::NoFrame)? {
+            if let Some((header, length)) =
+                FrameHeader::parse(&mut cursor).map_err(|_| SessionError::NoFrame)?
+            {
                 let is_control = matches!(header.opcode, OpCode::Control(_));
                 let longest = if is_control { LONGEST_CONTROL } else { LONGEST_BYTES };
                 let length = match usize::try_from(length) {
                     Ok(length) if length <= longest => length,
-                    _ => return Err(Trouble::TooLong(length)),
+                    _ => return Err(SessionError::TooLong(length)),
                 };
                 let is_plain = header.is_final && !(header.rsv1 || header.rsv2 || header.rsv3);
                 if !is_plain || header.mask.is_some() {
-                    return Err(Trouble::NoFrame);
+                    return Err(SessionError::NoFrame);
                 }
                 let from = self.start + usize::try_from(cursor.position()).unwrap_or(0);
                 if from + length <= self.end {
@@ -177,14 +179,14 @@ impl Socket {
     }
 
     /// Waits for more bytes in the receive buffer.
-    fn fill(&mut self, until: Instant) -> Result<(), Trouble> {
+    fn fill(&mut self, until: Instant) -> Result<(), SessionError> {
         // Move the partial frame to the front, to have room for the longest.
         self.buffer.copy_within(self.start..self.end, 0);
         (self.start, self.end) = (0, self.end - self.start);
-        let late = if self.end == 0 { Trouble::Silent } else { Trouble::Unfinished };
+        let late = if self.end == 0 { SessionError::Silent } else { SessionError::Unfinished };
         let room = self.buffer.get_mut(self.end..).unwrap_or_default();
         match self.stream.read(room) {
-            Ok(0) => Err(Trouble::Gone),
+            Ok(0) => Err(SessionError::Gone),
             Ok(_) if Instant::now() > until => Err(late),
             Ok(length) => {
                 self.end += length;
@@ -193,7 +195,7 @@ impl Socket {
             Err(error) => match error.kind() {
                 ErrorKind::Interrupted if Instant::now() < until => Ok(()),
                 ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted => Err(late),
-                _ => Err(Trouble::Gone),
+                _ => Err(SessionError::Gone),
             },
         }
     }

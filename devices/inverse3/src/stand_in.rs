@@ -19,7 +19,7 @@ pub const GRIP: &str = "61B8";
 /// Returns a state with the cursor at a position, m, and a force on the hand, N.
 #[must_use]
 pub fn state(position_m: DVec3, force_n: DVec3) -> String {
-    told(position_m, force_n, "")
+    reply(position_m, force_n, "")
 }
 
 /// Returns the reply to a configuration with all required settings, for a gain of the force gate.
@@ -30,10 +30,10 @@ pub fn configured(force_gate: f64) -> String {
          \"filters\":{{\"force_gate\":{{\"gain\":{force_gate}}},\"damping\":{{\"scalar\":0.0}}}},\
          \"gravity_compensation\":{{\"enabled\":true,\"scaling_factor\":1.0}}}},"
     );
-    told(DVec3::ZERO, DVec3::ZERO, &config)
+    reply(DVec3::ZERO, DVec3::ZERO, &config)
 }
 
-fn told(position_m: DVec3, force_n: DVec3, config: &str) -> String {
+fn reply(position_m: DVec3, force_n: DVec3, config: &str) -> String {
     let vector = |DVec3 { x, y, z }: DVec3| format!("{{\"x\":{x:?},\"y\":{y:?},\"z\":{z:?}}}");
     let arm = |id: &str, config: &str, position_m: DVec3, force_n: DVec3| {
         format!(
@@ -74,7 +74,7 @@ pub enum Said {
 pub struct StandIn {
     /// Address, `host:port`.
     pub address: String,
-    heard: Arc<Mutex<Vec<String>>>,
+    received: Arc<Mutex<Vec<String>>>,
     ended: Arc<AtomicUsize>,
 }
 
@@ -86,17 +86,17 @@ impl StandIn {
     pub fn start(answer: impl FnMut(usize, &str) -> Said + Send + 'static) -> io::Result<Self> {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let address = listener.local_addr()?.to_string();
-        let heard = Arc::new(Mutex::new(Vec::new()));
+        let received = Arc::new(Mutex::new(Vec::new()));
         let ended = Arc::new(AtomicUsize::new(0));
-        let (mut answer, hearing, ending) = (answer, Arc::clone(&heard), Arc::clone(&ended));
+        let (mut answer, receiving, ending) = (answer, Arc::clone(&received), Arc::clone(&ended));
         std::thread::Builder::new().name("stand-in".to_owned()).spawn(move || {
             while let Ok((stream, _)) = listener.accept() {
                 // A client that disconnects is no failure.
-                let _ = serve(stream, &mut answer, &hearing);
+                let _ = serve(stream, &mut answer, &receiving);
                 ending.fetch_add(1, Ordering::Release);
             }
         })?;
-        Ok(Self { address, heard, ended })
+        Ok(Self { address, received, ended })
     }
 
     /// Returns the number of ended connections, whose forces are gone.
@@ -107,8 +107,8 @@ impl StandIn {
 
     /// Returns all received messages.
     #[must_use]
-    pub fn heard(&self) -> Vec<String> {
-        self.heard.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    pub fn received(&self) -> Vec<String> {
+        self.received.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
@@ -134,7 +134,7 @@ pub fn frame(text: &str) -> Vec<u8> {
 fn serve(
     mut stream: TcpStream,
     answer: &mut impl FnMut(usize, &str) -> Said,
-    hearing: &Mutex<Vec<String>>,
+    receiving: &Mutex<Vec<String>>,
 ) -> io::Result<()> {
     stream.set_nodelay(true)?;
     let mut head = Vec::new();
@@ -154,7 +154,7 @@ fn serve(
     for number in 0.. {
         if number > 0 {
             text = receive(&mut stream)?;
-            hearing.lock().unwrap_or_else(PoisonError::into_inner).push(text.clone());
+            receiving.lock().unwrap_or_else(PoisonError::into_inner).push(text.clone());
         }
         match answer(number, &text) {
             Said::Text(text) => stream.write_all(&frame(&text))?,

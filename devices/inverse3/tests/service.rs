@@ -13,7 +13,7 @@ const HELD_M: DVec3 = DVec3::new(0.01, -0.02, 0.03);
 
 /// The three components of the newest force that the service was commanded, and whether there was one.
 fn commanded_n(service: &StandIn) -> Option<DVec3> {
-    service.heard().iter().rev().find_map(|message| force_of(message))
+    service.received().iter().rev().find_map(|message| force_of(message))
 }
 
 /// The last message is on its way when a tick hears of the fault; the service reads it in its own time.
@@ -112,7 +112,7 @@ fn a_force_goes_to_the_service_and_what_it_says_comes_back() {
     let mut ticks = Ticks::of(opened.activate(&CONFIG).map_err(|(_, refusal)| refusal).expect("once more"));
     ticks.until(force_n, |_, state| state.delivered.force() == force_n);
     assert_eq!(service.ended(), 0, "it is the same session");
-    let configured = &service.heard()[0];
+    let configured = &service.received()[0];
     for part in [
         "\"gain\":0}",
         "\"scalar\":0}",
@@ -169,7 +169,7 @@ fn whatever_the_service_breaks_ends_with_its_own_fault_and_no_force() {
         let is_over = || service.ended() == 1 && (commanded_n(&service) == Some(DVec3::ZERO) || !listens);
         let started = Instant::now();
         while !is_over() {
-            assert!(started.elapsed() < PATIENCE, "{what}: {:?}", service.heard().last());
+            assert!(started.elapsed() < PATIENCE, "{what}: {:?}", service.received().last());
             std::thread::sleep(Duration::from_millis(1));
         }
     }
@@ -205,7 +205,7 @@ fn another_session_that_pushes_too_is_a_fault() {
     let mut ticks = Ticks::of(activated(&service, &[]));
     ticks.until(DVec3::X, |cycle, _| cycle == Cycle::Fault(Fault::Protocol));
     until_it_pushes_no_more(&service);
-    let heard = service.heard().len();
+    let heard = service.received().len();
     // Three samples after the first push, and the last message takes the force away.
     assert!((43..=45).contains(&heard), "{heard} messages");
 }
@@ -333,7 +333,7 @@ fn a_device_that_is_well_is_opened_without_a_command_and_says_what_it_is() {
     let mut opened = open(&service, &[]).expect("nothing is wrong");
     let told = opened.capabilities().expect("they are legal");
     assert_eq!((told.sensed, told.actuated), (Axes::ALL, Axes::TRANSLATION));
-    assert_eq!(commanded_n(&service), None, "{:?}", service.heard());
+    assert_eq!(commanded_n(&service), None, "{:?}", service.received());
 }
 
 #[test]

@@ -117,7 +117,7 @@ impl Holder {
         let period = Duration::from_micros(u64::from(self.period_us).max(1));
         let ticks = duration.as_micros() / period.as_micros();
         let started = Instant::now();
-        let mut heard_at = started;
+        let mut received_at = started;
         for tick in 0..u32::try_from(ticks).unwrap_or(u32::MAX) {
             if status.mode != Mode::Levitating {
                 return Err(Aborted::Faulted(status.condition.faults()));
@@ -126,15 +126,15 @@ impl Holder {
             let command = self.command(&target(progress), &status);
             seen(progress, &command);
             link.send(request(&command, self.period_us), tick.wrapping_mul(self.period_us)).map_err(lost)?;
-            let heard = if self.lockstep {
+            let newest = if self.lockstep {
                 link.wait_for(link.sequence(), PATIENCE).map_err(lost)?
             } else {
                 std::thread::sleep((started + period * (tick + 1)).saturating_duration_since(Instant::now()));
                 link.take().map_err(lost)?
             };
-            if let Some(heard) = heard {
-                (status, heard_at) = (heard.status, Instant::now());
-            } else if heard_at.elapsed() > PATIENCE {
+            if let Some(newest) = newest {
+                (status, received_at) = (newest.status, Instant::now());
+            } else if received_at.elapsed() > PATIENCE {
                 return Err(Aborted::Silent);
             }
         }

@@ -24,7 +24,7 @@ pub(crate) enum Unanswered {
 
 /// The newest status, with the sequence number of the request that it answers.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Heard {
+pub(crate) struct AcknowledgedStatus {
     pub(crate) status: Status,
     pub(crate) acknowledged: u32,
 }
@@ -38,7 +38,7 @@ pub(crate) struct HostLink {
     /// 0 until armed.
     session: u32,
     intake: Intake,
-    newest: Option<Heard>,
+    newest: Option<AcknowledgedStatus>,
 }
 
 impl HostLink {
@@ -70,11 +70,11 @@ impl HostLink {
     }
 
     /// Reads all pending replies and returns the newest status not returned before. Real-time: bounded, no allocation.
-    pub(crate) fn take(&mut self) -> Result<Option<Heard>, LinkLost> {
+    pub(crate) fn take(&mut self) -> Result<Option<AcknowledgedStatus>, LinkLost> {
         for _ in 0..ANSWERS_PER_LOOK {
             match self.receive()? {
                 Received::Nothing => break,
-                Received::Status(heard) => self.newest = Some(heard),
+                Received::Status(newest) => self.newest = Some(newest),
                 Received::Page(_) | Received::Rejected => {}
             }
         }
@@ -82,11 +82,15 @@ impl HostLink {
     }
 
     /// Returns the status that answers the request `awaited`; `None` on timeout. Spins: for hosts on a virtual clock.
-    pub(crate) fn wait_for(&mut self, awaited: u32, patience: Duration) -> Result<Option<Heard>, LinkLost> {
+    pub(crate) fn wait_for(
+        &mut self,
+        awaited: u32,
+        patience: Duration,
+    ) -> Result<Option<AcknowledgedStatus>, LinkLost> {
         let started = Instant::now();
         loop {
             match self.take()? {
-                Some(heard) if heard.acknowledged == awaited => return Ok(Some(heard)),
+                Some(newest) if newest.acknowledged == awaited => return Ok(Some(newest)),
                 _ if started.elapsed() > patience => return Ok(None),
                 Some(_) => {}
                 None => std::thread::yield_now(),
@@ -120,7 +124,9 @@ impl HostLink {
             return Received::Rejected;
         }
         match frame.answer {
-            Answer::Status(status) => Received::Status(Heard { status, acknowledged: frame.acknowledged }),
+            Answer::Status(status) => {
+                Received::Status(AcknowledgedStatus { status, acknowledged: frame.acknowledged })
+            }
             Answer::Description(page) => Received::Page(page),
         }
     }
@@ -191,7 +197,7 @@ impl HostLink {
 
     fn ask_mode(&mut self, request: Request, mode: Mode, patience: Duration) -> Result<Status, Unanswered> {
         self.ask(request, patience, |received, _| match received {
-            Received::Status(heard) if heard.status.mode == mode => Some(heard.status),
+            Received::Status(newest) if newest.status.mode == mode => Some(newest.status),
             _ => None,
         })
     }
@@ -202,7 +208,7 @@ impl HostLink {
 enum Received {
     Nothing,
     Rejected,
-    Status(Heard),
+    Status(AcknowledgedStatus),
     Page(crate::protocol::description::Page),
 }
 

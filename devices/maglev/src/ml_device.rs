@@ -47,9 +47,9 @@ pub(crate) struct MlActive {
     pending: Option<WirePose>,
     newest: WirePose,
     state: DeviceState,
-    /// Loop time of the last used tick, ns; `heard`: arrival of the newest tick on the machine's clock.
+    /// Loop time of the last used tick, ns; `received_at`: arrival of the newest tick on the machine's clock.
     sampled_ns: Option<u64>,
-    heard: Instant,
+    received_at: Instant,
     at_boundary: bool,
     fault: Option<Fault>,
     /// Reads since an unexplained rejection of a command; `None` without one.
@@ -152,7 +152,7 @@ impl MlDevice {
             newest: pose,
             state: DeviceState::HOME,
             sampled_ns: None,
-            heard: Instant::now(),
+            received_at: Instant::now(),
             at_boundary: false,
             fault: None,
             refused: None,
@@ -187,7 +187,7 @@ impl MlActive {
     }
 
     /// Reads the pending events and waits for a tick until the timeout; returns the number of ticks read.
-    fn look(&mut self, patience: Duration) -> Result<u64, NoResults> {
+    fn poll(&mut self, patience: Duration) -> Result<u64, NoResults> {
         let until = Instant::now() + patience;
         let mut ticks = 0;
         for _ in 0..EVENTS_PER_LOOK {
@@ -199,7 +199,7 @@ impl MlActive {
                 None => break,
                 Some(Event::Tick(pose)) => {
                     self.pending = Some(pose);
-                    self.heard = Instant::now();
+                    self.received_at = Instant::now();
                     ticks += 1;
                 }
                 // The first fault is the cause; later ones, such as a fall, may result from it.
@@ -220,7 +220,7 @@ impl MlActive {
         if self.pending.is_some() {
             return SampleWait::Arrived { samples: 1 };
         }
-        match self.look(Duration::from_nanos(timeout_ns)) {
+        match self.poll(Duration::from_nanos(timeout_ns)) {
             Ok(_) if self.pending.is_some() => {
                 SampleWait::Arrived { samples: 1 + self.dropped_ticks() - dropped }
             }
@@ -232,11 +232,11 @@ impl MlActive {
 
     pub(crate) fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         let waits = self.lockstep && self.pending.is_none();
-        let looked = self.look(if waits { LOCKSTEP_PATIENCE } else { Duration::ZERO });
-        let verdict = match (looked, self.pending.take()) {
+        let polled = self.poll(if waits { LOCKSTEP_PATIENCE } else { Duration::ZERO });
+        let verdict = match (polled, self.pending.take()) {
             (Err(why), _) => Cycle::Fault(why.fault()),
             (Ok(_), Some(pose)) => self.sample(&pose, tick),
-            (Ok(_), None) if self.heard.elapsed() > self.timeout && !self.lockstep => {
+            (Ok(_), None) if self.received_at.elapsed() > self.timeout && !self.lockstep => {
                 Cycle::Fault(Fault::Timeout)
             }
             (Ok(_), None) => Cycle::Stale,

@@ -1,7 +1,7 @@
 //! The device behind Flotor's own protocol: armed and taken off by activation, on any transport.
 
 use crate::flight::Holder;
-use crate::host_link::{Heard, HostLink, Unanswered};
+use crate::host_link::{AcknowledgedStatus, HostLink, Unanswered};
 use crate::parameters::Options;
 use crate::protocol::{Condition, Description, Mode, Rejections, Request, Status};
 use crate::shaping::Shaping;
@@ -199,11 +199,11 @@ fn axes(bits: u8) -> Axes {
 
 impl OwnActive {
     pub(crate) fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        let heard = match self.look() {
-            Ok(heard) => heard,
+        let newest = match self.poll() {
+            Ok(newest) => newest,
             Err(LinkLost) => return Cycle::Fault(Fault::Disconnected),
         };
-        let status = heard.map(|heard| heard.status).or_else(|| self.first.take());
+        let status = newest.map(|newest| newest.status).or_else(|| self.first.take());
         let Some(status) = status else {
             #[allow(clippy::cast_possible_truncation)] // ten seconds at most
             let timeout_ns = self.opened.options.timeout.as_nanos() as u64;
@@ -279,7 +279,7 @@ impl OwnActive {
     }
 
     /// Reads the newest status, if any; in lockstep, waits for the status that answers the last command.
-    fn look(&mut self) -> Result<Option<Heard>, LinkLost> {
+    fn poll(&mut self) -> Result<Option<AcknowledgedStatus>, LinkLost> {
         let awaited = self.awaited.take().filter(|_| self.opened.options.lockstep);
         match awaited {
             Some(awaited) => self.opened.link.wait_for(awaited, LOCKSTEP_PATIENCE),

@@ -30,7 +30,7 @@ impl Shaping {
         let wrench = if wrench.is_finite() { *wrench } else { Wrench::ZERO };
         let walls = self.walls.as_ref().map_or(Wrench::ZERO, |walls| walls.wrench(state));
         self.commanded = wrench + walls;
-        self.warning.look(self.commanded.force());
+        self.warning.update(self.commanded.force());
         let total = self.commanded + self.weight;
         let height_m = state.pose.position().z;
         let z = self.calibration.command_n(total.force().z + self.own_n, height_m) - self.own_n;

@@ -17,7 +17,7 @@ pub struct ExcessForce {
 
 impl ExcessForce {
     /// Updates the warning from a commanded force, N; a component that is NaN counts as zero.
-    pub fn look(&mut self, force_n: DVec3) {
+    pub fn update(&mut self, force_n: DVec3) {
         let limit_n = if self.active { LIMIT_N * RELEASE } else { LIMIT_N };
         self.active = force_n.abs().cmpgt(limit_n).any();
     }
@@ -37,7 +37,7 @@ mod tests {
     fn a_force_that_trembles_about_the_limit_is_one_warning() {
         let mut warning = ExcessForce::default();
         let seen = [49.0, 50.5, 49.5, 50.5, 45.5, 44.5, 49.9, -51.0].map(|z| {
-            warning.look(DVec3::Z * z);
+            warning.update(DVec3::Z * z);
             warning.is_active()
         });
         assert_eq!(seen, [false, true, true, true, true, false, false, true]);
@@ -47,7 +47,7 @@ mod tests {
     fn sideways_the_limit_is_lower_and_nan_is_no_force() {
         let mut warning = ExcessForce::default();
         for (force_n, active) in [(DVec3::X * -10.5, true), (DVec3::Y * 9.5, true), (DVec3::NAN, false)] {
-            warning.look(force_n);
+            warning.update(force_n);
             assert_eq!(warning.is_active(), active, "{force_n}");
         }
     }

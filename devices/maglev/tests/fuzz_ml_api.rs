@@ -91,7 +91,7 @@ fn wounded_frames_of_the_ml_api_are_messages_or_nothing() {
         }
         // As much as a server reads before it gives up: whole frames and nothing else.
         let (mut intake, mut stream) = (Intake::default(), bytes);
-        while let Taken::Frame(length) = intake.take(&mut stream) {
+        while let ReadResult::Frame(length) = intake.take(&mut stream) {
             assert!((8..=512).contains(&length) && intake.frame().len() == length);
             on_a_stream += 1;
         }

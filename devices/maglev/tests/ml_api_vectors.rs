@@ -107,7 +107,7 @@ fn request(row: &Value) -> Request {
         }
         _ => match arguments.as_object().expect("arguments").iter().next() {
             None => Request::Plain(function),
-            Some((_, values)) if values.is_array() => Request::Six(function, floats(values)),
+            Some((_, values)) if values.is_array() => Request::AxisValues(function, floats(values)),
             Some((_, value)) => Request::Number(function, float(value)),
         },
     }
@@ -119,7 +119,7 @@ fn results(row: &Value) -> Results {
     match Results::zero(Function::of(int(&row["id"])).expect("a known function")) {
         Results::None => Results::None,
         Results::Number(_) => Results::Number(float(&decoded["value"])),
-        Results::Six(_) => Results::Six(floats(&decoded["values"])),
+        Results::AxisValues(_) => Results::AxisValues(floats(&decoded["values"])),
         Results::Pose(_) => Results::Pose(pose(decoded)),
         Results::Modes(_) => unreachable!("the recorded client never asks"),
         Results::Buttons(_) => Results::Buttons(buttons(decoded)),

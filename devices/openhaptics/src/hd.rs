@@ -5,7 +5,7 @@ use crate::ffi::{
     TORQUE, TRANSFORM, USABLE_WORKSPACE, VELOCITY, name_of,
 };
 use flotor_hal::{Conditions, DMat3, DQuat, DVec3, Fault, Pose, Refusal, Twist, Wrench};
-use flotor_vendor_sdk::{Library, LibraryProblem, Sample, Sdk, StandIn, without_signals};
+use flotor_vendor_sdk::{DropInPolicy, Library, LibraryProblem, Sample, Sdk, without_signals};
 use std::ffi::{c_int, c_uint};
 
 /// Library lookup of the SDK.
@@ -97,8 +97,12 @@ pub(crate) struct Facts {
 
 impl Hd {
     /// Opens the library, and the device with a name or the default one. Causes no motion. Not real-time.
-    pub(crate) fn open(path: Option<&str>, stand_in: StandIn, name: Option<&str>) -> Result<Self, Refusal> {
-        let library = Library::open(&SDK, path, stand_in).map_err(Refusal::resource)?;
+    pub(crate) fn open(
+        path: Option<&str>,
+        policy: DropInPolicy,
+        name: Option<&str>,
+    ) -> Result<Self, Refusal> {
+        let library = Library::open(&SDK, path, policy).map_err(Refusal::resource)?;
         let functions = Functions::load(&library).map_err(Refusal::resource)?;
         let version = functions.text(VERSION);
         if version
@@ -127,11 +131,11 @@ impl Hd {
             return Err(Failed { code, words: functions.words(code), what }.refusal());
         }
         let mut hd = Self { functions, handle, facts: Facts::NONE };
-        hd.facts = hd.ask()?;
+        hd.facts = hd.query()?;
         Ok(hd)
     }
 
-    fn ask(&self) -> Result<Facts, Refusal> {
+    fn query(&self) -> Result<Facts, Refusal> {
         let functions = &self.functions;
         functions.make_current(self.handle);
         let [least_x, least_y, least_z, x, y, z] = functions.numbers(USABLE_WORKSPACE);

@@ -7,7 +7,7 @@ use flotor_hal::{
     LoopConfig, PacingDevice, Parameter, Refusal, SampleWait, Settings, Tick, UsbAccess, UsbKind, Wrench,
     choices, export_device,
 };
-use flotor_vendor_sdk::{Exchange, LoopEnd, Pace, StandIn, StopSwitch};
+use flotor_vendor_sdk::{DropInPolicy, Exchange, LoopEnd, Pace, StopSwitch};
 use std::f64::consts::PI;
 use std::sync::Arc;
 use std::time::Duration;
@@ -82,10 +82,10 @@ impl Device for TouchDevice {
     type Stop = StopSwitch;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let stand_in = [StandIn::Refuse, StandIn::Accept];
-        let stand_in =
-            stand_in.get(settings.choice_or_default("stand_in")).copied().unwrap_or(StandIn::Refuse);
-        let hd = Hd::open(settings.text("library"), stand_in, settings.text("name"))?;
+        let policy = [DropInPolicy::Refuse, DropInPolicy::Accept];
+        let policy =
+            policy.get(settings.choice_or_default("stand_in")).copied().unwrap_or(DropInPolicy::Refuse);
+        let hd = Hd::open(settings.text("library"), policy, settings.text("name"))?;
         hd.calibrate()?;
         let Facts { force_n, torque_nm, gives_torque, .. } = *hd.facts();
         let told = |id: &str, own: f64| match settings.number_or_default(id) {

@@ -6,7 +6,7 @@
 use crate::ffi::{Scheduled, Stopped};
 use crate::hd::{Failed, Force, Hd};
 use flotor_hal::{Fault, Wrench};
-use flotor_vendor_sdk::{Exchange, Orders, without_signals};
+use flotor_vendor_sdk::{CommandCursor, Exchange, without_signals};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Clients in the scheduler of this process, which runs while there are any.
@@ -26,7 +26,7 @@ fn clients() -> MutexGuard<'static, Clients> {
 pub(crate) struct Client {
     hd: Arc<Hd>,
     exchange: Arc<Exchange>,
-    orders: Orders,
+    cursor: CommandCursor,
     force: Force,
 }
 
@@ -50,7 +50,7 @@ impl Client {
             self.force = Force::On;
         }
         self.exchange.publish(&sample);
-        let wrench = self.exchange.next_wrench(&mut self.orders);
+        let wrench = self.exchange.next_wrench(&mut self.cursor);
         self.hd.finish(&wrench)?;
         self.exchange.note_sent(&wrench);
         Ok(())
@@ -85,9 +85,9 @@ impl Driver {
     /// Schedules the device, which is energised at zero in the first frame. Not real-time.
     pub(crate) fn start(hd: &Arc<Hd>, exchange: &Arc<Exchange>) -> Result<Self, Failed> {
         let (hd, exchange) = (Arc::clone(hd), Arc::clone(exchange));
-        let orders = exchange.begin();
+        let cursor = exchange.begin();
         let client =
-            Client { hd: Arc::clone(&hd), exchange: Arc::clone(&exchange), orders, force: Force::Off };
+            Client { hd: Arc::clone(&hd), exchange: Arc::clone(&exchange), cursor, force: Force::Off };
         let mut clients = clients();
         let scheduled = hd.functions().schedule(Box::new(client));
         if !scheduled.is_in() {

@@ -88,7 +88,7 @@ impl Port {
     ///
     /// # Errors
     /// If the port is gone.
-    pub fn forget_input(&self) -> io::Result<()> {
+    pub fn discard_input(&self) -> io::Result<()> {
         Ok(self.0.clear(ClearBuffer::Input)?)
     }
 

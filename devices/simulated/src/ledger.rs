@@ -89,7 +89,7 @@ impl Ledger {
 
     /// Adds the work of an interval and sets the energy at its end. Real-time: bounded, no allocation.
     #[inline]
-    pub fn book(&mut self, work: Work, now: MechanicalEnergy) {
+    pub fn add(&mut self, work: Work, now: MechanicalEnergy) {
         self.work += work;
         self.now = now;
         self.peak_j = self.peak_j.max(now.total_j().abs());

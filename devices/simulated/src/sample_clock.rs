@@ -8,23 +8,23 @@ pub(crate) struct SampleClock {
     period: Duration,
     started: Option<Instant>,
     /// Samples reported by earlier waits.
-    told: u64,
+    reported: u64,
 }
 
 impl SampleClock {
     pub(crate) fn new(period_ns: u64) -> Self {
-        Self { period: Duration::from_nanos(period_ns.max(1)), started: None, told: 0 }
+        Self { period: Duration::from_nanos(period_ns.max(1)), started: None, reported: 0 }
     }
 
     /// Sleeps until an unreported sample is available, or until `timeout`.
     pub(crate) fn wait(&mut self, timeout: Duration) -> SampleWait {
         let since = self.started.get_or_insert_with(Instant::now).elapsed();
-        let next = Duration::from_nanos(self.nanoseconds(self.told + 1));
+        let next = Duration::from_nanos(self.nanoseconds(self.reported + 1));
         let until_next = next.saturating_sub(since);
         std::thread::sleep(until_next.min(timeout));
         let taken = self.taken();
-        let samples = taken - self.told.min(taken);
-        self.told = taken.max(self.told);
+        let samples = taken - self.reported.min(taken);
+        self.reported = taken.max(self.reported);
         if samples == 0 { SampleWait::TimedOut } else { SampleWait::Arrived { samples } }
     }
 
@@ -54,10 +54,10 @@ mod tests {
         };
         let first = next();
         std::thread::sleep(Duration::from_millis(20));
-        let told = first + next();
+        let reported = first + next();
         // A busy machine makes all of it longer.
         let taken = started.elapsed().as_millis();
-        assert!(first >= 1 && told >= 21 && u128::from(told) <= taken, "{told} of {taken}");
+        assert!(first >= 1 && reported >= 21 && u128::from(reported) <= taken, "{reported} of {taken}");
     }
 
     #[test]

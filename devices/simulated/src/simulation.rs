@@ -165,7 +165,7 @@ impl Simulation {
         while self.time_ns < end_ns {
             let (piece_ns, intention) = self.next_piece(end_ns);
             match self.plant.advance(piece_ns, coils, intention.as_ref()) {
-                Outcome::Moved(work) => self.ledger.book(work, self.plant.energy()),
+                Outcome::Moved(work) => self.ledger.add(work, self.plant.energy()),
                 Outcome::Stopped => {
                     incidents.stopped = true;
                     self.ledger = Ledger::open(self.plant.energy());

@@ -67,7 +67,7 @@ pub struct Exchange {
 
 /// Newest wrench of the loop, as seen by the thread of an SDK.
 #[derive(Debug)]
-pub struct Orders {
+pub struct CommandCursor {
     seen: u64,
     renewed: Instant,
     wrench: Wrench,
@@ -117,24 +117,24 @@ impl Exchange {
     }
 
     /// Returns the wrench to send. In lockstep, waits for the loop. On the thread of the SDK.
-    pub fn next_wrench(&self, orders: &mut Orders) -> Wrench {
+    pub fn next_wrench(&self, cursor: &mut CommandCursor) -> Wrench {
         if self.pace == Pace::Lockstep {
-            self.wait_for_command(orders.seen);
+            self.wait_for_command(cursor.seen);
         }
         if let Some((count, words)) = self.command.get()
-            && count != orders.seen
+            && count != cursor.seen
         {
             let [x, y, z, rx, ry, rz] = words.map(f64::from_bits);
-            orders.wrench = Wrench { force_n: [x, y, z], torque_nm: [rx, ry, rz] };
-            (orders.seen, orders.renewed) = (count, Instant::now());
+            cursor.wrench = Wrench { force_n: [x, y, z], torque_nm: [rx, ry, rz] };
+            (cursor.seen, cursor.renewed) = (count, Instant::now());
         }
-        let is_expired = self.pace == Pace::Real && orders.renewed.elapsed() > VALID;
+        let is_expired = self.pace == Pace::Real && cursor.renewed.elapsed() > VALID;
         // Either the stopping thread sees pending force, or this thread sees the stop: one of both is certain.
         self.is_quiet.store(false, Ordering::SeqCst);
         if is_expired || self.is_over() || self.is_stopped.load(Ordering::SeqCst) {
             return Wrench::ZERO;
         }
-        orders.wrench
+        cursor.wrench
     }
 
     fn wait_for_command(&self, seen: u64) {
@@ -166,13 +166,13 @@ impl Exchange {
 
     /// Resets wrench, fault and stop; the sample count continues. The result is for the thread of the SDK. Not real-time.
     #[must_use]
-    pub fn begin(&self) -> Orders {
+    pub fn begin(&self) -> CommandCursor {
         self.command.put(&[0; 6]);
         self.begun_at.store(self.samples(), Ordering::Release);
         self.fault.store(0, Ordering::Release);
         self.is_stopped.store(false, Ordering::SeqCst);
         self.is_over.store(false, Ordering::Release);
-        Orders { seen: self.command.count(), renewed: Instant::now(), wrench: Wrench::ZERO }
+        CommandCursor { seen: self.command.count(), renewed: Instant::now(), wrench: Wrench::ZERO }
     }
 
     /// Requests the end of the SDK's thread.
@@ -277,26 +277,26 @@ mod tests {
     #[test]
     fn a_wrench_arrives_and_expires() {
         let exchange = Exchange::new(Pace::Real);
-        let mut orders = exchange.begin();
-        assert_eq!(exchange.next_wrench(&mut orders), Wrench::ZERO);
+        let mut cursor = exchange.begin();
+        assert_eq!(exchange.next_wrench(&mut cursor), Wrench::ZERO);
         exchange.command(&PUSH);
-        assert_eq!(exchange.next_wrench(&mut orders), PUSH);
+        assert_eq!(exchange.next_wrench(&mut cursor), PUSH);
         std::thread::sleep(VALID * 2);
-        assert_eq!(exchange.next_wrench(&mut orders), Wrench::ZERO, "the loop is gone");
+        assert_eq!(exchange.next_wrench(&mut cursor), Wrench::ZERO, "the loop is gone");
         exchange.command(&PUSH);
-        assert_eq!(exchange.next_wrench(&mut orders), PUSH, "and back");
+        assert_eq!(exchange.next_wrench(&mut cursor), PUSH, "and back");
     }
 
     #[test]
     fn after_a_stop_nothing_but_zero_is_sent_whoever_comes_first() {
         for round in 0..200_u64 {
             let exchange = Exchange::new(Pace::Real);
-            let (sent, mut orders) = (Mutex::new(Wrench::ZERO), exchange.begin());
+            let (sent, mut cursor) = (Mutex::new(Wrench::ZERO), exchange.begin());
             let (exchange, sent) = (&exchange, &sent);
             std::thread::scope(|scope| {
                 scope.spawn(move || {
                     while !exchange.is_over() {
-                        let wrench = exchange.next_wrench(&mut orders);
+                        let wrench = exchange.next_wrench(&mut cursor);
                         *sent.lock().expect("nobody panics") = wrench;
                         exchange.note_sent(&wrench);
                     }
@@ -314,7 +314,7 @@ mod tests {
     fn in_lockstep_each_sample_meets_the_wrench_that_answers_it() {
         const CYCLES: u32 = 2_000;
         let exchange = Exchange::new(Pace::Lockstep);
-        let mut orders = exchange.begin();
+        let mut cursor = exchange.begin();
         let exchange = &exchange;
         std::thread::scope(|scope| {
             scope.spawn(move || {
@@ -326,7 +326,7 @@ mod tests {
                         buttons: cycle,
                         conditions: Conditions::NONE,
                     });
-                    let wrench = exchange.next_wrench(&mut orders);
+                    let wrench = exchange.next_wrench(&mut cursor);
                     assert_eq!(wrench.force_n[0], f64::from(cycle) * 2.0);
                 }
             });

@@ -20,8 +20,8 @@ mod platform;
 mod problem;
 mod search;
 
-pub use exchange::{Exchange, Orders, Pace, Sample, VALID};
-pub use library::{Library, StandIn};
+pub use exchange::{CommandCursor, Exchange, Pace, Sample, VALID};
+pub use library::{DropInPolicy, Library};
 pub use loop_end::{LoopEnd, StopSwitch};
 pub use platform::without_signals;
 pub use problem::LibraryProblem;

@@ -12,7 +12,7 @@ const MARKER: &[u8] = b"flotor_dropin\0";
 
 /// Policy for Flotor's own drop-in libraries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StandIn {
+pub enum DropInPolicy {
     /// Refuse them: no simulated device without consent.
     Refuse,
     /// Accept them as simulated devices.
@@ -27,20 +27,20 @@ pub struct Library {
 }
 
 impl Library {
-    /// Opens the library: the file `told`, else the first fitting file in the folders of SDK and system. Not
+    /// Opens the library: the file `chosen`, else the first fitting file in the folders of SDK and system. Not
     /// real-time; runs the constructors of the library.
     ///
     /// # Errors
     /// [`LibraryProblem`] with the cause and the remedy.
-    pub fn open(sdk: &Sdk, told: Option<&str>, stand_in: StandIn) -> Result<Self, LibraryProblem> {
-        let places = match told {
+    pub fn open(sdk: &Sdk, chosen: Option<&str>, policy: DropInPolicy) -> Result<Self, LibraryProblem> {
+        let places = match chosen {
             Some(path) => vec![PathBuf::from(path)],
             None => sdk.places(|variable| std::env::var(variable).ok().filter(|value| !value.is_empty())),
         };
         let mut problem = None;
         for place in &places {
             match looked_at(place) {
-                Some(Ok(())) => return Self::load(place, stand_in),
+                Some(Ok(())) => return Self::load(place, policy),
                 // Possibly for another processor: a later folder may have the right file.
                 Some(Err(why)) => problem = problem.or(Some(why)),
                 None => {}
@@ -49,7 +49,7 @@ impl Library {
         Err(problem.unwrap_or(LibraryProblem::NotFound { sdk: sdk.name, searched: places }))
     }
 
-    fn load(path: &Path, stand_in: StandIn) -> Result<Self, LibraryProblem> {
+    fn load(path: &Path, policy: DropInPolicy) -> Result<Self, LibraryProblem> {
         // SAFETY: the user guarantees that the file is the library of the SDK that is named: loading it runs its code. It is
         // bound at once and shares no names with other libraries.
         let loaded = unsafe { platform::open(path) };
@@ -63,9 +63,9 @@ impl Library {
         let library = Self { loaded: ManuallyDrop::new(loaded), path: path.to_path_buf() };
         // SAFETY: only its address is looked at; it is not called.
         let is_stand_in = unsafe { library.optional::<*const ()>(MARKER) }.is_some();
-        match stand_in {
-            StandIn::Refuse if is_stand_in => Err(LibraryProblem::StandIn { path: library.path }),
-            StandIn::Refuse | StandIn::Accept => Ok(library),
+        match policy {
+            DropInPolicy::Refuse if is_stand_in => Err(LibraryProblem::StandIn { path: library.path }),
+            DropInPolicy::Refuse | DropInPolicy::Accept => Ok(library),
         }
     }
 

@@ -23,7 +23,7 @@ impl Board {
         theirs.set_timeout(TIMEOUT).expect("a timeout");
         ours.set_timeout(Duration::from_millis(1)).expect("a timeout");
         let (force_mn, is_ending) = (Arc::new(AtomicI64::new(i64::MIN)), Arc::new(AtomicBool::new(false)));
-        let (heard, ending) = (Arc::clone(&force_mn), Arc::clone(&is_ending));
+        let (received, ending) = (Arc::clone(&force_mn), Arc::clone(&is_ending));
         let thread = std::thread::spawn(move || {
             let (mut decoder, mut bytes) = (Decoder::new(FORCE), [0; 64]);
             while !ending.load(Ordering::Acquire) {
@@ -31,7 +31,7 @@ impl Board {
                 // A read without data times out after a millisecond: the period of the board.
                 let count = ours.read(&mut bytes).unwrap_or(0);
                 for force in bytes[..count].iter().filter_map(|byte| decoder.push(*byte)) {
-                    heard.store(force.into(), Ordering::Release);
+                    received.store(force.into(), Ordering::Release);
                 }
             }
         });

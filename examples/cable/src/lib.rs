@@ -70,7 +70,9 @@ impl Device for Knob {
     fn activate(self, _config: &LoopConfig) -> Result<ActiveKnob, (Self, Refusal)> {
         self.is_stopped.store(false, Ordering::Release);
         match self.port.try_clone_native().map_err(std::io::Error::from).and_then(Reader::start) {
-            Ok(reader) => Ok(ActiveKnob { knob: self, reader, seen: 0, told: 0, z_m: None, force_n: 0.0 }),
+            Ok(reader) => {
+                Ok(ActiveKnob { knob: self, reader, seen: 0, reported: 0, z_m: None, force_n: 0.0 })
+            }
             Err(error) => Err((self, Refusal::resource(format!("no thread reads the port: {error}")))),
         }
     }
@@ -95,7 +97,7 @@ struct ActiveKnob {
     reader: Reader,
     /// Number of the last sample returned by `read`, and of the last sample reported by a wait.
     seen: u64,
-    told: u64,
+    reported: u64,
     z_m: Option<f64>,
     force_n: f64,
 }
@@ -140,10 +142,10 @@ impl ActiveDevice for ActiveKnob {
 
 impl PacingDevice for ActiveKnob {
     fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
-        match self.reader.wait_beyond(self.told, Duration::from_nanos(timeout_ns)) {
+        match self.reader.wait_beyond(self.reported, Duration::from_nanos(timeout_ns)) {
             Some(number) => {
-                let samples = number - self.told;
-                self.told = number;
+                let samples = number - self.reported;
+                self.reported = number;
                 SampleWait::Arrived { samples }
             }
             None => SampleWait::TimedOut,

@@ -2,7 +2,7 @@
 //! said again.
 #![no_main]
 
-use flotor_maglev::ml_api::{Acknowledgement, Event, Function, Intake, Reply, Request, Taken};
+use flotor_maglev::ml_api::{Acknowledgement, Event, Function, Intake, ReadResult, Reply, Request};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -24,7 +24,7 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let _ = Acknowledgement::decode(bytes);
     let (mut intake, mut stream) = (Intake::default(), bytes);
-    while let Taken::Frame(length) = intake.take(&mut stream) {
+    while let ReadResult::Frame(length) = intake.take(&mut stream) {
         assert_eq!(intake.frame().len(), length);
     }
 });

@@ -4,7 +4,7 @@ use flotor_emulation::rig::Stand;
 use flotor_falcon::boot::{AGREED, LOAD_DIVISOR, PROMPT, PROMPT_ANSWER, PROMPT_DIVISOR, RUN_DIVISOR};
 use flotor_falcon::chip::{PAYLOAD_BYTES, Request};
 use flotor_falcon::kinematics::{CENTRE_M, angles_rad, counts, inverse, posture};
-use flotor_falcon::protocol::{ALL_HOMED, Command, Frames, Heard, Homing, Report};
+use flotor_falcon::protocol::{ALL_HOMED, Command, Frames, Homing, Parsed, Report};
 use flotor_hal::{DVec3, VerticalCalibration};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -121,7 +121,7 @@ pub struct Machine {
     /// Time of the last packet.
     last_packet: Duration,
     to_host: VecDeque<u8>,
-    heard: VecDeque<u8>,
+    received: VecDeque<u8>,
     frames: Frames,
     homed: u8,
     homing_commands: u32,
@@ -150,7 +150,7 @@ impl Machine {
             latency_ms: LATENCY_MS,
             last_packet: Duration::ZERO,
             to_host: VecDeque::new(),
-            heard: VecDeque::new(),
+            received: VecDeque::new(),
             frames: Frames::default(),
             homed,
             homing_commands: 0,
@@ -210,10 +210,10 @@ impl Machine {
             _ if number == Request::Reset as u8 => {
                 match value {
                     1 => self.to_host.clear(),
-                    2 => self.heard.clear(),
+                    2 => self.received.clear(),
                     _ => {
                         self.to_host.clear();
-                        self.heard.clear();
+                        self.received.clear();
                         self.latency_ms = LATENCY_MS;
                     }
                 }
@@ -259,10 +259,10 @@ impl Machine {
         for byte in bytes {
             match (self.stage, self.divisor) {
                 (Stage::Running, RUN_DIVISOR) => {
-                    if let Heard::Frame(frame) = self.frames.push(*byte)
+                    if let Parsed::Frame(frame) = self.frames.push(*byte)
                         && let Some(command) = Command::read(&frame)
                     {
-                        self.obey(command, at);
+                        self.execute(command, at);
                     }
                 }
                 (Stage::Loader | Stage::Prompted, PROMPT_DIVISOR) => self.prompted(*byte),
@@ -293,19 +293,19 @@ impl Machine {
     }
 
     fn prompted(&mut self, byte: u8) {
-        self.heard.push_back(byte);
-        while self.heard.len() > PROMPT.len() {
-            self.heard.pop_front();
+        self.received.push_back(byte);
+        while self.received.len() > PROMPT.len() {
+            self.received.pop_front();
         }
-        if self.heard.iter().eq(&PROMPT) && self.fault != Some(Fault::NoPrompt) {
-            self.heard.clear();
+        if self.received.iter().eq(&PROMPT) && self.fault != Some(Fault::NoPrompt) {
+            self.received.clear();
             self.stage = Stage::Prompted;
             self.to_host.extend(PROMPT_ANSWER);
         }
     }
 
     /// Carries out a command and queues a report.
-    fn obey(&mut self, command: Command, at: Duration) {
+    fn execute(&mut self, command: Command, at: Duration) {
         self.command = command;
         self.commands += 1;
         let since = |first: u64| self.commands >= first;

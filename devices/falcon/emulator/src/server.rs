@@ -21,7 +21,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
 pub fn serve(mut stream: TcpStream, device: &InProcess, mut tenure: Tenure<'_>) -> io::Result<()> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
-    let (mut heard, mut chunk) = (Vec::new(), [0; 1024]);
+    let (mut received, mut chunk) = (Vec::new(), [0; 1024]);
     loop {
         if tenure.is_over() {
             return Err(ErrorKind::TimedOut.into());
@@ -29,14 +29,14 @@ pub fn serve(mut stream: TcpStream, device: &InProcess, mut tenure: Tenure<'_>) 
         if poll(&mut [PollFd::new(&stream, PollFlags::IN)], Some(&LOOK))? > 0 {
             match stream.read(&mut chunk)? {
                 0 => return Ok(()),
-                length => heard.extend_from_slice(chunk.get(..length).unwrap_or_default()),
+                length => received.extend_from_slice(chunk.get(..length).unwrap_or_default()),
             }
         }
-        while let Some(length) = obey(&heard, device)? {
-            heard.drain(..length);
+        while let Some(length) = execute(&received, device)? {
+            received.drain(..length);
             tenure.message();
         }
-        if !heard.is_empty() {
+        if !received.is_empty() {
             tenure.part();
         }
         let now = device.now();
@@ -55,9 +55,9 @@ pub fn serve(mut stream: TcpStream, device: &InProcess, mut tenure: Tenure<'_>) 
 }
 
 /// Carries out the first message in a buffer; returns its length, `None` while it is incomplete.
-fn obey(heard: &[u8], device: &InProcess) -> io::Result<Option<usize>> {
+fn execute(received: &[u8], device: &InProcess) -> io::Result<Option<usize>> {
     let now = device.now();
-    match heard {
+    match received {
         [REQUEST, number, low, high, ..] => {
             let _ = device.machine().request(*number, u16::from_le_bytes([*low, *high]));
             Ok(Some(4))

@@ -1,6 +1,6 @@
 //! Commands and reports in the two threads: one in flight, and each fault is its own, with the motors at rest.
 
-use flotor_falcon::Trouble;
+use flotor_falcon::DeviceError;
 use flotor_falcon::boot::start;
 use flotor_falcon::chip::Chip;
 use flotor_falcon::exchange::{Exchange, ForceSwitch};
@@ -43,7 +43,7 @@ fn each_command_has_one_report() {
     let before = device.machine().commands();
     let mut reports = 0;
     until("reports come", || {
-        exchange.leave(PUSH);
+        exchange.post(PUSH);
         reports += u64::from(exchange.take().expect("nothing is wrong").is_some());
         reports == 200
     });
@@ -57,28 +57,28 @@ fn each_command_has_one_report() {
 
 #[test]
 fn every_fault_is_its_own_and_leaves_the_motors_at_rest() {
-    for (fault, trouble) in [
-        (Fault::ShortPacket(30), Trouble::ShortPacket),
-        (Fault::StaleReport(30), Trouble::StaleReport),
-        (Fault::IdlePackets(30), Trouble::Silent),
-        (Fault::Noise(30), Trouble::Noise),
-        (Fault::HubReset(30), Trouble::Gone),
+    for (fault, error) in [
+        (Fault::ShortPacket(30), DeviceError::ShortPacket),
+        (Fault::StaleReport(30), DeviceError::StaleReport),
+        (Fault::IdlePackets(30), DeviceError::Silent),
+        (Fault::Noise(30), DeviceError::Noise),
+        (Fault::HubReset(30), DeviceError::Gone),
     ] {
-        let timeout = if trouble == Trouble::Silent { Duration::from_millis(200) } else { PATIENCE };
+        let timeout = if error == DeviceError::Silent { Duration::from_millis(200) } else { PATIENCE };
         let Running { device, exchange, .. } = running(timeout);
         device.machine().breaks(Some(fault));
         let mut found = None;
         until("it is noticed", || {
-            exchange.leave(PUSH);
+            exchange.post(PUSH);
             found = exchange.take().err();
             found.is_some()
         });
-        assert_eq!(found, Some(trouble), "{fault:?}");
+        assert_eq!(found, Some(error), "{fault:?}");
         // What is gone hears nothing any more.
-        if trouble != Trouble::Gone {
+        if error != DeviceError::Gone {
             until("the motors rest", || device.machine().command().motors == [0; 3]);
         }
-        assert_eq!(exchange.take(), Err(trouble), "it stays");
+        assert_eq!(exchange.take(), Err(error), "it stays");
     }
 }
 
@@ -86,22 +86,22 @@ fn every_fault_is_its_own_and_leaves_the_motors_at_rest() {
 fn a_stop_and_a_tick_that_never_comes_take_the_force_away() {
     let Running { device, exchange, switch } = running(PATIENCE);
     until("there is force", || {
-        exchange.leave(PUSH);
+        exchange.post(PUSH);
         device.machine().command() == PUSH
     });
     // Nothing else is left for the thread: it stops by itself.
     until("the motors rest", || device.machine().command().motors == [0; 3]);
     until("there is force again", || {
-        exchange.leave(PUSH);
+        exchange.post(PUSH);
         device.machine().command() == PUSH
     });
     std::thread::spawn(move || switch.safe_stop()).join().expect("it does not panic");
     until("the motors rest", || {
-        exchange.leave(PUSH);
+        exchange.post(PUSH);
         device.machine().command().motors == [0; 3]
     });
     for _ in 0..50 {
-        exchange.leave(PUSH);
+        exchange.post(PUSH);
         std::thread::sleep(Duration::from_millis(1));
         assert_eq!(device.machine().command().motors, [0; 3]);
     }

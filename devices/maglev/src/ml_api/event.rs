@@ -1,7 +1,7 @@
 //! Events: unsolicited messages of a controller on the callback connection, and their acknowledgements by a client.
 
 use super::frame::{Fields, Frame};
-use super::values::{Buttons, FaultBits, Six, WirePose};
+use super::values::{AxisValues, Buttons, FaultBits, WirePose};
 
 /// Number of the event that ends a callback connection, and of the function that requests the end.
 const END: i32 = 71;
@@ -29,7 +29,7 @@ pub enum Event {
     /// A boundary was crossed: for each axis -1 below its range, 1 above, 0 inside; last element: 1 outside the sphere.
     Boundary([i32; 7]),
     /// A coil is too hot: temperatures of all coils, °C.
-    Overtemp(Six),
+    Overtemp(AxisValues),
     /// The fault bits changed.
     Fault(FaultBits),
     /// A servo interval began: the pose at its start.

@@ -69,8 +69,8 @@ impl<'a> Fields<'a> {
     pub(super) fn of(frame: &'a [u8]) -> Option<(i32, Self)> {
         let (length, rest) = frame.split_first_chunk()?;
         let (code, bytes) = rest.split_first_chunk()?;
-        let told = usize::try_from(i32::from_le_bytes(*length)).ok()?;
-        (told == frame.len()).then_some((i32::from_le_bytes(*code), Self { bytes }))
+        let declared = usize::try_from(i32::from_le_bytes(*length)).ok()?;
+        (declared == frame.len()).then_some((i32::from_le_bytes(*code), Self { bytes }))
     }
 
     /// Reads the next four bytes as an integer.

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read};
 
 /// Result of one read of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Taken {
+pub enum ReadResult {
     /// A whole frame of this many bytes; [`Intake::frame`] returns the frame until the next read.
     Frame(usize),
     /// No whole frame yet.
@@ -22,12 +22,12 @@ pub struct Intake {
     bytes: [u8; LONGEST_BYTES],
     filled: usize,
     /// Bytes of the frame returned last; discarded by the next read.
-    told: usize,
+    returned: usize,
 }
 
 impl Default for Intake {
     fn default() -> Self {
-        Self { bytes: [0; LONGEST_BYTES], filled: 0, told: 0 }
+        Self { bytes: [0; LONGEST_BYTES], filled: 0, returned: 0 }
     }
 }
 
@@ -35,31 +35,31 @@ impl Intake {
     /// Returns the frame found by the last [`Intake::take`].
     #[must_use]
     pub fn frame(&self) -> &[u8] {
-        self.bytes.get(..self.told).unwrap_or_default()
+        self.bytes.get(..self.returned).unwrap_or_default()
     }
 
     /// Reads the next frame of a stream; one system call at most if the stream does not block.
-    pub fn take(&mut self, stream: &mut impl Read) -> Taken {
-        self.bytes.copy_within(self.told..self.filled, 0);
-        self.filled -= self.told;
-        self.told = 0;
+    pub fn take(&mut self, stream: &mut impl Read) -> ReadResult {
+        self.bytes.copy_within(self.returned..self.filled, 0);
+        self.filled -= self.returned;
+        self.returned = 0;
         loop {
             match self.length() {
-                Some(Err(())) => return Taken::Malformed,
+                Some(Err(())) => return ReadResult::Malformed,
                 Some(Ok(length)) if length <= self.filled => {
-                    self.told = length;
-                    return Taken::Frame(length);
+                    self.returned = length;
+                    return ReadResult::Frame(length);
                 }
                 _ => {}
             }
             let room = self.bytes.get_mut(self.filled..).unwrap_or_default();
             match stream.read(room) {
-                Ok(0) => return Taken::Lost,
+                Ok(0) => return ReadResult::Lost,
                 Ok(read) => self.filled += read,
                 Err(error) => match error.kind() {
-                    ErrorKind::WouldBlock | ErrorKind::TimedOut => return Taken::Nothing,
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut => return ReadResult::Nothing,
                     ErrorKind::Interrupted => {}
-                    _ => return Taken::Lost,
+                    _ => return ReadResult::Lost,
                 },
             }
         }
@@ -67,8 +67,8 @@ impl Intake {
 
     /// Returns true if a frame has arrived in part.
     #[must_use]
-    pub fn is_in_the_middle(&self) -> bool {
-        self.filled > self.told
+    pub fn has_partial_frame(&self) -> bool {
+        self.filled > self.returned
     }
 
     /// Returns the length of the frame at the start of the buffer; an error if the length is invalid.
@@ -102,11 +102,11 @@ mod tests {
         for mut stream in [Pieces(all.iter().map(|byte| vec![*byte]).collect()), Pieces(vec![all.clone()])] {
             let mut intake = Intake::default();
             for frame in &frames {
-                assert_eq!(intake.take(&mut stream), Taken::Frame(frame.len()));
+                assert_eq!(intake.take(&mut stream), ReadResult::Frame(frame.len()));
                 assert_eq!(intake.frame(), frame);
             }
-            assert_eq!(intake.take(&mut stream), Taken::Nothing);
-            assert!(!intake.is_in_the_middle());
+            assert_eq!(intake.take(&mut stream), ReadResult::Nothing);
+            assert!(!intake.has_partial_frame());
         }
     }
 
@@ -114,11 +114,11 @@ mod tests {
     fn a_length_that_no_frame_has_is_told() {
         for length in [0_i32, 7, -1, 513, i32::MIN] {
             let mut stream = Pieces(vec![length.to_le_bytes().to_vec()]);
-            assert_eq!(Intake::default().take(&mut stream), Taken::Malformed, "{length}");
+            assert_eq!(Intake::default().take(&mut stream), ReadResult::Malformed, "{length}");
         }
         let mut half = Intake::default();
-        assert_eq!(half.take(&mut Pieces(vec![vec![12, 0, 0, 0, 1]])), Taken::Nothing);
-        assert!(half.is_in_the_middle());
-        assert_eq!(half.take(&mut [].as_slice()), Taken::Lost);
+        assert_eq!(half.take(&mut Pieces(vec![vec![12, 0, 0, 0, 1]])), ReadResult::Nothing);
+        assert!(half.has_partial_frame());
+        assert_eq!(half.take(&mut [].as_slice()), ReadResult::Lost);
     }
 }

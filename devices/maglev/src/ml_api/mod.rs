@@ -29,11 +29,12 @@ pub mod values;
 pub use event::{Acknowledgement, Event, EventKind};
 pub use frame::Frame;
 pub use function::Function;
-pub use intake::{Intake, Taken};
+pub use intake::{Intake, ReadResult};
 pub use reply::{Reply, Results};
-pub use request::{Request, Unreadable};
+pub use request::{InvalidRequest, Request};
 pub use values::{
-    Axis, AxisMode, Buttons, Cell, CellOffset, FaultBits, Gain, GainSet, Pid, Six, Status, Version, WirePose,
+    Axis, AxisMode, AxisValues, Buttons, Cell, CellOffset, FaultBits, Gain, GainSet, Pid, Status, Version,
+    WirePose,
 };
 
 /// TCP port of every controller.

@@ -3,7 +3,9 @@
 
 use super::frame::{Fields, Frame};
 use super::function::Function;
-use super::values::{AxisMode, Buttons, Cell, CellOffset, FaultBits, Pid, Six, Status, Version, WirePose};
+use super::values::{
+    AxisMode, AxisValues, Buttons, Cell, CellOffset, FaultBits, Pid, Status, Version, WirePose,
+};
 
 /// Results of a function. Units of [`super`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,7 +15,7 @@ pub enum Results {
     /// One number.
     Number(f32),
     /// Six numbers.
-    Six(Six),
+    AxisValues(AxisValues),
     /// A pose of the flotor or a frame.
     Pose(WirePose),
     /// Control mode of each axis.
@@ -59,7 +61,7 @@ impl Results {
             | Function::GetGravity
             | Function::GetSpeedLimits
             | Function::GetTemp
-            | Function::GetVelocity => Self::Six([0.0; 6]),
+            | Function::GetVelocity => Self::AxisValues([0.0; 6]),
             Function::GetActualPosition | Function::GetDesiredPosition | Function::GetFrame => {
                 Self::Pose(WirePose::default())
             }
@@ -88,7 +90,7 @@ impl Results {
         match self {
             Self::None => {}
             Self::Number(value) => return frame.float(*value),
-            Self::Six(values) => return frame.floats(values),
+            Self::AxisValues(values) => return frame.floats(values),
             Self::Pose(pose) => return frame.int(pose.out_of_range.into()).floats(&pose.at),
             Self::Modes(modes) => {
                 // The first two are sent a second time: the vendor's decoder reads two further numbers.
@@ -125,7 +127,7 @@ impl Results {
         Some(match Self::zero(function) {
             Self::None => Self::None,
             Self::Number(_) => Self::Number(fields.float()?),
-            Self::Six(_) => Self::Six(fields.floats()?),
+            Self::AxisValues(_) => Self::AxisValues(fields.floats()?),
             Self::Pose(_) => Self::Pose(WirePose { out_of_range: fields.int()? != 0, at: fields.floats()? }),
             Self::Modes(mut modes) => {
                 for mode in &mut modes {

@@ -3,7 +3,7 @@
 use super::event::EventKind;
 use super::frame::{Fields, Frame};
 use super::function::Function;
-use super::values::{Axis, CellOffset, Gain, GainSet, Pid, Six, Status, WirePose};
+use super::values::{Axis, AxisValues, CellOffset, Gain, GainSet, Pid, Status, WirePose};
 
 /// Request of a client. Units of [`super`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub enum Request {
     /// A function of one number: radius m, voltage V, current A, frequency Hz.
     Number(Function, f32),
     /// A function of six numbers: currents A, speeds m/s and rad/s, wrenches N and N·m.
-    Six(Function, Six),
+    AxisValues(Function, AxisValues),
     /// A function of a pose: desired position, frame.
     Pose(Function, WirePose),
     /// Sets the force of one axis, N or N·m.
@@ -51,7 +51,7 @@ pub enum Request {
 
 /// An invalid request, with the status for the reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unreadable {
+pub struct InvalidRequest {
     /// The requested function; `None` if the number is unknown.
     pub function: Option<Function>,
     /// Status for the reply.
@@ -68,7 +68,7 @@ impl Request {
             | Self::OfSet(function, _)
             | Self::Register(function, _)
             | Self::Number(function, _)
-            | Self::Six(function, _)
+            | Self::AxisValues(function, _)
             | Self::Pose(function, _) => function,
             Self::ConstrainAxis { .. } => Function::ConstrainAxis,
             Self::GetGainVecAxis(..) => Function::GetGainVecAxis,
@@ -111,7 +111,7 @@ impl Request {
             }
             Self::Register(_, process) => frame.int(process),
             Self::Number(_, value) => frame.float(value),
-            Self::Six(_, values) => frame.floats(&values),
+            Self::AxisValues(_, values) => frame.floats(&values),
             Self::Pose(_, pose) => frame.int(pose.out_of_range.into()).floats(&pose.at),
             Self::SetForceAxis(axis, force) => frame.int(axis as i32).float(force),
             Self::SetGainVecAxes(set, gains) => {
@@ -140,9 +140,9 @@ impl Request {
     /// Decodes a frame; bytes after the arguments are ignored. Never panics.
     ///
     /// # Errors
-    /// [`Unreadable`] for an unknown function, missing arguments or an invalid axis, gain or gain set.
-    pub fn decode(frame: &[u8]) -> Result<Self, Unreadable> {
-        let unknown = Unreadable { function: None, status: Status::UNKNOWN };
+    /// [`InvalidRequest`] for an unknown function, missing arguments or an invalid axis, gain or gain set.
+    pub fn decode(frame: &[u8]) -> Result<Self, InvalidRequest> {
+        let unknown = InvalidRequest { function: None, status: Status::UNKNOWN };
         let (id, fields) = Fields::of(frame).ok_or(unknown)?;
         let function = Function::of(id).ok_or(unknown)?;
         Arguments { fields, function }.read()
@@ -156,7 +156,7 @@ struct Arguments<'a> {
 }
 
 impl Arguments<'_> {
-    fn read(mut self) -> Result<Request, Unreadable> {
+    fn read(mut self) -> Result<Request, InvalidRequest> {
         let function = self.function;
         Ok(match function {
             Function::ConstrainAxis => {
@@ -178,7 +178,7 @@ impl Arguments<'_> {
             | Function::SetForces
             | Function::SetGravity
             | Function::SetSpeedLimits
-            | Function::SetVelocity => Request::Six(function, self.six()?),
+            | Function::SetVelocity => Request::AxisValues(function, self.six()?),
             Function::SetDesiredPosition | Function::SetFrame => {
                 // The flag is ignored: clients send uninitialised memory.
                 self.int()?;
@@ -213,36 +213,36 @@ impl Arguments<'_> {
         })
     }
 
-    fn unreadable(&self, status: Status) -> Unreadable {
-        Unreadable { function: Some(self.function), status }
+    fn invalid(&self, status: Status) -> InvalidRequest {
+        InvalidRequest { function: Some(self.function), status }
     }
 
-    fn int(&mut self) -> Result<i32, Unreadable> {
-        self.fields.int().ok_or(self.unreadable(Status::COMMUNICATION))
+    fn int(&mut self) -> Result<i32, InvalidRequest> {
+        self.fields.int().ok_or(self.invalid(Status::COMMUNICATION))
     }
 
-    fn float(&mut self) -> Result<f32, Unreadable> {
-        self.fields.float().ok_or(self.unreadable(Status::COMMUNICATION))
+    fn float(&mut self) -> Result<f32, InvalidRequest> {
+        self.fields.float().ok_or(self.invalid(Status::COMMUNICATION))
     }
 
-    fn six(&mut self) -> Result<Six, Unreadable> {
-        self.fields.floats().ok_or(self.unreadable(Status::COMMUNICATION))
+    fn six(&mut self) -> Result<AxisValues, InvalidRequest> {
+        self.fields.floats().ok_or(self.invalid(Status::COMMUNICATION))
     }
 
-    fn pid(&mut self) -> Result<Pid, Unreadable> {
-        self.fields.pid().ok_or(self.unreadable(Status::COMMUNICATION))
+    fn pid(&mut self) -> Result<Pid, InvalidRequest> {
+        self.fields.pid().ok_or(self.invalid(Status::COMMUNICATION))
     }
 
-    fn axis(&mut self) -> Result<Axis, Unreadable> {
-        Axis::of(self.int()?).ok_or(self.unreadable(Status::AXIS))
+    fn axis(&mut self) -> Result<Axis, InvalidRequest> {
+        Axis::of(self.int()?).ok_or(self.invalid(Status::AXIS))
     }
 
-    fn set(&mut self) -> Result<GainSet, Unreadable> {
-        GainSet::of(self.int()?).ok_or(self.unreadable(Status::GAIN_TYPE))
+    fn set(&mut self) -> Result<GainSet, InvalidRequest> {
+        GainSet::of(self.int()?).ok_or(self.invalid(Status::GAIN_TYPE))
     }
 
-    fn gain(&mut self) -> Result<Gain, Unreadable> {
-        Gain::of(self.int()?).ok_or(self.unreadable(Status::GAIN_TYPE))
+    fn gain(&mut self) -> Result<Gain, InvalidRequest> {
+        Gain::of(self.int()?).ok_or(self.invalid(Status::GAIN_TYPE))
     }
 }
 

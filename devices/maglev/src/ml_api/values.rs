@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// A number for each axis: x, y, z, then the rotations about x, y, z.
-pub type Six = [f32; 6];
+pub type AxisValues = [f32; 6];
 
 /// Axis of translation or rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,7 +110,7 @@ pub struct WirePose {
     /// True if the flotor is outside the sensors' range.
     pub out_of_range: bool,
     /// Position, then the angles defined in [`super::angles`].
-    pub at: Six,
+    pub at: AxisValues,
 }
 
 /// Control mode of an axis.

@@ -1,7 +1,7 @@
 //! Connections: one outstanding call, one write per frame, a timeout for every read.
 
 use crate::ml_api::{
-    Acknowledgement, Event, Frame, Function, Intake, Reply, Request, Results, Status, Taken,
+    Acknowledgement, Event, Frame, Function, Intake, ReadResult, Reply, Request, Results, Status,
 };
 use crate::platform::{reset_when_dropped, wait_for};
 use crate::transport::{OpenError, tcp};
@@ -63,10 +63,10 @@ impl Line {
         let until = Instant::now() + patience;
         loop {
             match self.intake.take(&mut self.stream) {
-                Taken::Frame(_) => return Ok(true),
-                Taken::Lost => return Err(NoResults::Lost),
-                Taken::Malformed => return Err(NoResults::Malformed),
-                Taken::Nothing => {}
+                ReadResult::Frame(_) => return Ok(true),
+                ReadResult::Lost => return Err(NoResults::Lost),
+                ReadResult::Malformed => return Err(NoResults::Malformed),
+                ReadResult::Nothing => {}
             }
             let rest = until.saturating_duration_since(Instant::now());
             if rest.is_zero() {

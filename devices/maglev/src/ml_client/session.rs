@@ -2,8 +2,8 @@
 
 use super::connection::{Control, Events, Line, NoResults};
 use crate::ml_api::{
-    Acknowledgement, Event, EventKind, FaultBits, Function, GainSet, Pid, Request, Results, Six, Status,
-    WirePose,
+    Acknowledgement, AxisValues, Event, EventKind, FaultBits, Function, GainSet, Pid, Request, Results,
+    Status, WirePose,
 };
 use crate::transport::OpenError;
 use std::time::{Duration, Instant};
@@ -28,8 +28,8 @@ const FORCED: [GainSet; 3] = [GainSet::Normal, GainSet::Locked, GainSet::Constra
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Facts {
     pub(crate) version: crate::ml_api::Version,
-    pub(crate) current_limits_a: Six,
-    pub(crate) speed_limits: Six,
+    pub(crate) current_limits_a: AxisValues,
+    pub(crate) speed_limits: AxisValues,
 }
 
 /// Settings of a session.
@@ -47,7 +47,7 @@ pub(crate) struct TakenOff {
     /// Pose of the first tick.
     pub(crate) pose: WirePose,
     /// Wrench that balances the weight of the flotor, N and N·m.
-    pub(crate) gravity: Six,
+    pub(crate) gravity: AxisValues,
 }
 
 /// Cause of a failed take-off, with the function that failed.
@@ -113,9 +113,9 @@ impl Session {
         self.control.call(request, patience).map_err(|why| Failed::At(request.function(), why))
     }
 
-    fn six(&mut self, function: Function) -> Result<Six, Failed> {
+    fn six(&mut self, function: Function) -> Result<AxisValues, Failed> {
         match self.call(&Request::Plain(function))? {
-            Results::Six(values) => Ok(values),
+            Results::AxisValues(values) => Ok(values),
             _ => Err(Failed::At(function, NoResults::Malformed)),
         }
     }
@@ -195,15 +195,15 @@ impl Session {
     }
 
     /// Measures the weight of the flotor, and compensates it by the controller until force commands replace the gains.
-    fn carry(&mut self, plan: &Plan) -> Result<Six, Failed> {
+    fn carry(&mut self, plan: &Plan) -> Result<AxisValues, Failed> {
         if !plan.finds_gravity {
             return Ok([0.0; 6]);
         }
         let found = self.call_within(&Request::Plain(Function::FindGravity), PROCEDURE_PATIENCE)?;
-        let Results::Six(gravity) = found else {
+        let Results::AxisValues(gravity) = found else {
             return Err(Failed::At(Function::FindGravity, NoResults::Malformed));
         };
-        self.call(&Request::Six(Function::SetGravity, gravity))?;
+        self.call(&Request::AxisValues(Function::SetGravity, gravity))?;
         self.call(&Request::Plain(Function::DefyGravity))?;
         Ok(gravity)
     }
@@ -220,7 +220,7 @@ impl Session {
 
     /// Fades the gains down to the feed-forward of the weight and replaces them by a force command. All three sets end at
     /// zero: the force is then the same whether a command replaces the gains or adds to them.
-    fn fade_to_forces(&mut self, fade: Duration, gravity: Six) -> Result<(), Failed> {
+    fn fade_to_forces(&mut self, fade: Duration, gravity: AxisValues) -> Result<(), Failed> {
         for (place, set) in FORCED.into_iter().enumerate() {
             self.kept[place] = match self.call(&Request::OfSet(Function::GetGainVecAxes, set))? {
                 Results::Gains(gains) => gains,
@@ -238,7 +238,7 @@ impl Session {
                 std::thread::sleep(fade / FADE_STEPS);
             }
         }
-        self.call(&Request::Six(Function::SetForces, gravity))?;
+        self.call(&Request::AxisValues(Function::SetForces, gravity))?;
         for set in FORCED {
             self.call(&Request::SetGainVecAxes(set, [Pid::ZERO; 6]))?;
         }
@@ -304,11 +304,11 @@ impl Session {
 
     /// Commands a wrench; returns true if the controller confirms within the budget. Waits for the confirmation of an
     /// earlier command first, and drops the new command if that is missing. Real-time: bounded, no allocation.
-    pub(crate) fn command(&mut self, wrench: Six, budget: Duration) -> Result<bool, NoResults> {
+    pub(crate) fn command(&mut self, wrench: AxisValues, budget: Duration) -> Result<bool, NoResults> {
         if self.control.outstanding_since().is_some() && !self.is_confirmed(budget)? {
             return Ok(false);
         }
-        self.control.begin(&Request::Six(Function::SetForces, wrench))?;
+        self.control.begin(&Request::AxisValues(Function::SetForces, wrench))?;
         self.is_confirmed(budget)
     }
 

@@ -99,7 +99,7 @@ impl Guidance {
                 true
             }
         };
-        self.hear(now_ns)
+        self.poll(now_ns)
     }
 
     /// Moves the target along an axis, m. Real-time: bounded, no allocation.
@@ -107,12 +107,12 @@ impl Guidance {
     /// # Errors
     /// [`NotGuiding`] if the client that identified itself last does not guide.
     pub(crate) fn aim_at(&mut self, axis: usize, target_m: f64, now_ns: u64) -> Result<(), NotGuiding> {
-        self.hear(now_ns)?;
+        self.poll(now_ns)?;
         self.target_m[axis.min(2)] = target_m;
         Ok(())
     }
 
-    fn hear(&mut self, now_ns: u64) -> Result<(), NotGuiding> {
+    fn poll(&mut self, now_ns: u64) -> Result<(), NotGuiding> {
         if !self.is_guide_speaking || self.guide() == 0.0 {
             return Err(NotGuiding { guide: self.guide() });
         }

@@ -101,7 +101,7 @@ pub struct Load {
 
 impl Load {
     /// Updates the mean square with a wrench applied for `dt_s`; returns true if the continuous limit is exceeded.
-    pub fn bear(&mut self, wrench: &Wrench, dt_s: f64, limits: &LimitConfig) -> bool {
+    pub fn update(&mut self, wrench: &Wrench, dt_s: f64, limits: &LimitConfig) -> bool {
         let share = limits.share(wrench);
         self.mean_square += (share * share - self.mean_square) * -math::exp_m1(-dt_s / limits.load_time_s);
         self.mean_square > limits.continuous_load * limits.continuous_load

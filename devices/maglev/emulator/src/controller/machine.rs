@@ -145,7 +145,7 @@ impl Controller {
     /// Executes a received request and returns the reply; `None` for a rejected request.
     pub fn receive(&mut self, packet: &[u8], now_us: u64) -> Option<Reply> {
         match RequestFrame::decode(packet) {
-            Ok(frame) => self.obey(&frame, now_us),
+            Ok(frame) => self.execute(&frame, now_us),
             Err(rejection) => {
                 self.intake.reject(rejection);
                 None
@@ -158,7 +158,7 @@ impl Controller {
         self.intake.reject(Rejection::Length);
     }
 
-    fn obey(&mut self, frame: &RequestFrame, now_us: u64) -> Option<Reply> {
+    fn execute(&mut self, frame: &RequestFrame, now_us: u64) -> Option<Reply> {
         // A description request is open to every host and changes nothing.
         if let Request::Describe { page } = frame.request {
             let page = self.config.description.page(page).map_err(|rejection| self.intake.reject(rejection));
@@ -258,7 +258,7 @@ impl Controller {
         }
         self.condition = reports;
         self.driven = driven;
-        if self.load.bear(&driven, dt_s, &self.config.limits) {
+        if self.load.update(&driven, dt_s, &self.config.limits) {
             return self.fault(Condition::OVERLOAD, now_us);
         }
         driven

@@ -10,7 +10,7 @@ const MACHINE_FAULT_S: f64 = 0.5;
 
 /// Kind of an injected fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MisbehaviorKind {
+pub enum InjectedFaultKind {
     /// No more replies to this client.
     Silence,
     /// Half a reply, and no more after that.
@@ -44,9 +44,9 @@ pub enum When {
 
 /// An injected fault with its state and delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Misbehavior {
+pub struct InjectedFault {
     /// Kind of the fault.
-    pub kind: MisbehaviorKind,
+    pub kind: InjectedFaultKind,
     /// State in which the fault occurs.
     pub when: When,
     /// Delay after the start of the state, s.
@@ -71,7 +71,7 @@ impl fmt::Display for Unknown {
 
 impl std::error::Error for Unknown {}
 
-impl FromStr for Misbehavior {
+impl FromStr for InjectedFault {
     type Err = Unknown;
 
     fn from_str(text: &str) -> Result<Self, Unknown> {
@@ -95,17 +95,17 @@ impl FromStr for Misbehavior {
             None => (rest, When::Anytime),
         };
         let kind = match kind {
-            "silence" => MisbehaviorKind::Silence,
-            "half-frame" => MisbehaviorKind::HalfFrame,
-            "close" => MisbehaviorKind::Close,
-            "reset" => MisbehaviorKind::Reset,
-            "stall" => MisbehaviorKind::Stall,
-            "wrong-length" => MisbehaviorKind::WrongLength,
-            "late-tick" => MisbehaviorKind::LateTick,
-            "out-of-range" => MisbehaviorKind::Machine(FaultBits::SENSOR_RANGE),
-            "over-temperature" => MisbehaviorKind::Machine(FaultBits::OVER_TEMPERATURE),
-            "over-current" => MisbehaviorKind::Machine(FaultBits::OVER_CURRENT),
-            "over-speed" => MisbehaviorKind::Machine(FaultBits::OVER_SPEED),
+            "silence" => InjectedFaultKind::Silence,
+            "half-frame" => InjectedFaultKind::HalfFrame,
+            "close" => InjectedFaultKind::Close,
+            "reset" => InjectedFaultKind::Reset,
+            "stall" => InjectedFaultKind::Stall,
+            "wrong-length" => InjectedFaultKind::WrongLength,
+            "late-tick" => InjectedFaultKind::LateTick,
+            "out-of-range" => InjectedFaultKind::Machine(FaultBits::SENSOR_RANGE),
+            "over-temperature" => InjectedFaultKind::Machine(FaultBits::OVER_TEMPERATURE),
+            "over-current" => InjectedFaultKind::Machine(FaultBits::OVER_CURRENT),
+            "over-speed" => InjectedFaultKind::Machine(FaultBits::OVER_SPEED),
             other => {
                 let (code, every) = other
                     .strip_prefix("status=")
@@ -113,7 +113,7 @@ impl FromStr for Misbehavior {
                     .ok_or_else(unknown)?;
                 let status = Status(code.parse().map_err(|_| unknown())?);
                 let every = every.parse().ok().filter(|every| *every > 0).ok_or_else(unknown)?;
-                MisbehaviorKind::Status(status, every)
+                InjectedFaultKind::Status(status, every)
             }
         };
         Ok(Self { kind, when, after_s })
@@ -144,7 +144,7 @@ pub(super) enum Deed {
 /// Pending faults, and the affected client.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plan {
-    pending: Vec<(Misbehavior, f64)>,
+    pending: Vec<(InjectedFault, f64)>,
     calls: u32,
     silenced: Option<u64>,
     machine: Option<(FaultBits, f64)>,
@@ -152,8 +152,8 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub(super) fn new(misbehaviors: Vec<Misbehavior>) -> Self {
-        Self { pending: misbehaviors.into_iter().map(|one| (one, 0.0)).collect(), ..Self::default() }
+    pub(super) fn new(injected_faults: Vec<InjectedFault>) -> Self {
+        Self { pending: injected_faults.into_iter().map(|one| (one, 0.0)).collect(), ..Self::default() }
     }
 
     /// Advances by a servo interval, s, in this state; returns the injected faults of the machine.
@@ -165,19 +165,19 @@ impl Plan {
             *left_s -= dt_s;
         }
         self.machine = self.machine.filter(|(_, left_s)| *left_s > 0.0);
-        if let Some(MisbehaviorKind::Machine(bits)) =
-            self.take(|kind| matches!(kind, MisbehaviorKind::Machine(_)))
+        if let Some(InjectedFaultKind::Machine(bits)) =
+            self.take(|kind| matches!(kind, InjectedFaultKind::Machine(_)))
         {
             self.machine = Some((bits, MACHINE_FAULT_S));
         }
-        self.is_tick_late |= self.take(|kind| kind == MisbehaviorKind::LateTick).is_some();
+        self.is_tick_late |= self.take(|kind| kind == InjectedFaultKind::LateTick).is_some();
         self.machine.map_or(FaultBits::NONE, |(bits, _)| bits)
     }
 
     /// Takes the first due fault of a kind.
-    fn take(&mut self, is_wanted: impl Fn(MisbehaviorKind) -> bool) -> Option<MisbehaviorKind> {
+    fn take(&mut self, is_wanted: impl Fn(InjectedFaultKind) -> bool) -> Option<InjectedFaultKind> {
         let is_due =
-            |(one, in_state_s): &(Misbehavior, f64)| is_wanted(one.kind) && *in_state_s > one.after_s;
+            |(one, in_state_s): &(InjectedFault, f64)| is_wanted(one.kind) && *in_state_s > one.after_s;
         let place = self.pending.iter().position(is_due)?;
         Some(self.pending.remove(place).0.kind)
     }
@@ -198,7 +198,7 @@ impl Plan {
             return Deed::Silence;
         }
         let every = self.pending.iter().find_map(|(one, in_state_s)| match one.kind {
-            MisbehaviorKind::Status(status, every) if *in_state_s > one.after_s => Some((status, every)),
+            InjectedFaultKind::Status(status, every) if *in_state_s > one.after_s => Some((status, every)),
             _ => None,
         });
         if let Some((status, every)) = every {
@@ -208,16 +208,16 @@ impl Plan {
         let on_a_connection = |kind| {
             !matches!(
                 kind,
-                MisbehaviorKind::Machine(_) | MisbehaviorKind::LateTick | MisbehaviorKind::Status(..)
+                InjectedFaultKind::Machine(_) | InjectedFaultKind::LateTick | InjectedFaultKind::Status(..)
             )
         };
         let deed = match self.take(on_a_connection) {
-            Some(MisbehaviorKind::Silence) => Deed::Silence,
-            Some(MisbehaviorKind::HalfFrame) => Deed::HalfFrame,
-            Some(MisbehaviorKind::Close) => Deed::Close,
-            Some(MisbehaviorKind::Reset) => Deed::Reset,
-            Some(MisbehaviorKind::Stall) => Deed::Stall,
-            Some(MisbehaviorKind::WrongLength) => Deed::WrongLength,
+            Some(InjectedFaultKind::Silence) => Deed::Silence,
+            Some(InjectedFaultKind::HalfFrame) => Deed::HalfFrame,
+            Some(InjectedFaultKind::Close) => Deed::Close,
+            Some(InjectedFaultKind::Reset) => Deed::Reset,
+            Some(InjectedFaultKind::Stall) => Deed::Stall,
+            Some(InjectedFaultKind::WrongLength) => Deed::WrongLength,
             _ => Deed::Answer,
         };
         if matches!(deed, Deed::Silence | Deed::HalfFrame) {
@@ -241,9 +241,9 @@ mod tests {
 
     #[test]
     fn faults_are_read_as_they_are_written() {
-        let read = |text: &str| text.parse::<Misbehavior>();
-        let expected = Misbehavior {
-            kind: MisbehaviorKind::Status(Status(5), 10),
+        let read = |text: &str| text.parse::<InjectedFault>();
+        let expected = InjectedFault {
+            kind: InjectedFaultKind::Status(Status(5), 10),
             when: When::In(Flight::Flying),
             after_s: 0.2,
         };

@@ -6,16 +6,16 @@
 //!
 //! - [`controller`]: the machine's behaviour. Pure: requests and samples in, replies and a wrench out.
 //! - [`server`]: connections, clients, callback connections, events.
-//! - [`misbehavior`]: injected faults.
+//! - [`injected_fault`]: injected faults.
 //! - [`Machine`]: the servo loop over a [`Plant`](crate::Plant); [`proxy`]: the host's loop over any device.
 
 pub mod controller;
-pub mod misbehavior;
+pub mod injected_fault;
 pub mod proxy;
 mod run;
 pub mod server;
 
 pub use controller::{Commanders, Controller, ControllerConfig, ForceCommand, Silence};
-pub use misbehavior::{Misbehavior, MisbehaviorKind, When};
+pub use injected_fault::{InjectedFault, InjectedFaultKind, When};
 pub use run::Machine;
 pub use server::Server;

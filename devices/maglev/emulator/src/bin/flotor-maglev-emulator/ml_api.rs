@@ -9,7 +9,7 @@ use flotor_hal::Refusal;
 use flotor_maglev::ml_api::PORT;
 use flotor_maglev_emulator::ml_api::server::Hub;
 use flotor_maglev_emulator::ml_api::{
-    Commanders, Controller, ControllerConfig, ForceCommand, Machine, Misbehavior, Server, Silence,
+    Commanders, Controller, ControllerConfig, ForceCommand, InjectedFault, Machine, Server, Silence,
 };
 use flotor_maglev_emulator::{Pace, Plant};
 use std::error::Error;
@@ -55,7 +55,7 @@ pub(crate) struct MlApiArguments {
     /// wrong-length, status=CODE/N (every Nth call), late-tick, out-of-range, over-temperature, over-current, over-speed;
     /// states landed, taking-off, flying, ticking, landing
     #[arg(long = "fault", value_name = "FAULT")]
-    faults: Vec<Misbehavior>,
+    faults: Vec<InjectedFault>,
     /// Button press, as left@1.5-2, in s from the start (repeatable)
     #[arg(long = "press", value_name = "BUTTON@FROM-TO")]
     presses: Vec<Press>,

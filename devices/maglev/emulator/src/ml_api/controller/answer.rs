@@ -1,9 +1,10 @@
 //! Execution of requests: queries, settings, procedures.
 
 use super::machine::{Command, Controller, Flight, narrow, vector};
-use super::procedure::Ticket;
+use super::procedure::ProcedureId;
 use flotor_maglev::ml_api::{
-    Axis, AxisMode, Cell, Function, GainSet, Pid, Reply, Request, Results, Six, Status, Version, WirePose,
+    Axis, AxisMode, AxisValues, Cell, Function, GainSet, Pid, Reply, Request, Results, Status, Version,
+    WirePose,
 };
 
 /// Version of the controller.
@@ -21,7 +22,7 @@ pub enum Answer {
     /// An immediate reply.
     Now(Reply),
     /// The reply of a procedure, at its end.
-    When(Ticket),
+    When(ProcedureId),
 }
 
 impl Controller {
@@ -83,7 +84,7 @@ impl Controller {
     }
 
     /// Returns the applied wrench in the wire format.
-    fn forces(&self) -> Six {
+    fn forces(&self) -> AxisValues {
         let applied = self.applied();
         narrow(applied.force(), applied.torque())
     }
@@ -97,30 +98,30 @@ impl Controller {
             Function::GetButtonStatus => Results::Buttons(self.buttons()),
             Function::GetCellPosition if self.pose().out_of_range => Results::Cells([Cell::default(); 3]),
             Function::GetCellPosition => Results::Cells(self.coils.cells(&self.sample.pose)),
-            Function::GetCurrentLimits => Results::Six(self.coils.limits_a),
-            Function::GetCurrents => Results::Six(self.currents_a()),
+            Function::GetCurrentLimits => Results::AxisValues(self.coils.limits_a),
+            Function::GetCurrents => Results::AxisValues(self.currents_a()),
             Function::GetDesiredPosition => Results::Pose(desired),
             Function::GetFault => Results::Fault(self.faults),
-            Function::GetForces => Results::Six(self.forces()),
+            Function::GetForces => Results::AxisValues(self.forces()),
             Function::GetFrame => Results::Pose(WirePose { out_of_range: false, at: self.frame }),
             Function::GetGainVecGrasp => Results::Pid(self.grasp.gains),
             Function::GetGraspCurrent => Results::Number(self.grasp.current_a),
             Function::GetGraspCurrentLimit => Results::Number(self.grasp.limit_a),
-            Function::GetGravity => Results::Six(self.gravity),
+            Function::GetGravity => Results::AxisValues(self.gravity),
             Function::GetLatCellLimit => Results::Number(CELL_LIMIT_M),
             Function::GetLatCellOffset => Results::CellOffsets(self.cell_offsets),
             Function::GetRawCellData => Results::Voltages(self.coils.voltages(&self.sample.pose)),
             Function::GetServoFrequency => Results::Number(self.servo_hz),
-            Function::GetSpeedLimits => Results::Six(self.speed_limits),
-            Function::GetTemp => Results::Six(self.temperatures_c()),
-            Function::GetVelocity => Results::Six(self.velocity()),
+            Function::GetSpeedLimits => Results::AxisValues(self.speed_limits),
+            Function::GetTemp => Results::AxisValues(self.temperatures_c()),
+            Function::GetVelocity => Results::AxisValues(self.velocity()),
             Function::GetVersion => Results::Version(Version::new(VERSION)),
             _ => return None,
         })
     }
 
     #[allow(clippy::cast_possible_truncation)] // the wire format is f32
-    fn currents_a(&self) -> Six {
+    fn currents_a(&self) -> AxisValues {
         match self.command {
             Command::Currents(currents_a) if self.faults.is_empty() => currents_a,
             _ => self.coils.driven(&self.wanted()).0.map(|current| current as f32),
@@ -128,7 +129,7 @@ impl Controller {
     }
 
     /// Returns the desired position, clamped to the ranges of constrained axes.
-    fn desired_told(&self) -> Six {
+    fn desired_told(&self) -> AxisValues {
         let mut told = self.desired_told;
         for axis in Axis::ALL {
             let [least, most] = self.ranges[axis as usize];
@@ -161,7 +162,8 @@ impl Controller {
                 self.end_resets(Status::OFF_LINE, |_| true);
                 let mut anew = Self::new(self.config);
                 // Calls waiting for a procedure still get their reply.
-                (anew.finished, anew.last_ticket) = (std::mem::take(&mut self.finished), self.last_ticket);
+                (anew.finished, anew.last_procedure_id) =
+                    (std::mem::take(&mut self.finished), self.last_procedure_id);
                 anew.injected = self.injected;
                 anew.observe(&self.sample);
                 *self = anew;
@@ -207,7 +209,7 @@ impl Controller {
                 Status::OK
             }
             Request::Number(function, value) => self.set_number(function, value),
-            Request::Six(function, values) => self.set_six(function, values),
+            Request::AxisValues(function, values) => self.set_six(function, values),
             Request::Pose(function, pose) => self.set_pose(function, pose),
             Request::SetForceAxis(axis, force) => {
                 let mut forces = match self.command {
@@ -259,7 +261,7 @@ impl Controller {
         Status::OK
     }
 
-    fn set_six(&mut self, function: Function, values: Six) -> Status {
+    fn set_six(&mut self, function: Function, values: AxisValues) -> Status {
         let is_finite = values.iter().all(|value| value.is_finite());
         match function {
             Function::SetForces if is_finite => self.command = Command::Forces(values),

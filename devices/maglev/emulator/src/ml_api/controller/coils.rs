@@ -1,7 +1,7 @@
 //! Currents, temperatures and light spots: the coil, thermal and optical models of the simulated flotor.
 
 use flotor_hal::{Pose, Wrench};
-use flotor_maglev::ml_api::{Cell, Six};
+use flotor_maglev::ml_api::{AxisValues, Cell};
 use flotor_simulated::actuation::coils::{COILS, CURRENT_LIMIT_A, CoilGeometry, Coils, Currents};
 use flotor_simulated::actuation::thermal::{
     MEAN_CURRENT_LIMIT_A, TEMPERATURE_LIMIT_C, Thermal, ThermalParameters,
@@ -19,7 +19,7 @@ pub(super) struct CoilSet {
     optics: Option<Optics>,
     thermal: Thermal,
     /// Current limit of each coil set by a client, A.
-    pub(super) limits_a: Six,
+    pub(super) limits_a: AxisValues,
     currents_a: Currents,
 }
 
@@ -61,7 +61,7 @@ impl CoilSet {
     }
 
     /// Clips currents to the limits; returns true if one was clipped.
-    pub(super) fn clipped(&self, asked_a: &Six) -> (Six, bool) {
+    pub(super) fn clipped(&self, asked_a: &AxisValues) -> (AxisValues, bool) {
         #[allow(clippy::cast_possible_truncation)] // an f32 or a limit
         let clip = |(coil, current): (usize, &f32)| {
             f64::from(*current).clamp(-self.limit_a(coil), self.limit_a(coil)) as f32
@@ -74,7 +74,7 @@ impl CoilSet {
     }
 
     /// Returns the wrench of the given currents.
-    pub(super) fn wrench(&self, currents_a: &Six) -> Wrench {
+    pub(super) fn wrench(&self, currents_a: &AxisValues) -> Wrench {
         let made = self.coils.as_ref().map(|coils| coils.wrench(&currents_a.map(f64::from)));
         made.map_or(Wrench::ZERO, |made| Wrench::new(made.force_n, made.torque_nm))
     }
@@ -87,7 +87,7 @@ impl CoilSet {
 
     /// Returns the temperatures of the coils, °C.
     #[allow(clippy::cast_possible_truncation)] // the wire format is f32
-    pub(super) fn temperatures_c(&self) -> Six {
+    pub(super) fn temperatures_c(&self) -> AxisValues {
         self.thermal.temperatures_c().map(|value| value as f32)
     }
 

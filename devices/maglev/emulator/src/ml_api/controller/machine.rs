@@ -2,11 +2,11 @@
 
 use super::coils::CoilSet;
 use super::gains::Gains;
-use super::procedure::{GainReset, Procedure, Ticket};
+use super::procedure::{GainReset, Procedure, ProcedureId};
 use crate::controller::Sample;
 use flotor_hal::{DVec3, Wrench};
 use flotor_maglev::ml_api::{
-    Axis, AxisMode, Buttons, CellOffset, Event, FaultBits, GainSet, Pid, Reply, Six, Status, angles,
+    Axis, AxisMode, AxisValues, Buttons, CellOffset, Event, FaultBits, GainSet, Pid, Reply, Status, angles,
 };
 
 /// Effect of a force command on the gains.
@@ -79,9 +79,9 @@ pub enum Flight {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Command {
     Position,
-    Velocity(Six),
-    Forces(Six),
-    Currents(Six),
+    Velocity(AxisValues),
+    Forces(AxisValues),
+    Currents(AxisValues),
 }
 
 /// Faults injected for a test.
@@ -104,17 +104,17 @@ pub struct Controller {
     pub(super) gains: Gains,
     pub(super) coils: CoilSet,
     pub(super) flight: Flight,
-    pub(super) procedure: Option<(Ticket, Procedure)>,
+    pub(super) procedure: Option<(ProcedureId, Procedure)>,
     /// Gains on the way to their defaults, at most one entry per set.
     pub(super) resets: Vec<GainReset>,
-    pub(super) finished: Vec<(Ticket, Reply)>,
-    pub(super) last_ticket: Ticket,
+    pub(super) finished: Vec<(ProcedureId, Reply)>,
+    pub(super) last_procedure_id: ProcedureId,
     pub(super) command: Command,
     pub(super) modes: [AxisMode; 6],
     pub(super) locked_at: [f64; 6],
     pub(super) ranges: [[f32; 2]; 6],
     pub(super) desired: [f64; 6],
-    pub(super) desired_told: Six,
+    pub(super) desired_told: AxisValues,
     /// Force and torque of the integrals, N and N·m.
     pub(super) integral_n: [f64; 6],
     /// Offset added by the search for gravity, N and N·m.
@@ -127,10 +127,10 @@ pub struct Controller {
     /// Position and angles, default frame.
     pub(super) at: [f64; 6],
     pub(super) speed: [f64; 6],
-    pub(super) frame: Six,
-    pub(super) gravity: Six,
+    pub(super) frame: AxisValues,
+    pub(super) gravity: AxisValues,
     pub(super) boundary_radius_m: f32,
-    pub(super) speed_limits: Six,
+    pub(super) speed_limits: AxisValues,
     pub(super) servo_hz: f32,
     pub(super) cell_offsets: [CellOffset; 3],
     pub(super) grasp: Grasp,
@@ -161,7 +161,7 @@ impl Controller {
             procedure: None,
             resets: Vec::with_capacity(GainSet::ALL.len()),
             finished: Vec::with_capacity(KEPT),
-            last_ticket: Ticket::default(),
+            last_procedure_id: ProcedureId::default(),
             command: Command::Position,
             modes: [AxisMode::Normal; 6],
             locked_at: [0.0; 6],
@@ -248,7 +248,7 @@ impl Controller {
     }
 
     /// Returns the velocity in the clients' frame.
-    pub(super) fn velocity(&self) -> Six {
+    pub(super) fn velocity(&self) -> AxisValues {
         let user = angles::orientation(three(&self.frame, 3));
         narrow(user * vector(&self.speed, 0), user * vector(&self.speed, 3))
     }
@@ -358,7 +358,7 @@ impl Controller {
     }
 
     /// Returns the temperatures of the coils, °C; a made-up one for an injected over-temperature.
-    pub(super) fn temperatures_c(&self) -> Six {
+    pub(super) fn temperatures_c(&self) -> AxisValues {
         let mut all = self.coils.temperatures_c();
         if self.is_too_hot() && !self.coils.is_too_hot() {
             all[0] = 260.0;
@@ -396,7 +396,7 @@ pub(super) fn vector(six: &[f64; 6], first: usize) -> DVec3 {
     DVec3::new(at(first), at(first + 1), at(first + 2))
 }
 
-fn three(six: &Six, first: usize) -> DVec3 {
+fn three(six: &AxisValues, first: usize) -> DVec3 {
     vector(&six.map(f64::from), first)
 }
 
@@ -406,6 +406,6 @@ pub(super) fn wrench(six: &[f64; 6]) -> Wrench {
 
 /// Converts to the wire format.
 #[allow(clippy::cast_possible_truncation)]
-pub(super) fn narrow(linear: DVec3, angular: DVec3) -> Six {
+pub(super) fn narrow(linear: DVec3, angular: DVec3) -> AxisValues {
     [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z].map(|value| value as f32)
 }

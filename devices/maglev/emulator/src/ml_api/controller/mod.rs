@@ -14,4 +14,4 @@ mod tests;
 
 pub use answer::Answer;
 pub use machine::{Commanders, Controller, ControllerConfig, Flight, ForceCommand, Injected, Silence};
-pub use procedure::Ticket;
+pub use procedure::ProcedureId;

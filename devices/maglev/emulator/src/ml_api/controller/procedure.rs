@@ -7,7 +7,7 @@ use flotor_maglev::ml_api::{Axis, GainSet, Pid, Reply, Results, Status};
 
 /// Handle of a call that waits for a procedure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Ticket(u64);
+pub struct ProcedureId(u64);
 
 /// Speed of the moving target, m/s and rad/s.
 const GLIDE_M_PER_S: f64 = 15.0e-3;
@@ -40,7 +40,7 @@ pub(super) enum Procedure {
 /// Reset of a gain set to its defaults, in progress.
 #[derive(Clone, Debug)]
 pub(super) struct GainReset {
-    ticket: Ticket,
+    procedure_id: ProcedureId,
     set: GainSet,
     from: [Pid; 6],
     elapsed_s: f64,
@@ -58,8 +58,8 @@ pub(super) struct Search {
 impl Controller {
     /// Returns the reply to a finished procedure; `None` while in progress.
     #[must_use]
-    pub fn reply(&self, ticket: Ticket) -> Option<Reply> {
-        self.finished.iter().find(|(of, _)| *of == ticket).map(|(_, reply)| *reply)
+    pub fn reply(&self, procedure_id: ProcedureId) -> Option<Reply> {
+        self.finished.iter().find(|(of, _)| *of == procedure_id).map(|(_, reply)| *reply)
     }
 
     /// Begins a landing if the flotor is levitating, without a waiting call.
@@ -69,7 +69,7 @@ impl Controller {
         }
     }
 
-    pub(super) fn begin_take_off(&mut self) -> Ticket {
+    pub(super) fn begin_take_off(&mut self) -> ProcedureId {
         self.end_resets(Status::OK, |set| set == GainSet::Normal);
         self.gains.glide(GainSet::Normal, &[Pid::ZERO; 6], 1.0);
         (self.desired, self.command) = (self.at, Command::Position);
@@ -78,7 +78,7 @@ impl Controller {
         self.begin(Procedure::TakeOff { at_home_s: 0.0 })
     }
 
-    pub(super) fn begin_landing(&mut self) -> Ticket {
+    pub(super) fn begin_landing(&mut self) -> ProcedureId {
         (self.desired, self.command) = (self.at, Command::Position);
         self.integral_n = [0.0; 6];
         self.landing = (self.gains.landing(), 1.0);
@@ -86,58 +86,58 @@ impl Controller {
         self.begin(Procedure::Land { faded_s: 0.0 })
     }
 
-    pub(super) fn begin_search(&mut self) -> Ticket {
+    pub(super) fn begin_search(&mut self) -> ProcedureId {
         // The actual position, unless the gains hold a target already.
         (self.desired, self.command) = (self.at_target(), Command::Position);
         self.desired_told = narrow(vector(&self.desired, 0), vector(&self.desired, 3));
         self.begin(Procedure::FindGravity(Search::default()))
     }
 
-    pub(super) fn begin_reset(&mut self, set: GainSet) -> Ticket {
+    pub(super) fn begin_reset(&mut self, set: GainSet) -> ProcedureId {
         self.end_resets(Status::REPLACED, |other| other == set);
-        let (ticket, from) = (self.next_ticket(), *self.gains.set(set));
-        self.resets.push(GainReset { ticket, set, from, elapsed_s: 0.0 });
-        ticket
+        let (procedure_id, from) = (self.next_procedure_id(), *self.gains.set(set));
+        self.resets.push(GainReset { procedure_id, set, from, elapsed_s: 0.0 });
+        procedure_id
     }
 
     /// Ends the resets of the selected sets at their present gains.
     pub(super) fn end_resets(&mut self, status: Status, is_meant: impl Fn(GainSet) -> bool) {
         while let Some(place) = self.resets.iter().position(|reset| is_meant(reset.set)) {
-            let ticket = self.resets.swap_remove(place).ticket;
-            self.finish(ticket, Reply::status(status));
+            let procedure_id = self.resets.swap_remove(place).procedure_id;
+            self.finish(procedure_id, Reply::status(status));
         }
     }
 
-    fn begin(&mut self, procedure: Procedure) -> Ticket {
+    fn begin(&mut self, procedure: Procedure) -> ProcedureId {
         self.end_procedure(Status::REPLACED);
-        let ticket = self.next_ticket();
-        self.procedure = Some((ticket, procedure));
-        ticket
+        let procedure_id = self.next_procedure_id();
+        self.procedure = Some((procedure_id, procedure));
+        procedure_id
     }
 
-    fn next_ticket(&mut self) -> Ticket {
-        self.last_ticket.0 += 1;
-        self.last_ticket
+    fn next_procedure_id(&mut self) -> ProcedureId {
+        self.last_procedure_id.0 += 1;
+        self.last_procedure_id
     }
 
     /// Ends the procedure in progress with a status.
     pub(super) fn end_procedure(&mut self, status: Status) {
         self.trim = [0.0; 6];
-        if let Some((ticket, procedure)) = self.procedure.take() {
+        if let Some((procedure_id, procedure)) = self.procedure.take() {
             let results = match procedure {
-                Procedure::FindGravity(_) => Results::Six([0.0; 6]),
+                Procedure::FindGravity(_) => Results::AxisValues([0.0; 6]),
                 _ => Results::None,
             };
-            self.finish(ticket, Reply { status, results });
+            self.finish(procedure_id, Reply { status, results });
         }
     }
 
-    fn finish(&mut self, ticket: Ticket, reply: Reply) {
+    fn finish(&mut self, procedure_id: ProcedureId, reply: Reply) {
         // Several calls may wait, and their clients may be disconnected: only the newest replies are stored.
         if self.finished.len() >= KEPT {
             self.finished.remove(0);
         }
-        self.finished.push((ticket, reply));
+        self.finished.push((procedure_id, reply));
     }
 
     /// Advances the procedure by a cycle, s, and the target of a velocity command.
@@ -149,15 +149,15 @@ impl Controller {
             self.desired_told = narrow(vector(&self.desired, 0), vector(&self.desired, 3));
         }
         self.glide_gains(dt_s);
-        let Some((ticket, mut procedure)) = self.procedure.take() else { return };
+        let Some((procedure_id, mut procedure)) = self.procedure.take() else { return };
         let reply = match &mut procedure {
             Procedure::TakeOff { at_home_s } => self.take_off(at_home_s, dt_s),
             Procedure::Land { faded_s } => self.let_down(faded_s, dt_s),
             Procedure::FindGravity(search) => self.search(search, dt_s),
         };
         match reply {
-            Some(reply) => self.finish(ticket, reply),
-            None => self.procedure = Some((ticket, procedure)),
+            Some(reply) => self.finish(procedure_id, reply),
+            None => self.procedure = Some((procedure_id, procedure)),
         }
     }
 
@@ -248,6 +248,6 @@ impl Controller {
         }
         self.trim = [0.0; 6];
         let status = if is_found { Status::OK } else { Status::TIMER };
-        Some(Reply { status, results: Results::Six(narrow(vector(&found, 0), vector(&found, 3))) })
+        Some(Reply { status, results: Results::AxisValues(narrow(vector(&found, 0), vector(&found, 3))) })
     }
 }

@@ -1,6 +1,6 @@
 //! The controller over a free body: what its procedures find has a closed form, and what it is told it says again.
 
-use super::{Answer, Controller, ControllerConfig, Flight, ForceCommand, Ticket};
+use super::{Answer, Controller, ControllerConfig, Flight, ForceCommand, ProcedureId};
 use crate::controller::Sample;
 use flotor_hal::{DVec3, Pose, Twist, Wrench};
 use flotor_maglev::ml_api::*;
@@ -50,14 +50,14 @@ impl Rig {
     fn call(&mut self, request: Request) -> Reply {
         match self.controller.answer(&request) {
             Answer::Now(reply) => reply,
-            Answer::When(ticket) => self.finish(ticket),
+            Answer::When(procedure_id) => self.finish(procedure_id),
         }
     }
 
-    fn finish(&mut self, ticket: Ticket) -> Reply {
+    fn finish(&mut self, procedure_id: ProcedureId) -> Reply {
         for _ in 0..60_000 {
             self.step();
-            if let Some(reply) = self.controller.reply(ticket) {
+            if let Some(reply) = self.controller.reply(procedure_id) {
                 return reply;
             }
         }
@@ -68,9 +68,9 @@ impl Rig {
         self.call(Request::Plain(function))
     }
 
-    fn six(&mut self, function: Function) -> Six {
+    fn six(&mut self, function: Function) -> AxisValues {
         match self.plain(function).results {
-            Results::Six(values) => values,
+            Results::AxisValues(values) => values,
             other => panic!("{other:?}"),
         }
     }
@@ -97,7 +97,7 @@ fn taking_off_sags_by_what_the_gains_do_not_carry_and_gravity_takes_the_sag_away
     // Within what the procedure calls found.
     assert!((f64::from(gravity[2]) - MASS_KG * GRAVITY).abs() < 5.0e-3, "{gravity:?}");
     assert_eq!(rig.six(Function::GetGravity), [0.0; 6], "it is not stored by finding it");
-    assert_eq!(rig.status(Request::Six(Function::SetGravity, gravity)), Status::OK);
+    assert_eq!(rig.status(Request::AxisValues(Function::SetGravity, gravity)), Status::OK);
     assert_eq!(rig.plain(Function::DefyGravity).status, Status::OK);
     rig.run(2000);
     assert!(rig.position.z.abs() < 1.0e-6, "{}", rig.position.z);
@@ -111,7 +111,7 @@ fn landing_ends_on_the_floor_without_force() {
     assert_eq!((rig.controller.flight(), rig.position.z), (Flight::Landed, FLOOR_M));
     assert_eq!(rig.step(), Wrench::ZERO);
     assert_eq!(rig.plain(Function::Land).status, Status::LANDED);
-    assert_eq!(rig.status(Request::Six(Function::SetForces, [9.0; 6])), Status::LANDED);
+    assert_eq!(rig.status(Request::AxisValues(Function::SetForces, [9.0; 6])), Status::LANDED);
     assert_eq!(rig.step(), Wrench::ZERO);
     assert_eq!(rig.plain(Function::FindGravity), Reply::failed(Some(Function::FindGravity), Status::LANDED));
 }
@@ -122,7 +122,7 @@ fn a_force_command_replaces_the_gains_or_comes_on_top_of_them() {
     for (kind, on_top) in [(ForceCommand::Replaces, 0.0), (ForceCommand::Adds, 1.0)] {
         let mut rig = Rig::flying(kind);
         let held = f64::from(rig.six(Function::GetForces)[2]);
-        assert_eq!(rig.status(Request::Six(Function::SetForces, forces)), Status::OK);
+        assert_eq!(rig.status(Request::AxisValues(Function::SetForces, forces)), Status::OK);
         let found = rig.six(Function::GetForces);
         let expected = 5.5 + on_top * held;
         // The rounding of the wire.
@@ -218,14 +218,15 @@ fn an_integral_gain_acts_from_when_it_is_set_and_takes_the_sag_away() {
 #[test]
 fn gains_that_are_reset_end_no_landing_and_a_second_landing_waits_for_the_first() {
     let mut rig = Rig::flying(ForceCommand::Replaces);
-    let ticket = |answer: Answer| match answer {
-        Answer::When(ticket) => ticket,
+    let procedure_id = |answer: Answer| match answer {
+        Answer::When(procedure_id) => procedure_id,
         Answer::Now(reply) => panic!("{reply:?}"),
     };
-    let landing = ticket(rig.controller.answer(&Request::Plain(Function::Land)));
+    let landing = procedure_id(rig.controller.answer(&Request::Plain(Function::Land)));
     rig.run(100);
-    let reset = ticket(rig.controller.answer(&Request::OfSet(Function::ResetGainVecAxes, GainSet::Locked)));
-    let second = ticket(rig.controller.answer(&Request::Plain(Function::Land)));
+    let reset =
+        procedure_id(rig.controller.answer(&Request::OfSet(Function::ResetGainVecAxes, GainSet::Locked)));
+    let second = procedure_id(rig.controller.answer(&Request::Plain(Function::Land)));
     assert_eq!(rig.finish(second).status, Status::OK);
     assert_eq!((rig.controller.flight(), rig.position.z), (Flight::Landed, FLOOR_M));
     assert_eq!(rig.finish(landing).status, Status::OK);
@@ -240,7 +241,7 @@ fn gravity_is_found_where_the_flotor_is() {
     assert_eq!(rig.status(Request::OfAxis(Function::LockAxis, Axis::X)), Status::OK);
     assert_eq!(rig.status(Request::Pose(Function::SetDesiredPosition, to)), Status::OK);
     let weight = [0.0, 0.0, 5.442_69, 0.0, 0.0, 0.0];
-    assert_eq!(rig.status(Request::Six(Function::SetForces, weight)), Status::OK);
+    assert_eq!(rig.status(Request::AxisValues(Function::SetForces, weight)), Status::OK);
     (rig.position, rig.velocity) = (DVec3::Z * 4.0e-3, DVec3::ZERO);
     rig.step();
     let gravity = rig.six(Function::FindGravity);
@@ -253,7 +254,10 @@ fn gravity_is_found_where_the_flotor_is() {
 fn the_boundary_pushes_back_on_top_of_a_force_command() {
     let mut rig = Rig::flying(ForceCommand::Replaces);
     assert_eq!(rig.status(Request::Number(Function::SetBoundaryRadius, 4.0e-3)), Status::OK);
-    assert_eq!(rig.status(Request::Six(Function::SetForces, [0.0, 0.0, 5.0, 0.0, 0.0, 0.0])), Status::OK);
+    assert_eq!(
+        rig.status(Request::AxisValues(Function::SetForces, [0.0, 0.0, 5.0, 0.0, 0.0, 0.0])),
+        Status::OK
+    );
     (rig.position, rig.velocity) = (DVec3::Z * -5.0e-3, DVec3::ZERO);
     rig.controller.sense(&rig.sample(), 0.0);
     let force = f64::from(rig.six(Function::GetForces)[2]);
@@ -264,7 +268,7 @@ fn the_boundary_pushes_back_on_top_of_a_force_command() {
 fn a_fault_switches_off_and_stays_until_its_cause_is_gone() {
     let mut rig = Rig::flying(ForceCommand::Replaces);
     let limits = [1.0e-9; 6];
-    assert_eq!(rig.status(Request::Six(Function::SetSpeedLimits, limits)), Status::OK);
+    assert_eq!(rig.status(Request::AxisValues(Function::SetSpeedLimits, limits)), Status::OK);
     rig.velocity.x = 1.0e-3;
     rig.step();
     assert_eq!((rig.controller.faults(), rig.step()), (FaultBits::OVER_SPEED, Wrench::ZERO));
@@ -275,7 +279,7 @@ fn a_fault_switches_off_and_stays_until_its_cause_is_gone() {
     let faults: Vec<Event> =
         rig.controller.take_events().filter(|event| matches!(event, Event::Fault(_))).collect();
     assert_eq!(faults, [Event::Fault(FaultBits::OVER_SPEED), Event::Fault(FaultBits::NONE)]);
-    assert_eq!(rig.status(Request::Six(Function::SetSpeedLimits, [2.0; 6])), Status::OK);
+    assert_eq!(rig.status(Request::AxisValues(Function::SetSpeedLimits, [2.0; 6])), Status::OK);
     assert_eq!(rig.plain(Function::Takeoff).status, Status::OK);
 }
 
@@ -288,16 +292,16 @@ fn values_come_back_as_they_were_set_and_wrong_ones_are_refused() {
         (Function::SetSpeedLimits, Function::GetSpeedLimits),
         (Function::SetCurrentLimits, Function::GetCurrentLimits),
     ] {
-        assert_eq!(rig.status(Request::Six(set, six)), Status::OK);
+        assert_eq!(rig.status(Request::AxisValues(set, six)), Status::OK);
         assert_eq!(rig.six(get), six);
     }
-    assert_eq!(rig.status(Request::Six(Function::SetCurrents, six)), Status::CURRENT);
+    assert_eq!(rig.status(Request::AxisValues(Function::SetCurrents, six)), Status::CURRENT);
     assert_eq!(rig.six(Function::GetCurrents), [1.0, 2.0, 3.0, 3.5, 3.5, 3.5]);
     for (request, status) in [
         (Request::Number(Function::SetServoFrequency, 99.0), Status::FREQUENCY),
         (Request::Number(Function::SetServoFrequency, f32::NAN), Status::FREQUENCY),
-        (Request::Six(Function::SetSpeedLimits, [-1.0; 6]), Status::SPEED),
-        (Request::Six(Function::SetForces, [f32::INFINITY; 6]), Status::FORCE),
+        (Request::AxisValues(Function::SetSpeedLimits, [-1.0; 6]), Status::SPEED),
+        (Request::AxisValues(Function::SetForces, [f32::INFINITY; 6]), Status::FORCE),
         (Request::SetGainVecSingle(GainSet::Normal, Axis::X, Gain::P, -1.0), Status::GAIN_RANGE),
     ] {
         assert_eq!(rig.status(request), status, "{request:?}");

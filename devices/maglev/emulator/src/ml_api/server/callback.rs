@@ -3,7 +3,7 @@
 use super::control::{is_gone, send, token_reply};
 use super::hub::{Hub, Id};
 use super::state::{CallbackEnd, Next};
-use flotor_maglev::ml_api::{Event, Intake, Taken};
+use flotor_maglev::ml_api::{Event, Intake, ReadResult};
 use std::net::{Shutdown, TcpStream};
 use std::time::Duration;
 
@@ -49,9 +49,9 @@ fn tell(stream: &mut TcpStream, hub: &Hub, token: Id) -> CallbackEnd {
         loop {
             match intake.take(stream) {
                 // The handler's return value is ignored: no known effect depends on it.
-                Taken::Frame(_) => break,
-                Taken::Malformed | Taken::Lost => return CallbackEnd::Gone,
-                Taken::Nothing => {
+                ReadResult::Frame(_) => break,
+                ReadResult::Malformed | ReadResult::Lost => return CallbackEnd::Gone,
+                ReadResult::Nothing => {
                     if let Some(end) = hub.is_over(token) {
                         return end;
                     }

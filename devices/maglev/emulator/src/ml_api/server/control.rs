@@ -2,10 +2,10 @@
 
 use super::callback;
 use super::hub::{Hub, Id};
-use crate::ml_api::controller::{Answer, Ticket};
-use crate::ml_api::misbehavior::Deed;
+use crate::ml_api::controller::{Answer, ProcedureId};
+use crate::ml_api::injected_fault::Deed;
 use flotor_emulation::clients::FIRST_MESSAGE;
-use flotor_maglev::ml_api::{Frame, Function, Intake, Reply, Request, Results, Status, Taken};
+use flotor_maglev::ml_api::{Frame, Function, Intake, ReadResult, Reply, Request, Results, Status};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
@@ -22,9 +22,9 @@ pub(super) fn serve(mut stream: TcpStream, hub: &Hub) {
     let mut intake = Intake::default();
     let mut deadline = Some(Instant::now() + FIRST_MESSAGE);
     // Dropping the connection resets it.
-    while let Taken::Frame(_) = intake.take(&mut Timed { stream: &mut stream, deadline }) {
+    while let ReadResult::Frame(_) = intake.take(&mut Timed { stream: &mut stream, deadline }) {
         // A client may be silent between requests without limit, but not within one.
-        deadline = intake.is_in_the_middle().then(|| Instant::now() + FIRST_MESSAGE);
+        deadline = intake.has_partial_frame().then(|| Instant::now() + FIRST_MESSAGE);
         let request = Request::decode(intake.frame());
         if request == Ok(Request::Plain(Function::RequestToken)) {
             callback::serve(stream, hub, hub.becomes_callback(id));
@@ -62,12 +62,12 @@ fn call(
     stream: &mut TcpStream,
     hub: &Hub,
     id: Id,
-    request: Result<Request, flotor_maglev::ml_api::Unreadable>,
+    request: Result<Request, flotor_maglev::ml_api::InvalidRequest>,
 ) -> bool {
     let handled = hub.handle(id, request);
     let reply = match handled.answer {
         Answer::Now(reply) => reply,
-        Answer::When(ticket) => match wait(stream, hub, ticket) {
+        Answer::When(procedure_id) => match wait(stream, hub, procedure_id) {
             Some(reply) => reply,
             None => return false,
         },
@@ -91,9 +91,9 @@ fn call(
 }
 
 /// Waits for the reply of a procedure; `None` if its client disconnects.
-fn wait(stream: &TcpStream, hub: &Hub, ticket: Ticket) -> Option<Reply> {
+fn wait(stream: &TcpStream, hub: &Hub, procedure_id: ProcedureId) -> Option<Reply> {
     loop {
-        if let Some(reply) = hub.wait_for_reply(ticket, LOOK) {
+        if let Some(reply) = hub.wait_for_reply(procedure_id, LOOK) {
             return Some(reply);
         }
         if is_gone(stream) {

@@ -2,10 +2,10 @@
 
 use super::state::{Callback, CallbackEnd, Client, EVENTS, Next, State};
 use crate::controller::Sample;
-use crate::ml_api::controller::{Answer, Controller, Flight, Silence, Ticket};
-use crate::ml_api::misbehavior::{Deed, Misbehavior, Plan};
+use crate::ml_api::controller::{Answer, Controller, Flight, ProcedureId, Silence};
+use crate::ml_api::injected_fault::{Deed, InjectedFault, Plan};
 use flotor_hal::Wrench;
-use flotor_maglev::ml_api::{EventKind, Function, Reply, Request, Unreadable};
+use flotor_maglev::ml_api::{EventKind, Function, InvalidRequest, Reply, Request};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -37,11 +37,11 @@ impl Hub {
     #[must_use]
     pub fn new(
         controller: Controller,
-        misbehaviors: Vec<Misbehavior>,
+        injected_faults: Vec<InjectedFault>,
         restarts_with_ticks: bool,
         log: Log,
     ) -> Self {
-        let state = State::new(controller, Plan::new(misbehaviors), restarts_with_ticks);
+        let state = State::new(controller, Plan::new(injected_faults), restarts_with_ticks);
         Self { state: Mutex::new(state), changed: Condvar::new(), log }
     }
 
@@ -156,7 +156,7 @@ impl Hub {
     }
 
     /// Handles a decoded request, or the error of an invalid one.
-    pub(super) fn handle(&self, id: Id, request: Result<Request, Unreadable>) -> Handled {
+    pub(super) fn handle(&self, id: Id, request: Result<Request, InvalidRequest>) -> Handled {
         let mut state = self.state();
         let deed = state.plan.deed(id);
         // No thread waits for a command: waking the servo loop would delay the reply.
@@ -168,7 +168,7 @@ impl Hub {
                 Answer::Now(Reply::failed(function, status))
             }
             (_, Err(unreadable)) => Answer::Now(Reply::failed(unreadable.function, unreadable.status)),
-            (_, Ok(request)) => state.obey(id, &request),
+            (_, Ok(request)) => state.execute(id, &request),
         };
         if deed == Deed::Close || deed == Deed::Reset {
             let end = if deed == Deed::Close { CallbackEnd::Close } else { CallbackEnd::Gone };
@@ -187,11 +187,11 @@ impl Hub {
     }
 
     /// Waits for the reply of a procedure; `None` on timeout.
-    pub(super) fn wait_for_reply(&self, ticket: Ticket, patience: Duration) -> Option<Reply> {
+    pub(super) fn wait_for_reply(&self, procedure_id: ProcedureId, patience: Duration) -> Option<Reply> {
         let until = Instant::now() + patience;
         let mut state = self.state();
         loop {
-            let reply = state.controller.reply(ticket);
+            let reply = state.controller.reply(procedure_id);
             let rest = until.saturating_duration_since(Instant::now());
             if reply.is_some() || rest.is_zero() {
                 return reply;

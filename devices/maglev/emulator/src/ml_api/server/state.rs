@@ -3,7 +3,7 @@
 use super::hub::{Id, Log};
 use crate::controller::Sample;
 use crate::ml_api::controller::{Answer, Commanders, Controller, Flight, Injected, Silence};
-use crate::ml_api::misbehavior::Plan;
+use crate::ml_api::injected_fault::Plan;
 use flotor_maglev::ml_api::{
     Event, EventKind, FaultBits, Function, Reply, Request, Results, Status, WirePose,
 };
@@ -23,7 +23,7 @@ pub(super) struct State {
     pub(super) next_id: Id,
     pub(super) restarts_with_ticks: bool,
     pub(super) is_restart_wanted: bool,
-    pub(super) told: (Flight, FaultBits),
+    pub(super) reported: (Flight, FaultBits),
     pub(super) now_s: f64,
 }
 
@@ -84,7 +84,7 @@ impl State {
             next_id: FIRST,
             restarts_with_ticks,
             is_restart_wanted: false,
-            told: (Flight::Landed, FaultBits::NONE),
+            reported: (Flight::Landed, FaultBits::NONE),
             now_s: 0.0,
         }
     }
@@ -109,7 +109,7 @@ impl State {
         self.clients.iter_mut().find(|client| client.id == id)
     }
 
-    pub(super) fn obey(&mut self, id: Id, request: &Request) -> Answer {
+    pub(super) fn execute(&mut self, id: Id, request: &Request) -> Answer {
         let function = request.function();
         if function.commands() && self.controller.config().commanders == Commanders::One {
             let commander = *self.commander.get_or_insert(id);
@@ -225,8 +225,8 @@ impl State {
 
     pub(super) fn log_changes(&mut self, log: &Log) {
         let now = (self.controller.flight(), self.controller.faults());
-        if now != self.told {
-            self.told = now;
+        if now != self.reported {
+            self.reported = now;
             log(format_args!("flight {:?} faults={} at_ms={:.0}", now.0, now.1, self.now_s * 1.0e3));
         }
     }
